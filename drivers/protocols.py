@@ -1,0 +1,114 @@
+"""What a device is to the rig: streams of samples in SI, and, for a motor controller, a command in volts."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, NamedTuple, Protocol, runtime_checkable
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """One column of a stream. `quantity` and `unit` are those of the recording format; `None` means "kept, not used"."""
+
+    name: str
+    quantity: str | None
+    unit: str
+    integer: bool = False
+    """True for raw counts (recorded as int64)."""
+    noise_std: float | None = None
+    resolution: float | None = None
+    """Step of the device's quantisation, in `unit`."""
+    range_min: float | None = None
+    range_max: float | None = None
+    calibration: str | None = None
+    """JSON: how the value follows from raw counts, date, uncertainty (`gain_std`, relative, 1 sigma)."""
+    description: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Stream:
+    """Rows that share one clock. `name` is unique on the bench: the device's name, or `<device>_<part>`."""
+
+    name: str
+    source: str
+    channels: tuple[Channel, ...]
+    period_s: float
+    """Nominal time between rows."""
+
+
+class Sample(NamedTuple):
+    """One row of a stream: `values` in the order of the stream's channels, NaN where the device gave nothing."""
+
+    stream: str
+    t_ns: int
+    """Arrival, `time.monotonic_ns()`."""
+    values: tuple[float, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Watchdog:
+    """The device's own command timeout, as configured and as read back where the device can say it."""
+
+    timeout_s: float | None
+    """None: the device has none, or nobody knows; the rig refuses to arm."""
+    fed_by: str
+    action: Literal["brake", "coast", "disarm"]
+    resumes_by_itself: bool
+
+
+@dataclass(frozen=True, slots=True)
+class LinkHealth:
+    """What the wire has been like. `bad` counts frames or lines that could not be understood; the first few are kept."""
+
+    alive: bool
+    received: int
+    bad: int
+    first_bad: tuple[str, ...]
+    error: str | None = None
+    """Why the link is not alive, as one sentence."""
+
+
+@runtime_checkable
+class Instrument(Protocol):
+    """A device that measures. Constructing one opens nothing; `streams` is known before `open`."""
+
+    name: str
+
+    @property
+    def streams(self) -> tuple[Stream, ...]: ...
+
+    def open(self) -> str:
+        """Open, identify, start streaming. Returns model and serial number. Raises LinkError or DeviceError."""
+
+    def drain(self) -> list[Sample]:
+        """All samples since the last call; never blocks, never raises."""
+
+    def health(self) -> LinkHealth: ...
+
+    def close(self) -> None:
+        """Stop streaming and let the port go; safe to call twice and after a failure."""
+
+
+@runtime_checkable
+class MotorController(Instrument, Protocol):
+    """An instrument that also turns the propeller."""
+
+    @property
+    def watchdog(self) -> Watchdog: ...
+
+    @property
+    def max_voltage(self) -> float:
+        """Largest |command| in V that the controller can carry out."""
+
+    def command(self, volts: float) -> None:
+        """Send the set-point once. Feeds the watchdog. Raises LinkError when the wire refuses it."""
+
+    def release(self) -> None:
+        """The second way to stop, by another command than `command(0)` (current 0, disable, quick stop)."""
+
+
+class ForceSensor(Instrument, Protocol):
+    """An instrument whose first stream has a `thrust` channel."""
+
+    def tare(self) -> None:
+        """Zero inside the instrument. The rig prefers to tare by subtraction; this is for devices that saturate."""

@@ -1,0 +1,1 @@
+"""Mathematics: arrays in, verdicts out. No files, wires, clocks or threads."""

@@ -1,0 +1,1 @@
+"""The bench and its operator: configuration, sequencing, safety, recording, console."""

@@ -1,0 +1,112 @@
+"""Bench and campaign as frozen dataclasses. The loader (load_bench, load_campaign) turns TOML into these or raises ConfigError."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+
+@dataclass(frozen=True, slots=True)
+class CanBusConfig:
+    """`[can.<name>]`"""
+
+    interface: str = "slcan"
+    channel: str = ""
+    """Port; a relative path with a slash is relative to the bench file."""
+    bitrate: int = 500_000
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceConfig:
+    """`[devices.<name>]`: `kind` is a key of drivers.KINDS, `options` an instance of that kind's own Options dataclass."""
+
+    name: str
+    kind: str
+    options: Any
+
+
+@dataclass(frozen=True, slots=True)
+class LimitConfig:
+    """`[limits."<stream>.<channel>"]`, in the channel's unit. NaN fails every limit."""
+
+    channel: str
+    min: float | None = None
+    max: float | None = None
+    max_age: float | None = None
+    """s; default max(3 sample periods, 0.2 s)."""
+
+
+@dataclass(frozen=True, slots=True)
+class MountConfig:
+    """`[mount]`: how the next thruster gets onto the bench. Empty command: the operator is asked."""
+
+    command: tuple[str, ...] = ()
+    """argv; `{thruster}` is replaced, `{bench_dir}` is the bench file's folder."""
+    timeout: float = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class BenchConfig:
+    """A bench file. `motor` and `force` name devices; `rotation_channel` tells rest from motion."""
+
+    path: Path
+    text: str
+    """The file, verbatim, for the recording."""
+    name: str
+    motor: str
+    force: str
+    devices: Mapping[str, DeviceConfig]
+    can: Mapping[str, CanBusConfig]
+    limits: tuple[LimitConfig, ...]
+    max_voltage: float
+    """V, largest |command| allowed on this bench."""
+    slew: float
+    """V/s, fastest command change allowed on this bench."""
+    facility: str = ""
+    water_density: float | None = None
+    loop_rate: float = 50.0
+    """Hz of the control loop; also the command refresh."""
+    watchdog_limit: float = 1.0
+    """s; a motor controller whose own timeout is longer, unknown or not effective is refused."""
+    rest_rate: float = 0.5
+    """rev/s; |rotation_rate| below this is at rest."""
+    coast_time: float = 3.0
+    """s a propeller may take from command 0 to rest before `STOP NOT CONFIRMED`."""
+    mount: MountConfig = field(default_factory=MountConfig)
+
+
+@dataclass(frozen=True, slots=True)
+class TareConfig:
+    """`[tare]`: rest measured before the sweep and at zero returns; refused when not stable."""
+
+    duration: float = 3.0
+    max_std_error: float = 0.05
+    """N"""
+    max_drift: float = 0.05
+    """N/s"""
+    attempts: int = 3
+
+
+@dataclass(frozen=True, slots=True)
+class CampaignConfig:
+    """A campaign file: which thrusters, which plan, how attended."""
+
+    path: Path
+    text: str
+    name: str
+    bench: BenchConfig
+    thrusters: tuple[str, ...]
+    plan: Any
+    """A plan of rig.plan: iterating it yields Step."""
+    output: Path
+    """Folder for recordings; relative to the campaign file."""
+    tare: TareConfig = field(default_factory=TareConfig)
+    kind: str = "tunnel"
+    operator: str = ""
+    notes: str = ""
+    unattended: bool = False
+    expected_C: float | None = None
+    """N/V^2, for the expected peak thrust of `rig check`; None: peak thrust is not checked and rig check says so."""
+    prove_watchdog: bool = True
