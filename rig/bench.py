@@ -1,0 +1,79 @@
+"""The configured devices as live objects: built without opening anything, opened one by one, closed in reverse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+
+from drivers import KINDS
+from drivers.can_bus import CanBus
+from drivers.errors import DeviceError as DriverDeviceError
+from drivers.errors import LinkError as DriverLinkError
+from drivers.protocols import Instrument, MotorController, Sample, Stream
+from rig.config import BenchConfig
+from rig.errors import ConfigError, DeviceError, LinkError
+
+COMMAND_STREAM = "command"
+"""The rig's own stream: one row per change of the commanded voltage."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """All devices of a bench. `identities` fills while they open."""
+
+    config: BenchConfig
+    buses: Mapping[str, CanBus]
+    instruments: Mapping[str, Instrument]
+    identities: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def motor(self) -> MotorController:
+        motor = self.instruments[self.config.motor]
+        if not isinstance(motor, MotorController):
+            raise ConfigError(
+                f"{self.config.path}: bench.motor names {self.config.motor!r}, which measures but can't turn a propeller; "
+                "name a motor controller"
+            )
+        return motor
+
+    def streams(self) -> Iterator[tuple[str, Stream]]:
+        """(device name, stream) of every device, in the order of the bench file."""
+        for name, instrument in self.instruments.items():
+            for stream in instrument.streams:
+                yield name, stream
+
+    def open_device(self, name: str) -> str:
+        """Open one device (and its bus, if it is the first on it); returns its identity."""
+        instrument = self.instruments[name]
+        try:
+            for bus in self.buses.values():
+                bus.open()
+            identity = instrument.open()
+        except DriverLinkError as error:
+            raise LinkError(f"{name}: {error}") from error
+        except DriverDeviceError as error:
+            raise DeviceError(f"{name}: {error}") from error
+        self.identities[name] = identity
+        return identity
+
+    def drain(self) -> list[Sample]:
+        return [sample for instrument in self.instruments.values() for sample in instrument.drain()]
+
+    def close(self) -> None:
+        for instrument in reversed(list(self.instruments.values())):
+            instrument.close()
+        for bus in self.buses.values():
+            bus.close()
+
+
+def build(config: BenchConfig) -> Bench:
+    """Construct the devices of a bench file; opens nothing."""
+    buses = {name: CanBus(bus.interface, bus.channel, bus.bitrate) for name, bus in config.can.items()}
+    instruments: dict[str, Instrument] = {}
+    for name, device in config.devices.items():
+        kind = KINDS[device.kind]
+        if kind.link == "can":
+            instruments[name] = kind.build(name, device.options, buses[device.options.bus])
+        else:
+            instruments[name] = kind.build(name, device.options)
+    return Bench(config, buses, instruments)
