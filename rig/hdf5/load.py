@@ -1,0 +1,252 @@
+"""Reading a recording, whoever wrote it: the optional may be missing, the unknown is ignored, the odd is said."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Final
+
+import h5py
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.recording import QUANTITY_UNITS, Channel, Event, Recording, Step
+from rig.errors import RecordingError
+from rig.hdf5.layout import FORMAT, FORMAT_VERSION, text_of
+
+UNIT_SPELLINGS: Final = {"Nm": "N.m", "N m": "N.m", "N·m": "N.m", "°C": "degC", "m/s2": "m/s^2", "m/s²": "m/s^2"}
+"""Spellings of the format's units that other programs use."""
+NAMED: Final = ("recording_id", "thruster", "kind", "created", "complete", "outcome", "water_density")
+
+
+@dataclass
+class Findings:
+    """What the reader has to say about a file; becomes warnings among its events."""
+
+    texts: list[str] = field(default_factory=list)
+
+
+def load(path: str | Path) -> Recording:
+    """A recording as read-only arrays. Raises RecordingError.
+
+    `attributes` has the root attributes that have no field of their own, `opened_as` (`plain`, or `swmr`: it was not
+    closed in order, or is still being written) and `streams` (source, device and note of each). What was not as it
+    should be (rows of different lengths, unknown units) is added to `events` as warnings.
+    """
+    path = Path(path)
+    file, opened_as = open_for_reading(path)
+    with file:
+        return _recording(file, path, opened_as)
+
+
+def open_for_reading(path: Path) -> tuple[h5py.File, str]:
+    """The open file and `plain` or `swmr`; its format has been checked. Raises RecordingError."""
+    if not path.is_file():
+        raise RecordingError(f"{path} is not there; give the path of a recording (*.h5)")
+    if not h5py.is_hdf5(path):
+        raise RecordingError(f"{path} is not an HDF5 file; `rig import` makes recordings of tables and logs")
+    try:
+        file, opened_as = h5py.File(path, "r"), "plain"
+    except OSError:
+        try:
+            file, opened_as = h5py.File(path, "r", swmr=True), "swmr"
+        except OSError as error:
+            raise RecordingError(f"{path} can't be opened, neither plain nor in SWMR mode: {error}") from error
+    try:
+        _check_format(file, path)
+    except RecordingError:
+        file.close()
+        raise
+    return file, opened_as
+
+
+def _check_format(file: h5py.File, path: Path) -> None:
+    found = text_of(file.attrs.get("format", ""))
+    if found != FORMAT:
+        raise RecordingError(f"{path} is HDF5, but its attribute `format` is {found!r} where {FORMAT!r} is expected")
+    version = _number(file.attrs.get("format_version", 1))
+    if version is None or version > FORMAT_VERSION:
+        raise RecordingError(
+            f"{path} is a recording of format_version {text_of(file.attrs['format_version'])}; this program reads "
+            f"up to {FORMAT_VERSION}; install a later thruster-rig"
+        )
+    if not isinstance(file.get("streams"), h5py.Group):
+        raise RecordingError(f"{path} says it is a recording, but has no group /streams")
+
+
+def _recording(file: h5py.File, path: Path, opened_as: str) -> Recording:
+    findings = Findings()
+    if opened_as == "swmr":
+        findings.texts.append(
+            "not closed in order (or still being written): opened in SWMR mode; `rig recover` copies it"
+        )
+    streams = {name: group for name, group in file["streams"].items() if isinstance(group, h5py.Group)}
+    channels = tuple(channel for name, group in streams.items() for channel in _channels(name, group, findings))
+    if not channels:
+        raise RecordingError(f"{path} says it is a recording, but no stream in it has a time and a channel")
+    steps = _steps(file, findings)
+    events = _events(file, findings)
+    latest = max((float(channel.time[-1]) for channel in channels if channel.time.size), default=0.0)
+    warnings = [Event(latest, "warning", text) for text in findings.texts]
+    root = {name: _plain(value) for name, value in file.attrs.items()}
+    return Recording(
+        recording_id=str(root.get("recording_id", "")),
+        thruster=str(root.get("thruster", "")),
+        channels=channels,
+        steps=steps,
+        events=(*events, *warnings),
+        kind=str(root.get("kind", "tunnel")),
+        created=str(root.get("created", "")),
+        water_density=_number(root.get("water_density")),
+        source=path.name,
+        attributes=_rest(root) | {"opened_as": opened_as, "streams": {n: _facts(g) for n, g in streams.items()}},
+        **_end(file),
+    )
+
+
+def _end(file: h5py.File) -> dict[str, Any]:
+    """`complete`, `outcome` and `cause`: /end is believed before the root attributes."""
+    end = file.get("end")
+    end = end if isinstance(end, h5py.Group) else {}
+
+    def fact(name: str, absent: object) -> Any:
+        return end[name][()] if name in end else file.attrs.get(name, absent)
+
+    return {
+        "complete": bool(_number(fact("complete", False))),
+        "outcome": text_of(fact("outcome", "")),
+        "cause": text_of(fact("cause", "")),
+    }
+
+
+def _rest(root: Mapping[str, object]) -> dict[str, object]:
+    return {name: value for name, value in root.items() if name not in NAMED}
+
+
+def _facts(group: h5py.Group) -> dict[str, str]:
+    return {name: text_of(group.attrs.get(name, "")) for name in ("source", "device_id", "note")}
+
+
+def numeric_columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
+    """Datasets of a stream that are one-dimensional and numeric, `time` among them."""
+    columns = {name: item for name, item in group.items() if isinstance(item, h5py.Dataset)}
+    return {name: item for name, item in columns.items() if item.ndim == 1 and item.dtype.kind in "iufb"}
+
+
+def _channels(stream: str, group: h5py.Group, findings: Findings) -> list[Channel]:
+    columns = numeric_columns(group)
+    if "time" not in columns:
+        findings.texts.append(f"stream {stream} has no numeric `time`: left out")
+        return []
+    ignored = sorted(set(group) - set(columns))
+    if ignored:
+        findings.texts.append(f"stream {stream}: {', '.join(ignored)} left out: not one-dimensional numbers")
+    lengths = {name: len(item) for name, item in columns.items()}
+    n = min(lengths.values())
+    if max(lengths.values()) > n:
+        longest = max(lengths.values())
+        findings.texts.append(f"stream {stream}: cut to its shortest dataset, {n} rows; {longest - n} were unfinished")
+    time = columns.pop("time")[:n].astype(np.float64)
+    good = _rising(time)
+    if not good.all():
+        findings.texts.append(
+            f"stream {stream}: {np.count_nonzero(~good)} rows left out: time not finite or running back"
+        )
+    return [_channel(stream, item, time, good, findings) for item in columns.values()]
+
+
+def _rising(time: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """True for rows whose time is finite and not before any earlier row."""
+    finite = np.isfinite(time)
+    return finite & (time >= np.maximum.accumulate(np.where(finite, time, -np.inf)))
+
+
+def _channel(
+    stream: str, item: h5py.Dataset, time: NDArray[np.float64], good: NDArray[np.bool_], findings: Findings
+) -> Channel:
+    name, facts = item.name.rsplit("/", 1)[-1], item.attrs
+    raw = item[: len(time)]
+    value = raw.astype(np.float64)
+    if "missing_value" in facts:
+        value[raw == facts["missing_value"]] = np.nan
+    quantity, unit = _quantity(f"{stream}/{name}", facts, findings)
+    return Channel(
+        name=name,
+        stream=stream,
+        quantity=quantity,
+        unit=unit,
+        time=time[good],
+        value=value[good],
+        noise_std=_number(facts.get("noise_std")),
+        range_min=_number(facts.get("range_min")),
+        range_max=_number(facts.get("range_max")),
+        calibration=_calibration(text_of(facts.get("calibration", ""))),
+        thruster=text_of(facts.get("thruster", "")) or None,
+        axis=text_of(facts.get("axis", "")) or None,
+        description=text_of(facts.get("description", "")),
+    )
+
+
+def _quantity(channel: str, facts: Mapping[str, Any], findings: Findings) -> tuple[str | None, str]:
+    """Quantity and unit; a quantity in a unit that is not the format's is not used, for its numbers would be wrong."""
+    quantity = text_of(facts.get("quantity", "")) or None
+    unit = text_of(facts.get("unit", ""))
+    unit = UNIT_SPELLINGS.get(unit, unit)
+    known = QUANTITY_UNITS.get(quantity or "")
+    if known is None:
+        return quantity, unit
+    if not unit:
+        return quantity, known[0]
+    if unit not in known:
+        findings.texts.append(f"{channel}: {quantity} in {unit!r} is kept, not used; the format's unit is {known[0]}")
+        return None, unit
+    return quantity, unit
+
+
+def _calibration(text: str) -> dict[str, object]:
+    if not text:
+        return {}
+    try:
+        content = json.loads(text)
+    except json.JSONDecodeError:
+        return {"text": text}
+    return content if isinstance(content, dict) else {"value": content}
+
+
+def _steps(file: h5py.File, findings: Findings) -> tuple[Step, ...]:
+    rows = _table(file, "steps", ("index", "phase", "command_voltage", "t_start", "t_end"), findings)
+    return tuple(Step(int(i), text_of(p), float(v), float(start), float(end)) for i, p, v, start, end in rows)
+
+
+def _events(file: h5py.File, findings: Findings) -> tuple[Event, ...]:
+    rows = _table(file, "events", ("time", "level", "text"), findings)
+    return tuple(Event(float(time), text_of(level), text_of(text)) for time, level, text in rows)
+
+
+def _table(file: h5py.File, name: str, fields: tuple[str, ...], findings: Findings) -> list[tuple[Any, ...]]:
+    item = file.get(name)
+    if item is None:
+        return []
+    if not isinstance(item, h5py.Dataset) or not set(fields) <= set(item.dtype.names or ()):
+        findings.texts.append(f"/{name} is not a table with the fields {', '.join(fields)}: left out")
+        return []
+    rows = np.atleast_1d(item[()])
+    return list(zip(*(rows[field].tolist() for field in fields), strict=True))
+
+
+def _number(value: Any) -> float | None:
+    """A finite number of whatever HDF5 holds; None for anything else."""
+    try:
+        number = float(np.asarray(value).reshape(-1)[0]) if value is not None else np.nan
+    except (TypeError, ValueError, IndexError):
+        return None
+    return number if np.isfinite(number) else None
+
+
+def _plain(value: Any) -> Any:
+    """An attribute as str, bool, int, float or list."""
+    if isinstance(value, bytes) or (isinstance(value, np.ndarray) and value.dtype.kind in "SO" and value.size == 1):
+        return text_of(value)
+    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value

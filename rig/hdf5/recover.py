@@ -1,0 +1,111 @@
+"""Saving a recording whose writer was killed: a plain copy, and the loss stated in samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from rig.errors import RecordingError
+from rig.hdf5.layout import CAUSE_BYTES, FLUSH_PERIOD, OUTCOME_BYTES, fixed, text_of
+from rig.hdf5.load import numeric_columns, open_for_reading
+
+
+@dataclass(frozen=True, slots=True)
+class Loss:
+    """What one stream has kept and lost."""
+
+    stream: str
+    kept: int
+    """Rows in the copy."""
+    unfinished: int
+    """Rows that had a value in some channels only: not copied."""
+    unflushed: int
+    """At most so many more had come after the last flush, by the stream's own mean rate; no file has them."""
+
+
+def recover(path: str | Path, out: str | Path) -> tuple[Loss, ...]:
+    """Copy a recording that was not closed in order into a plain file `out`, a new one. Raises RecordingError.
+
+    The writer must have ended. The copy keeps id, steps, events and everything unknown; it stays `complete = false`.
+    """
+    path, out = Path(path), Path(out)
+    if out.exists():
+        raise RecordingError(f"{out} exists; a recording is never overwritten: give another name")
+    source, opened_as = open_for_reading(path)
+    with source:
+        if opened_as == "plain":
+            raise RecordingError(f"{path} opens as it is; there is nothing to recover")
+        part = out.with_name(out.name + ".part")
+        with h5py.File(part, "w") as target:
+            losses = _copy(source, target)
+            _mark(source, target, path, losses)
+        part.rename(out)
+    return losses
+
+
+def _copy(source: h5py.File, target: h5py.File) -> tuple[Loss, ...]:
+    _copy_attributes(source, target)
+    for name in source:
+        if name not in ("streams", "events"):
+            source.copy(source[name], target, name=name)
+    streams = target.create_group("streams", track_order=True)
+    _copy_attributes(source["streams"], streams)
+    return tuple(_copy_stream(name, item, streams) for name, item in source["streams"].items() if len(item))
+
+
+def _copy_stream(name: str, source: h5py.Group, streams: h5py.Group) -> Loss:
+    target = streams.create_group(name, track_order=True)
+    _copy_attributes(source, target)
+    columns = numeric_columns(source)
+    lengths = [len(item) for item in columns.values()]
+    n = min(lengths)
+    for column, item in columns.items():
+        _copy_attributes(item, target.create_dataset(column, data=item[:n]))
+    return Loss(name, n, max(lengths) - n, _unflushed(columns, n))
+
+
+def _unflushed(columns: dict[str, h5py.Dataset], n: int) -> int:
+    if "time" not in columns or n < 2:
+        return 0
+    first, last = columns["time"][0], columns["time"][n - 1]
+    return int(np.ceil(2 * FLUSH_PERIOD * (n - 1) / (last - first))) if last > first else 0
+
+
+def _copy_attributes(source: Any, target: Any) -> None:
+    for name in source.attrs:
+        h5py_type = source.attrs.get_id(name).dtype
+        target.attrs.create(name, source.attrs[name], dtype=h5py_type)
+
+
+def _mark(source: h5py.File, target: h5py.File, path: Path, losses: tuple[Loss, ...]) -> None:
+    cause = f"recovered from {path.name}, which was not closed in order"
+    if "end" in target and text_of(target["end/outcome"][()]) == "running":
+        target["end/outcome"][...] = fixed("aborted", OUTCOME_BYTES)
+        target["end/cause"][...] = fixed(cause, CAUSE_BYTES)
+        target.attrs["outcome"] = fixed("aborted", OUTCOME_BYTES)
+    sentences = [cause, *(sentence(loss) for loss in losses)]
+    if "events" in source:
+        old = source["events"][()]
+        new = np.zeros(len(sentences), dtype=old.dtype)
+        new["time"] = _latest(target)
+        new["level"] = b"warning"
+        new["text"] = [text.encode() for text in sentences]
+        table = target.create_dataset("events", data=np.concatenate([old, new]))
+        _copy_attributes(source["events"], table)
+
+
+def _latest(file: h5py.File) -> float:
+    times = [group["time"] for group in file["streams"].values() if "time" in group]
+    return max((float(time[-1]) for time in times if len(time)), default=0.0)
+
+
+def sentence(loss: Loss) -> str:
+    """One stream's loss in words."""
+    return (
+        f"{loss.stream}: {loss.kept} rows kept; {loss.unfinished} unfinished rows left out; at most {loss.unflushed} "
+        "more had come after the last flush and are lost"
+    )
