@@ -1,4 +1,4 @@
-"""A recording in memory: read-only arrays, each channel on its own clock. What `rig.hdf5.load` returns and every fit takes."""
+"""A recording in memory: read-only arrays, each channel on its own clock. `rig.hdf5.load` returns it, fits take it."""
 
 from __future__ import annotations
 
@@ -134,7 +134,7 @@ class Recording:
         """The channel of that quantity; of several thrust cells the one whose calibration has role `primary`."""
         found = self.all_of(quantity)
         primary = [channel for channel in found if channel.calibration.get("role") == "primary"]
-        return (primary or list(found) or [None])[0]
+        return next(iter(primary or found), None)
 
     @cached_property
     def duration(self) -> float:

@@ -1,0 +1,158 @@
+"""From rows with known, unknown or correlated errors to parameters and the uncertainty of any combination of them.
+
+Three cases. *Known* standard errors (points of holds): weighted least squares (eq. 4.8, 4.9) and a chi-square test; where
+points scatter more than their errors allow, a common excess is added to every variance until chi-square equals its
+degrees of freedom (Mandel and Paule, Anal. Chem. 1970), as lack of fit and repeatability are the same for quiet and noisy
+holds alike. *Unknown* ones (level tables): least squares, sigma^2 from eq. 4.12, no chi-square test. *Even samples*: least
+squares with the sandwich covariance of correlated noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import norm
+from scipy.stats import t as student
+
+from identification.noise import MIN_SAMPLES
+from identification.recording import Floats
+from identification.regression import LinearFit, correlated_std, least_squares
+from identification.verdicts import Underfit, underfit
+
+Method = Literal["wls", "ls"]
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """y (n,) = H (n, p) theta + e; `blocks` are the rows of each recording, in time order."""
+
+    H: Floats
+    y: Floats
+    names: tuple[str, ...]
+    blocks: tuple[slice, ...]
+    std_error: Floats | None = None
+    """(n,), all finite and above zero; None when unknown."""
+    dof: Floats | None = None
+    """(n,) degrees of freedom of the standard errors."""
+    raw_dof: float = float("inf")
+    """Sum of the degrees of freedom behind all standard errors."""
+    even: bool = False
+    """Rows are samples even in time whose errors may be correlated."""
+
+
+@dataclass(frozen=True, slots=True)
+class Spread:
+    """Standard deviation of a combination of parameters, its dof, and what eq. 4.9 alone would give."""
+
+    std: float
+    dof: float
+    internal: float
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """`excess_std` was added to every standard error; `underfit` was judged before that; both None without known ones."""
+
+    rows: Rows
+    fit: LinearFit
+    underfit: Underfit | None
+    excess_std: float | None
+    internal: LinearFit | None
+    """The fit before any excess was added."""
+
+    @property
+    def birge_ratio(self) -> float | None:
+        """sqrt(chi2 / dof): how far points scatter beyond their standard errors (Birge, Phys. Rev. 1932)."""
+        if self.underfit is None or self.underfit.dof <= 0:
+            return None
+        return float(np.sqrt(self.underfit.per_dof))
+
+    def spread(self, contrast: Floats) -> Spread:
+        """Of contrast @ theta; NaN when the data do not determine it."""
+        fit = self.fit
+        lost = fit.deficiency is not None and any(contrast[fit.index(n)] != 0 for n in fit.deficiency.names)
+        if lost or fit.dof <= 0:
+            return Spread(float("nan"), 0.0, float("nan"))
+        plain = (
+            float(np.sqrt(max(contrast @ fit.cov @ contrast, 0.0))) if fit.deficiency is None else _part(fit, contrast)
+        )
+        if self.rows.even and min(b.stop - b.start for b in self.rows.blocks) >= MIN_SAMPLES:
+            std, dof = correlated_std(fit, contrast, self.rows.blocks)
+            return Spread(std, dof, plain)
+        if self.internal is None or self.rows.std_error is None:
+            return Spread(plain, float(fit.dof), plain)
+        internal = _part(self.internal, contrast)
+        if self.excess_std:
+            return Spread(plain, float(fit.dof), internal)
+        return self._pooled(contrast, internal)
+
+    def _pooled(self, contrast: Floats, internal: float) -> Spread:
+        """No excess: standard errors and residuals both measure the noise; average them by their dof."""
+        assert self.rows.std_error is not None
+        assert self.rows.dof is not None
+        assert self.underfit is not None
+        parts = (contrast @ self.fit.solver * self.rows.std_error) ** 2
+        known = float(parts.sum() ** 2 / np.sum(parts**2 / self.rows.dof)) if parts.any() else 0.0
+        known = min(known, self.rows.raw_dof)
+        if not np.isfinite(known):
+            return Spread(internal, known, internal)
+        total = known + self.underfit.dof
+        return Spread(internal * float(np.sqrt((known + self.underfit.chi2) / total)), total, internal)
+
+
+def _part(fit: LinearFit, contrast: Floats) -> float:
+    """Standard deviation of a combination that leaves out the parameters the data do not determine."""
+    used = contrast != 0
+    cov = fit.cov[np.ix_(used, used)]
+    return float(np.sqrt(max(contrast[used] @ cov @ contrast[used], 0.0)))
+
+
+def _judge(rows: Rows, fit: LinearFit) -> Underfit:
+    """Chi-square test in which a residual over an uncertain standard error counts as the normal deviate of equal rarity."""
+    assert rows.std_error is not None
+    assert rows.dof is not None
+    assert fit.chi2 is not None
+    z = np.abs(fit.residual / rows.std_error)
+    finite = np.isfinite(rows.dof)
+    rare = np.where(finite, student.sf(z, np.where(finite, rows.dof, 1.0)), norm.sf(z))
+    deviate = np.where(rare > 1e-300, norm.isf(np.maximum(rare, 1e-300)), z)
+    judged = underfit(float(deviate @ deviate), fit.dof)
+    return Underfit(fit.chi2, fit.dof, judged.p_value, judged.underfitted)
+
+
+def excess_std(rows: Rows) -> float:
+    """Standard deviation to add to every standard error so that chi2 = dof (Mandel-Paule); 0 when none is needed."""
+    assert rows.std_error is not None
+    error = rows.std_error
+
+    def surplus(extra: float) -> float:
+        fit = least_squares(rows.H, rows.y, rows.names, np.hypot(error, extra))
+        assert fit.chi2 is not None
+        return fit.chi2 - fit.dof
+
+    plain = least_squares(rows.H, rows.y, rows.names)
+    top = 2.0 * float(np.sqrt(plain.residual @ plain.residual / max(plain.dof, 1)))
+    if plain.dof <= 0 or surplus(0.0) <= 0 or top == 0.0:
+        return 0.0
+    return float(brentq(surplus, 0.0, top, rtol=1e-6))
+
+
+def estimate(rows: Rows, method: Method = "wls") -> Estimate:
+    """Parameters of the rows; `ls` ignores known standard errors.
+
+    >>> rows = Rows(np.array([[1.0], [2.0], [3.0]]), np.array([1.1, 1.9, 3.0]), ("a",), (slice(0, 3),))
+    >>> round(float(estimate(rows).fit.theta[0]), 3)
+    0.993
+    """
+    if rows.even or rows.std_error is None or method == "ls":
+        return Estimate(rows, least_squares(rows.H, rows.y, rows.names), None, None, None)
+    internal = least_squares(rows.H, rows.y, rows.names, rows.std_error)
+    verdict = _judge(rows, internal)
+    if not verdict.underfitted:
+        return Estimate(rows, internal, verdict, 0.0, internal)
+    extra = excess_std(rows)
+    fit = least_squares(rows.H, rows.y, rows.names, np.hypot(rows.std_error, extra))
+    return Estimate(rows, fit, verdict, extra, internal)

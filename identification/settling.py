@@ -1,0 +1,94 @@
+"""How much of the start of a hold to leave out, found from its own data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.recording import Floats
+
+BATCH = 5
+"""Samples averaged before the rule is applied: MSER-5 (White, Cobb, Spratt, Winter Simulation Conference 2000)."""
+MSER_GAIN = 0.8
+"""A cut must lower MSER's statistic to this share of the uncut one; pure noise reaches about 0.9 by chance."""
+LONGEST_CUT = 0.5
+"""MSER may leave out this share of a hold; a hold that asks for more has not settled."""
+LONGEST_EXPONENTIAL_CUT = 0.75
+"""The same for a fitted exponential, whose end is known better."""
+F_EXPONENTIAL = 30.0
+"""F statistic from which an exponential approach is believed; high, as correlated noise imitates one."""
+BIAS_SHARE = 0.1
+"""What is left of the exponential may shift the mean by this share of its (white) standard error."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settling:
+    """`cut` samples to leave out; `settled` False when the best cut lies at the limit; `time_constant` in samples."""
+
+    cut: int
+    settled: bool
+    time_constant: float | None
+
+
+def mser_cut(values: Floats) -> int:
+    """Samples to leave out by MSER-5: the cut that minimises sum((y - mean)^2) / (n - d)^2 over the rest.
+
+    >>> mser_cut(np.concatenate([np.linspace(9, 0, 20), np.tile([0.1, -0.1], 90)]))
+    20
+    """
+    size = min(BATCH, max(1, values.size // 20))
+    count = values.size // size
+    if count < 4:
+        return 0
+    batch = values[values.size - count * size :].reshape(count, size).mean(axis=1)[::-1]
+    n = np.arange(1, count + 1)
+    batch = batch - batch.mean()
+    spread = np.cumsum(batch**2) - np.cumsum(batch) ** 2 / n
+    statistic = (np.maximum(spread, 0.0) / n**2)[::-1]
+    allowed = int(count * LONGEST_CUT)
+    best = int(np.argmin(statistic[: allowed + 1]))
+    if best == 0 or statistic[best] > MSER_GAIN * statistic[0]:
+        return 0
+    return min(best * size + values.size - count * size, values.size // 2)
+
+
+def exponential_cut(values: Floats) -> tuple[int, float | None]:
+    """Samples after which an exponential approach shifts the mean by less than `BIAS_SHARE` of its standard error.
+
+    Fits a + b exp(-i / T) by variable projection over a grid of T up to a sixth of the hold; (0, None) when no
+    exponential is there.
+    """
+    n = values.size
+    if n < 12:
+        return 0, None
+    constants = np.geomspace(0.7, n / 6, 24)
+    column = np.exp(-np.arange(n) / constants[:, None])
+    column -= column.mean(axis=1, keepdims=True)
+    centred = values - values.mean()
+    power = np.einsum("kn,kn->k", column, column)
+    amplitude = (column @ centred) / power
+    gained = amplitude**2 * power
+    best = int(np.argmax(gained))
+    left = max(float(centred @ centred - gained[best]), 0.0)
+    if gained[best] * (n - 3) <= F_EXPONENTIAL * left or gained[best] == 0.0:
+        return 0, None
+    constant, start = float(constants[best]), abs(float(amplitude[best]))
+    noise = max(np.sqrt(left / (n - 3)), 1e-6 * start)
+    ratio = start * constant / (BIAS_SHARE * noise * np.sqrt(n / 2))
+    return int(np.ceil(constant * max(np.log(ratio), 0.0))), constant
+
+
+def settle(values: Floats) -> Settling:
+    """The longer of both cuts. Pure noise is left whole in most cases.
+
+    >>> i = np.arange(200)
+    >>> result = settle(20 * np.exp(-i / 8) + np.where(i % 2, 0.1, -0.1))
+    >>> (40 < result.cut < 90, result.settled)
+    (True, True)
+    """
+    exponential, constant = exponential_cut(values)
+    mser = mser_cut(values)
+    limit = int(values.size * LONGEST_EXPONENTIAL_CUT)
+    at_limit = mser > 0 and mser >= int(values.size * LONGEST_CUT) - BATCH and exponential < mser
+    return Settling(min(max(exponential, mser), limit), exponential <= limit and not at_limit, constant)
