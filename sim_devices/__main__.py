@@ -1,0 +1,101 @@
+"""`python -m sim_devices WORLD.toml` starts a bench; `python -m sim_devices mount CONTROL THRUSTER` works its crane."""
+
+from __future__ import annotations
+
+import signal
+import sys
+from pathlib import Path
+from types import FrameType
+from typing import NoReturn
+
+import click
+
+from sim_devices.bench import Bench, start
+from sim_devices.ports import ask
+from sim_devices.tables import WorldError
+
+FILE = click.Path(path_type=Path)
+
+
+class BenchByDefault(click.Group):
+    """A first word that is no command is the world file of `run`."""
+
+    def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
+        if args and args[0] not in self.commands and args[0] != "--help":
+            args = ["run", *args]
+        return super().parse_args(ctx, args)
+
+
+@click.group(cls=BenchByDefault)
+def main() -> None:
+    """A simulated thruster bench on the ports of this machine."""
+
+
+@main.command()
+@click.argument("world", type=FILE)
+@click.option("--links", type=FILE, help="Folder for the links to the ports (default: from the world file).")
+@click.option("--truth", type=FILE, help="Truth log, JSON lines (default: from the world file).")
+@click.option("--seed", type=click.IntRange(min=0), help="Seed of all noise (default: from the world file).")
+def run(world: Path, links: Path | None, truth: Path | None, seed: int | None) -> None:
+    """Start the bench of WORLD (TOML), print its ports and `ready`, live until SIGTERM or Ctrl+C."""
+    try:
+        bench = start(world, links, truth, seed)
+    except WorldError as error:
+        fail(str(error))
+    live(bench)
+
+
+def live(bench: Bench) -> None:
+    """Print the ports, then run until SIGTERM, SIGINT or SIGHUP; the links are removed."""
+    stopped: list[int] = []
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        stopped.append(number)
+
+    for each in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+        signal.signal(each, stop)
+    try:
+        for line in bench.listing():
+            click.echo(line)
+        click.echo("ready")
+        sys.stdout.flush()
+        bench.run(lambda: bool(stopped))
+    finally:
+        bench.close()
+
+
+@main.command()
+@click.argument("control", type=FILE)
+@click.argument("thruster")
+def mount(control: Path, thruster: str) -> None:
+    """Put THRUSTER on the bench behind the CONTROL port; exit status 2 when that is refused."""
+    send(control, f"mount {thruster}")
+
+
+@main.command()
+@click.argument("control", type=FILE)
+@click.argument("words", nargs=-1, required=True)
+def tell(control: Path, words: tuple[str, ...]) -> None:
+    """Send any command to the CONTROL port: fault, clear, flow, status."""
+    send(control, " ".join(words))
+
+
+def send(control: Path, line: str) -> None:
+    """Print the bench's answer; an error ends with exit status 2."""
+    try:
+        answer = ask(control, line)
+    except OSError as error:
+        fail(f"{control}: no bench answers ({error}); start one with `python -m sim_devices WORLD.toml`")
+    if answer.startswith("error "):
+        fail(answer.removeprefix("error "))
+    click.echo(answer.removeprefix("ok "))
+
+
+def fail(sentence: str) -> NoReturn:
+    """Say why, and end with exit status 2."""
+    click.echo(sentence, err=True)
+    raise SystemExit(2)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,303 @@
+"""Device side of a Mettler-Toledo weigh module: MT-SICS over a serial line.
+
+Source: Mettler-Toledo MT-SICS reference manuals 11780711 and 11781363: reply `ID SP status SP value(10 characters,
+right aligned) SP unit CRLF`; I4 on power-up and after @; S waits for stability (balance time-out 30 s), then `S I`;
+SI answers under the identifier S. Line: 18 characters of 10 bits, 213 lines/s at 38400 baud.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import inf, isnan
+
+STANDARD_GRAVITY = 9.80665
+"""m/s^2, exact (CGPM 1901): what balances that show mass are adjusted with."""
+UNITS = {"N": 1.0, "g": STANDARD_GRAVITY / 1000.0, "kg": STANDARD_GRAVITY}
+"""unit -> N."""
+BALANCE_TIMEOUT = 30.0
+"""s a command waits for stability."""
+BOOT_TIME = 2.0
+"""s from power-up to the first word."""
+STABLE_WINDOW = 0.5
+"""s over which a stable reading may not move by more than `stable_band`."""
+COMMANDS = ("@", "I0", "I1", "I2", "I3", "I4", "S", "SI", "SIR", "Z", "ZI", "T", "TA", "TAC", "TI", "UPD")
+LEVEL_1 = ("T", "TA", "TAC", "TI")
+LEVEL_2 = ("SIR", "UPD")
+
+
+@dataclass(frozen=True, slots=True)
+class MtSicsOptions:
+    """`[devices.<name>]` of kind mt_sics."""
+
+    kind: str
+    port: str
+    baud: int = 9600
+    model: str = "WXS-SIM"
+    serial: str = "B021002593"
+    unit: str = "N"
+    digit: float = 0.001
+    """Smallest step shown, in `unit`."""
+    capacity: float = 500.0
+    """N: beyond it the reply is `+` or `-`."""
+    rate: float = 92.0
+    """readings/s at power-up; UPD changes it."""
+    max_rate: float = 92.0
+    """readings/s, the most UPD accepts."""
+    stable_band: float = 0.3
+    """N."""
+
+    def __post_init__(self) -> None:
+        if self.unit not in UNITS:
+            raise ValueError(f"unit must be one of {', '.join(UNITS)}, got {self.unit!r}")
+        if not 0 < self.rate <= self.max_rate or self.digit <= 0:
+            raise ValueError("0 < rate <= max_rate and digit > 0 are needed")
+
+
+class MtSics:
+    """One weigh module. `read` gives the force on the cell in N (NaN: the electronics have no number)."""
+
+    faults = ("frozen", "overload", "underload", "wrong_unit", "reboot", "silent", "transmission_error")
+
+    def __init__(self, options: MtSicsOptions, read: Callable[[], float]) -> None:
+        self._options = options
+        self._read = read
+        self._buffer = b""
+        self._zero = self._tare = 0.0
+        self._value = read()
+        self._rate = options.rate
+        self._next = 0.0
+        self._streaming = False
+        self._pending: tuple[str, float] | None = None
+        self._boots_at = inf
+        self._fault = ""
+        self._unit = options.unit
+        self._recent: deque[float] = deque(maxlen=max(round(STABLE_WINDOW * self._rate), 2))
+        self._sample()
+
+    @property
+    def due(self) -> float:
+        return self._boots_at if self._boots_at < inf else self._next
+
+    def feed(self, data: bytes, t: float) -> bytes:
+        if self._boots_at < inf or self._fault == "silent":
+            return b""
+        self._buffer += data
+        out = b""
+        while (end := self._buffer.find(b"\n")) >= 0:
+            line, self._buffer = self._buffer[:end], self._buffer[end + 1 :]
+            out += self._answer(line.strip(b"\r "), t)
+        return out
+
+    def tick(self, t: float) -> bytes:
+        if self._boots_at < inf:
+            if t < self._boots_at:
+                return b""
+            self._boots_at, self._next = inf, t
+            return self._identity()
+        out = b""
+        while self._next <= t:
+            self._next += 1.0 / self._rate
+            self._sample()
+            out += self._on_reading(t)
+        return b"" if self._fault == "silent" else out
+
+    def fault(self, name: str, t: float) -> None:
+        if name not in self.faults:
+            raise ValueError(f"load cell: expected one of {', '.join(self.faults)}, got {name!r}")
+        if name == "reboot":
+            self._reset()
+            self._zero = self._tare = 0.0
+            self._rate = self._options.rate
+            self._boots_at = t + BOOT_TIME
+            return
+        self._fault = name
+        if name == "wrong_unit":
+            self._unit = "kg" if self._options.unit == "N" else "N"
+
+    def clear(self, t: float) -> None:
+        self._fault = ""
+        self._unit = self._options.unit
+        self._next = max(self._next, t)
+
+    # -- readings ---------------------------------------------------------------------------------------------------
+
+    def _sample(self) -> None:
+        if self._fault != "frozen":
+            self._value = self._read()
+            self._recent.append(self._value)
+
+    @property
+    def _stable(self) -> bool:
+        recent = self._recent
+        if len(recent) < (recent.maxlen or 0) or any(isnan(v) for v in recent):
+            return False
+        return max(recent) - min(recent) <= self._options.stable_band
+
+    def _refusal(self) -> str:
+        """Why there is no value: `+` overload, `-` underload, `I` not now; empty: there is one."""
+        if self._fault == "overload" or self._value > self._options.capacity:
+            return "+"
+        if self._fault == "underload" or self._value < -self._options.capacity:
+            return "-"
+        return "I" if isnan(self._value) else ""
+
+    def _shown(self, newtons: float) -> str:
+        digit = self._options.digit
+        decimals = max(0, len(f"{digit:.9f}".rstrip("0").partition(".")[2]))
+        value = round(newtons / UNITS[self._unit] / digit) * digit + 0.0
+        return f"{value:10.{decimals}f} {self._unit}"
+
+    def _weight(self, identifier: str) -> bytes:
+        why = self._refusal()
+        if why:
+            return _line(f"{identifier} {why}")
+        status = "S" if self._stable else "D"
+        return _line(f"{identifier} {status} {self._shown(self._value - self._zero - self._tare)}")
+
+    def _on_reading(self, t: float) -> bytes:
+        out = self._weight("S") if self._streaming else b""
+        if self._pending is None:
+            return out
+        command, since = self._pending
+        if self._stable or self._refusal() in ("+", "-"):
+            self._pending = None
+            return out + self._when_stable(command)
+        if t - since > BALANCE_TIMEOUT:
+            self._pending = None
+            return out + _line(f"{command} I")
+        return out
+
+    # -- commands ---------------------------------------------------------------------------------------------------
+
+    def _answer(self, line: bytes, t: float) -> bytes:
+        if self._fault == "transmission_error":
+            return _line("ET")
+        try:
+            words = line.decode("ascii").split()
+        except UnicodeDecodeError:
+            return _line("ET")
+        if not words:
+            return b""
+        command, arguments = words[0], words[1:]
+        if command not in COMMANDS:
+            return _line("ES")
+        if arguments and command not in ("TA", "UPD"):
+            return _line("ES")
+        return self._execute(command, arguments, t)
+
+    def _execute(self, command: str, arguments: list[str], t: float) -> bytes:
+        match command:
+            case "@":
+                self._reset()
+                return self._identity()
+            case "I0" | "I1" | "I2" | "I3" | "I4":
+                return self._information(command)
+            case "SI":
+                self._streaming = False
+                return self._weight("S")
+            case "SIR":
+                self._streaming = True
+                return b""
+            case "S" | "T" | "Z":
+                self._streaming = self._streaming and command != "S"
+                self._pending = (command, t)
+                return self._on_pending()
+            case "ZI":
+                return self._zero_now()
+            case "TI":
+                return self._tare_now()
+            case "TAC":
+                self._tare = 0.0
+                return _line("TAC A")
+            case "TA":
+                return self._preset_tare(arguments)
+            case _:
+                return self._update_rate(arguments)
+
+    def _on_pending(self) -> bytes:
+        if self._pending is not None and (self._stable or self._refusal() in ("+", "-")):
+            command, _ = self._pending
+            self._pending = None
+            return self._when_stable(command)
+        return b""
+
+    def _when_stable(self, command: str) -> bytes:
+        why = self._refusal()
+        if command == "S" or why:
+            return self._weight("S") if command == "S" else _line(f"{command} {why}")
+        if command == "Z":
+            self._zero, self._tare = self._value, 0.0
+            return _line("Z A")
+        self._tare = self._value - self._zero
+        return _line(f"T S {self._shown(self._tare)}")
+
+    def _zero_now(self) -> bytes:
+        why = self._refusal()
+        if why:
+            return _line(f"ZI {why}")
+        self._zero, self._tare = self._value, 0.0
+        return _line(f"ZI {'S' if self._stable else 'D'}")
+
+    def _tare_now(self) -> bytes:
+        why = self._refusal()
+        if why:
+            return _line(f"TI {why}")
+        self._tare = self._value - self._zero
+        return _line(f"TI {'S' if self._stable else 'D'} {self._shown(self._tare)}")
+
+    def _preset_tare(self, arguments: list[str]) -> bytes:
+        if not arguments:
+            return _line(f"TA A {self._shown(self._tare)}")
+        try:
+            value, unit = float(arguments[0]), arguments[1]
+            newtons = value * UNITS[unit]
+        except (ValueError, IndexError, KeyError):
+            return _line("TA L")
+        self._tare = newtons
+        return _line(f"TA A {self._shown(self._tare)}")
+
+    def _update_rate(self, arguments: list[str]) -> bytes:
+        if not arguments:
+            return _line(f"UPD A {self._rate:.3f}")
+        try:
+            rate = float(arguments[0])
+        except ValueError:
+            return _line("UPD L")
+        if len(arguments) > 1 or not 0.1 <= rate <= self._options.max_rate:
+            return _line("UPD L")
+        self._rate = rate
+        self._recent = deque(self._recent, maxlen=max(round(STABLE_WINDOW * rate), 2))
+        return _line("UPD A")
+
+    def _information(self, command: str) -> bytes:
+        o = self._options
+        match command:
+            case "I1":
+                return _line('I1 A "012" "2.00" "2.20" "1.00"')
+            case "I2":
+                return _line(f'I2 A "{o.model} {o.capacity / UNITS[o.unit]:.0f} {o.unit}"')
+            case "I3":
+                return _line('I3 A "1.00 0.0.0.0"')
+            case "I4":
+                return self._identity()
+            case _:
+                lines = [f'I0 B {_level(name)} "{name}"' for name in COMMANDS]
+                return b"".join(_line(text) for text in [*lines[:-1], lines[-1].replace("I0 B", "I0 A")])
+
+    def _identity(self) -> bytes:
+        return _line(f'I4 A "{self._options.serial}"')
+
+    def _reset(self) -> None:
+        """What @ does: stop repeating and waiting, forget half a line. Zero and tare stay (manual: as after power-up
+        but without zero setting)."""
+        self._streaming, self._pending, self._buffer = False, None, b""
+
+
+def _level(command: str) -> int:
+    return 1 if command in LEVEL_1 else 2 if command in LEVEL_2 else 0
+
+
+def _line(text: str) -> bytes:
+    return text.encode("ascii") + b"\r\n"

@@ -1,0 +1,88 @@
+"""Effects between the command and the voltage the rotor answers to (stage `command`, in V)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import copysign, sqrt
+from typing import ClassVar
+
+from sim_devices.world.effects.stage import Stage, require_choice, require_positive
+from sim_devices.world.state import State
+
+
+@dataclass(slots=True)
+class CommandSaturation:
+    """The drive clips: V_eff = clip(V, -limit, limit)."""
+
+    stage: ClassVar[Stage] = "command"
+    limit: float
+    """V."""
+
+    def __post_init__(self) -> None:
+        require_positive(limit=self.limit)
+
+    def apply(self, value: float, _s: State, _dt: float) -> float:
+        return min(max(value, -self.limit), self.limit)
+
+
+@dataclass(slots=True)
+class SupplySag:
+    """The command is a fraction of a supply that moves: V_eff = V (V_bus / V_nom)^exponent.
+
+    V_bus = V_nom - source_resistance * I_in - discharge * charge drawn.
+    """
+
+    stage: ClassVar[Stage] = "command"
+    source_resistance: float = 0.0
+    """ohm."""
+    discharge: float = 0.0
+    """V/(A.s)."""
+    exponent: float = 1.0
+    charge: float = field(init=False, default=0.0)
+    """A.s drawn so far."""
+
+    def apply(self, value: float, s: State, dt: float) -> float:
+        self.charge += s.input_current * dt
+        sagged = s.nominal_bus - self.source_resistance * s.input_current - self.discharge * self.charge
+        # the supply's output capacitor: 20 ms, so that current and voltage do not chase each other step by step
+        s.bus_voltage += (sagged - s.bus_voltage) * min(dt / 0.02, 1.0)
+        return float(value * (max(s.bus_voltage, 0.0) / s.nominal_bus) ** self.exponent)
+
+
+@dataclass(slots=True)
+class DeadBand:
+    """Static friction or the neutral zone of a drive.
+
+    form "shrink": V_eff = sgn(V) max(|V| - half_width, 0); form "jump": V_eff = V where |V| >= half_width, else 0.
+    """
+
+    stage: ClassVar[Stage] = "command"
+    half_width: float
+    """V."""
+    form: str = "shrink"
+
+    def __post_init__(self) -> None:
+        require_positive(half_width=self.half_width)
+        require_choice("form", self.form, ("shrink", "jump"))
+
+    def apply(self, value: float, _s: State, _dt: float) -> float:
+        size = abs(value)
+        if size < self.half_width:
+            return 0.0
+        return value if self.form == "jump" else copysign(size - self.half_width, value)
+
+
+@dataclass(slots=True)
+class WindingResistance:
+    """Voltage lost in the winding: |V| = |n|/k + R I(n) with I = alpha n^2 / b, so V_eff = n/k solves a quadratic."""
+
+    stage: ClassVar[Stage] = "command"
+    resistance: float
+    """ohm."""
+
+    def __post_init__(self) -> None:
+        require_positive(resistance=self.resistance)
+
+    def apply(self, value: float, s: State, _dt: float) -> float:
+        loss = self.resistance * s.drag * s.rate_per_volt**2 / s.torque_acceleration  # 1/V: V = e + loss e^2
+        return copysign((sqrt(1.0 + 4.0 * loss * abs(value)) - 1.0) / (2.0 * loss), value)

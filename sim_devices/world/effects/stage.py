@@ -1,0 +1,31 @@
+"""What an effect is to the world."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Literal, Protocol
+
+from sim_devices.world.state import State
+
+Stage = Literal["command", "hydro", "stand", "cell", "output"]
+
+
+class Effect(Protocol):
+    """Changes one number of the world at its stage."""
+
+    stage: ClassVar[Stage]
+
+    def apply(self, value: float, s: State, dt: float, /) -> float:
+        """The number with this effect in it. `dt` in s; called once per world step (stage `output`: per sample)."""
+
+
+def require_positive(**values: float) -> None:
+    """Raise ValueError naming the first parameter that is not above zero."""
+    for name, value in values.items():
+        if not value > 0:
+            raise ValueError(f"{name} must be above zero, got {value!r}")
+
+
+def require_choice(name: str, value: str, choices: tuple[str, ...]) -> None:
+    """Raise ValueError unless `value` is one of `choices`."""
+    if value not in choices:
+        raise ValueError(f"{name} must be one of {', '.join(choices)}, got {value!r}")

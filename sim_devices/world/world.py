@@ -1,0 +1,134 @@
+"""One thruster in a tunnel, on a stand, stepped at 1 kHz. Scalars only: a step costs a few microseconds."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sim_devices.tables import check_known
+from sim_devices.world.effects import Effect
+from sim_devices.world.effects.channel import ChannelFault
+from sim_devices.world.noise import CHANNELS, Noise, NoiseSource
+from sim_devices.world.settings import WorldSettings, make_effects
+from sim_devices.world.state import State
+
+REST_RATE = 0.5
+"""rev/s: slower than this the thruster may be taken off the bench."""
+
+
+class World:
+    """The bench as physics has it. `step` moves it, `sample` reads a sensor, `state` is the truth."""
+
+    def __init__(self, settings: WorldSettings, rng: np.random.Generator) -> None:
+        self.settings = settings
+        self.state = State(bus_voltage=settings.supply.voltage, nominal_bus=settings.supply.voltage)
+        self.state.flow = settings.tunnel.flow_speed
+        self._noise = {c: NoiseSource(settings.noise.get(c, Noise()), rng) for c in CHANNELS}
+        self._effects = make_effects(settings.effects)
+        self._command = self._of_stage("command")
+        self._hydro = self._of_stage("hydro")
+        self._stand = self._of_stage("stand")
+        self._cell = self._of_stage("cell")
+        outputs = self._of_stage("output")
+        self._clips = tuple(e for e in outputs if not isinstance(e, ChannelFault))
+        self._faults = {e.channel: e for e in outputs if isinstance(e, ChannelFault)}
+        self.mounted = settings.mounted
+        self._install()
+
+    def mount(self, name: str) -> None:
+        """Put another thruster on the bench. Raises ValueError while the rotor turns, WorldError for a name unknown."""
+        check_known(name, self.settings.thrusters, "mount")
+        if abs(self.state.n) > REST_RATE:
+            raise ValueError(
+                f"mount: {self.mounted} turns at {self.state.n:.1f} rev/s, expected rest (below {REST_RATE} rev/s); "
+                "stop the motor first"
+            )
+        self.mounted = name
+        self.state.n = self.state.motor_rise = 0.0
+        self._install()
+
+    def _install(self) -> None:
+        thruster, s = self.settings.thrusters[self.mounted], self.state
+        self._thruster = thruster
+        s.rate_per_volt = thruster.rate_per_volt
+        s.thrust_constant = thruster.C / thruster.rate_per_volt**2
+        s.drag = thruster.drag
+        s.torque_acceleration = thruster.torque_acceleration
+
+    def _of_stage(self, stage: str) -> tuple[Effect, ...]:
+        return tuple(e for e in self._effects if e.stage == stage)
+
+    def step(self, dt: float, volts: float | None, amps: float = 0.0) -> None:
+        """Advance by dt (s) with `volts` at the motor; None: the windings carry `amps` instead (0 = coasting)."""
+        s, th = self.state, self._thruster
+        s.t += dt
+        n = s.n
+        k, alpha = th.rate_per_volt, th.drag
+        if volts is None:
+            s.driven, s.command, s.volts = False, 0.0, n / k
+            push, pull = th.torque_acceleration * amps, th.friction
+        else:
+            s.driven, s.command = True, volts
+            for e in self._command:
+                volts = e.apply(volts, s, dt)
+            s.volts = volts
+            pull = th.stiffness
+            push = alpha * k * k * volts * abs(volts) + pull * k * volts
+        # Heun's rule for n' = push - pull n - alpha n|n|: second order, exact at the rest point
+        slope = push - (pull + alpha * abs(n)) * n
+        guess = n + dt * slope
+        s.n = n = n + 0.5 * dt * (slope + push - (pull + alpha * abs(guess)) * guess)
+        s.current = amps if volts is None else (push - pull * n) / th.torque_acceleration
+        s.input_current = s.current * s.volts / s.bus_voltage if s.bus_voltage > 1.0 else 0.0
+        s.motor_rise += (th.heating * s.current * s.current - s.motor_rise) * dt / th.heating_time
+        self._forces(dt)
+
+    def _forces(self, dt: float) -> None:
+        s = self.state
+        force = s.thrust_constant * s.n * abs(s.n)
+        for e in self._hydro:
+            force = e.apply(force, s, dt)
+        s.thrust = force
+        for e in self._stand:
+            force = e.apply(force, s, dt)
+        s.force = force
+        for e in self._cell:
+            force = e.apply(force, s, dt)
+        s.reading = force
+
+    def sample(self, channel: str) -> float:
+        """What the sensor of `channel` gives now, with noise, clipping and fault. SI; NaN: no number."""
+        s = self.state
+        value = self.exact(channel)
+        value += self._noise[channel].sample(value, s.t)
+        if channel == "thrust":
+            for e in self._clips:
+                value = e.apply(value, s, 0.0)
+        fault = self._faults.get(channel)
+        return value if fault is None else fault.apply(value, s, 0.0)
+
+    def exact(self, channel: str) -> float:
+        """The sensor without noise and faults: gain error and zero offset of the cell are in it."""
+        s = self.state
+        match channel:
+            case "thrust":
+                return s.reading * (1.0 + self.settings.cell.gain_error) + self.settings.cell.zero_offset
+            case "rotation_rate":
+                return s.n
+            case "current":
+                return s.current
+            case "bus_voltage":
+                return s.bus_voltage
+            case "input_current":
+                return s.input_current
+            case "flow_speed":
+                return s.flow
+            case "pressure":
+                return self.settings.tunnel.pressure
+            case "water_temperature":
+                return self.settings.tunnel.water_temperature
+            case "motor_temperature":
+                return self.settings.tunnel.water_temperature + s.motor_rise
+            case "fet_temperature":
+                return self.settings.tunnel.water_temperature + 5.0 + 0.5 * s.motor_rise
+            case _:
+                raise ValueError(f"sample: expected one of {', '.join(CHANNELS)}, got {channel!r}")
