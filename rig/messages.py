@@ -113,6 +113,8 @@ class Snapshot:
     """Of this thruster's run."""
     log: tuple[LogLine, ...]
     """Newest 500 events of the campaign."""
+    log_count: int
+    """Events so far, including those that are no longer in `log`."""
     trace: tuple[tuple[float, float, float], ...]
     """(t, command V, thrust N raw) at <= 20 rows/s; on attaching: the last 10 minutes of this run."""
     progress: Progress | None

@@ -1,0 +1,97 @@
+"""The list that must be green before a propeller may turn. Pure: judges what was read, opens nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from drivers.protocols import Stream, Watchdog
+from rig.config import BenchConfig
+from rig.messages import Check, Reading
+from rig.readings import Readings
+
+RATE_TOLERANCE = 0.25
+"""Relative difference between a stream's real and nominal rate that is still taken as healthy."""
+
+
+def device_checks(identities: Mapping[str, str], failures: Mapping[str, str], names: Iterable[str]) -> list[Check]:
+    """One line per device: who it says it is, or why it did not open."""
+    checks = []
+    for name in names:
+        if name in failures:
+            checks.append(Check(name, "failed", failures[name]))
+        elif name in identities:
+            checks.append(Check(name, "passed", identities[name]))
+        else:
+            checks.append(Check(name, "waiting", "opening"))
+    return checks
+
+
+def rate_check(stream: Stream, rate: float | None) -> Check:
+    """Does the stream come as fast as it should?"""
+    nominal = 1.0 / stream.period_s
+    name = f"{stream.name} rate"
+    if rate is None:
+        return Check(name, "failed", f"no samples came; {nominal:.3g}/s are expected")
+    verdict = "passed" if abs(rate / nominal - 1.0) <= RATE_TOLERANCE else "warning"
+    return Check(name, verdict, f"{rate:.3g}/s of {nominal:.3g}/s")
+
+
+def watchdog_check(watchdog: Watchdog, limit: float) -> Check:
+    """The motor controller must stop by itself when we fall silent (reliability.md, rule 1 and promise 9)."""
+    if watchdog.timeout_s is None:
+        return Check("watchdog", "failed", "the motor controller's own command timeout is off or unknown: refused")
+    text = f"{watchdog.timeout_s:g} s, then {watchdog.action}; fed by {watchdog.fed_by}"
+    if watchdog.timeout_s > limit:
+        return Check("watchdog", "failed", f"{text}; longer than this bench's limit of {limit:g} s: refused")
+    return Check("watchdog", "passed", text)
+
+
+def rest_check(readings: Iterable[Reading], rest_rate: float) -> Check:
+    """The propeller must be at rest, measured, before it is armed."""
+    rates = [r for r in readings if r.quantity == "rotation_rate"]
+    if not rates:
+        return Check("at rest", "warning", "no rotation rate is measured on this bench: rest can't be confirmed")
+    moving = [r for r in rates if r.value is None or abs(r.value) > rest_rate]
+    if moving:
+        value = "unknown" if moving[0].value is None else f"{moving[0].value:.1f} rev/s"
+        return Check("at rest", "failed", f"{moving[0].channel} is {value}; wait until |rate| < {rest_rate:g} rev/s")
+    return Check("at rest", "passed", f"|rotation rate| < {rest_rate:g} rev/s")
+
+
+def stop_input_check(readings: Iterable[Reading]) -> Check | None:
+    """A pressed emergency stop refuses; a bench without one is told so nowhere else."""
+    inputs = [r for r in readings if r.quantity == "emergency_stop"]
+    if not inputs:
+        return Check(
+            "emergency stop", "warning", "this bench has no emergency stop input: the rig can't see one pressed"
+        )
+    if any(r.value != 0 for r in inputs):
+        return Check("emergency stop", "failed", "pressed or unknown; release it")
+    return Check("emergency stop", "passed", "released")
+
+
+def limit_checks(readings: Iterable[Reading]) -> list[Check]:
+    """Channels with a limit must be fresh and inside it."""
+    checks = []
+    for r in readings:
+        if r.low is None and r.high is None:
+            continue
+        value = "nothing came" if r.value is None else f"{r.value:.4g} {r.unit}"
+        low = "-inf" if r.low is None else f"{r.low:g}"
+        high = "inf" if r.high is None else f"{r.high:g}"
+        verdict = "passed" if r.state == "ok" else "failed"
+        checks.append(Check(r.channel, verdict, f"{value} within [{low}, {high}], {r.state}"))
+    return checks
+
+
+def all_checks(config: BenchConfig, readings: Readings, watchdog: Watchdog, now: float) -> list[Check]:
+    """Everything that is judged once the devices are open."""
+    view = readings.view(now)
+    checks = [rate_check(stream, readings.rate(name)) for name, stream in readings.streams.items()]
+    checks.append(watchdog_check(watchdog, config.watchdog_limit))
+    checks.append(rest_check(view, config.rest_rate))
+    stop_input = stop_input_check(view)
+    if stop_input is not None:
+        checks.append(stop_input)
+    checks += limit_checks(view)
+    return checks

@@ -1,0 +1,171 @@
+"""rig run, console and stop: start a controller process, attach a front end to it, and say at the end what came of it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from datetime import datetime
+from pathlib import Path
+
+import click
+from rich.console import Console
+
+from rig.check import check_campaign
+from rig.errors import LinkError, RigError
+from rig.headless import Headless, check_alive
+from rig.link import Peer, connect
+from rig.messages import Request, Snapshot
+from rig.runs import Run, find_run, live_runs
+from rig.summary import print_summary
+
+START_TIMEOUT = 15.0
+"""s for a controller process to open its socket (imports included)."""
+END_TIMEOUT = 15.0
+"""s for a controller process to close its files and end after `done`."""
+SOCKET_NAME = "controller.sock"
+LOG_NAME = "controller.log"
+
+
+@click.command("run")
+@click.argument("campaign", type=click.Path(path_type=Path))
+@click.option(
+    "--headless", is_flag=True, help="A progress bar instead of the console; starts when the preflight passed."
+)
+@click.option(
+    "--output", type=click.Path(path_type=Path), help="Folder for the campaign's folder (default: the campaign's)."
+)
+@click.option("--thruster", "thrusters", multiple=True, help="Only this thruster of the campaign; may be repeated.")
+def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: tuple[str, ...]) -> int:
+    """Run CAMPAIGN on its bench: console, recording, table of the fits."""
+    report = check_campaign(campaign)
+    config = report.campaign
+    unknown = [name for name in thrusters if name not in config.thrusters]
+    if unknown:
+        raise RigError(
+            f"{campaign}: --thruster {unknown[0]} is not in the campaign; it has {', '.join(config.thrusters)}"
+        )
+    if not headless and not sys.stdout.isatty():
+        raise RigError("rig run opens the console, which needs a terminal; use --headless where there is none")
+    chosen = thrusters or config.thrusters
+    if headless and not config.bench.mount.command and len(chosen) > 1 and not sys.stdin.isatty():
+        raise RigError(
+            f"{campaign}: {len(chosen)} thrusters, and nobody at this terminal to put the next one on the bench; "
+            "give the bench a [mount] command or run one thruster at a time with --thruster"
+        )
+    folder = campaign_folder(output or config.output, config.name)
+    return follow(start_controller(campaign, folder, thrusters), headless, start=True)
+
+
+@click.command("console")
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+@click.option("--headless", is_flag=True, help="Follow with a progress bar instead.")
+def console_command(folder: Path | None, headless: bool) -> int:
+    """Attach to a run that is going on: the one in FOLDER, or the only one on this machine."""
+    return follow(find_run(folder), headless, start=False)
+
+
+@click.command("stop")
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+def stop_command(folder: Path | None) -> int:
+    """Stop a run that is going on: zero volts now, close the recording."""
+    peer = connect(Path(find_run(folder).socket), "the controller")
+    peer.send(Request("stop", "rig stop"))
+    last = Headless(peer, Console(stderr=True)).follow(start=False)
+    peer.close()
+    if last is None or last.stop_confirmed is False:
+        raise LinkError("STOP NOT CONFIRMED by a measurement: look at the propeller, cut the supply")
+    click.echo(f"stopped; {last.cause or 'the run had already ended'}")
+    return 0
+
+
+def campaign_folder(output: Path, name: str) -> Path:
+    """A new folder for one campaign: `<output>/<name>-<local date and time>`."""
+    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "campaign"
+    folder = output / f"{slug}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
+    try:
+        folder.mkdir(parents=True)
+    except OSError as error:
+        raise RigError(f"{folder}: the campaign's folder can't be made: {error.strerror}") from error
+    return folder.resolve()
+
+
+def start_controller(campaign: Path, folder: Path, thrusters: Sequence[str]) -> Run:
+    """Start the controller process in a session of its own; returns once it listens."""
+    with (folder / LOG_NAME).open("wb") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rig.controller", str(campaign.resolve()), str(folder), *thrusters],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+        )
+    deadline = time.monotonic() + START_TIMEOUT
+    while time.monotonic() < deadline:
+        run = next((run for run in live_runs() if run.pid == process.pid), None)
+        if run is not None:
+            return run
+        try:
+            process.wait(0.05)
+        except subprocess.TimeoutExpired:
+            continue
+        raise LinkError(f"the controller ended at once: {_last_words(folder)}")
+    process.kill()
+    raise LinkError(f"the controller did not open its socket within {START_TIMEOUT:g} s; see {folder / LOG_NAME}")
+
+
+def follow(run: Run, headless: bool, *, start: bool) -> int:
+    """Attach a front end until it ends or detaches; then the table, where the files are, and the exit status."""
+    peer = connect(Path(run.socket), "the controller")
+    console = Console(stderr=True)
+    try:
+        last = check_alive(Headless(peer, console).follow(start) if headless else _console(peer))
+    finally:
+        peer.close()
+    if last.state != "done" and _exists(run.pid):
+        click.echo(f"the run goes on in {run.folder}; attach again with: rig console {run.folder}")
+        return 0
+    _await_end(run.pid)
+    return _conclude(last, Path(run.folder))
+
+
+def _console(peer: Peer) -> Snapshot | None:
+    from rig.console import run_console
+    from rig.console.feed import SocketFeed
+
+    return run_console(SocketFeed(peer))
+
+
+def _conclude(last: Snapshot, folder: Path) -> int:
+    print_summary([Path(file) for file in last.files], folder)
+    outcome = last.outcome if last.state == "done" else "aborted"
+    if outcome == "completed":
+        return 0
+    cause = last.cause or f"the controller is gone; see {folder / LOG_NAME}"
+    click.echo(f"rig: the campaign ended {outcome}: {cause}", err=True)
+    if last.stop_confirmed is False:
+        click.echo("rig: STOP NOT CONFIRMED by a measurement: look at the propeller, cut the supply", err=True)
+    return 1
+
+
+def _await_end(pid: int) -> None:
+    deadline = time.monotonic() + END_TIMEOUT
+    while _exists(pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+
+
+def _exists(pid: int) -> bool:
+    """Is the process there and not a zombie of ours?"""
+    try:
+        done, _ = os.waitpid(pid, os.WNOHANG)
+    except ChildProcessError:
+        done = 0
+    return not done and any(run.pid == pid for run in live_runs())
+
+
+def _last_words(folder: Path) -> str:
+    lines = (folder / LOG_NAME).read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return lines[-1].removeprefix("rig: ") if lines else "it said nothing"

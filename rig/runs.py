@@ -1,0 +1,99 @@
+"""Which runs are alive on this machine: a small file per controller process, and a lock per bench."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import tempfile
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import IO
+
+from rig.errors import LinkError
+
+
+@dataclass(frozen=True, slots=True)
+class Run:
+    """A controller process and where to reach it."""
+
+    pid: int
+    socket: str
+    folder: str
+    campaign: str
+    bench: str
+
+
+def _private_folder() -> Path:
+    folder = Path(tempfile.gettempdir()) / f"thruster-rig-{os.getuid()}"
+    folder.mkdir(mode=0o700, exist_ok=True)
+    status = folder.lstat()
+    if folder.is_symlink() or status.st_uid != os.getuid() or status.st_mode & 0o077:
+        raise LinkError(
+            f"{folder} must be a directory of yours with mode 0700: another user may have made it; remove it"
+        )
+    return folder
+
+
+def register(run: Run) -> Path:
+    """Announce a run; the caller removes the returned file at its end."""
+    path = _private_folder() / f"run-{run.pid}.json"
+    path.write_text(json.dumps(asdict(run)), encoding="utf-8")
+    return path
+
+
+def live_runs() -> list[Run]:
+    """Runs whose controller process still exists; files of dead ones are removed."""
+    found = []
+    for path in sorted(_private_folder().glob("run-*.json"), key=lambda p: p.stat().st_mtime):
+        run = Run(**json.loads(path.read_text(encoding="utf-8")))
+        if _alive(run.pid):
+            found.append(run)
+        else:
+            path.unlink(missing_ok=True)
+    return found
+
+
+def find_run(folder: Path | None) -> Run:
+    """The live run in `folder`, or the only one there is. Raises LinkError."""
+    runs = live_runs()
+    if folder is not None:
+        runs = [run for run in runs if Path(run.folder) == folder.resolve()]
+    if not runs:
+        where = f"in {folder}" if folder else "on this machine"
+        raise LinkError(f"no run is going on {where}; start one with `rig run CAMPAIGN`")
+    if len(runs) > 1:
+        folders = ", ".join(run.folder for run in runs)
+        raise LinkError(f"{len(runs)} runs are going on; name the folder of one: {folders}")
+    return runs[0]
+
+
+def lock_bench(bench: Path) -> IO[str]:
+    """Hold the bench for this process as long as the returned file is open. Raises LinkError that names the holder."""
+    name = hashlib.sha256(os.fsencode(bench.resolve())).hexdigest()[:16]
+    file = (_private_folder() / f"bench-{name}.lock").open("a+", encoding="utf-8")
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.seek(0)
+        holder = file.read().strip() or "another process"
+        file.close()
+        raise LinkError(
+            f"bench {bench} is in use by {holder}; stop that run first, or look at it with `rig console`"
+        ) from None
+    file.seek(0)
+    file.truncate()
+    file.write(f"process {os.getpid()}")
+    file.flush()
+    return file
+
+
+def _alive(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    except PermissionError:
+        return True
+    return True
