@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from rig.plan import Plan
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,6 +77,8 @@ class BenchConfig:
     """rev/s; |rotation_rate| below this is at rest."""
     coast_time: float = 3.0
     """s a propeller may take from command 0 to rest before `STOP NOT CONFIRMED`."""
+    proof_voltage: float = 4.0
+    """V at which the motor's watchdog is proved: low, but enough to turn the propeller."""
     mount: MountConfig = field(default_factory=MountConfig)
 
 
@@ -98,8 +103,8 @@ class CampaignConfig:
     name: str
     bench: BenchConfig
     thrusters: tuple[str, ...]
-    plan: Any
-    """A plan of rig.plan: iterating it yields Step."""
+    plan: Plan
+    """Iterating it yields the steps of one run."""
     output: Path
     """Folder for recordings; relative to the campaign file."""
     tare: TareConfig = field(default_factory=TareConfig)
