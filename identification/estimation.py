@@ -1,10 +1,10 @@
 """From rows with known, unknown or correlated errors to parameters and the uncertainty of any combination of them.
 
-Three cases. *Known* standard errors (points of holds): weighted least squares (eq. 4.8, 4.9) and a chi-square test; where
-points scatter more than their errors allow, a common excess is added to every variance until chi-square equals its
-degrees of freedom (Mandel and Paule, Anal. Chem. 1970), as lack of fit and repeatability are the same for quiet and noisy
-holds alike. *Unknown* ones (level tables): least squares, sigma^2 from eq. 4.12, no chi-square test. *Even samples*: least
-squares with the sandwich covariance of correlated noise.
+Three cases. *Known* standard errors (points of holds): weighted least squares (eq. 4.8, 4.9) and a chi-square test.
+Where points scatter more than their errors allow, a common excess is added to every variance until chi-square equals
+its degrees of freedom (Mandel and Paule, Anal. Chem. 1970): lack of fit and repeatability are the same for quiet and
+for noisy holds. *Unknown* ones (level tables): least squares, sigma^2 from eq. 4.12, no chi-square test.
+*Even samples*: least squares with the sandwich covariance of correlated noise.
 """
 
 from __future__ import annotations
@@ -54,7 +54,7 @@ class Spread:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """`excess_std` was added to every standard error; `underfit` was judged before that; both None without known ones."""
+    """`excess_std` was added to every standard error, `underfit` judged before that; None without known ones."""
 
     rows: Rows
     fit: LinearFit
@@ -68,12 +68,14 @@ class Estimate:
         """sqrt(chi2 / dof): how far points scatter beyond their standard errors (Birge, Phys. Rev. 1932)."""
         if self.underfit is None or self.underfit.dof <= 0:
             return None
-        return float(np.sqrt(self.underfit.per_dof))
+        ratio = np.sqrt(self.underfit.per_dof)
+        return float(ratio)
 
     def spread(self, contrast: Floats) -> Spread:
         """Of contrast @ theta; NaN when the data do not determine it."""
         fit = self.fit
-        lost = fit.deficiency is not None and any(contrast[fit.index(n)] != 0 for n in fit.deficiency.names)
+        missing = () if fit.deficiency is None else fit.deficiency.names
+        lost = any(bool(contrast[fit.index(name)]) for name in missing)
         if lost or fit.dof <= 0:
             return Spread(float("nan"), 0.0, float("nan"))
         plain = (
@@ -107,11 +109,12 @@ def _part(fit: LinearFit, contrast: Floats) -> float:
     """Standard deviation of a combination that leaves out the parameters the data do not determine."""
     used = contrast != 0
     cov = fit.cov[np.ix_(used, used)]
-    return float(np.sqrt(max(contrast[used] @ cov @ contrast[used], 0.0)))
+    variance = float(contrast[used] @ cov @ contrast[used])
+    return float(np.sqrt(max(variance, 0.0)))
 
 
 def _judge(rows: Rows, fit: LinearFit) -> Underfit:
-    """Chi-square test in which a residual over an uncertain standard error counts as the normal deviate of equal rarity."""
+    """Chi-square test; a residual over an uncertain standard error counts as the normal deviate of equal rarity."""
     assert rows.std_error is not None
     assert rows.dof is not None
     assert fit.chi2 is not None

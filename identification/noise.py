@@ -33,10 +33,10 @@ SAMPLES_PER_BIN = 8
 MIN_SAMPLES = 5
 """Fewer samples carry no usable information on their own correlation."""
 
-_DOF = np.geomspace(1.0, 1e4, 80)
-_T95 = student.ppf(0.975, _DOF)
+_DOF: Floats = np.geomspace(1.0, 1e4, 80)
+_T95: Floats = np.asarray(student.ppf(0.975, _DOF))
 _ONE_SIGMA = 0.3173105078629141
-_RATIO = _T95 / student.ppf(1 - _ONE_SIGMA / 2, _DOF)
+_RATIO: Floats = _T95 / np.asarray(student.ppf(1 - _ONE_SIGMA / 2, _DOF))
 
 
 def ar1_spectrum(frequency: Floats, tau: Floats) -> Floats:
@@ -175,13 +175,14 @@ def _mixture_interval(weight: Floats, std: Floats, most: float) -> tuple[float, 
     wide, one = _half_width(weight, std, 0.05), _half_width(weight, std, _ONE_SIGMA)
     if one <= 0:
         return 0.0, most
-    dof = float(np.exp(np.interp(wide / one, _RATIO[::-1], np.log(_DOF)[::-1])))
+    log_dof = float(np.interp(wide / one, _RATIO[::-1], np.log(_DOF)[::-1]))
+    dof = float(np.exp(log_dof))
     dof = min(dof, most)
     return wide / float(np.interp(np.log(dof), np.log(_DOF), _T95)), dof
 
 
 def _half_width(weight: Floats, std: Floats, outside: float) -> float:
-    """Half width h such that a mixture of zero-mean normals lies outside +-h with that probability (bisection in log h)."""
+    """Half width h: a mixture of zero-mean normals lies outside +-h with that probability (bisection in log h)."""
     low, high = float(std.min()) * 0.5, float(std.max()) * 4.0
     if high <= 0:
         return 0.0

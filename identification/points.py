@@ -129,7 +129,7 @@ def resolution(channel: Channel, windows: tuple[Window, ...]) -> float:
 
 
 def _not_below(estimate: MeanEstimate, step: float) -> MeanEstimate:
-    """Samples that do not leave one digit do not average it away: the error is then the digit's own, step / sqrt(12)."""
+    """Samples that do not leave one digit do not average it away: the error is the digit's own, step / sqrt(12)."""
     spread = estimate.std_error * np.sqrt(max(estimate.n_effective, 1.0))
     if spread >= 0.5 * step or not np.isfinite(spread):
         return estimate

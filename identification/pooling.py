@@ -1,8 +1,8 @@
 """Standard errors of many short holds made to lend each other degrees of freedom (moderated variances).
 
 Weights 1 / s_i^2 from few degrees of freedom overstate what a weighted fit knows: holds whose s_i came out small by
-luck weigh most (Meier, Biometrics 1953). The variances are therefore shrunk towards their common level, which may grow with
-the load, by the empirical Bayes rule of Smyth (Stat. Appl. Genet. Mol. Biol. 2004): the more alike they are, the more.
+luck weigh most (Meier, Biometrics 1953). The variances are therefore shrunk towards their common level, which may grow
+with the load, by the empirical Bayes rule of Smyth (Stat. Appl. Genet. Mol. Biol. 2004): the more alike, the more.
 """
 
 from __future__ import annotations

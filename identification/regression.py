@@ -1,4 +1,4 @@
-"""Linear least squares, plain and weighted, by QR. What the data cannot tell is said, not raised. Knows no thrusters."""
+"""Linear least squares, plain and weighted, by QR. What data cannot tell is said, not raised. Knows no thrusters."""
 
 from __future__ import annotations
 

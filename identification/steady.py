@@ -92,6 +92,8 @@ def settled_estimate(time: Floats, value: Floats, noise_std: float | None = None
 class SteadyMonitor:
     """Collects the samples of one hold as they arrive and says how well the mean is known so far.
 
+    `mean`, `std_error`, `drift` and `drift_std` are those of `estimate`, worked out when first asked for after an `add`.
+
     NaN samples are counted and left out. `estimate` costs about a millisecond whatever the length of the hold.
 
     >>> monitor = SteadyMonitor()
@@ -108,12 +110,15 @@ class SteadyMonitor:
         self._value = np.empty(256)
         self._count = 0
         self.skipped = 0
+        self._latest: MeanEstimate | None = None
 
-    def add(self, time: Floats, value: Floats) -> None:
-        """One block: times (k,) s and values (k,), in order."""
+    def add(self, time: Floats | float, value: Floats | float) -> None:
+        """One sample or one block: times (k,) s and values (k,), in order."""
+        time, value = np.atleast_1d(time), np.atleast_1d(value)
         good = np.isfinite(value)
+        self._latest = None
         self.skipped += int(good.size - good.sum())
-        time, value = np.asarray(time)[good], np.asarray(value)[good]
+        time, value = time[good], value[good]
         end = self._count + value.size
         if end > self._time.size:
             room = max(end, 2 * self._time.size)
@@ -125,9 +130,28 @@ class SteadyMonitor:
 
     def estimate(self) -> MeanEstimate:
         """Of all samples so far, their settling left out; `n` counts averages of neighbours above 512 samples."""
+        if self._latest is not None:
+            return self._latest
         step = -(-self._count // MOST_SAMPLES) if self._count else 1
         used = self._count // step * step
         late = slice(self._count - used, self._count)
         time = self._time[late].reshape(-1, step).mean(axis=1)
         value = self._value[late].reshape(-1, step).mean(axis=1)
-        return settled_estimate(time, value)
+        self._latest = settled_estimate(time, value)
+        return self._latest
+
+    @property
+    def mean(self) -> float:
+        return self.estimate().mean
+
+    @property
+    def std_error(self) -> float:
+        return self.estimate().std_error
+
+    @property
+    def drift(self) -> float:
+        return self.estimate().drift
+
+    @property
+    def drift_std(self) -> float:
+        return self.estimate().drift_std
