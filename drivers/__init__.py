@@ -1,1 +1,31 @@
-"""Wires: bytes to SI numbers and back. Knows no campaign, file or screen."""
+"""Wires: bytes to SI numbers and back. Knows no campaign, file or screen.
+
+`KINDS` is the list of devices that a bench file can name. A new device is one file and one line here
+(docs/howto/add-a-device.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from drivers import mt_sics, vesc_can
+from drivers.protocols import Instrument
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """One kind of device: its options and how it is built. Building opens nothing."""
+
+    options: type[Any]
+    """Frozen dataclass; its `__post_init__` raises ValueError for impossible values."""
+    build: Callable[..., Instrument]
+    """`build(name, options)` for a serial device, `build(name, options, bus)` for one on CAN."""
+    link: Literal["serial", "can"]
+
+
+KINDS: dict[str, Kind] = {
+    "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial"),
+    "vesc_can": Kind(vesc_can.Options, vesc_can.VescCan, "can"),
+}

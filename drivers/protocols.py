@@ -8,7 +8,7 @@ from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """One column of a stream. `quantity` and `unit` are those of the recording format; `None` means "kept, not used"."""
+    """One column of a stream. `quantity`, `unit`: those of the recording format; `None` means "kept, not used"."""
 
     name: str
     quantity: str | None
@@ -58,7 +58,7 @@ class Watchdog:
 
 @dataclass(frozen=True, slots=True)
 class LinkHealth:
-    """What the wire has been like. `bad` counts frames or lines that could not be understood; the first few are kept."""
+    """What the wire has been like. `bad` counts frames or lines not understood; the first few are kept."""
 
     alive: bool
     received: int
@@ -66,6 +66,8 @@ class LinkHealth:
     first_bad: tuple[str, ...]
     error: str | None = None
     """Why the link is not alive, as one sentence."""
+    dropped: int = 0
+    """Records lost because nobody drained in time."""
 
 
 @runtime_checkable

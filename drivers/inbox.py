@@ -1,0 +1,80 @@
+"""The queue between a reader thread and the rig: bounded, stamped, counted."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable, Sequence
+from typing import Generic, TypeVar
+
+Record = TypeVar("Record")
+
+FIRST_BAD_KEPT = 5
+"""How many of the lines or frames that could not be understood are kept word for word."""
+
+
+class BadRecords:
+    """Counts what could not be understood and keeps the first few, so that nothing is dropped silently."""
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.first: tuple[str, ...] = ()
+
+    def add(self, text: str) -> None:
+        self.count += 1
+        if len(self.first) < FIRST_BAD_KEPT:
+            self.first = (*self.first, text)
+
+
+class Inbox(Generic[Record]):
+    """Records with their arrival time. One thread puts, one takes. When full the oldest go, and are counted."""
+
+    def __init__(self, capacity: int) -> None:
+        if capacity < 1:
+            raise ValueError(f"inbox capacity must be at least 1, not {capacity}")
+        self.received = 0
+        self.dropped = 0
+        self._capacity = capacity
+        self._rows: deque[tuple[int, Record]] = deque(maxlen=capacity)
+        self._arrival = threading.Condition()
+        self._open = True
+
+    def put(self, t_ns: int, records: Sequence[Record]) -> None:
+        """Add records that arrived together at `t_ns` (`time.monotonic_ns()`)."""
+        with self._arrival:
+            self.dropped += max(0, len(self._rows) + len(records) - self._capacity)
+            self._rows.extend([(t_ns, record) for record in records])
+            self.received += len(records)
+            self._arrival.notify_all()
+
+    def take_all(self) -> list[tuple[int, Record]]:
+        """Everything since the last call; never blocks on the wire."""
+        with self._arrival:
+            rows = list(self._rows)
+            self._rows.clear()
+        return rows
+
+    def wait_for(self, match: Callable[[Record], bool], timeout: float, *, take: bool = True) -> Record | None:
+        """The first record that matches, waiting up to `timeout` s; None when it did not come or the link ended.
+
+        With `take` it leaves the inbox; records that do not match stay where they are.
+        """
+        deadline = time.monotonic() + timeout
+        with self._arrival:
+            while True:
+                for index, (_, record) in enumerate(self._rows):
+                    if match(record):
+                        if take:
+                            del self._rows[index]
+                        return record
+                left = deadline - time.monotonic()
+                if left <= 0.0 or not self._open:
+                    return None
+                self._arrival.wait(left)
+
+    def end(self) -> None:
+        """No more records will come: whoever waits is woken."""
+        with self._arrival:
+            self._open = False
+            self._arrival.notify_all()

@@ -1,0 +1,53 @@
+"""Lines of text on a serial port: cutting bytes into lines, and how many lines a port can carry."""
+
+from __future__ import annotations
+
+import re
+
+MAX_LINE = 1024
+"""Bytes; no instrument here sends lines nearly as long, so a longer one is noise and is cut."""
+
+_FRAMING = re.compile(r"([78])([NEO])([12])")
+
+
+class LineCutter:
+    """Bytes in any portions -> complete lines without their CR and LF. Empty lines are left out."""
+
+    def __init__(self) -> None:
+        self._rest = b""
+
+    def feed(self, data: bytes) -> list[bytes]:
+        *lines, rest = (self._rest + data).replace(b"\r", b"\n").split(b"\n")
+        if len(rest) > MAX_LINE:
+            lines.append(rest[:MAX_LINE])
+            rest = b""
+        self._rest = rest
+        return [line for line in lines if line]
+
+
+def bits_per_character(framing: str) -> int:
+    """Bits on the wire per byte: start, data, parity, stop. `8N1` is 10, `8E1` is 11."""
+    parts = _FRAMING.fullmatch(framing)
+    if parts is None:
+        raise ValueError(f"framing must look like 8N1 or 7E1, not {framing!r}")
+    data, parity, stop = parts.groups()
+    return 1 + int(data) + (parity != "N") + int(stop)
+
+
+def check_line_rate(who: str, rate: float, baud: int, framing: str, characters: int) -> None:
+    """Raise ValueError when `rate` messages/s of `characters` bytes each do not fit through `baud` bit/s."""
+    if not 0.0 < rate < float("inf"):
+        raise ValueError(f"{who} rate must be a positive number of samples/s, not {rate}")
+    if baud <= 0:
+        raise ValueError(f"{who} baud must be positive, not {baud}")
+    limit = baud / (bits_per_character(framing) * characters)
+    if rate > limit:
+        raise ValueError(
+            f"{who} asks {rate:g} samples/s but {baud} baud carries at most {limit:.0f}/s"
+            f" ({characters} characters a sample): lower rate or raise baud"
+        )
+
+
+def printable(line: bytes) -> str:
+    """A line as it can be shown to a person, shortened to 80 characters."""
+    return line[:80].decode("ascii", errors="backslashreplace")
