@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from sim_devices.can_frame import CanFrame
-from sim_devices.control import obey
+from sim_devices.control import clear, fault, obey
 from sim_devices.device import SerialDevice
 from sim_devices.keller import Keller, KellerOptions
 from sim_devices.motor_tap import MotorTap
@@ -21,12 +21,11 @@ from sim_devices.nortek import Nortek, NortekOptions
 from sim_devices.ports import ControlSocket, PtyPort, wait
 from sim_devices.settings import BenchSettings, ScriptedFault, load
 from sim_devices.slcan import Adapter
-from sim_devices.tables import check_known
-from sim_devices.truth import TruthLog
+from sim_devices.truth import TruthLog, header_fields, state_fields
 from sim_devices.vesc import Vesc, VescOptions
-from sim_devices.wire import DEFAULT_AMOUNT, WIRE_FAULTS, Wire
+from sim_devices.wire import Wire
 from sim_devices.world import World
-from sim_devices.world.noise import Normals
+from sim_devices.world.noise import Noise, Normals
 
 LONGEST_SLEEP = 0.01
 """s between two looks at the clock and the stop request."""
@@ -55,10 +54,9 @@ class Bench:
 
     def __init__(self, settings: BenchSettings) -> None:
         self.settings = settings
-        world_rng, wire_rng = np.random.default_rng(settings.seed).spawn(2)
+        world_rng, wire_rng, self._cross_rng = np.random.default_rng(settings.seed).spawn(3)
         self._wire_rng = wire_rng
         self.world = World(settings.world, world_rng)
-        self._cross = Normals(world_rng)
         self._start_ns = time.monotonic_ns()
         self._epoch = datetime.now(UTC)
         self._steps = 0
@@ -74,7 +72,7 @@ class Bench:
             self._add(name, options)
         self.control = ControlSocket(settings.links / "control")
         self._script = _script(settings.faults)
-        self._log_header()
+        self.log("header", seed=settings.seed, **header_fields(settings.world))
 
     def _port(self, name: str, baud: int | None) -> PtyPort:
         return PtyPort(self.settings.links / name, Wire(baud, self._wire_rng))
@@ -86,11 +84,9 @@ class Bench:
                 device = MtSics(options, lambda: world.sample("thrust"))
                 self.serial[name] = (device, self._port(options.port, options.baud), 0.0)
             case NortekOptions():
-                white = self.settings.world.noise.get("flow_speed")
-                std = white.white if white else 0.0
-                meter = Nortek(
-                    options, lambda: world.sample("flow_speed"), lambda: std * self._cross.draw(), self._epoch
-                )
+                std = self.settings.world.noise.get("flow_speed", Noise()).white
+                cross = Normals(self._cross_rng)
+                meter = Nortek(options, lambda: world.sample("flow_speed"), lambda: std * cross.draw(), self._epoch)
                 self.serial[name] = (meter, self._port(options.port, options.baud), 0.0)
             case KellerOptions():
                 slave = Keller(options, lambda: world.sample("pressure"), lambda: world.sample("water_temperature"))
@@ -178,7 +174,7 @@ class Bench:
             data = port.read()
             if data:
                 _say(port, device.feed(data, t), t, turnaround)
-        self.control.serve(self.obey)
+        self.control.serve(lambda line: obey(self, line))
 
     def _broadcast(self, frame: CanFrame, t: float, sender: PtyPort | None) -> None:
         """A frame on the bus: every other node hears it; sender None: the motor controller."""
@@ -191,72 +187,13 @@ class Bench:
             for answer in self.vesc.receive(frame, t):
                 self._broadcast(answer, t, None)
 
-    # -- what the operator of the bench may do -------------------------------------------------------------------------
-
-    def obey(self, line: str) -> str:
-        """One line of the control port."""
-        return obey(self, line)
-
-    def mount(self, thruster: str) -> None:
-        """Put another thruster on. Raises ValueError while the rotor turns, WorldError for an unknown name."""
-        self.world.mount(thruster)
-        self.log("mount")
-
-    def fault(self, target: str, name: str, amount: float = DEFAULT_AMOUNT) -> None:
-        """A device, or the wire of a device or adapter, goes wrong from now on. Raises ValueError or WorldError."""
-        port, device = self._target(target)
-        if port is not None and name == "pulled":
-            port.pull()
-        elif port is not None and name in WIRE_FAULTS:
-            port.wire.fault(name, amount)
-        elif device is not None:
-            device.fault(name, self.now())
-        else:
-            raise ValueError(f"{target}: expected one of pulled, {', '.join(WIRE_FAULTS)}, got {name!r}")
-        self.log("fault", target=target, fault=name, amount=amount)
-
-    def clear(self, target: str) -> None:
-        """The target is in order again; a pulled cable is back, on a new pty under the same name."""
-        port, device = self._target(target)
-        if port is not None:
-            port.plug()
-            port.wire.clear()
-        if device is not None:
-            device.clear(self.now())
-        self.log("clear", target=target)
-
-    def status(self) -> dict[str, object]:
-        """For the control port."""
-        s = self.world.state
-        return {
-            "thruster": self.world.mounted,
-            "rotation_rate": s.n,
-            "thrust": s.thrust,
-            "flow_speed": s.flow,
-            "lost": {port.link.name: port.wire.lost for port in self.ports},
-        }
-
-    def set_flow(self, speed: float) -> None:
-        """Tunnel flow from now on, m/s."""
-        self.world.state.flow = speed
-        self.log("flow", speed=speed)
-
-    def _target(self, name: str) -> tuple[PtyPort | None, SerialDevice | Vesc | None]:
-        check_known(name, [*self.settings.devices, *self.adapters], "target")
-        if name in self.adapters:
-            return self.adapters[name][1], None
-        if name in self.serial:
-            device, port, _ = self.serial[name]
-            return port, device
-        return None, self.vesc
-
     def _run_script(self, t: float) -> None:
         while self._script and self._script[0][0] <= t:
             _, begins, entry = self._script.pop(0)
             if begins:
-                self.fault(entry.device, entry.fault, entry.amount)
+                fault(self, entry.device, entry.fault, entry.amount)
             else:
-                self.clear(entry.device)
+                clear(self, entry.device)
 
     # -- truth -------------------------------------------------------------------------------------------------------
 
@@ -268,29 +205,8 @@ class Bench:
         s = self.world.state
         turning = abs(s.n) > AT_REST or s.command != 0.0
         self._next_state = s.t + (STATE_PERIOD if turning else 10.0 * STATE_PERIOD)
-        self.truth.write(
-            "state",
-            self._start_ns + round(s.t * 1e9),
-            self.world.mounted,
-            command=s.command if s.driven else None,
-            volts=round(s.volts, 6),
-            n=round(s.n, 6),
-            current=round(s.current, 4),
-            thrust=round(s.thrust, 6),
-            force=round(s.force, 6),
-        )
-
-    def _log_header(self) -> None:
-        w = self.settings.world
-        self.log(
-            "header",
-            C={name: each.C for name, each in w.thrusters.items()},
-            cell_gain=1.0 + w.cell.gain_error,
-            zero_offset=w.cell.zero_offset,
-            effects={name: dict(table) for name, table in w.effects.items()},
-            seed=self.settings.seed,
-            nominal_bus=w.supply.voltage,
-        )
+        stamp = self._start_ns + round(s.t * 1e9)
+        self.truth.write("state", stamp, self.world.mounted, **state_fields(s))
 
     def listing(self) -> list[str]:
         """One line per port: name, path the rig opens, device behind it."""

@@ -10,23 +10,19 @@ status                          JSON: thruster, rotation rate, thrust, messages 
 from __future__ import annotations
 
 import json
-from typing import Protocol
+from typing import TYPE_CHECKING
 
-from sim_devices.tables import WorldError
-from sim_devices.wire import DEFAULT_AMOUNT
+from sim_devices.tables import WorldError, check_known
+from sim_devices.wire import DEFAULT_AMOUNT, WIRE_FAULTS
 
-
-class Operable(Protocol):
-    """What the control port can do to a bench."""
-
-    def mount(self, thruster: str, /) -> None: ...
-    def fault(self, target: str, name: str, amount: float, /) -> None: ...
-    def clear(self, target: str, /) -> None: ...
-    def set_flow(self, speed: float, /) -> None: ...
-    def status(self) -> dict[str, object]: ...
+if TYPE_CHECKING:
+    from sim_devices.bench import Bench
+    from sim_devices.device import SerialDevice
+    from sim_devices.ports import PtyPort
+    from sim_devices.vesc import Vesc
 
 
-def obey(bench: Operable, line: str) -> str:
+def obey(bench: Bench, line: str) -> str:
     """Do what one line says; the answer says what was done, or why not."""
     try:
         return f"ok {_done(bench, line.split())}"
@@ -34,24 +30,87 @@ def obey(bench: Operable, line: str) -> str:
         return f"error {error}"
 
 
-def _done(bench: Operable, words: list[str]) -> str:
+def _done(bench: Bench, words: list[str]) -> str:
     match words:
         case ["mount", thruster]:
-            bench.mount(thruster)
+            mount(bench, thruster)
             return f"{thruster} is on the bench"
         case ["fault", target, name, *rest] if len(rest) <= 1:
-            bench.fault(target, name, float(rest[0]) if rest else DEFAULT_AMOUNT)
+            fault(bench, target, name, float(rest[0]) if rest else DEFAULT_AMOUNT)
             return f"{target} has fault {name}"
         case ["clear", target]:
-            bench.clear(target)
+            clear(bench, target)
             return f"{target} is in order"
         case ["flow", speed]:
-            bench.set_flow(float(speed))
+            set_flow(bench, float(speed))
             return f"flow is {float(speed)} m/s"
         case ["status"]:
-            return json.dumps(bench.status())
+            return json.dumps(status(bench))
         case _:
             raise ValueError(
                 "control: expected mount THRUSTER, fault TARGET FAULT [AMOUNT], clear TARGET, flow SPEED or status, "
                 f"got {' '.join(words)!r}"
             )
+
+
+def mount(bench: Bench, thruster: str) -> None:
+    """Put another thruster on. Raises ValueError while the rotor turns, WorldError for an unknown name."""
+    bench.world.mount(thruster)
+    bench.log("mount")
+
+
+def fault(bench: Bench, target: str, name: str, amount: float = DEFAULT_AMOUNT) -> None:
+    """A device, or the wire of a device or adapter, goes wrong from now on. Raises ValueError or WorldError.
+
+    `pulled` takes the cable out. `amount` is a share (0..1) or, for `delayed`, seconds.
+    """
+    port, device = _target(bench, target)
+    if port is not None and name == "pulled":
+        port.pull()
+    elif port is not None and name in WIRE_FAULTS:
+        port.wire.fault(name, amount)
+    elif device is not None and name in device.faults:
+        device.fault(name, bench.now())
+    else:
+        known = (*(device.faults if device else ()), *(("pulled", *WIRE_FAULTS) if port else ()))
+        raise ValueError(f"{target}: expected one of {', '.join(known)}, got {name!r}")
+    bench.log("fault", target=target, fault=name, amount=amount)
+
+
+def clear(bench: Bench, target: str) -> None:
+    """The target is in order again; a pulled cable is back, on a new pty under the same name."""
+    port, device = _target(bench, target)
+    if port is not None:
+        port.plug()
+        port.wire.clear()
+    if device is not None:
+        device.clear(bench.now())
+    bench.log("clear", target=target)
+
+
+def set_flow(bench: Bench, speed: float) -> None:
+    """Tunnel flow from now on, m/s."""
+    bench.world.state.flow = speed
+    bench.log("flow", speed=speed)
+
+
+def status(bench: Bench) -> dict[str, object]:
+    """Thruster on the bench, rotation in rev/s, thrust in N, flow in m/s, messages lost per port."""
+    s = bench.world.state
+    return {
+        "thruster": bench.world.mounted,
+        "rotation_rate": s.n,
+        "thrust": s.thrust,
+        "flow_speed": s.flow,
+        "lost": {port.link.name: port.wire.lost for port in bench.ports},
+    }
+
+
+def _target(bench: Bench, name: str) -> tuple[PtyPort | None, SerialDevice | Vesc | None]:
+    check_known(name, [*bench.settings.devices, *bench.adapters], "target")
+    if name in bench.adapters:
+        return bench.adapters[name][1], None
+    if name in bench.serial:
+        device, port, _ = bench.serial[name]
+        return port, device
+    return None, bench.vesc

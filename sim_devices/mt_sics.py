@@ -22,9 +22,9 @@ BOOT_TIME = 2.0
 """s from power-up to the first word."""
 STABLE_WINDOW = 0.5
 """s over which a stable reading may not move by more than `stable_band`."""
-COMMANDS = ("@", "I0", "I1", "I2", "I3", "I4", "S", "SI", "SIR", "Z", "ZI", "T", "TA", "TAC", "TI", "UPD")
+COMMANDS = ("@", "I0", "I1", "I2", "I3", "I4", "I10", "I11", "S", "SI", "SIR", "Z", "ZI", "T", "TA", "TAC", "TI", "UPD")
 LEVEL_1 = ("T", "TA", "TAC", "TI")
-LEVEL_2 = ("SIR", "UPD")
+LEVEL_2 = ("UPD", "I10", "I11")
 
 
 @dataclass(frozen=True, slots=True)
@@ -172,12 +172,9 @@ class MtSics:
     # -- commands ---------------------------------------------------------------------------------------------------
 
     def _answer(self, line: bytes, t: float) -> bytes:
-        if self._fault == "transmission_error":
+        if self._fault == "transmission_error" or not line.isascii():
             return _line("ET")
-        try:
-            words = line.decode("ascii").split()
-        except UnicodeDecodeError:
-            return _line("ET")
+        words = line.decode("ascii").split()
         if not words:
             return b""
         command, arguments = words[0], words[1:]
@@ -192,7 +189,7 @@ class MtSics:
             case "@":
                 self._reset()
                 return self._identity()
-            case "I0" | "I1" | "I2" | "I3" | "I4":
+            case "I0" | "I1" | "I2" | "I3" | "I4" | "I10" | "I11":
                 return self._information(command)
             case "SI":
                 self._streaming = False
@@ -273,25 +270,24 @@ class MtSics:
 
     def _information(self, command: str) -> bytes:
         o = self._options
-        match command:
-            case "I1":
-                return _line('I1 A "012" "2.00" "2.20" "1.00"')
-            case "I2":
-                return _line(f'I2 A "{o.model} {o.capacity / UNITS[o.unit]:.0f} {o.unit}"')
-            case "I3":
-                return _line('I3 A "1.00 0.0.0.0"')
-            case "I4":
-                return self._identity()
-            case _:
-                lines = [f'I0 B {_level(name)} "{name}"' for name in COMMANDS]
-                return b"".join(_line(text) for text in [*lines[:-1], lines[-1].replace("I0 B", "I0 A")])
+        if command == "I0":
+            last = COMMANDS[-1]
+            return b"".join(_line(f'I0 {"A" if c == last else "B"} {_level(c)} "{c}"') for c in COMMANDS)
+        texts = {
+            "I1": '"012" "2.00" "2.20" "1.00"',
+            "I2": f'"{o.model} {o.capacity / UNITS[o.unit]:.0f} {o.unit}"',
+            "I3": '"1.00 0.0.0.0"',
+            "I4": f'"{o.serial}"',
+            "I10": '"SIM"',
+            "I11": f'"{o.model}"',
+        }
+        return _line(f"{command} A {texts[command]}")
 
     def _identity(self) -> bytes:
-        return _line(f'I4 A "{self._options.serial}"')
+        return self._information("I4")
 
     def _reset(self) -> None:
-        """What @ does: stop repeating and waiting, forget half a line. Zero and tare stay (manual: as after power-up
-        but without zero setting)."""
+        """What @ does: as after power-up, but without a new zero."""
         self._streaming, self._pending, self._buffer = False, None, b""
 
 

@@ -12,6 +12,9 @@ import json
 from pathlib import Path
 from typing import Any
 
+from sim_devices.world import WorldSettings
+from sim_devices.world.state import State
+
 
 class TruthLog:
     """Path None: nothing is kept."""
@@ -31,3 +34,26 @@ class TruthLog:
         if self._file is not None:
             self._file.close()
             self._file = None
+
+
+def header_fields(world: WorldSettings) -> dict[str, Any]:
+    """The constants a campaign has to find. C in N/V^2, cell_gain relative, zero_offset in N."""
+    return {
+        "C": {name: each.C for name, each in world.thrusters.items()},
+        "cell_gain": 1.0 + world.cell.gain_error,
+        "zero_offset": world.cell.zero_offset,
+        "effects": {name: dict(table) for name, table in world.effects.items()},
+        "nominal_bus": world.supply.voltage,
+    }
+
+
+def state_fields(s: State) -> dict[str, Any]:
+    """Volts commanded (None: released), volts the rotor answers to, rev/s, A, N, N."""
+    return {
+        "command": s.command if s.driven else None,
+        "volts": round(s.volts, 6),
+        "n": round(s.n, 6),
+        "current": round(s.current, 4),
+        "thrust": round(s.thrust, 6),
+        "force": round(s.force, 6),
+    }

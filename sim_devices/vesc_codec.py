@@ -136,12 +136,12 @@ def values(t: Telemetry, mask: int = ALL_VALUES) -> bytes:
 
 
 def firmware_version(serial: bytes) -> bytes:
-    """FW_VERSION reply: version, hardware name, 12-byte UUID, pairing, test version, hardware type, custom configs."""
+    """The reply to FW_VERSION: version, name, 12-byte UUID, pairing, test version, hardware type, custom configs."""
     return bytes((COMM_FW_VERSION, *FIRMWARE)) + HARDWARE_NAME + b"\0" + serial + b"\0\0" + bytes((0, 0))
 
 
 def crc16(data: bytes) -> int:
-    """XMODEM: polynomial 0x1021, start 0 (util/crc.c); crc16(b"123456789") = 0x31C3."""
+    """XMODEM: polynomial 0x1021, start 0 (util/crc.c); 0x31C3 for the nine digits 1 to 9."""
     crc = 0
     for byte in data:
         crc ^= byte << 8
@@ -151,7 +151,7 @@ def crc16(data: bytes) -> int:
 
 
 def buffer_frames(payload: bytes, to: int, sender: int) -> list[CanFrame]:
-    """A reply to `to` as the firmware sends it (comm_can.c, send_buffer): one short frame, or pieces and a checksum."""
+    """Frames of a reply addressed to `to`: one short frame, or pieces and a checksum (comm_can.c)."""
     if len(payload) <= 6:
         return [CanFrame(PROCESS_SHORT_BUFFER << 8 | to, bytes((sender, 1)) + payload)]
     frames, at = [], 0
