@@ -1,14 +1,13 @@
-"""Bench and campaign as frozen dataclasses. The loader (load_bench, load_campaign) turns TOML into these or raises ConfigError."""
+"""Bench and campaign as frozen dataclasses. `rig.loading` turns TOML into these or raises ConfigError."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-if TYPE_CHECKING:
-    from rig.plan import Plan
+from rig.plan import Plan, TareConfig
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +22,7 @@ class CanBusConfig:
 
 @dataclass(frozen=True, slots=True)
 class DeviceConfig:
-    """`[devices.<name>]`: `kind` is a key of drivers.KINDS, `options` an instance of that kind's own Options dataclass."""
+    """`[devices.<name>]`: `kind` is a key of drivers.KINDS, `options` an instance of that kind's own dataclass."""
 
     name: str
     kind: str
@@ -80,18 +79,6 @@ class BenchConfig:
     proof_voltage: float = 4.0
     """V at which the motor's watchdog is proved: low, but enough to turn the propeller."""
     mount: MountConfig = field(default_factory=MountConfig)
-
-
-@dataclass(frozen=True, slots=True)
-class TareConfig:
-    """`[tare]`: rest measured before the sweep and at zero returns; refused when not stable."""
-
-    duration: float = 3.0
-    max_std_error: float = 0.05
-    """N"""
-    max_drift: float = 0.05
-    """N/s"""
-    attempts: int = 3
 
 
 @dataclass(frozen=True, slots=True)

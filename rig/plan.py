@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
-from rig.config import TareConfig
 from rig.shapes import (
     Hold,
     Move,
@@ -27,8 +26,9 @@ Phase = Literal["tare", "ramp", "hold", "rest", "sine", "free"]
 class Step:
     """One step of a plan.
 
-    The command goes from the previous step's end value to `voltage` with the slew limit inside a `ramp` step of its own;
-    `hold`, `rest` and `tare` keep it. A `sine` step commands `voltage + amplitude * sin(2 pi frequency t)`, t from its start.
+    The command goes from the previous step's end value to `voltage` with the slew limit inside a `ramp` step of its
+    own; `hold`, `rest` and `tare` keep it. A `sine` step commands `voltage + amplitude * sin(2 pi frequency t)`, t from
+    its start.
     """
 
     index: int
@@ -50,7 +50,7 @@ class Step:
 
     @property
     def expected(self) -> float:
-        """s this step takes by plan. A hold until steady: half way between its bounds; a tare: one attempt."""
+        """Seconds this step takes by plan. A hold until steady: half way between its bounds; a tare: one attempt."""
         return (self.min_duration + self.max_duration) / 2 if self.phase == "hold" else self.min_duration
 
     @property
@@ -82,7 +82,7 @@ class FixedDwell:
 
 @dataclass(frozen=True, slots=True)
 class SteadyDwell:
-    """A hold ends once standard error (N) and |drift| (N/s) of the thrust are small: after `min` s, at `max` s at the latest."""
+    """A hold ends once standard error (N) and |drift| (N/s) are small: after `min` s, at `max` s at the latest."""
 
     min: float
     max: float
@@ -118,11 +118,29 @@ class Duration(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Plan:
-    """A shape with its pacing. Iterating yields the steps of one run: tare, then ramps and measurements, zero returns, zero.
+class TareConfig:
+    """`[tare]`: rest measured before the sweep and at zero returns; refused when not stable. Raises PlanError."""
 
-    Each zero return is a ramp to 0, a rest of at least `rest` s until the propeller is at rest (at most `rest + coast_time` s),
-    and a tare. There is one after every `zero_every` units (0: none) and always one at the end.
+    duration: float = 3.0
+    max_std_error: float = 0.05
+    """N"""
+    max_drift: float = 0.05
+    """N/s"""
+    attempts: int = 3
+
+    def __post_init__(self) -> None:
+        require_above_zero("duration", self.duration, "s")
+        require_above_zero("max_std_error", self.max_std_error, "N")
+        require_above_zero("max_drift", self.max_drift, "N/s")
+        require(self.attempts >= 1, f"attempts must be at least 1, but is {self.attempts}")
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A shape with its pacing. Iterating yields the steps of one run: tare, ramps and measurements, zero returns, zero.
+
+    Each zero return is a ramp to 0, a rest of at least `rest` s until the propeller is at rest (at most
+    `rest + coast_time` s), and a tare. There is one after every `zero_every` units (0: none) and always one at the end.
     Raises PlanError on impossible values.
     """
 
@@ -143,10 +161,6 @@ class Plan:
         require(self.zero_every >= 0, f"zero_every must be at least 0 (0: no zero returns), but is {self.zero_every}")
         require_not_negative("rest", self.rest, "s")
         require_not_negative("coast_time", self.coast_time, "s")
-        require_above_zero("tare.duration", self.tare.duration, "s")
-        require_above_zero("tare.max_std_error", self.tare.max_std_error, "N")
-        require_above_zero("tare.max_drift", self.tare.max_drift, "N/s")
-        require(self.tare.attempts >= 1, f"tare.attempts must be at least 1, but is {self.tare.attempts}")
         for move in (move for unit in self.shape.units(1) for move in unit):
             require(
                 steepest(move) <= self.slew * (1 + 1e-9),  # slack: float arithmetic only

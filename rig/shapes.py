@@ -1,12 +1,12 @@
-"""Shapes of a sweep: which voltages, sweeps or sines are measured, in which order. `rig.plan.Plan` puts ramps and tares between."""
+"""Shapes of a sweep: which voltages, sweeps or sines are measured, in which order. `rig.plan` puts the rest between."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import isfinite, pi
 from types import MappingProxyType
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -206,7 +206,7 @@ def steepest(move: Move) -> float:
             return 2 * pi * frequency * amplitude
 
 
-SHAPES = MappingProxyType(
+SHAPES: Mapping[str, type[Any]] = MappingProxyType(
     {
         "staircase": Staircase,
         "interleaved": Interleaved,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from identification.recording import Step as StepRow
-from rig.config import TareConfig
 from rig.guard import Trip
 from rig.messages import LogLine, Point, Request, State
+from rig.plan import TareConfig
 from rig.proof import ProofSettings
 from rig.steady import Online, SteadyEstimator
 

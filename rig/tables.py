@@ -1,0 +1,123 @@
+"""TOML tables into frozen dataclasses, or a ConfigError that names file, key, what was expected and what came."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable, Mapping
+from dataclasses import MISSING, fields, is_dataclass
+from pathlib import Path
+from typing import Any, TypeVar, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
+
+from rig.errors import ConfigError, PlanError
+
+T = TypeVar("T")
+Table = Mapping[str, Any]
+
+
+def read_toml(path: Path, what: str) -> tuple[str, dict[str, Any]]:
+    """Text and content of a TOML file; `what` names it in the error (`bench file`)."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ConfigError(f"{path}: there is no such {what}; give the path of one") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: this {what} can't be read: {error}") from None
+    try:
+        return text, tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from None
+
+
+def joined(prefix: str, key: str) -> str:
+    """Dotted path of a key; a key with a dot is quoted as TOML would."""
+    shown = f'"{key}"' if "." in key else key
+    return f"{prefix}.{shown}" if prefix else shown
+
+
+def refuse_unknown(path: Path, prefix: str, keys: Iterable[str], known: Iterable[str]) -> None:
+    """Raise for the first key that is not known, naming the nearest one that is."""
+    known = sorted(known)
+    for key in keys:
+        if key not in known:
+            near = difflib.get_close_matches(key, known, n=1, cutoff=0.5)
+            hint = f"did you mean {joined(prefix, near[0])}?" if near else f"known are {', '.join(known)}"
+            raise ConfigError(f"{path}: unknown key {joined(prefix, key)}; {hint}")
+
+
+def table_at(path: Path, content: Table, key: str, prefix: str = "", optional: bool = False) -> dict[str, Any]:
+    """The table at `key`; an absent optional one is empty."""
+    if key not in content and optional:
+        return {}
+    if key not in content:
+        raise ConfigError(f"{path}: missing table [{joined(prefix, key)}]")
+    found = content[key]
+    if not isinstance(found, dict):
+        raise ConfigError(f"{path}: {joined(prefix, key)} must be a table, but is {found!r}")
+    return found
+
+
+def decode(cls: type[T], table: Table, path: Path, prefix: str) -> T:
+    """An instance of the dataclass `cls` from a table. Types are strict; a whole number passes for a number."""
+    return construct(cls, values(cls, table, path, prefix), path, prefix)
+
+
+def values(
+    cls: type[Any], table: Table, path: Path, prefix: str, *, elsewhere: Iterable[str] = (), also: Iterable[str] = ()
+) -> dict[str, Any]:
+    """Checked keyword arguments for `cls`, of the keys of `table`.
+
+    Fields of `cls` named in `elsewhere` are no keys; keys in `also` are allowed and left to the caller.
+    """
+    wanted = {field.name: field for field in fields(cls) if field.init and field.name not in tuple(elsewhere)}
+    refuse_unknown(path, prefix, table, (*wanted, *also))
+    hints = get_type_hints(cls)
+    for name, field in wanted.items():
+        if name not in table and field.default is MISSING and field.default_factory is MISSING:
+            raise ConfigError(f"{path}: missing key {joined(prefix, name)} ({_type_said(hints[name])})")
+    return {key: typed(hints[key], value, path, joined(prefix, key)) for key, value in table.items() if key in wanted}
+
+
+def construct(cls: type[T], arguments: Mapping[str, Any], path: Path, prefix: str) -> T:
+    """`cls(**arguments)`; what its own checks refuse becomes an error of this file."""
+    try:
+        return cls(**arguments)
+    except PlanError as error:
+        raise PlanError(f"{path}: [{prefix}]: {error}") from None
+    except ValueError as error:
+        raise ConfigError(f"{path}: [{prefix}]: {error}") from None
+
+
+def typed(hint: Any, value: Any, path: Path, key: str) -> Any:
+    """`value` if it is of the type `hint`; arrays become tuples, text becomes a Path where one is asked for."""
+    if is_dataclass(hint) and isinstance(hint, type) and isinstance(value, dict):
+        return decode(hint, value, path, key)
+    if hint is Path and isinstance(value, str):
+        return Path(value)
+    try:
+        return TypeAdapter(hint).validate_python(_tuples(value), strict=True)
+    except ValidationError as error:
+        reason = error.errors()[0]
+        where = "".join(f"[{part}]" for part in reason["loc"] if isinstance(part, int))
+        came = f"{value!r} ({type(value).__name__})"
+        raise ConfigError(f"{path}: {key}{where} must be {_type_said(hint)}, but is {came}") from None
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
+
+
+WORDS = {"str": "text", "float": "a number", "int": "a whole number", "bool": "true or false"}
+
+
+def _type_said(hint: Any) -> str:
+    """The type in an operator's words."""
+    name = hint.__name__ if isinstance(hint, type) else str(hint)
+    if name in WORDS and isinstance(hint, type):
+        return WORDS[name]
+    said = str(hint).replace("typing.", "").replace("Literal[", "one of [").replace(" | None", "").replace(", ...", "")
+    for short, long in (("tuple[str]", "an array of text"), ("tuple[float]", "an array of numbers")):
+        said = said.replace(short, long)
+    return WORDS.get(said, said)
