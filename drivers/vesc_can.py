@@ -67,8 +67,8 @@ class Options:
     """STATUS messages/s (VESC Tool: CAN Status Rate 1)."""
     supply_rate: float = 50.0
     """STATUS_5 messages/s; 0: not sent, then there is no motor voltage."""
-    thermal_rate: float = 50.0
-    """STATUS_4 messages/s; 0: not sent."""
+    thermal_rate: float = 5.0
+    """STATUS_4 messages/s (CAN Status Rate 2, factory 5 Hz); 0: not sent."""
     fault_every: int = 0
     """Ask for the fault code with every n-th command; 0: never."""
 
