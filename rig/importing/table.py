@@ -1,0 +1,133 @@
+"""Text into rows of cells. A row that is not as the others is refused with its line number, never guessed."""
+
+from __future__ import annotations
+
+import csv
+import difflib
+import unicodedata
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from rig.errors import RecordingError
+from rig.importing.mapping import ColumnRef, FileMap, HeaderValue
+
+FIRST_LINES = 5
+"""Line numbers kept per reason."""
+
+
+@dataclass
+class Refused:
+    """Rows left out, per reason, with the first line numbers."""
+
+    counts: Counter[str] = field(default_factory=Counter)
+    lines: dict[str, list[int]] = field(default_factory=dict)
+
+    def add(self, reason: str, line: int) -> None:
+        self.counts[reason] += 1
+        if self.counts[reason] <= FIRST_LINES:
+            self.lines.setdefault(reason, []).append(line)
+
+    def sentences(self) -> list[str]:
+        return [f"{n} rows left out: {why} (lines {self._where(why)})" for why, n in self.counts.items()]
+
+    def _where(self, reason: str) -> str:
+        more = ", ..." if self.counts[reason] > FIRST_LINES else ""
+        return ", ".join(map(str, self.lines[reason])) + more
+
+
+@dataclass(frozen=True)
+class Table:
+    names: tuple[str, ...]
+    """Of the header; empty without one."""
+    rows: tuple[tuple[int, Sequence[str]], ...]
+    """Line number and cells."""
+    above: tuple[Sequence[str], ...]
+    """Cells of comment and skipped lines."""
+    width: int
+    encoding: str
+    latin: bool
+    """The bytes were not in the encoding asked for, so latin-1 it is."""
+
+
+def decode(data: bytes, encoding: str) -> tuple[str, str]:
+    """Text and the encoding that was used: the one asked for, with or without byte-order mark, else latin-1."""
+    try:
+        return data.decode("utf-8-sig" if encoding.lower() in ("utf-8", "utf8") else encoding), encoding
+    except UnicodeDecodeError:
+        return data.decode("latin-1"), "latin-1"
+    except LookupError as error:
+        raise RecordingError(
+            f"no encoding is called {encoding!r}; give for example utf-8, utf-16 or latin-1"
+        ) from error
+
+
+def read_table(data: bytes, form: FileMap, refused: Refused) -> Table:
+    """Rows of the right width. `refused` is told of the others."""
+    text, encoding = decode(data, form.encoding)
+    above: list[Sequence[str]] = []
+    body: list[tuple[int, Sequence[str]]] = []
+    for number, line in enumerate(text.splitlines(), start=1):
+        if not line.strip() or any(mark in line for mark in form.ignore):
+            continue
+        cells = split(line, form)
+        if number <= form.skip_rows or (form.comment and line.lstrip().startswith(form.comment)):
+            above.append(cells)
+        else:
+            body.append((number, cells))
+    names: tuple[str, ...] = ()
+    if form.header and body:
+        names = tuple(_normal(cell) for cell in body.pop(0)[1])
+    width = form.width or len(names) or _usual_width(body)
+    good = tuple((number, cells) for number, cells in body if len(cells) == width)
+    for number, cells in body:
+        if len(cells) != width:
+            refused.add(f"{'fewer' if len(cells) < width else 'more'} than {width} columns", number)
+    return Table(names, good, tuple(above), width, encoding, encoding != form.encoding)
+
+
+def split(line: str, form: FileMap) -> Sequence[str]:
+    if form.delimiter == "whitespace":
+        return line.split()
+    mark = "\t" if form.delimiter == "tab" else form.delimiter
+    return next(csv.reader([line], delimiter=mark)) if '"' in line else line.split(mark)
+
+
+def _usual_width(body: Sequence[tuple[int, Sequence[str]]]) -> int:
+    counts = Counter(len(cells) for _, cells in body)
+    return counts.most_common(1)[0][0] if counts else 0
+
+
+def _normal(name: str) -> str:
+    """Header text for comparison: the two Unicode micro signs are one, NFKC."""
+    return unicodedata.normalize("NFKC", name).strip()
+
+
+def index_of(table: Table, column: ColumnRef) -> int | None:
+    """0-based place of a column, None when there is none of that name or number."""
+    if isinstance(column, int):
+        return column - 1 if 1 <= column <= table.width else None
+    wanted = _normal(column)
+    return table.names.index(wanted) if wanted in table.names else None
+
+
+def no_such_column(table: Table, column: ColumnRef) -> RecordingError:
+    if isinstance(column, int) or not table.names:
+        return RecordingError(f"column {column!r} is not there: rows have {table.width} columns, counted from 1")
+    near = difflib.get_close_matches(column, table.names, 1, cutoff=0.4)
+    hint = f"the nearest is {near[0]!r}" if near else f"there are {', '.join(map(repr, table.names))}"
+    return RecordingError(f"no column is called {column!r}; {hint}; is this the right map?")
+
+
+def header_value(table: Table, name: str, wanted: HeaderValue) -> float:
+    """A number from the lines above the data. Raises RecordingError."""
+    for cells in table.above:
+        if cells[0].strip() == wanted.line and len(cells) >= wanted.field:
+            try:
+                return float(cells[wanted.field - 1])
+            except ValueError as error:
+                found = cells[wanted.field - 1]
+                raise RecordingError(
+                    f"{name}: field {wanted.field} of {wanted.line} is {found!r}, not a number"
+                ) from error
+    raise RecordingError(f"{name}: no line above the data starts with {wanted.line!r} and has {wanted.field} fields")
