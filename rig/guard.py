@@ -1,7 +1,7 @@
 """The guard: asked before every command whether the motor may go on. Pure: readings and time are arguments.
 
-It trips on a limit, on a value that is too old or NaN, on its own lateness, on a dead link, on a recorder that is gone or
-late, and on an operator who is gone. Whoever gets a Trip commands 0 V at once.
+It trips on a limit, on a value that is too old or NaN, on its own lateness, on a dead link, on a recorder that is gone
+or late, and on an operator who is gone. Whoever gets a Trip commands 0 V at once.
 """
 
 from __future__ import annotations
@@ -103,7 +103,7 @@ def allowances(loop_rate: float) -> Allowances:
 def watches(
     limits: Iterable[LimitConfig], streams: Iterable[Stream], essential: Iterable[str] = ()
 ) -> tuple[Watch, ...]:
-    """Resolve configured limits against the bench's streams; `essential` channels are watched for age and NaN in any case.
+    """Resolve configured limits against the bench's streams; `essential` channels are watched for age and NaN anyway.
 
     Channels are `<stream>.<channel>`. Raises ValueError naming a channel that no stream has.
     """

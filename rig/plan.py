@@ -238,3 +238,11 @@ def _said(move: Move) -> str:
             return f"a sine of {amplitude:g} V at {frequency:g} Hz"
         case _:
             return f"a sweep at {steepest(move):g} V/s"
+
+
+def require_steps(steps: tuple[Step, ...], max_voltage: float) -> None:
+    """Raise PlanError for no steps at all and for a command beyond `max_voltage` V."""
+    require(len(steps) > 0, "the plan has no steps: nothing would be measured")
+    for step in steps:
+        sentence = f"step {step.index} commands {step.peak:g} V, but at most {max_voltage:g} V are allowed"
+        require(step.peak <= max_voltage, sentence)

@@ -1,4 +1,4 @@
-"""Proof that the motor stops by itself when nobody commands it (reliability.md, rule 2). Pure: time and rotation are given.
+"""Proof that the motor stops by itself when nobody commands it (reliability.md, rule 2). Pure: time is given.
 
 At a low voltage the rig falls silent and measures how long the motor's own watchdog takes. The motor is refused when it
 does not slow down, slows down too late, does not come to rest, or moves again afterwards.
@@ -12,7 +12,7 @@ from typing import Literal, NamedTuple
 TURNING = 4.0
 """Times the rest rate: from here on the propeller certainly turns."""
 SLOWED = 0.8
-"""Share of the speed below which the motor has been let go; a rotor in water loses a fifth within tenths of a second."""
+"""Share of the speed below which the motor has been let go; in water a rotor loses a fifth in tenths of a second."""
 SLOWING_TIME = 0.3
 """s after the watchdog's limit for the rotor to lose that fifth and for the status message to arrive."""
 SPIN_TIME = (0.5, 2.0)
@@ -35,6 +35,12 @@ class ProofSettings:
     def expected(self) -> float:
         """Expected duration in s: half the silence allowed, and the rest."""
         return self.voltage / self.slew + SPIN_TIME[0] + self.watchdog_limit / 2 + QUIET_TIME + 0.5
+
+    @property
+    def worst(self) -> float:
+        """Longest duration in s that still passes."""
+        turning = self.voltage / self.slew + SPIN_TIME[1]
+        return self.coast_time + turning + self.watchdog_limit + self.coast_time + QUIET_TIME
 
 
 class Proved(NamedTuple):
@@ -131,13 +137,13 @@ class Proof:
                 return ProofStep(0.0)
         if not self._slowed and elapsed > limits.watchdog_limit + SLOWING_TIME:
             cause = (
-                f"the motor's own watchdog is refused: {elapsed:.2f} s without a command and the propeller still turns, "
+                f"the motor's own watchdog is refused: {elapsed:.2f} s without a command and still it turns, "
                 f"{limits.watchdog_limit:g} s are allowed; set the device's command timeout"
             )
             return ProofStep(0.0, Refused(cause))
         if elapsed > limits.watchdog_limit + limits.coast_time:
             cause = (
-                f"the motor's own watchdog is refused: the propeller is not at rest {elapsed:.2f} s after the last command, "
+                f"the motor's own watchdog is refused: not at rest {elapsed:.2f} s after the last command, "
                 f"{limits.watchdog_limit:g} s and {limits.coast_time:g} s of coasting are allowed"
             )
             return ProofStep(0.0, Refused(cause))

@@ -7,111 +7,77 @@ except to 0 V, where every stop, trip, pause and lapse goes at once. The first c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from itertools import accumulate
 from math import copysign, isfinite, pi, sin
 from types import MappingProxyType
-from typing import Literal
 
-from identification.recording import Step as StepRow
-from rig.config import BenchConfig, CampaignConfig
-from rig.errors import PlanError
-from rig.guard import MIN_LATENESS
-from rig.messages import LogLine, Point, Request, State
-from rig.plan import Phase, SteadyDwell, Step
-from rig.proof import Proof, ProofSettings, Refused
-from rig.steady import Window
-from rig.ticks import Outcome, Output, Settings, Tick
+from rig.holding import Holding
+from rig.journal import Journal
+from rig.messages import Request, State
+from rig.plan import Step, require_steps
+from rig.proof import Proof, Refused
+from rig.stopping import Stop, is_rest, turning
+from rig.taring import Taring
+from rig.ticks import Outcome, Output, Settings, Tick, settings_for
 
-REST_CONFIRM = 0.2
-"""s of measured rest before a stop counts as confirmed: ten status messages at 50 Hz."""
+__all__ = ["Sequencer", "settings_for"]
+
 EPSILON = 1e-9
 """s and V, slack for float arithmetic."""
-PROOF_INDEX = -1
-"""Index in `/steps` of the watchdog proof, which is no step of the plan."""
-
-
-def settings_for(campaign: CampaignConfig, thruster: str) -> Settings:
-    """Settings of one thruster's run."""
-    bench, plan = campaign.bench, campaign.plan
-    steady = plan.dwell if isinstance(plan.dwell, SteadyDwell) else None
-    slew = min(plan.slew, bench.slew)
-    return Settings(
-        thruster=thruster,
-        max_voltage=bench.max_voltage,
-        slew=slew,
-        rest_rate=bench.rest_rate,
-        coast_time=bench.coast_time,
-        tare=campaign.tare,
-        lapse=max(5 / bench.loop_rate, MIN_LATENESS) + 1 / bench.loop_rate,
-        max_std_error=steady.max_std_error if steady else None,
-        max_drift=steady.max_drift if steady else None,
-        proof=proof_settings(bench, slew) if campaign.prove_watchdog else None,
-    )
-
-
-def proof_settings(bench: BenchConfig, slew: float) -> ProofSettings:
-    return ProofSettings(bench.proof_voltage, slew, bench.rest_rate, bench.watchdog_limit, bench.coast_time)
 
 
 class Sequencer:
-    """One run of one thruster, advanced once per tick of the control loop. Raises PlanError for steps it may not run."""
+    """One run of one thruster, advanced once per control period. Raises PlanError for steps it may not run."""
 
     def __init__(self, steps: Iterable[Step], settings: Settings) -> None:
         self._steps = tuple(steps)
         self._settings = settings
-        if not self._steps:
-            raise PlanError("the plan has no steps: nothing would be measured")
-        for step in self._steps:
-            if step.peak > settings.max_voltage:
-                raise PlanError(
-                    f"step {step.index} commands {step.peak:g} V, the bench allows {settings.max_voltage:g} V"
-                )
+        require_steps(self._steps, settings.max_voltage)
+        self._after = tuple(accumulate((s.expected for s in reversed(self._steps)), initial=0.0))[-2::-1]
         self._state: State = "tare"
         self._position = 0
         self._command = 0.0
         self._silent = False
         self._last: float | None = None
+        self._dt = 0.0
         self._since = 0.0
         self._target = 0.0
         self._rate = settings.slew
         self._approach = False
-        self._window = Window(0.0, settings.estimator)
-        self._attempt = 1
+        self._holding = Holding(0.0, self._steps[0], settings)
+        self._taring = Taring(0.0, 0.0, settings.tare, settings.estimator)
         self._tare: float | None = None
         self._proof = Proof(settings.proof) if settings.proof else None
         self._time_to_zero: float | None = None
-        self._rest_since: float | None = None
+        self._stop = Stop(0.0, settings.rest_rate, settings.coast_time)
         self._outcome: Outcome = "running"
         self._cause = ""
         self._trip_told = False
         self._release = False
         self._stop_confirmed: bool | None = None
-        self._points: list[Point] = []
-        self._rows: list[StepRow] = []
-        self._events: list[LogLine] = []
+        self._journal = Journal()
 
     def advance(self, tick: Tick) -> Output:
         """Decide one tick. Raises ValueError when time runs backwards or is not finite."""
         if not isfinite(tick.time) or (self._last is not None and tick.time < self._last):
             raise ValueError(f"tick time must be finite and must not run backwards: {tick.time} s after {self._last} s")
-        self._points, self._rows, self._events = [], [], []
+        self._journal.clear()
         if self._last is None:
             self._last = tick.time
             self._begin(tick.time)
-        dt, self._last = tick.time - self._last, tick.time
-        self._interrupt(tick, dt)
-        while HANDLERS[self._state](self, tick, dt):
-            dt = 0.0
+        self._dt, self._last = tick.time - self._last, tick.time
+        self._interrupt(tick)
+        while (handler := HANDLERS.get(self._state)) and handler(self, tick):
+            self._dt = 0.0
         return self._output(tick.time)
 
-    # what comes from outside
-
-    def _interrupt(self, tick: Tick, dt: float) -> None:
+    def _interrupt(self, tick: Tick) -> None:
         if self._state == "run_done":
             return
         if tick.trip:
             self._tripped(tick.time, tick.trip.cause)
-        if self._state not in ("paused", "stopping") and dt > self._settings.lapse:
-            cause = f"the control loop gave no tick for {dt:.2f} s, {self._settings.lapse:.2f} s are allowed"
+        if self._state not in ("paused", "stopping") and self._dt > self._settings.lapse:
+            cause = f"the control loop gave no tick for {self._dt:.2f} s, {self._settings.lapse:.2f} s are allowed"
             self._tripped(tick.time, cause)
         for request in tick.requests:
             if self._state != "stopping":
@@ -122,7 +88,7 @@ class Sequencer:
         if self._state != "stopping":
             self._halt(time, "tripped", cause)
         elif not self._trip_told:
-            self._say(time, "trip", f"while stopping: {cause}")
+            self._journal.say(time, "trip", f"while stopping: {cause}")
         self._trip_told = True
 
     def _obey(self, request: Request, time: float) -> None:
@@ -132,16 +98,16 @@ class Sequencer:
             case "pause" if self._state != "paused":
                 self._end_row(time, cut=True)
                 self._zero(time, "paused")
-                self._say(time, "info", f"paused in step {self._position}: command 0 V")
+                self._journal.say(time, "info", f"paused in step {self._position}: command 0 V")
             case "resume" if self._state == "paused":
                 self._end_row(time)
-                self._say(time, "info", f"resumed: step {self._position} is retaken")
+                self._journal.say(time, "info", f"resumed: step {self._position} is retaken")
                 self._begin(time)
             case "skip" if self._state in ("hold", "sine", "free"):
-                self._say(time, "info", f"step {self._position} was ended early by the operator, its data are kept")
+                self._journal.say(time, "info", f"step {self._position} ended early on request, its data are kept")
                 self._finish_step(time)
             case "pause" | "resume" | "skip":
-                self._say(time, "warning", f"{request.kind} was ignored: it means nothing in state {self._state}")
+                self._journal.say(time, "warning", f"{request.kind} ignored: it means nothing in state {self._state}")
             case _:
                 pass  # notes, leases and the like are the controller's
 
@@ -150,13 +116,11 @@ class Sequencer:
         self._end_row(time, cut=True)
         self._zero(time, "stopping")
         self._outcome, self._cause = outcome, cause
-        if outcome != "completed":
-            self._say(time, "trip" if outcome == "tripped" else "warning", f"{cause}: command 0 V")
+        self._journal.say(time, "trip" if outcome == "tripped" else "warning", f"{cause}: command 0 V")
 
     def _zero(self, time: float, state: State) -> None:
         self._state, self._since, self._command, self._silent = state, time, 0.0, False
-
-    # going from step to step
+        self._stop = Stop(time, self._settings.rest_rate, self._settings.coast_time)
 
     def _begin(self, time: float) -> None:
         """Begin the step at the present position, by an approach ramp where the command is elsewhere."""
@@ -170,8 +134,9 @@ class Sequencer:
         if self._approach:
             self._state, self._target, self._rate = "ramp", entry, self._settings.slew
             return
-        self._state, self._target, self._attempt = step.phase, step.voltage, 1
-        self._window = Window(time + step.settle, self._settings.estimator)
+        self._state, self._target = step.phase, step.voltage
+        self._holding = Holding(time, step, self._settings)
+        self._taring = Taring(time, step.min_duration, self._settings.tare, self._settings.estimator)
         travel = abs(step.voltage - step.from_voltage)
         self._rate = travel / step.min_duration if step.swept else self._settings.slew
 
@@ -188,53 +153,20 @@ class Sequencer:
     def _finish_step(self, time: float) -> None:
         """End a step that has measured: a hold gives its point."""
         if self._state == "hold":
-            self._take_point(time)
+            point = self._holding.point(time, self._tare or 0.0)
+            if point is not None:
+                self._journal.points.append(point)
+            if point is None or not point.steady:
+                self._journal.say(time, "warning", f"{'not steady' if point else 'no point'}, {self._holding}")
         self._next(time)
 
-    def _take_point(self, time: float) -> None:
-        window, step = self._window, self._steps[self._position]
-        if window.count == 0:
-            self._say(time, "warning", f"step {self._position} at {step.voltage:g} V has no thrust samples: no point")
-            return
-        thrust = window.mean - (self._tare or 0.0)
-        steady = self._steady()
-        point = Point(
-            self._position, step.voltage, thrust, window.std_error, time - self._since, steady, self._settings.thruster
-        )
-        self._points.append(point)
-        if not steady:
-            self._say(time, "warning", f"step {self._position} at {step.voltage:g} V is not steady: {window}")
-
-    def _steady(self) -> bool:
-        """Always True for a fixed dwell, which has no thresholds."""
-        error, drift = self._settings.max_std_error, self._settings.max_drift
-        return error is None or drift is None or self._window.steady(error, drift)
-
     def _end_row(self, time: float, cut: bool = False) -> None:
-        """Row for `/steps`. A hold, sine or tare that was cut short is `free`, so that nobody takes it for a whole one."""
-        if time <= self._since:
-            return
-        step = self._steps[self._position]
-        index, phase, volts = self._position, step.phase, step.voltage
-        match self._state:
-            case "proving":
-                index, phase, volts = PROOF_INDEX, "free", self._settings.proof.voltage if self._settings.proof else 0.0
-            case "paused":
-                phase, volts = "rest", 0.0
-            case "ramp":
-                phase, volts = "ramp", self._command if cut else self._target
-            case "stopping":
-                phase, volts = "rest", 0.0
-            case _ if cut:
-                phase = "free"
-        self._rows.append(StepRow(index, phase, volts, self._since, time))
-
-    def _say(self, time: float, level: Literal["info", "warning", "trip", "error"], text: str) -> None:
-        self._events.append(LogLine(time, level, text))
+        volts = self._target if self._state == "ramp" and not cut else self._command
+        self._journal.row(self._state, self._steps[self._position], volts, self._since, time, cut=cut)
 
     # one handler per state; True: the state has changed, ask the new one in this same tick
 
-    def _proving(self, tick: Tick, dt: float) -> bool:
+    def _proving(self, tick: Tick) -> bool:
         assert self._proof is not None
         volts, verdict = self._proof.advance(tick.time, tick.rotation)
         self._silent = volts is None
@@ -245,41 +177,36 @@ class Sequencer:
             self._halt(tick.time, "tripped", verdict.cause)
             return True
         self._time_to_zero = verdict.time_to_zero_s
-        self._say(tick.time, "info", f"watchdog proved: at rest {verdict.time_to_zero_s:.2f} s after the last command")
+        text = f"watchdog proved: at rest {verdict.time_to_zero_s:.2f} s after the last command"
+        self._journal.say(tick.time, "info", text)
         self._end_row(tick.time)
         self._proof = None
         self._begin(tick.time)
         return True
 
-    def _taring(self, tick: Tick, dt: float) -> bool:
-        window, wanted, step = self._window, self._settings.tare, self._steps[self._position]
-        window.add(tick.thrust)
-        if tick.time - self._since < step.min_duration - EPSILON:
-            return False
-        if window.steady(wanted.max_std_error, wanted.max_drift):
-            self._tare = window.mean
-            self._say(tick.time, "info", f"tare {window}")
-            self._next(tick.time)
-            return True
-        allowed = f"{wanted.max_std_error:g} N and {wanted.max_drift:g} N/s are allowed"
-        told = f"tare attempt {self._attempt} of {wanted.attempts} is not stable: {window}; {allowed}"
-        self._attempt += 1
-        if self._attempt <= wanted.attempts:
-            self._say(tick.time, "warning", told)
-            self._end_row(tick.time, cut=True)
-            self._since, self._window = tick.time, Window(tick.time, self._settings.estimator)
-            return False
-        if self._tare is None:
-            self._halt(tick.time, "tripped", told)
-            return True
-        self._say(tick.time, "warning", f"{told}; the last tare of {self._tare:.4f} N stays in use")
-        self._end_row(tick.time, cut=True)
-        self._since = tick.time
-        self._next(tick.time)
-        return True
+    def _zeroing(self, tick: Tick) -> bool:
+        """The first tare must be stable; a later one that is not leaves the one before in use."""
+        verdict, mean, text = self._taring.advance(tick.time, tick.thrust)
+        match verdict:
+            case "waiting":
+                return False
+            case "accepted":
+                self._tare = mean
+                self._journal.say(tick.time, "info", text)
+                self._next(tick.time)
+            case "failed" if self._tare is None:
+                self._halt(tick.time, "tripped", text)
+            case _:
+                kept = f"; the last tare of {self._tare:.4f} N stays in use" if verdict == "failed" else ""
+                self._journal.say(tick.time, "warning", text + kept)
+                self._end_row(tick.time, cut=True)
+                self._since = tick.time
+                if verdict == "failed":
+                    self._next(tick.time)
+        return verdict != "again"
 
-    def _ramping(self, tick: Tick, dt: float) -> bool:
-        gap, most = self._target - self._command, self._rate * dt
+    def _ramping(self, tick: Tick) -> bool:
+        gap, most = self._target - self._command, self._rate * self._dt
         if abs(gap) <= most + EPSILON:
             self._command = self._target
             self._next(tick.time)
@@ -287,68 +214,51 @@ class Sequencer:
         self._command += copysign(most, gap)
         return False
 
-    def _holding(self, tick: Tick, dt: float) -> bool:
-        step = self._steps[self._position]
-        self._window.add(tick.thrust)
-        elapsed = tick.time - self._since + EPSILON
-        thresholds = self._settings.max_std_error is not None
-        if elapsed >= step.max_duration or (thresholds and elapsed >= step.min_duration and self._steady()):
-            self._finish_step(tick.time)
-            return True
-        return False
+    def _hold(self, tick: Tick) -> bool:
+        if not self._holding.advance(tick.time, tick.thrust):
+            return False
+        self._finish_step(tick.time)
+        return True
 
-    def _resting(self, tick: Tick, dt: float) -> bool:
+    def _resting(self, tick: Tick) -> bool:
         step = self._steps[self._position]
-        elapsed, at_rest = tick.time - self._since + EPSILON, self._at_rest(tick.rotation)
+        elapsed, at_rest = tick.time - self._since + EPSILON, is_rest(tick.rotation, self._settings.rest_rate)
         if elapsed >= step.max_duration or (elapsed >= step.min_duration and at_rest):
             if not at_rest:
-                self._say(tick.time, "warning", f"not at rest after {elapsed:.1f} s at 0 V: {_said(tick.rotation)}")
+                text = f"not at rest after {elapsed:.1f} s at 0 V: {turning(tick.rotation)}"
+                self._journal.say(tick.time, "warning", text)
             self._next(tick.time)
             return True
         return False
 
-    def _waving(self, tick: Tick, dt: float) -> bool:
+    def _waving(self, tick: Tick) -> bool:
         step = self._steps[self._position]
         elapsed = tick.time - self._since
         value = step.voltage + step.amplitude * sin(2 * pi * step.frequency * elapsed)
-        most = self._settings.slew * dt
+        most = self._settings.slew * self._dt
         self._command += min(max(value - self._command, -most), most)
-        return self._timed(tick, dt)
+        return self._timed(tick)
 
-    def _timed(self, tick: Tick, dt: float) -> bool:
+    def _timed(self, tick: Tick) -> bool:
         if tick.time - self._since < self._steps[self._position].max_duration - EPSILON:
             return False
         self._next(tick.time)
         return True
 
-    def _stopping(self, tick: Tick, dt: float) -> bool:
-        """0 V until measured rest; after half the coast time by the motor's second way to stop as well."""
-        elapsed, coast_time = tick.time - self._since, self._settings.coast_time
-        self._rest_since = (
-            None if not self._at_rest(tick.rotation) else tick.time if self._rest_since is None else self._rest_since
-        )
-        if self._rest_since is not None and tick.time - self._rest_since >= REST_CONFIRM - EPSILON:
-            self._stopped(tick.time, True, "info", f"at rest {elapsed:.2f} s after command 0 V")
-        elif elapsed >= coast_time:
-            text = f"STOP NOT CONFIRMED {elapsed:.2f} s after command 0 V: {_said(tick.rotation)}; cut the power"
-            self._stopped(tick.time, False, "error", text)
-        self._release = self._stop_confirmed is False or (self._rest_since is None and elapsed >= coast_time / 2)
+    def _stopping(self, tick: Tick) -> bool:
+        """0 V until measured rest."""
+        confirmed, self._release = self._stop.advance(tick.time, tick.rotation)
+        if confirmed is not None:
+            self._end_row(tick.time)
+            self._stop_confirmed, self._state = confirmed, "run_done"
+            after = f"{tick.time - self._since:.2f} s after command 0 V: {turning(tick.rotation)}"
+            text = f"at rest {after}" if confirmed else f"STOP NOT CONFIRMED {after}; cut the power"
+            self._journal.say(tick.time, "info" if confirmed else "error", text)
         return False
-
-    def _stopped(self, time: float, confirmed: bool, level: Literal["info", "error"], text: str) -> None:
-        self._end_row(time)
-        self._say(time, level, text)
-        self._stop_confirmed, self._state = confirmed, "run_done"
-
-    def _waiting(self, tick: Tick, dt: float) -> bool:
-        return False
-
-    def _at_rest(self, rotation: float | None) -> bool:
-        return rotation is not None and abs(rotation) <= self._settings.rest_rate
 
     def _output(self, time: float) -> Output:
         step, elapsed = self._steps[self._position], time - self._since
-        expected, after = step.expected, sum(s.expected for s in self._steps[self._position + 1 :])
+        expected, after = step.expected, self._after[self._position]
         if self._state == "proving" and self._settings.proof:
             expected, after = self._settings.proof.expected, expected + after
         over = self._state in ("stopping", "run_done")
@@ -361,9 +271,9 @@ class Sequencer:
             step_expected=expected,
             remaining=0.0 if over else max(expected - elapsed, 0.0) + after,
             release=self._release,
-            points=tuple(self._points),
-            rows=tuple(self._rows),
-            events=tuple(self._events),
+            points=tuple(self._journal.points),
+            rows=tuple(self._journal.rows),
+            events=tuple(self._journal.events),
             tare=self._tare,
             time_to_zero_s=self._time_to_zero,
             outcome=self._outcome,
@@ -373,21 +283,16 @@ class Sequencer:
         )
 
 
-def _said(rotation: float | None) -> str:
-    return "the rotation rate is unknown" if rotation is None else f"the propeller turns {rotation:.2f} rev/s"
-
-
-HANDLERS: Mapping[State, Callable[[Sequencer, Tick, float], bool]] = MappingProxyType(
+HANDLERS: Mapping[State, Callable[[Sequencer, Tick], bool]] = MappingProxyType(
     {
         "proving": Sequencer._proving,
-        "tare": Sequencer._taring,
+        "tare": Sequencer._zeroing,
         "ramp": Sequencer._ramping,
-        "hold": Sequencer._holding,
+        "hold": Sequencer._hold,
         "rest": Sequencer._resting,
         "sine": Sequencer._waving,
         "free": Sequencer._timed,
-        "paused": Sequencer._waiting,
         "stopping": Sequencer._stopping,
-        "run_done": Sequencer._waiting,
     }
 )
+"""Transition table: what a state does in a tick. `paused` and `run_done` wait."""

@@ -30,7 +30,7 @@ class SteadyEstimator(Protocol):
 
 
 class Online:
-    """Constant memory: batch means for the error (Law and Kelton, Simulation Modeling and Analysis, 9.5.3), a line for drift."""
+    """Constant memory: batch means for the error (Law, Simulation Modeling and Analysis, 9.5.3), a line for drift."""
 
     def __init__(self) -> None:
         self._size = 1
@@ -86,14 +86,12 @@ class Window:
     def __init__(self, start: float, estimator: Callable[[], SteadyEstimator]) -> None:
         self._start = start
         self._estimate = estimator()
-        self.count = 0
 
     def add(self, rows: tuple[tuple[float, float], ...]) -> None:
         """(s, N) rows."""
         for t, value in rows:
             if t >= self._start and not isnan(value):
                 self._estimate.add(t, value)
-                self.count += 1
 
     @property
     def mean(self) -> float:

@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from identification.recording import Step as StepRow
-from rig.guard import Trip
+from rig.config import BenchConfig, CampaignConfig
+from rig.guard import MIN_LATENESS, Trip
 from rig.messages import LogLine, Point, Request, State
-from rig.plan import TareConfig
+from rig.plan import SteadyDwell, TareConfig
 from rig.proof import ProofSettings
 from rig.steady import Online, SteadyEstimator
 
@@ -87,3 +88,26 @@ class Output:
     stop_confirmed: bool | None = None
     """Measured: True at rest, False STOP NOT CONFIRMED, None not known yet."""
     done: bool = False
+
+
+def settings_for(campaign: CampaignConfig, thruster: str) -> Settings:
+    """Settings of one thruster's run."""
+    bench, plan = campaign.bench, campaign.plan
+    steady = plan.dwell if isinstance(plan.dwell, SteadyDwell) else None
+    slew = min(plan.slew, bench.slew)
+    return Settings(
+        thruster=thruster,
+        max_voltage=bench.max_voltage,
+        slew=slew,
+        rest_rate=bench.rest_rate,
+        coast_time=bench.coast_time,
+        tare=campaign.tare,
+        lapse=max(5 / bench.loop_rate, MIN_LATENESS) + 1 / bench.loop_rate,
+        max_std_error=steady.max_std_error if steady else None,
+        max_drift=steady.max_drift if steady else None,
+        proof=proof_settings(bench, slew) if campaign.prove_watchdog else None,
+    )
+
+
+def proof_settings(bench: BenchConfig, slew: float) -> ProofSettings:
+    return ProofSettings(bench.proof_voltage, slew, bench.rest_rate, bench.watchdog_limit, bench.coast_time)

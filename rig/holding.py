@@ -1,0 +1,52 @@
+"""A hold at constant voltage, of fixed length or until steady, and the point it gives. Pure: time is given."""
+
+from __future__ import annotations
+
+from math import isnan
+
+from rig.messages import Point
+from rig.plan import Step
+from rig.steady import Window
+from rig.ticks import Settings
+
+EPSILON = 1e-9
+"""s, slack for float arithmetic."""
+
+
+class Holding:
+    """One hold from `start` s on. Its first `step.settle` s are left out of the mean."""
+
+    def __init__(self, start: float, step: Step, settings: Settings) -> None:
+        self._start, self._step, self._settings = start, step, settings
+        self._window = Window(start + step.settle, settings.estimator)
+
+    def advance(self, time: float, rows: tuple[tuple[float, float], ...]) -> bool:
+        """True when the hold is over. `rows`: (s, N) thrust samples since the last call, raw."""
+        self._window.add(rows)
+        elapsed = time - self._start + EPSILON
+        until_steady = self._settings.max_std_error is not None
+        return elapsed >= self._step.max_duration or (
+            until_steady and elapsed >= self._step.min_duration and self._steady()
+        )
+
+    def point(self, time: float, tare: float) -> Point | None:
+        """The point of a hold that ends at `time` s; None with too few samples for an error. `tare` in N is subtracted."""
+        if isnan(self._window.std_error):
+            return None
+        return Point(
+            step=self._step.index,
+            voltage=self._step.voltage,
+            thrust=self._window.mean - tare,
+            std_error=self._window.std_error,
+            duration=time - self._start,
+            steady=self._steady(),
+            thruster=self._settings.thruster,
+        )
+
+    def _steady(self) -> bool:
+        """Always True for a fixed dwell, which has no thresholds."""
+        error, drift = self._settings.max_std_error, self._settings.max_drift
+        return error is None or drift is None or self._window.steady(error, drift)
+
+    def __str__(self) -> str:
+        return f"step {self._step.index} at {self._step.voltage:g} V: {self._window}"

@@ -1,0 +1,48 @@
+"""After a stop: "at 0" means measured at rest, not "we sent 0" (reliability.md, rule 5). Pure: time is given."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+REST_CONFIRM = 0.2
+"""s of measured rest before a stop counts as confirmed: ten status messages at 50 Hz."""
+EPSILON = 1e-9
+"""s, slack for float arithmetic."""
+
+
+class StopStep(NamedTuple):
+    """`confirmed`: True at rest, False not within the coast time, None still waiting."""
+
+    confirmed: bool | None
+    release: bool
+    """Use the motor's second way to stop as well."""
+
+
+class Stop:
+    """One wait for rest, from command 0 V at `start` s on."""
+
+    def __init__(self, start: float, rest_rate: float, coast_time: float) -> None:
+        self._start, self._rest_rate, self._coast_time = start, rest_rate, coast_time
+        self._rest_since: float | None = None
+
+    def advance(self, time: float, rotation: float | None) -> StopStep:
+        """`rotation` in rev/s, None: unknown, which is no rest. After half the coast time the motor is released too."""
+        if not is_rest(rotation, self._rest_rate):
+            self._rest_since = None
+        elif self._rest_since is None:
+            self._rest_since = time
+        elapsed = time - self._start
+        if self._rest_since is not None and time - self._rest_since >= REST_CONFIRM - EPSILON:
+            return StopStep(True, release=False)
+        if elapsed >= self._coast_time:
+            return StopStep(False, release=True)
+        return StopStep(None, release=self._rest_since is None and elapsed >= self._coast_time / 2)
+
+
+def is_rest(rotation: float | None, rest_rate: float) -> bool:
+    return rotation is not None and abs(rotation) <= rest_rate
+
+
+def turning(rotation: float | None) -> str:
+    """The rotation in words, for messages."""
+    return "the rotation rate is unknown" if rotation is None else f"the propeller turns {rotation:.2f} rev/s"
