@@ -46,13 +46,13 @@ class Bench:
         """Open one device (and its bus, if it is the first on it); returns its identity."""
         instrument = self.instruments[name]
         try:
-            for bus in self.buses.values():
-                bus.open()
+            if KINDS[self.config.devices[name].kind].link == "can":
+                self.buses[self.config.devices[name].options.bus].open()
             identity = instrument.open()
         except DriverLinkError as error:
-            raise LinkError(f"{name}: {error}") from error
+            raise LinkError(_about(name, error)) from error
         except DriverDeviceError as error:
-            raise DeviceError(f"{name}: {error}") from error
+            raise DeviceError(_about(name, error)) from error
         self.identities[name] = identity
         return identity
 
@@ -77,3 +77,9 @@ def build(config: BenchConfig) -> Bench:
         else:
             instruments[name] = kind.build(name, device.options)
     return Bench(config, buses, instruments)
+
+
+def _about(name: str, error: Exception) -> str:
+    """The driver's sentence, led by the device's name if it does not begin with it."""
+    text = str(error)
+    return text if text.startswith(f"{name}:") else f"{name}: {text}"

@@ -29,9 +29,9 @@ from rig.preflight import all_checks, device_checks
 from rig.readings import Readings
 from rig.recorder_link import RecorderLink, recording_path
 from rig.recorder_messages import EventRow, StepRow
-from rig.sequencer import Sequencer, settings_for
+from rig.sequencer import Sequencer
 from rig.status import Status
-from rig.ticks import Output, Tick
+from rig.ticks import Output, Tick, settings_for
 
 Level = Literal["info", "warning", "trip", "error"]
 
@@ -72,23 +72,30 @@ class CampaignRun:
         )
 
     def run(self) -> None:
-        """The whole campaign; never raises what belongs to bench or operator."""
+        """The whole campaign; never raises what belongs to bench or operator. Motor at zero and all closed, whatever is raised."""
         try:
-            self._connect()
-            self._preflight()
-            for index in range(len(self.status.thrusters)):
-                self.status.run = index
-                self._mount()
-                self._record()
-            self.status.outcome = "completed"
-        except Stopped as stop:
-            self._conclude(stop.outcome, str(stop))
-        except RigError as error:
-            self._say("error", str(error))
-            self._conclude("aborted", str(error))
-        finally:
+            try:
+                self._stages()
+                self.status.outcome = "completed"
+            except Stopped as stop:
+                self._conclude(stop.outcome, str(stop))
+            except RigError as error:
+                self._conclude("aborted", str(error))
             self._rest()
-        self._farewell()
+            self._farewell()
+        finally:
+            if self.status.outcome in ("", "running"):
+                self.status.outcome, self.status.cause = "aborted", "the controller failed; its log says where"
+            self._rest()
+            self._close()
+
+    def _stages(self) -> None:
+        self._connect()
+        self._preflight()
+        for index in range(len(self.status.thrusters)):
+            self.status.run = index
+            self._mount()
+            self._record()
 
     # stages
 
@@ -171,8 +178,10 @@ class CampaignRun:
         self.loop.begin_recording(t0_ns)
         self.status.files.append(str(path))
         self._await_recorder(lambda: self.recorder.ready, f"open {path}")
-        prove = self.campaign.prove_watchdog and self.status.run == 0
-        sequencer = Sequencer(tuple(self.campaign.plan), settings_for(self.campaign, self.status.thruster, prove))
+        settings = settings_for(self.campaign, self.status.thruster)
+        if self.status.run > 0:
+            settings = replace(settings, proof=None)  # the motor controller is the one that was proved in the first run
+        sequencer = Sequencer(self.campaign.plan, settings)
         self.ledger.write("run_start", thruster=self.status.thruster, recording=str(path), recording_t0_ns=t0_ns)
         output = self._sequence(sequencer, t0_ns)
         self._close_recording(output)
@@ -299,14 +308,13 @@ class CampaignRun:
             self._say("error", f"release was refused: {error}")
 
     def _farewell(self) -> None:
-        """Show the end to front ends that are there, then close everything."""
+        """Show the end to front ends that are there."""
         self.status.state = "done"
         end = self.loop.now + FAREWELL
         while self.loop.now < end and self.loop.clients.connected:
             self.loop.tick(self.motor, lambda _: IDLE)
-        self.close()
 
-    def close(self) -> None:
+    def _close(self) -> None:
         self.recorder.shut_down()
         self.loop.clients.close()
         remove(socket_path(self.folder, SOCKET_NAME))

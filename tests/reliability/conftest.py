@@ -1,0 +1,30 @@
+"""Each promise prints its measured number (reliability.md, promise 35): build/reliability.json, quoted by the README."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+RESULTS = Path(__file__).parents[2] / "build" / "reliability.json"
+
+
+@pytest.fixture(scope="session")
+def measured() -> Iterator[dict[str, dict[str, float | str]]]:
+    numbers: dict[str, dict[str, float | str]] = {}
+    yield numbers
+    RESULTS.parent.mkdir(exist_ok=True)
+    RESULTS.write_text(json.dumps(numbers, indent=1) + "\n")
+
+
+@pytest.fixture
+def report(measured: dict[str, dict[str, float | str]]) -> Callable[[str, float, str], None]:
+    """Keep a measured number under its name."""
+
+    def keep(name: str, value: float, unit: str) -> None:
+        measured[name] = {"value": round(value, 4), "unit": unit}
+        print(f"{name}: {value:.3f} {unit}")
+
+    return keep

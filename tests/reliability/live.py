@@ -1,0 +1,173 @@
+"""A simulated bench in its own process, a controller on it, and the truth log that tells what the motor really did."""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from rig.link import Peer, connect
+from rig.messages import Request, Snapshot
+from rig.run import start_controller
+from rig.runs import Run
+
+PROJECT = Path(__file__).parents[2]
+WATCHDOG = 0.5
+"""s, the device's own command timeout in benches/simulated/world.toml."""
+TICK = 0.02
+"""s, loop period of benches/simulated/bench.toml."""
+SLACK = 0.03
+"""s of scheduling noise allowed on a loaded two-core machine."""
+
+CAMPAIGN = """
+[campaign]
+name = "reliability"
+bench = "bench.toml"
+thrusters = ["T1"]
+output = "out"
+unattended = {unattended}
+expected_C = 0.5
+prove_watchdog = {prove}
+
+[tare]
+duration = 1.0
+max_std_error = 0.2
+max_drift = 1.0
+
+[plan]
+kind = "levels"
+voltages = [6.0, -6.0, 10.0, -10.0]
+slew = 24.0
+zero_every = 2
+[plan.dwell]
+kind = "fixed"
+duration = {dwell}
+"""
+
+
+@dataclass
+class LiveBench:
+    """Bench files in `folder`; the bench runs until the context ends."""
+
+    folder: Path
+    process: subprocess.Popen[str]
+    runs: list[Run] = field(default_factory=list)
+
+    def truth(self) -> list[dict[str, Any]]:
+        lines = (self.folder / "ports" / "truth.jsonl").read_text().split("\n")
+        return [json.loads(line) for line in lines[:-1]]
+
+    def start(self, *, unattended: bool = True, prove: bool = False, dwell: float = 2.0, **names: str) -> Run:
+        """A controller process on this bench, listening."""
+        text = CAMPAIGN.format(unattended=str(unattended).lower(), prove=str(prove).lower(), dwell=dwell)
+        for old, new in names.items():
+            text = text.replace(old, new)
+        campaign = self.folder / "campaign.toml"
+        campaign.write_text(text)
+        folder = self.folder / "out" / f"run-{len(self.runs)}"
+        folder.mkdir(parents=True)
+        self.runs.append(start_controller(campaign, folder, ()))
+        return self.runs[-1]
+
+    def tell(self, *words: str) -> None:
+        """Script a fault over the bench's control port."""
+        control = str(self.folder / "ports" / "control")
+        subprocess.run([sys.executable, "-m", "sim_devices", "tell", control, *words], check=True, cwd=PROJECT)
+
+
+@contextmanager
+def live_bench(folder: Path, edit: Callable[[str], str] = lambda text: text) -> Iterator[LiveBench]:
+    """Start the bench of benches/simulated with its world file edited; everything is ended at the end."""
+    shutil.copy(PROJECT / "benches/simulated/bench.toml", folder)
+    world = folder / "world.toml"
+    world.write_text(edit((PROJECT / "benches/simulated/world.toml").read_text()))
+    process = subprocess.Popen(
+        [sys.executable, "-m", "sim_devices", str(world)], stdout=subprocess.PIPE, text=True, cwd=PROJECT
+    )
+    assert process.stdout is not None
+    bench = LiveBench(folder, process)
+    try:
+        for line in process.stdout:
+            if line.strip() == "ready":
+                break
+        yield bench
+    finally:
+        for run in bench.runs:
+            end(run.pid)
+        process.terminate()
+        process.wait(10)
+        process.stdout.close()
+
+
+def end(pid: int) -> None:
+    """Kill a controller that is still there, and collect it."""
+    try:
+        if os.waitpid(pid, os.WNOHANG) == (0, 0):
+            os.kill(pid, signal.SIGKILL)
+            os.waitpid(pid, 0)
+    except (ChildProcessError, ProcessLookupError):
+        return
+
+
+@dataclass
+class FrontEnd:
+    """A front end that attends and never draws."""
+
+    peer: Peer
+    last: Snapshot | None = None
+
+    def until(self, wanted: Callable[[Snapshot], bool], timeout: float = 40.0) -> Snapshot:
+        """Follow the run, start it when it waits for that, until a snapshot is as wanted."""
+        deadline = time.monotonic() + timeout
+        asked = False
+        while time.monotonic() < deadline and not self.peer.closed:
+            self.peer.send(Request("lease"))
+            select.select([self.peer], [], [], 0.1)
+            for message in self.peer.receive():
+                assert isinstance(message, Snapshot)
+                self.last = message
+                if wanted(message):
+                    return message
+                if message.state == "preflight" and not asked and len(message.checks) > 5:
+                    asked = True
+                    self.peer.send(Request("start"))
+        raise AssertionError(f"not reached within {timeout} s; last: {self.last}")
+
+
+def attach(run: Run) -> FrontEnd:
+    return FrontEnd(connect(Path(run.socket), "the controller"))
+
+
+def turning(volts: float) -> Callable[[Snapshot], bool]:
+    """Is a hold of that voltage going on, and has the propeller answered?"""
+    return lambda s: s.state == "hold" and abs(s.command - volts) < 0.01 and bool(s.progress and s.progress.step_elapsed > 0.5)
+
+
+def zero_after(truth: list[dict[str, Any]], t_ns: int) -> float:
+    """s from `t_ns` until the drive no longer drives: command 0, or released. Fails when it drives again later."""
+    changes = [line for line in truth if line["event"] in ("command", "timeout") and line["t_ns"] >= t_ns]
+    zero = next(line for line in changes if line["event"] == "timeout" or line["value"] == 0)
+    driven_again = [line for line in changes if line["t_ns"] > zero["t_ns"] and line.get("value")]
+    assert not driven_again, f"the motor was driven again: {driven_again[:3]}"
+    return (zero["t_ns"] - t_ns) * 1e-9
+
+
+def at_rest(bench: LiveBench, timeout: float = 5.0) -> bool:
+    """Does the rotor come to rest (|n| < 0.5 rev/s) by the truth log?"""
+    deadline = time.monotonic() + timeout
+    while time.monotonic() < deadline:
+        states = [line for line in bench.truth() if line["event"] == "state"]
+        if abs(states[-1]["n"]) < 0.5:
+            return True
+        select.select([], [], [], 0.1)
+    return False
