@@ -108,7 +108,7 @@ class MtSics:
             raise ValueError(f"load cell: expected one of {', '.join(self.faults)}, got {name!r}")
         if name == "reboot":
             self._reset()
-            self._zero = self._tare = 0.0
+            self._buffer, self._zero, self._tare = b"", 0.0, 0.0
             self._rate = self._options.rate
             self._boots_at = t + BOOT_TIME
             return
@@ -288,7 +288,7 @@ class MtSics:
 
     def _reset(self) -> None:
         """What @ does: as after power-up, but without a new zero."""
-        self._streaming, self._pending, self._buffer = False, None, b""
+        self._streaming, self._pending = False, None
 
 
 def _level(command: str) -> int:

@@ -37,7 +37,7 @@ def decode(line: bytes) -> CanFrame | None:
         return None
     if identifier > (0x1FFFFFFF if extended else 0x7FF) or length > 8 or len(data) != (0 if remote else length):
         return None
-    return CanFrame(identifier, data, extended, remote, length)
+    return CanFrame(identifier, data, extended, remote, length if remote else 0)
 
 
 class Adapter:

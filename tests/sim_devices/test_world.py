@@ -107,7 +107,7 @@ def test_an_effect_changes_the_prediction(name):
 
 def test_what_is_not_named_is_exactly_absent():
     world = World(read_world(PLAIN), np.random.default_rng(1))
-    assert not (world._command or world._hydro or world._stand or world._cell or world._clips or world._faults)
+    assert not any((world._command, world._hydro, world._stand, world._cell, world._clips, world._faults))
     assert np.array_equal(thrust({}), thrust({}, flow=((0.0, 0.0),)))
 
 
@@ -163,7 +163,14 @@ def test_a_clipping_cell_clips_its_noise_too():
 def test_noise_has_the_size_it_was_given_and_repeats_with_its_seed():
     noise = {"thrust": {"white": 0.3, "slow": 0.4, "slow_time": 0.05}}
     first, second, other = (
-        run(read_world({**PLAIN, "noise": noise}), [0.0], [0.0], 60.0, rates={"thrust": 50.0}, rng=np.random.default_rng(s))
+        run(
+            read_world({**PLAIN, "noise": noise}),
+            [0.0],
+            [0.0],
+            60.0,
+            rates={"thrust": 50.0},
+            rng=np.random.default_rng(s),
+        )
         for s in (5, 5, 6)
     )
     assert np.array_equal(first["thrust"].value, second["thrust"].value)
