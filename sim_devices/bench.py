@@ -57,6 +57,7 @@ class Bench:
         world_rng, wire_rng, self._cross_rng = np.random.default_rng(settings.seed).spawn(3)
         self._wire_rng = wire_rng
         self.world = World(settings.world, world_rng)
+        self.control = ControlSocket(settings.links / "control")  # first: it refuses a second bench on these links
         self._start_ns = time.monotonic_ns()
         self._epoch = datetime.now(UTC)
         self._steps = 0
@@ -70,7 +71,6 @@ class Bench:
         self.adapters = {name: (Adapter(), self._port(name, None)) for name in settings.can.adapters}
         for name, options in settings.devices.items():
             self._add(name, options)
-        self.control = ControlSocket(settings.links / "control")
         self._script = _script(settings.faults)
         self.log("header", seed=settings.seed, **header_fields(settings.world))
 

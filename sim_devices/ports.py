@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import contextlib
+import fcntl
 import os
 import select
 import shutil
 import socket
+import sys
 import tempfile
+import termios
 import tty
 from collections.abc import Callable
 from math import inf
 from pathlib import Path
 
+from sim_devices.tables import WorldError
 from sim_devices.wire import Wire
 
 READ_SIZE = 4096
+HOST_BUFFER = 4000
+"""bytes a host may leave unread, as with the kernel's buffer of a real port (4095). More would lie in the pty's own
+buffer, survive the flush with which a host opens a port, and be read as new."""
 RETRY = 0.005
 """s until a full pty is tried again."""
 
@@ -77,14 +84,22 @@ class PtyPort:
     def flush(self, t: float) -> None:
         """Hand the host what has arrived by t; what its buffer does not take waits."""
         while self.plugged and (data := self.wire.ready(t)):
-            try:
-                count = os.write(self._master, data)
-            except BlockingIOError:
-                count = 0
+            count = self._write(data) if len(data) <= HOST_BUFFER - self._unread() else 0
             self.wire.taken(count)
             if count < len(data):
                 self._retry_at = t + RETRY
                 return
+
+    def _write(self, data: bytes) -> int:
+        try:
+            return os.write(self._master, data)
+        except BlockingIOError:
+            return 0
+
+    def _unread(self) -> int:
+        """Bytes the host has not read yet."""
+        count = fcntl.ioctl(self._slave, termios.FIONREAD, bytes(4))
+        return int.from_bytes(count, sys.byteorder)
 
 
 class ControlSocket:
@@ -94,6 +109,9 @@ class ControlSocket:
     """
 
     def __init__(self, link: Path) -> None:
+        """Raises WorldError when a bench answers at this link already."""
+        if _answers(link):
+            raise WorldError(f"{link}: a simulated bench runs here already; stop it, or give this one other --links")
         self.link = link
         self._folder = tempfile.mkdtemp(prefix="sim_bench_")
         self.path = f"{self._folder}/control"
@@ -137,6 +155,15 @@ class ControlSocket:
         if self.link.is_symlink() and str(self.link.readlink()).startswith(self._folder):
             self.link.unlink()
         shutil.rmtree(self._folder, ignore_errors=True)
+
+
+def _answers(control: Path) -> bool:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
+        try:
+            client.connect(str(control.resolve()))
+        except OSError:
+            return False
+        return True
 
 
 def ask(control: Path, line: str, timeout: float = 5.0) -> str:

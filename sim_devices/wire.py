@@ -73,17 +73,17 @@ class Wire:
 
     def ready(self, t: float) -> bytes:
         """The bytes that have arrived by t: the rest of a message begun, or the next one. Empty: nothing."""
-        if self._started:
-            return self._started
         while self._queue and self._queue[0][0] <= t - MAX_AGE:
             self._queue.popleft()
             self.lost += 1
-        if self._queue and self._queue[0][0] <= t:
-            self._started = self._queue.popleft()[1]
-        return self._started
+        if self._started:
+            return self._started
+        return self._queue[0][1] if self._queue and self._queue[0][0] <= t else b""
 
     def taken(self, count: int) -> None:
-        """The host's buffer took `count` of the bytes that `ready` gave."""
+        """The host's buffer took `count` of the bytes that `ready` gave. A message not begun can still grow old."""
+        if count and not self._started:
+            self._started = self._queue.popleft()[1]
         self._started = self._started[count:]
 
     def unplug(self) -> None:

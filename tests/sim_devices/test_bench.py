@@ -206,3 +206,22 @@ def test_a_world_that_cannot_be_ends_with_status_2(tmp_path):
     (tmp_path / "w.toml").write_text("seeed = 1\n")
     with pytest.raises(RuntimeError, match="did you mean 'seed'"), running(tmp_path / "w.toml", tmp_path / "ports"):
         pass
+
+
+def test_a_second_bench_on_the_same_links_is_refused(bench):
+    with pytest.raises(RuntimeError, match="runs here already"), running(WORLD, bench.links):
+        pass
+    assert "T1" in bench.tell("status")
+
+
+def test_what_a_dead_host_left_unread_is_gone_when_the_next_one_opens(bench):
+    serial = pytest.importorskip("serial")
+    with Host(bench.links / "load_cell") as host:
+        host.send(b"SIR\r\n")
+        wait_for(lambda: '"load_cell": 0' not in bench.tell("status"), "the buffer to be full")
+        host.send(b"@\r\n")
+        begin = time.monotonic()
+        wait_for(lambda: time.monotonic() > begin + 0.5, "the answer to be dropped")
+    with serial.Serial(str(bench.links / "load_cell"), 38400, timeout=PATIENCE) as port:
+        port.write(b"I4\r\n")
+        assert port.readline() == b'I4 A "B021002593"\r\n'
