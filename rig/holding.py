@@ -30,7 +30,7 @@ class Holding:
         )
 
     def point(self, time: float, tare: float) -> Point | None:
-        """The point of a hold that ends at `time` s; None with too few samples for an error. `tare` in N is subtracted."""
+        """The point of a hold that ends at `time` s, less `tare` N; None with too few samples for an error."""
         if isnan(self._window.std_error):
             return None
         return Point(

@@ -101,8 +101,7 @@ def typed(hint: Any, value: Any, path: Path, key: str) -> Any:
     except ValidationError as error:
         reason = error.errors()[0]
         where = "".join(f"[{part}]" for part in reason["loc"] if isinstance(part, int))
-        came = f"{value!r} ({type(value).__name__})"
-        raise ConfigError(f"{path}: {key}{where} must be {_type_said(hint)}, but is {came}") from None
+        raise ConfigError(f"{path}: {key}{where} must be {_type_said(hint)}, but is {value!r}") from None
 
 
 def _tuples(value: Any) -> Any:
@@ -115,6 +114,8 @@ WORDS = {"str": "text", "float": "a number", "int": "a whole number", "bool": "t
 def _type_said(hint: Any) -> str:
     """The type in an operator's words."""
     name = hint.__name__ if isinstance(hint, type) else str(hint)
+    if hint is Path:
+        return "a path"
     if name in WORDS and isinstance(hint, type):
         return WORDS[name]
     said = str(hint).replace("typing.", "").replace("Literal[", "one of [").replace(" | None", "").replace(", ...", "")
