@@ -17,9 +17,9 @@ from scipy.optimize import brentq
 from scipy.stats import norm
 from scipy.stats import t as student
 
-from identification.noise import MIN_SAMPLES
+from identification.noise import MIN_SAMPLES, NoiseModel
 from identification.recording import Floats
-from identification.regression import LinearFit, correlated_std, least_squares
+from identification.regression import LinearFit, block_noise, correlated_std, least_squares
 from identification.verdicts import Underfit, underfit
 
 Method = Literal["wls", "ls"]
@@ -62,6 +62,8 @@ class Estimate:
     excess_std: float | None
     internal: LinearFit | None
     """The fit before any excess was added."""
+    noise: tuple[NoiseModel, ...] = ()
+    """Of each block, for even samples."""
 
     @property
     def birge_ratio(self) -> float | None:
@@ -76,13 +78,11 @@ class Estimate:
         fit = self.fit
         missing = () if fit.deficiency is None else fit.deficiency.names
         lost = any(bool(contrast[fit.index(name)]) for name in missing)
-        if lost or fit.dof <= 0:
+        if lost or (fit.dof <= 0 and self.internal is None):
             return Spread(float("nan"), 0.0, float("nan"))
-        plain = (
-            float(np.sqrt(max(contrast @ fit.cov @ contrast, 0.0))) if fit.deficiency is None else _part(fit, contrast)
-        )
-        if self.rows.even and min(b.stop - b.start for b in self.rows.blocks) >= MIN_SAMPLES:
-            std, dof = correlated_std(fit, contrast, self.rows.blocks)
+        plain = _part(fit, contrast)
+        if self.noise:
+            std, dof = correlated_std(fit, contrast, self.noise)
             return Spread(std, dof, plain)
         if self.internal is None or self.rows.std_error is None:
             return Spread(plain, float(fit.dof), plain)
@@ -151,7 +151,10 @@ def estimate(rows: Rows, method: Method = "wls") -> Estimate:
     0.993
     """
     if rows.even or rows.std_error is None or method == "ls":
-        return Estimate(rows, least_squares(rows.H, rows.y, rows.names), None, None, None)
+        fit = least_squares(rows.H, rows.y, rows.names)
+        long = rows.even and min(b.stop - b.start for b in rows.blocks) >= MIN_SAMPLES
+        noise = block_noise(rows.H, fit.residual, rows.blocks) if long else ()
+        return Estimate(rows, fit, None, None, None, noise)
     internal = least_squares(rows.H, rows.y, rows.names, rows.std_error)
     verdict = _judge(rows, internal)
     if not verdict.underfitted:

@@ -9,21 +9,21 @@ the mean has a mixture of normals as posterior, summed up by a standard deviatio
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from scipy.fft import dct
-from scipy.special import ndtr
+from scipy.special import logsumexp, ndtr
 from scipy.stats import t as student
 
 from identification.recording import Floats
 
-SHARES = (0.03, 0.1, 0.3, 0.6, 0.85, 0.97, 1.0)
-"""Share of the variance that is correlated, grid of the posterior."""
-TAU_COUNT = 14
+SHARES = (0.0, 0.03, 0.1, 0.3, 0.6, 0.85, 0.97, 1.0)
+"""Share of the variance that is correlated, grid of the posterior; white noise has half of the prior."""
 TAU_MIN = 0.5
-"""Samples."""
+"""Samples; the grid of time constants goes up by sqrt(2)."""
 TAU_MAX = 0.4
 """Longest time constant as a fraction of the window: slower noise looks like drift and is told by the drift slope."""
 BIN_GROWTH = 1.2
@@ -66,22 +66,21 @@ def _octaves(values: Floats) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class _Grid:
-    """Everything of the posterior that depends on the number of samples only."""
+    """Everything of the posterior that depends on the number of samples only.
+
+    K shapes (first order, then flicker, each by time constant), S shares, B frequency bins, G = S K grid points.
+    """
 
     starts: np.ndarray[tuple[int], np.dtype[np.intp]]
     counts: Floats
+    """Coefficients in each bin, (B,)."""
     centre: Floats
     """cycles per sample, (B,)"""
-    shapes: Floats
-    """Unit-variance spectra (K, B): row 0 white, then first order, then flicker."""
-    shape_mean: Floats
-    """Variance of the mean for each shape, (K,)."""
-    mix_shape: np.ndarray[tuple[int], np.dtype[np.intp]]
-    mix_share: Floats
-    inverse: Floats
-    """1 / spectrum (G, B) of each grid point."""
-    log_volume: Floats
+    spectra: Floats
+    """Unit-variance spectra (G, B)."""
+    log_spectra: Floats
     mean_variance: Floats
+    """Variance of the mean under each of them, (G,)."""
     log_prior: Floats
 
 
@@ -92,34 +91,28 @@ def _bins(n: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     return np.array(edges, dtype=np.intp)
 
 
-@lru_cache(maxsize=256)
-def _grid(n: int) -> _Grid:
+def _constants(n: int) -> int:
+    """How many time constants the grid of a window of n samples has."""
+    return 2 + int(2 * np.log2(max(TAU_MAX * n / TAU_MIN, 4.0)))
+
+
+@lru_cache(maxsize=512)
+def _grid(n: int, constants: int) -> _Grid:
     edges = _bins(n)
     counts = np.diff(edges).astype(np.float64)
     inside = edges[:-1, None] + (counts[:, None] - 1) * np.linspace(0, 1, SAMPLES_PER_BIN)
-    tau = np.geomspace(TAU_MIN, max(4 * TAU_MIN, TAU_MAX * n), TAU_COUNT)
-    first = ar1_spectrum(inside.ravel() / (2 * n), tau).reshape(TAU_COUNT, -1, SAMPLES_PER_BIN).mean(axis=2)
+    tau = TAU_MIN * 2.0 ** (np.arange(constants) / 2)
+    first = ar1_spectrum(inside.ravel() / (2 * n), tau).reshape(constants, -1, SAMPLES_PER_BIN).mean(axis=2)
     first_mean = ar1_mean_variance(n, tau)
-    shapes = np.vstack([np.ones((1, counts.size)), first, _octaves(first)])
-    shape_mean = np.concatenate([[1.0 / n], first_mean, _octaves(first_mean)])
-    coloured = np.arange(1, len(shapes))
-    share = np.concatenate([[0.0], np.repeat(SHARES, coloured.size)])
-    index = np.concatenate([[0], np.tile(coloured, len(SHARES))]).astype(np.intp)
-    spectra = (1 - share)[:, None] + share[:, None] * shapes[index]
-    prior = np.concatenate([[0.5], np.full(share.size - 1, 0.5 / (share.size - 1))])
-    return _Grid(
-        edges[:-1] - 1,
-        counts,
-        inside.mean(axis=1) / (2 * n),
-        shapes,
-        shape_mean,
-        index,
-        share,
-        1.0 / spectra,
-        np.log(spectra) @ counts,
-        (1 - share) / n + share * shape_mean[index],
-        np.log(prior),
-    )
+    shapes = np.vstack([first, _octaves(first)])
+    shape_mean = np.concatenate([first_mean, _octaves(first_mean)])
+    share = np.array(SHARES)[:, None]
+    spectra = ((1 - share)[:, :, None] + share[:, :, None] * shapes).reshape(-1, counts.size)
+    mean_variance = ((1 - share) / n + share * shape_mean).ravel()
+    prior = np.full((len(SHARES), len(shapes)), 0.5 / (len(SHARES) - 1) / len(shapes))
+    prior[0] = 0.5 / len(shapes)
+    centre = inside.mean(axis=1) / (2 * n)
+    return _Grid(edges[:-1] - 1, counts, centre, spectra, np.log(spectra), mean_variance, np.log(prior.ravel()))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,11 +133,7 @@ class NoiseModel:
 
     def spectrum(self, frequency: Floats) -> Floats:
         """Posterior mean of the variance of a cosine coefficient at each frequency (cycles per sample, > 0)."""
-        level = np.zeros(len(self.grid.shapes))
-        mass = self.weight * self.variance
-        np.add.at(level, self.grid.mix_shape, mass * self.grid.mix_share)
-        level[0] += mass @ (1 - self.grid.mix_share)
-        binned = level @ self.grid.shapes
+        binned = (self.weight * self.variance) @ self.grid.spectra
         out: Floats = np.exp(np.interp(np.log(frequency), np.log(self.grid.centre), np.log(binned)))
         return out
 
@@ -154,10 +143,9 @@ class NoiseModel:
         A least-squares parameter or a slope is such a sum: this is its sandwich covariance in the cosine domain.
         """
         power: Floats = np.square(dct(coefficients, norm="ortho"))
-        binned = np.add.reduceat(power[1:], self.grid.starts) / self.grid.counts
+        binned = np.add.reduceat(power[1:], self.grid.starts)
         keep = self.weight > 1e-6
-        spectra = self.grid.counts / self.grid.inverse[keep]
-        total = spectra @ binned + power[0] * self.n * self.grid.mean_variance[keep]
+        total = self.grid.spectra[keep] @ binned + power[0] * self.n * self.grid.mean_variance[keep]
         return _mixture_interval(self.weight[keep], np.sqrt(self.variance[keep] * total), self.n - 1)
 
     def mean_std(self) -> tuple[float, float]:
@@ -197,29 +185,73 @@ def _half_width(weight: Floats, std: Floats, outside: float) -> float:
     return float(np.sqrt(low * high))
 
 
-def fit_noise(residual: Floats, first: int = 1) -> NoiseModel:
+@dataclass(frozen=True, eq=False)
+class _Likelihood:
+    n: int
+    grid: _Grid
+    log: Floats
+    """(G,) with the scale integrated out."""
+    variance: Floats
+    """(G,) posterior mean of the scale."""
+
+
+def _likelihood(residual: Floats, constants: int, lost: Floats | None) -> _Likelihood:
+    n = residual.size
+    if n < MIN_SAMPLES:
+        raise ValueError(f"fit_noise needs at least {MIN_SAMPLES} samples, got {n}")
+    grid = _grid(n, constants)
+    power = dct(residual - residual.mean(), norm="ortho")[1:] ** 2
+    binned = np.add.reduceat(power, grid.starts)
+    counts = grid.counts
+    if lost is not None:
+        left = np.clip(1 - lost[1:], 0.0, 1.0)
+        counts = np.add.reduceat(left, grid.starts)
+    used = float(counts.sum())
+    total = np.maximum((1 / grid.spectra) @ binned, 1e-300)
+    log = -0.5 * grid.log_spectra @ counts - 0.5 * used * np.log(total)
+    variance = total / max(used - 2, 1.0) * (total > 1e-299)
+    return _Likelihood(n, grid, log, variance)
+
+
+def fit_noise(residual: Floats, lost: Floats | None = None) -> NoiseModel:
     """Posterior over spectra of an evenly sampled residual (n,), NaN-free, n >= 5.
 
-    The mean never enters (cosine coefficient 0). `first=2` leaves coefficient 1 out too: it holds 98.6 % of any linear
-    drift, so the noise is then judged as if the drift had been removed.
+    The mean never enters (cosine coefficient 0). `lost` (n,) says what share of each cosine coefficient a fit took out
+    of the residual (its leverage there, see `leverage`): such coefficients count for less (restricted likelihood).
 
     >>> model = fit_noise(np.random.default_rng(0).normal(0.0, 2.0, 4000))
     >>> bool(abs(model.std - 2.0) < 0.1)
     True
     """
-    n = residual.size
-    if n < MIN_SAMPLES:
-        raise ValueError(f"fit_noise needs at least {MIN_SAMPLES} samples, got {n}")
-    grid = _grid(n)
-    power = dct(residual - residual.mean(), norm="ortho")[1:] ** 2
-    binned = np.add.reduceat(power, grid.starts)
-    counts, log_volume = grid.counts, grid.log_volume
-    if first == 2:  # coefficient 1 is a bin of its own
-        binned[0] = 0.0
-        log_volume = log_volume + np.log(grid.inverse[:, 0])
-    n_used = float(counts.sum()) - (first - 1)
-    total = np.maximum(grid.inverse @ binned, 1e-300)
-    log_weight = grid.log_prior - 0.5 * log_volume - 0.5 * n_used * np.log(total)
+    found = _likelihood(residual, _constants(residual.size), lost)
+    return _posterior(found, found.log + found.grid.log_prior)
+
+
+def fit_noise_jointly(residuals: Sequence[Floats]) -> tuple[NoiseModel, ...]:
+    """Windows of one run, each n >= 5: they share the kind and time constant of the noise, not its size or share.
+
+    One short window hardly knows its own correlation time; a dozen of them together do.
+    """
+    constants = _constants(max((r.size for r in residuals), default=0))
+    found = [_likelihood(residual, constants, None) for residual in residuals]
+    logs = [(f.log + f.grid.log_prior).reshape(len(SHARES), -1) for f in found]
+    by_shape = [logsumexp(log, axis=0) for log in logs]
+    together = np.sum(by_shape, axis=0)
+    return tuple(
+        _posterior(f, (log + together - own).ravel()) for f, log, own in zip(found, logs, by_shape, strict=True)
+    )
+
+
+def _posterior(found: _Likelihood, log_weight: Floats) -> NoiseModel:
     weight = np.exp(log_weight - log_weight.max())
-    variance = total / max(n_used - 2, 1.0)
-    return NoiseModel(n, weight / weight.sum(), variance * (total > 1e-299), grid)
+    return NoiseModel(found.n, weight / weight.sum(), found.variance, found.grid)
+
+
+def leverage(basis: Floats) -> Floats:
+    """Share (n,) of each cosine coefficient that least squares on orthonormal columns (n, p) takes out of its residual.
+
+    >>> leverage(np.full((4, 1), 0.5)).round(6).tolist()
+    [1.0, 0.0, 0.0, 0.0]
+    """
+    out: Floats = np.sum(np.square(dct(basis, axis=0, norm="ortho")), axis=1)
+    return out

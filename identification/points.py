@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.holds import Window, from_steps, from_voltage, overlap_free
 from identification.recording import Channel, Floats, Recording
-from identification.steady import MeanEstimate, settled_estimate
+from identification.steady import MeanEstimate, settled_estimates
 
 MIN_HOLD_SAMPLES = 8
 """Fewer thrust samples in an unmarked window make no hold: it may be a slow sine or a ramp sampled slowly."""
@@ -97,35 +98,34 @@ def reduce_to_points(recording: Recording, voltage: Channel, thrust: Channel) ->
 
     When `voltage` is a measured channel, a point's voltage is its mean over the window that was kept.
     """
-    windows = find_windows(recording, voltage, thrust)
-    step = resolution(thrust, windows)
-    found, skipped = [], 0
-    for window in windows:
+    windows, samples, skipped = [], [], 0
+    for window in find_windows(recording, voltage, thrust):
         time, value = thrust.window(window.t_start, window.t_end)
         good = np.isfinite(value)
         skipped += int(good.size - good.sum())
         if good.any():
-            estimate = _not_below(settled_estimate(time[good], value[good], thrust.noise_std), step)
-            level = _level(window, voltage, estimate)
-            if np.isfinite(level):
-                found.append((level, estimate, window.phase))
-    if not found:
-        return None
-    largest = max(abs(estimate.mean) for _, estimate, _ in found)
-    points = tuple(Point(level, e, phase, _steady(e, largest)) for level, e, phase in found)
-    return Points(recording.recording_id, points, skipped)
+            windows.append(window)
+            samples.append((time[good], value[good]))
+    step = resolution([value for _, value in samples])
+    estimates = [_not_below(e, step) for e in settled_estimates(samples, thrust.noise_std)]
+    levels = [_level(window, voltage, e) for window, e in zip(windows, estimates, strict=True)]
+    largest = max((abs(e.mean) for e in estimates), default=0.0)
+    points = tuple(
+        Point(level, e, window.phase, _steady(e, largest))
+        for window, level, e in zip(windows, levels, estimates, strict=True)
+        if np.isfinite(level)
+    )
+    return Points(recording.recording_id, points, skipped) if points else None
 
 
-def resolution(channel: Channel, windows: tuple[Window, ...]) -> float:
-    """Smallest step between neighbouring samples inside the windows, N: the cell's least digit. 0 when none differ."""
-    steps = []
-    for window in windows:
-        _, value = channel.window(window.t_start, window.t_end)
-        moved = np.abs(np.diff(value))
-        moved = moved[moved > 0]
-        if moved.size:
-            steps.append(float(moved.min()))
-    return min(steps, default=0.0)
+def resolution(windows: Sequence[Floats]) -> float:
+    """Smallest step between neighbouring samples inside the windows, N: the cell's least digit. 0 when none differ.
+
+    >>> resolution([np.array([1.0, 1.5, 1.0]), np.array([9.0, 9.0])])
+    0.5
+    """
+    moved = [np.abs(np.diff(value)) for value in windows]
+    return min((float(m[m > 0].min()) for m in moved if np.any(m > 0)), default=0.0)
 
 
 def _not_below(estimate: MeanEstimate, step: float) -> MeanEstimate:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.linalg import cholesky, solve_triangular
 
-from identification.noise import fit_noise
+from identification.noise import NoiseModel, fit_noise, leverage
 from identification.recording import Floats
 
 RANK_TOLERANCE = 1e-10
@@ -132,20 +133,30 @@ def _deficiency(unseen: Floats, scale: Floats, names: tuple[str, ...]) -> Defici
     return Deficiency(tuple(combinations))
 
 
-def correlated_std(fit: LinearFit, contrast: Floats, blocks: tuple[slice, ...]) -> tuple[float, float]:
+def correlated_std(fit: LinearFit, contrast: Floats, noise: Sequence[NoiseModel]) -> tuple[float, float]:
     """Standard deviation and effective dof of contrast @ theta when residuals are correlated in time.
 
-    Sandwich covariance S Sigma S^T, S the solver of an unweighted fit, Sigma the noise of each block of rows (one
-    recording each, even in time) as found by identification.noise from its own residual. The residual has lost the
-    fitted parameters, so its variance is raised by n / (n - p).
+    Sandwich covariance S Sigma S^T, S the solver of an unweighted fit; Sigma is block-diagonal, one noise model for the
+    rows of each recording, in their order (`block_noise`).
     """
     weights = contrast @ fit.solver
-    raised = fit.residual.size / max(fit.dof, 1)
-    variance, spread = 0.0, 0.0
-    for rows in blocks:
-        std, dof = fit_noise(fit.residual[rows]).combination_std(weights[rows])
+    variance, spread, start = 0.0, 0.0, 0
+    for model in noise:
+        std, dof = model.combination_std(weights[start : start + model.n])
+        start += model.n
         variance += std**2
         spread += std**4 / dof
     if variance == 0.0:
         return 0.0, float(fit.dof)
-    return float(np.sqrt(variance * raised)), min(variance**2 / spread, float(fit.dof))
+    return float(np.sqrt(variance)), min(variance**2 / spread, float(fit.dof))
+
+
+def block_noise(H: Floats, residual: Floats, blocks: Sequence[slice]) -> tuple[NoiseModel, ...]:
+    """Noise of each block of rows (a recording each, even in time) from the residual of an unweighted fit on H (n, p).
+
+    What the fit took out of the residual at each frequency is allowed for.
+    """
+    scale = np.linalg.norm(H, axis=0)
+    U, s, _ = np.linalg.svd(H / np.where(scale > 0, scale, 1.0), full_matrices=False)
+    basis = U[:, s > RANK_TOLERANCE * s[0]]
+    return tuple(fit_noise(residual[rows], leverage(basis[rows])) for rows in blocks)

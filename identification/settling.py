@@ -10,14 +10,15 @@ from identification.recording import Floats
 
 BATCH = 5
 """Samples averaged before the rule is applied: MSER-5 (White, Cobb, Spratt, Winter Simulation Conference 2000)."""
-MSER_GAIN = 0.8
-"""A cut must lower MSER's statistic to this share of the uncut one; pure noise reaches about 0.9 by chance."""
+MSER_CERTAIN = 0.4
+"""A cut that lowers MSER's statistic to this share of the uncut one is believed without a further test."""
 LONGEST_CUT = 0.5
 """MSER may leave out this share of a hold; a hold that asks for more has not settled."""
 LONGEST_EXPONENTIAL_CUT = 0.75
 """The same for a fitted exponential, whose end is known better."""
-F_EXPONENTIAL = 30.0
-"""F statistic from which an exponential approach is believed; high, as correlated noise imitates one."""
+F_SHIFT = 14.0
+"""F statistic from which a different start is believed, correlation of the rest allowed for; about 1 in 5000 by chance,
+since the place of the cut and the time constant were searched for."""
 BIAS_SHARE = 0.1
 """What is left of the exponential may shift the mean by this share of its (white) standard error."""
 
@@ -48,9 +49,25 @@ def mser_cut(values: Floats) -> int:
     statistic = (np.maximum(spread, 0.0) / n**2)[::-1]
     allowed = int(count * LONGEST_CUT)
     best = int(np.argmin(statistic[: allowed + 1]))
-    if best == 0 or statistic[best] > MSER_GAIN * statistic[0]:
-        return 0
-    return min(best * size + values.size - count * size, values.size // 2)
+    cut = min(best * size + values.size - count * size, values.size // 2)
+    certain = statistic[best] <= MSER_CERTAIN * statistic[0]
+    return cut if best > 0 and (certain or _shifted(values, cut)) else 0
+
+
+def _correlation(values: Floats) -> float:
+    """(1 + r) / (1 - r), r the lag-1 correlation: by this factor first-order noise widens the variance of means."""
+    centred = values - values.mean()
+    power = float(centred @ centred)
+    r = float(centred[1:] @ centred[:-1]) / power if power > 0 else 0.0
+    r = min(max(r + (1 + 3 * r) / values.size, 0.0), 0.98)  # Marriott and Pope's correction for the bias of r
+    return (1 + r) / (1 - r)
+
+
+def _shifted(values: Floats, cut: int) -> bool:
+    """Is the mean of the first `cut` samples different from that of the rest?"""
+    head, rest = values[:cut], values[cut:]
+    variance = float(rest.var(ddof=1)) * _correlation(rest) * (1 / cut + 1 / rest.size)
+    return float(head.mean() - rest.mean()) ** 2 > F_SHIFT * variance
 
 
 def exponential_cut(values: Floats) -> tuple[int, float | None]:
@@ -70,11 +87,12 @@ def exponential_cut(values: Floats) -> tuple[int, float | None]:
     amplitude = (column @ centred) / power
     gained = amplitude**2 * power
     best = int(np.argmax(gained))
-    left = max(float(centred @ centred - gained[best]), 0.0)
-    if gained[best] * (n - 3) <= F_EXPONENTIAL * left or gained[best] == 0.0:
+    rest = centred - amplitude[best] * column[best]
+    left = float(rest @ rest)
+    if gained[best] == 0.0 or gained[best] * (n - 3) <= F_SHIFT * left * _correlation(rest):
         return 0, None
     constant, start = float(constants[best]), abs(float(amplitude[best]))
-    noise = max(np.sqrt(left / (n - 3)), 1e-6 * start)
+    noise = max(float(np.sqrt(left / (n - 3))), 1e-6 * start)
     ratio = start * constant / (BIAS_SHARE * noise * np.sqrt(n / 2))
     return int(np.ceil(constant * max(np.log(ratio), 0.0))), constant
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.stats import t as student
 
-from identification.noise import MIN_SAMPLES, fit_noise
+from identification.noise import MIN_SAMPLES, NoiseModel, fit_noise, fit_noise_jointly, leverage
 from identification.recording import Floats
 from identification.settling import settle
 
@@ -44,10 +45,13 @@ class MeanEstimate:
         return bool(abs(self.drift) > student.ppf(1 - DRIFT_ALPHA / 2, self.drift_dof) * self.drift_std)
 
 
-def mean_estimate(time: Floats, value: Floats, noise_std: float | None = None) -> MeanEstimate:
+def mean_estimate(
+    time: Floats, value: Floats, noise_std: float | None = None, model: NoiseModel | None = None
+) -> MeanEstimate:
     """Estimate from NaN-free, nearly even samples (n,) of one window, all of them used.
 
     `noise_std` (known sensor noise) stands in for the standard error when there are too few samples to find it.
+    `model` is the noise of these samples when it was found together with that of other windows.
 
     >>> t = np.arange(400) / 100
     >>> e = mean_estimate(t, 5 + np.random.default_rng(1).normal(0, 1, 400))
@@ -64,7 +68,7 @@ def mean_estimate(time: Floats, value: Floats, noise_std: float | None = None) -
         std = noise_std / float(np.sqrt(n)) if noise_std is not None and known else float("nan")
         dof = float("inf") if known else 0.0
         return MeanEstimate(mean, std, dof, n, float(n), float("nan"), float("nan"), 0.0, start, end)
-    model = fit_noise(value)
+    model = model or fit_noise(value)
     std, dof = model.mean_std()
     effective = float(np.clip((model.std / std) ** 2, 1.0, n)) if std > 0 else float(n)
     return MeanEstimate(mean, std, dof, n, effective, *_slope(time, value), start, end)
@@ -78,7 +82,8 @@ def _slope(time: Floats, value: Floats) -> tuple[float, float, float]:
         return float("nan"), float("nan"), 0.0
     weights = centred / power
     slope = float(weights @ value)
-    std, dof = fit_noise(value - slope * centred, first=2).combination_std(weights)
+    lost = leverage(centred[:, None] / np.sqrt(power))
+    std, dof = fit_noise(value - slope * centred, lost).combination_std(weights)
     return slope, std, dof
 
 
@@ -89,10 +94,26 @@ def settled_estimate(time: Floats, value: Floats, noise_std: float | None = None
     return replace(e, settled=found.settled)
 
 
+def settled_estimates(
+    windows: Sequence[tuple[Floats, Floats]], noise_std: float | None = None
+) -> tuple[MeanEstimate, ...]:
+    """`settled_estimate` of each (time, value), their noise found together (identification.noise.fit_noise_jointly)."""
+    found = [settle(value) for _, value in windows]
+    kept = [(time[s.cut :], value[s.cut :]) for s, (time, value) in zip(found, windows, strict=True)]
+    models = iter(fit_noise_jointly([value for _, value in kept if value.size >= MIN_SAMPLES]))
+    return tuple(
+        replace(
+            mean_estimate(time, value, noise_std, next(models) if value.size >= MIN_SAMPLES else None),
+            settled=s.settled,
+        )
+        for s, (time, value) in zip(found, kept, strict=True)
+    )
+
+
 class SteadyMonitor:
     """Collects the samples of one hold as they arrive and says how well the mean is known so far.
 
-    `mean`, `std_error`, `drift` and `drift_std` are those of `estimate`, worked out when first asked for after an `add`.
+    `mean`, `std_error`, `drift` and `drift_std` are those of `estimate`, worked out when first asked for after `add`.
 
     NaN samples are counted and left out. `estimate` costs about a millisecond whatever the length of the hold.
 
