@@ -137,9 +137,9 @@ def _good_rows(table: Table, row_reader: RowReader, refused: Refused) -> tuple[F
             continue
         latest = times
         kept.append((times, values))
-    shape = len(kept), -1 if kept else 0
     time_grid = np.array([times for times, _ in kept], dtype=np.float64).reshape(len(kept), len(row_reader.clocks))
-    return time_grid, np.array([values for _, values in kept], dtype=np.float64).reshape(shape)
+    value_grid = np.array([values for _, values in kept], dtype=np.float64).reshape(len(kept), len(row_reader.indices))
+    return time_grid, value_grid
 
 
 def _scaled(raw: Floats, factor: float, column: Column) -> Floats:

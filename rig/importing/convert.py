@@ -68,7 +68,13 @@ def convert(data: bytes, plan: ImportMap, overrides: Mapping[str, float]) -> Imp
     return Imported(
         streams=streams,
         steps=_steps(plan, streams),
-        notes=(*plan.notes, *_parameter_notes(parameters), *clock_note, *_absent(columns, cells)),
+        notes=(
+            *plan.notes,
+            *_parameter_notes(parameters),
+            *clock_note,
+            *_absent(columns, cells),
+            *_begun(columns, cells),
+        ),
         warnings=(*encoding, *refused.sentences()),
         created=created,
         rows=cells.rows,
@@ -92,6 +98,21 @@ def _parameter_notes(parameters: Mapping[str, float]) -> list[str]:
 def _absent(columns: Mapping[str, Column], cells: Cells) -> list[str]:
     names = [name for name in columns if name not in cells.columns]
     return [f"the file has no column for {', '.join(names)}: channels that need it are left out"] if names else []
+
+
+def _begun(columns: Mapping[str, Column], cells: Cells) -> list[str]:
+    """How many rows at the start were taken as "not measured yet"."""
+    counts = {name: _leading_nan(cells.columns[name]) for name in cells.columns if columns[name].not_given is not None}
+    return [
+        f"{name}: the first {n} rows are exactly {columns[name].not_given:g}: taken as not measured yet"
+        for name, n in counts.items()
+        if n
+    ]
+
+
+def _leading_nan(values: Floats) -> int:
+    given = np.isfinite(values)
+    return int(np.argmax(given)) if given.any() else len(values)
 
 
 def _parameters(plan: ImportMap, overrides: Mapping[str, float]) -> dict[str, float]:

@@ -70,20 +70,29 @@ def read_table(data: bytes, form: FileMap, refused: Refused) -> Table:
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip() or any(mark in line for mark in form.ignore):
             continue
-        cells = split(line, form)
+        cells = list(split(line, form))
         if number <= form.skip_rows or (form.comment and line.lstrip().startswith(form.comment)):
             above.append(cells)
         else:
             body.append((number, cells))
     names: tuple[str, ...] = ()
     if form.header and body:
-        names = tuple(_normal(cell) for cell in body.pop(0)[1])
+        names = tuple(_normal(cell) for cell in _trimmed(body.pop(0)[1], 0))
     width = form.width or len(names) or _usual_width(body)
+    body = [(number, _trimmed(cells, width)) for number, cells in body]
     good = tuple((number, cells) for number, cells in body if len(cells) == width)
     for number, cells in body:
         if len(cells) != width:
             refused.add(f"{'fewer' if len(cells) < width else 'more'} than {width} columns", number)
     return Table(names, good, tuple(above), width, encoding, encoding != form.encoding)
+
+
+def _trimmed(cells: Sequence[str], width: int) -> Sequence[str]:
+    """Without empty cells beyond `width`: some programs end every line with a separator."""
+    n = len(cells)
+    while n > width and not cells[n - 1].strip():
+        n -= 1
+    return cells[:n]
 
 
 def split(line: str, form: FileMap) -> Sequence[str]:

@@ -112,7 +112,7 @@ def test_rows_that_run_back_are_dropped_and_counted(tmp_path):
 def test_a_long_event_becomes_several_rows_and_loses_nothing(tmp_path):
     path = tmp_path / "r.h5"
     file = written(path)
-    note = "ü" * 700
+    note = "a" + "ü" * 700
     file.add_event(EventRow(1.0, "info", note))
     file.close("completed", "ü" * 400, 2.0)
     recording = load(path)
