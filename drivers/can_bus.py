@@ -1,8 +1,9 @@
 """One CAN bus shared by several devices, through python-can. With serial_port.py the only place that opens wires.
 
 Traps of python-can 4 that this file knows (seen in can/interfaces/slcan.py and tried):
-a malformed line raises bare ValueError or IndexError out of recv; a byte above 7F stays in its buffer and spoils every
-later line until flush(); opening sleeps 2 s unless told not to; shutdown of a lost port raises before closing it.
+a malformed line raises bare ValueError or IndexError out of recv; a byte above 7F raises what looks like a lost port
+(CanOperationError from UnicodeDecodeError) and stays in its buffer, spoiling every later line until flush(); opening
+sleeps 2 s unless told not to; shutdown of a lost port raises before closing it.
 """
 
 from __future__ import annotations
@@ -161,8 +162,12 @@ class CanBus:
             message = bus.recv(READ_TIMEOUT)
         except (ValueError, IndexError) as error:
             self._bad.add(str(error))
-            if isinstance(error, UnicodeDecodeError) and (flush := getattr(bus, "flush", None)) is not None:
-                flush()
+            return
+        except can.CanOperationError as error:
+            if not isinstance(error.__cause__, UnicodeDecodeError):
+                raise
+            self._bad.add(str(error.__cause__))
+            bus.flush()  # type: ignore[attr-defined]  # only slcan decodes text, and it has flush()
             return
         if message is None:
             return

@@ -11,13 +11,13 @@ from collections.abc import Callable
 from types import TracebackType
 
 Script = Callable[["Peer", bytes], None]
-"""Called with every complete request, without its terminator."""
+"""Called with every complete request without its terminator, or (terminator None) with whatever came."""
 
 
 class Peer:
     """A device on a pty. `port` is the path to open; `unplug` is the pulled cable."""
 
-    def __init__(self, script: Script, terminator: bytes = b"\n") -> None:
+    def __init__(self, script: Script, terminator: bytes | None = b"\n") -> None:
         self._script, self._terminator = script, terminator
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
@@ -52,10 +52,12 @@ class Peer:
         rest = b""
         while not self._stop.is_set():
             if select.select([self._master], [], [], 0.001)[0]:
-                *requests, rest = (rest + os.read(self._master, 4096)).split(self._terminator)
+                data = rest + os.read(self._master, 4096)
+                *requests, rest = (data, b"") if self._terminator is None else data.split(self._terminator)
                 for request in requests:
-                    self.heard.append(request.strip())
-                    self._script(self, request.strip())
+                    request = request if self._terminator is None else request.strip()
+                    self.heard.append(request)
+                    self._script(self, request)
             if self.streaming is not None:
                 self.send(self.streaming)
 
