@@ -1,0 +1,217 @@
+"""The console application: folds snapshots into a view, shows it, turns keys into requests. It asks and never acts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import ClassVar, Final
+
+from textual.app import App, ComposeResult
+from textual.binding import Binding, BindingType
+from textual.containers import Container, Horizontal, Vertical, VerticalScroll
+from textual.widgets import ContentSwitcher
+
+from rig.console.dialogs import LeaveDialog, Leaving, NoteDialog
+from rig.console.feed import Feed
+from rig.console.keys import key_line, page_of
+from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
+from rig.console.parting import Parting, begin, refused, settled
+from rig.console.plots import FitPlot, ResidualPlot, TimePlot
+from rig.console.view import View, absorb
+from rig.errors import LinkError
+from rig.messages import Request, RequestKind
+
+REDRAW: Final = 0.1
+"""s between looks at the text: as often as snapshots come."""
+REPLOT: Final = 0.2
+"""s between looks at the plots: one costs 10-20 ms, and the stop key must not wait for many."""
+LEASE: Final = 0.5
+"""s between leases. From the screen's own loop on purpose: when the screen hangs, the lease goes stale."""
+VIEWS: Final = ("main", "fit", "time", "log", "results")
+
+
+class ConsoleApp(App[None], inherit_bindings=False):
+    """One operator's window on one controller."""
+
+    CSS_PATH = "console.tcss"
+    TITLE = "rig console"
+    ENABLE_COMMAND_PALETTE = False
+    ALLOW_SELECT = False  # nothing to copy: Ctrl+C is the stop key
+    BINDINGS: ClassVar[list[BindingType]] = [
+        # priority: before any screen, dialog or text field sees the key; super+c is Cmd+C where a terminal passes it on
+        Binding("ctrl+c,super+c,f9", "stop", "STOP", priority=True),
+        Binding("ctrl+q", "leave", "leave", priority=True),
+        Binding("f5", "go", "start"),
+        Binding("p", "ask('pause')", "pause"),
+        Binding("r", "ask('resume')", "resume"),
+        Binding("k", "ask('skip')", "skip"),
+        Binding("n", "note", "note"),
+        Binding("d", "leave", "detach"),
+        *(Binding(str(i + 1), f"view('{name}')", name) for i, name in enumerate(VIEWS)),
+    ]
+
+    def __init__(self, feed: Feed, clock: Callable[[], float], again: str = "rig console") -> None:
+        """`clock` gives s and never goes back; `again` is the command line that attaches once more."""
+        super().__init__()
+        self.HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # columns from which all panels fit at once
+        self.VERTICAL_BREAKPOINTS = [(0, "-low"), (32, "-tall")]  # rows
+        self.feed = feed
+        self.clock = clock
+        self.again = again
+        self.state = View(now=clock())
+        self.chosen = "main"
+        self.parting: Parting | None = None
+
+    def compose(self) -> ComposeResult:
+        yield Head()
+        with ContentSwitcher(initial="preflight", id="pages"):
+            with VerticalScroll(id="preflight"):
+                yield ChecksPanel()
+            with Container(id="live", classes="main"):
+                yield ProgressPanel(id="progress")
+                with Horizontal(id="upper"):
+                    with VerticalScroll(id="readings"):
+                        yield ReadingsPanel(markup=False)
+                    with Vertical(id="plots"):
+                        yield FitPlot()
+                        yield ResidualPlot()
+                        yield TimePlot()
+                yield LogPanel(id="log", min_width=20, wrap=True)
+            with VerticalScroll(id="results"):
+                yield ResultsPanel()
+        yield Panel(id="keys", markup=False)
+
+    def on_mount(self) -> None:
+        self.query_one("#readings").border_title = "live readings"
+        self.query_one("#log").border_title = "events"
+        self.query_one("#preflight").border_title = "preflight"
+        self.query_one("#results").border_title = "result per thruster: C V|V| fitted to the holds"
+        self.run_worker(self._follow())
+        self.set_interval(REDRAW, self.show_text)
+        self.set_interval(REPLOT, self.show_plots)
+        self.set_interval(LEASE, self._renew_lease)
+        self._renew_lease()
+
+    async def _follow(self) -> None:
+        while (snapshot := await self.feed.receive()) is not None:
+            ended_before = self._ended
+            self.state = absorb(self.state, snapshot, self.clock())
+            if self._ended and not ended_before:
+                self.chosen = "results"
+            self._part()
+        self.state = replace(self.state, connected=False)
+        if self.parting is not None and self.parting.kind == "detach":
+            self.exit()
+
+    @property
+    def _ended(self) -> bool:
+        return self.state.snapshot is not None and self.state.snapshot.state == "done"
+
+    def _standing(self) -> bool:
+        """False while the application closes: its widgets go before its timers."""
+        return bool(self.screen_stack) and len(self.screen_stack[0].query("#keys")) > 0
+
+    def show_text(self) -> None:
+        """Everything but the plots, from the view."""
+        self.state = replace(self.state, now=self.clock())
+        if not self._standing():
+            return
+        view, base = self.state, self.screen_stack[0]
+        base.query_one(ContentSwitcher).current = page_of(view, self.chosen)
+        base.query_one("#live").set_classes(self.chosen)
+        base.query_one(Head).show(view)
+        base.query_one(ChecksPanel).show(view)
+        base.query_one(ProgressPanel).show(view)
+        base.query_one(ReadingsPanel).show(view)
+        base.query_one(ResultsPanel).show(view)
+        base.query_one(LogPanel).show(view)
+        base.query_one("#keys", Panel).put(line := key_line(view), line)
+        if isinstance(self.screen, NoteDialog | LeaveDialog):
+            self.screen.show(view)
+        base.set_class(view.condition != "live", "old")
+
+    def show_plots(self) -> None:
+        """The plots that are on the screen, from the view."""
+        if self._standing():
+            base = self.screen_stack[0]
+            base.query_one(FitPlot).show(self.state)
+            base.query_one(ResidualPlot).show(self.state)
+            base.query_one(TimePlot).show(self.state)
+
+    def action_stop(self) -> None:
+        """The stop key: the request goes out here, before anything is drawn."""
+        try:
+            self.feed.send(Request("stop", "console"))
+            failed = ""
+        except LinkError as error:
+            failed = str(error)
+        self.state = replace(self.state, stop_asked=self.clock(), stop_failed=failed)
+        self.call_later(self.show_text)
+
+    def action_ask(self, kind: RequestKind, text: str = "") -> None:
+        """Send a request that needs no answer; say so when it cannot be sent."""
+        try:
+            self.feed.send(Request(kind, text))
+        except LinkError as error:
+            self.notify(str(error), title=f"{kind}: not sent", severity="error", markup=False)
+            return
+        self.notify(f"asked the controller: {kind} {text}", timeout=2.0, markup=False)
+
+    def action_go(self) -> None:
+        """F5: start, or the thruster is mounted, whichever the controller waits for."""
+        waits_for: dict[str, RequestKind] = {"preflight": "start", "mount": "mounted"}
+        state = self.state.snapshot.state if self.state.snapshot is not None else ""
+        if state in waits_for:
+            self.action_ask(waits_for[state])
+        else:
+            self.notify("F5 starts a run; the controller waits for no start now.", severity="warning")
+
+    def action_view(self, name: str) -> None:
+        self.chosen = name
+        self.show_text()
+        self.call_after_refresh(self.show_plots)
+
+    def action_note(self) -> None:
+        self.push_screen(NoteDialog(), self._keep_note)
+        self.call_after_refresh(self.show_text)
+
+    def _keep_note(self, text: str | None) -> None:
+        if text:
+            self.action_ask("note", text)
+
+    def action_leave(self) -> None:
+        if len(self.screen_stack) > 1:
+            return  # a dialog is open: Escape first
+        if self._ended or not self.state.connected:
+            self.exit()
+            return
+        self.push_screen(LeaveDialog(self.state.snapshot, self.again), self._leave)
+        self.call_after_refresh(self.show_text)
+
+    def _leave(self, leaving: Leaving | None) -> None:
+        if leaving is None:
+            return
+        self.parting = begin(leaving, self.state, self.clock())
+        if leaving == "stop":
+            self.action_stop()
+        else:
+            self.action_ask("detach")
+
+    def _part(self) -> None:
+        """After the operator chose to leave: go once that is settled, stay when the controller refuses."""
+        if self.parting is None:
+            return
+        answer = refused(self.parting, self.state)
+        if answer:
+            self.parting = None
+            self.notify(answer, title="You cannot leave", severity="error", timeout=10.0, markup=False)
+        elif settled(self.parting, self.state):
+            self.exit()
+
+    def _renew_lease(self) -> None:
+        leaving = self.parting is not None and self.parting.kind == "detach"
+        if self.state.connected and not leaving:
+            try:
+                self.feed.send(Request("lease"))
+            except LinkError:
+                return  # `receive` reports the end of the link, and the banner says so

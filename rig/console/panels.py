@@ -1,0 +1,168 @@
+"""The widgets that show a view. None of them knows the feed; each draws again only when its text has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+
+from rich.console import Group
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.containers import Horizontal, Vertical
+from textual.events import Resize
+from textual.widgets import RichLog, Static
+
+from rig.console import wording
+from rig.console.alarms import alarm
+from rig.console.tables import checks_table, readings_text, results_table, verdict_summary
+from rig.console.view import View
+from rig.messages import LogLine, Snapshot
+
+LOG_STYLES = {"info": "", "warning": "#f0c040", "trip": "bold #ff6070", "error": "bold #ff6070"}
+LOG_WORDS = {"info": "     ", "warning": "WARN ", "trip": "TRIP ", "error": "ERROR"}
+
+
+class Panel(Static):
+    """A Static that remembers what it shows."""
+
+    shown: Hashable = None
+
+    def put(self, made_of: Hashable, renderable: Text | Group) -> None:
+        """Show `renderable` unless it was made of the same as what is on the screen."""
+        if made_of != self.shown:
+            self.shown = made_of
+            self.update(renderable)
+
+
+class StopKey(Static):
+    """The labelled stop key. A click on it is the key."""
+
+    async def on_click(self) -> None:
+        await self.run_action("app.stop")
+
+
+class Head(Vertical):
+    """On every screen and every dialog: the stop key, what the bench does, whether it is the present, and the alarm."""
+
+    def compose(self) -> ComposeResult:
+        with Horizontal(classes="head-row"):
+            yield StopKey(" ■ STOP  Ctrl+C or F9 ", classes="stop-key")
+            yield Panel(classes="head-state", markup=False)
+        yield Panel(classes="alarm", markup=False)
+
+    def show(self, view: View) -> None:
+        if not (
+            self.query(".alarm") and self.query(".head-state")
+        ):  # a dialog just opening, or the application closing
+            return
+        lines = Text(overflow="ellipsis", no_wrap=True)
+        name = view.snapshot.campaign if view.snapshot is not None else "rig console"
+        doing = wording.activity(view.snapshot) if view.snapshot is not None else "no data yet"
+        live = view.condition == "live"
+        if view.snapshot is not None and not live:
+            doing = f"last known: {doing}"
+        lines.append(doing, "bold #ffffff").append(f"   {name}\n", "#b0b0b0")
+        lines.append(wording.link(view), "#7fd88f" if live else "bold #ff9090")
+        lines.append(_attendance(view.snapshot) if live else "", "#b0b0b0")
+        if view.snapshot is not None and view.snapshot.files:
+            lines.append(
+                f"\n{view.snapshot.files[-1]}", "#b0b0b0"
+            )  # a third line, where the screen is tall enough for it
+        state = self.query_one(".head-state", Panel)
+        state.put((lines.plain, view.condition), lines)
+        self._shout(view)
+
+    def _shout(self, view: View) -> None:
+        said = alarm(view)
+        line = self.query_one(".alarm", Panel)
+        line.put(said, Text(said.text, "bold"))
+        for severity in ("none", "info", "warning", "danger"):
+            line.set_class(severity == said.severity, severity)
+
+
+def _attendance(snapshot: Snapshot | None) -> str:
+    if snapshot is None:
+        return ""
+    return "   attended: stops without you" if snapshot.attended else "   unattended: goes on without you"
+
+
+class ProgressPanel(Panel):
+    """Campaign and step, two lines."""
+
+    def show(self, view: View) -> None:
+        snapshot, width = view.snapshot, self.content_size.width
+        if snapshot is None or snapshot.progress is None:
+            self.put("none", Text("no run yet"))
+            return
+        progress = snapshot.progress
+        lines = Text(no_wrap=True)
+        lines.append(wording.campaign_line(progress, snapshot.thruster, width) + "\n")
+        lines.append(wording.step_line(progress, snapshot, width))
+        self.put(lines.plain, lines)
+
+
+class ReadingsPanel(Panel):
+    """Live numbers."""
+
+    def show(self, view: View) -> None:
+        text = readings_text(view)
+        self.put((text.plain, view.condition), text)
+
+
+class ChecksPanel(Panel):
+    """The preflight list and what follows from it."""
+
+    def show(self, view: View) -> None:
+        checks = view.snapshot.checks if view.snapshot is not None else ()
+        self.put(checks, Group(checks_table(checks), Text(), verdict_summary(checks)))
+
+
+class ResultsPanel(Panel):
+    """The table per thruster, how it ended, and where the files are."""
+
+    def show(self, view: View) -> None:
+        snapshot = view.snapshot
+        if snapshot is None:
+            return
+        made_of = (tuple(view.points.items()), snapshot.files, snapshot.outcome, snapshot.cause)
+        self.put(made_of, Group(results_table(view.points), Text(), *_ending(view, snapshot)))
+
+
+def _ending(view: View, snapshot: Snapshot) -> list[Text]:
+    lines = [Text(f"outcome: {snapshot.outcome or 'not started'}. {snapshot.cause}", "bold"), Text()]
+    missing = len(snapshot.files) - len(view.points)
+    if missing > 0 and snapshot.state == "done":
+        lines += [
+            Text(f"{missing} more recordings were made before this console attached: `rig fit` reads them all."),
+            Text(),
+        ]
+    lines.append(Text("recordings:" if snapshot.files else "no recording was made", "bold"))
+    return lines + [Text(f"  {name}", overflow="fold") for name in snapshot.files]
+
+
+class LogPanel(RichLog):
+    """Events, newest last; scrolls with the wheel and, when focused, the arrow keys."""
+
+    count = 0
+    """Events written so far, by the controller's count."""
+    lines_known: tuple[LogLine, ...] = ()
+
+    def show(self, view: View) -> None:
+        if view.snapshot is None:
+            return
+        self.lines_known = view.snapshot.log
+        if not self.size:  # hidden: `on_resize` writes everything once there is room
+            return
+        new = min(view.snapshot.log_count - self.count, len(self.lines_known))
+        self.count = view.snapshot.log_count
+        for line in self.lines_known[len(self.lines_known) - new :] if new > 0 else ():
+            self.write(event_text(line), expand=True)
+
+    def on_resize(self, _: Resize) -> None:
+        """Lines were wrapped for the old width: the next `show` writes them all again."""
+        self.clear()
+        self.count = 0
+
+
+def event_text(line: LogLine) -> Text:
+    """`   12.3 s  WARN  text`: the level is a word too."""
+    return Text(f"{line.time:8.1f} s  {LOG_WORDS[line.level]}  {line.text}", LOG_STYLES[line.level])

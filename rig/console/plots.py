@@ -1,0 +1,141 @@
+"""The curves of a sweep: thrust against V|V| with error bars and running fit, the residual, thrust against time."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Hashable, Sequence
+from typing import Final
+
+from textual_plotext import PlotextPlot
+from textual_plotext.plot import Plot
+
+from rig.console.axes import reach, thin, ticks
+from rig.console.fit import RunningFit, in_words, running_fit, usable, v_abs_v
+from rig.console.view import TraceRow, View
+from rig.messages import Point
+
+WINDOW: Final = 120.0
+"""s of trace drawn: enough for a dozen holds, and short enough to see one settle."""
+BAR: Final = 1.96
+"""Standard errors in an error bar: 95 %."""
+CYAN, GREEN, AMBER, GREY = (90, 200, 250), (127, 216, 143), (240, 192, 64), (170, 170, 170)
+RIGHT: Final = 2
+"""Number of plotext's right axis, where its signatures ask for a number."""
+LEAST_THRUST: Final = 1.0
+"""N, smallest span of a thrust axis: noise at rest shall not fill the plot."""
+
+
+class Curve(PlotextPlot):
+    """A plot that is drawn again only when what it shows has changed."""
+
+    drawn: Hashable = None
+    """What the drawing on the screen was made of."""
+
+    def redraw(self, made_of: Hashable, draw: Callable[[Plot], None]) -> None:
+        """Draw, unless this is on the screen already. Hidden plots cost nothing."""
+        if made_of == self.drawn or not self.size:
+            return
+        self.drawn = made_of
+        self.plt.clear_figure()
+        draw(self.plt)
+        self.refresh()
+
+
+class FitPlot(Curve):
+    """Thrust in N against V|V| in V^2."""
+
+    def show(self, view: View) -> None:
+        points = points_of(view)
+        fit = running_fit(points)
+        legend = "   ● steady  ○ not steady  bars 95 %" if self.size.width >= 64 else "  ● steady ○ not"
+        self.border_title = f"thrust (N) over V|V| (V²){legend}"
+        self.border_subtitle = in_words(fit)
+
+        def draw(plot: Plot) -> None:
+            _frame(plot, points, [point.thrust for point in points], self.size.height)
+            if fit is not None:
+                ends = [min(map(v_abs_v, points)), max(map(v_abs_v, points))]
+                plot.plot(ends, [fit.predict(end) for end in ends], marker="braille", color=GREEN)
+            _holds(plot, points, [point.thrust for point in points])
+
+        self.redraw((points, self.size), draw)
+
+
+class ResidualPlot(Curve):
+    """Thrust minus the running fit in N against V|V| in V^2: on this scale the error bars can be seen."""
+
+    def show(self, view: View) -> None:
+        points = points_of(view)
+        fit = running_fit(points)
+        self.border_title = "thrust minus fit (N) over V|V| (V²)"
+        self.border_subtitle = "a bend here is something that C V|V| leaves out"
+        self.redraw((points, self.size), lambda plot: self._draw(plot, points, fit))
+
+    def _draw(self, plot: Plot, points: tuple[Point, ...], fit: RunningFit | None) -> None:
+        if fit is None:
+            return
+        left = [point.thrust - fit.predict(v_abs_v(point)) for point in points]
+        _frame(plot, points, left, self.size.height)
+        ends = [min(map(v_abs_v, points)), max(map(v_abs_v, points))]
+        plot.plot(ends, [0.0, 0.0], marker="braille", color=GREEN)
+        _holds(plot, points, left)
+
+
+class TimePlot(Curve):
+    """Two strips over the recording's time in s: raw thrust in N above, command in V below."""
+
+    def show(self, view: View) -> None:
+        window = f", last {WINDOW:.0f} s" if self.size.width >= 64 else ""
+        self.border_title = f"thrust (N), command (V, right) over time (s){window}"
+        rows = [row for row in view.trace if row[0] >= view.trace[-1][0] - WINDOW]
+        self.redraw((rows[-1] if rows else (), len(rows), self.size), lambda plot: self._draw(plot, rows))
+
+    def _draw(self, plot: Plot, rows: Sequence[TraceRow]) -> None:
+        dots = 2 * self.size.width
+        time, thrust = thin([(t, thrust) for t, _, thrust in rows], dots)
+        command_time, volts = thin([(t, volts) for t, volts, _ in rows], dots)
+        if not time or not volts:
+            return
+        low, high = reach(thrust, least=LEAST_THRUST)
+        plot.ylim(low - 0.6 * (high - low), high)  # thrust in the upper five eighths
+        plot.yticks(*ticks(low, high, max(4, self.size.height // 2)))
+        least, most = reach(volts, least=1.0)
+        plot.ylim(least, most + 2.2 * (most - least), yside=RIGHT)  # the command in the lower third
+        plot.yticks(*ticks(least, most, 3), yside=RIGHT)
+        plot.xlim(rows[0][0], max(rows[-1][0], rows[0][0] + 10.0))
+        plot.xticks(*ticks(rows[0][0], max(rows[-1][0], rows[0][0] + 10.0), 6))
+        plot.scatter(command_time, volts, marker="braille", color=AMBER, yside="right")
+        plot.scatter(time, thrust, marker="braille", color=CYAN)
+
+
+def points_of(view: View) -> tuple[Point, ...]:
+    """The holds of the thruster on the bench, whose thrust is a number."""
+    known = view.points.get(view.snapshot.thruster, ()) if view.snapshot is not None else ()
+    return tuple(point for point in known if math.isfinite(point.thrust))
+
+
+def _half(point: Point) -> float:
+    return BAR * point.std_error if usable(point) else 0.0
+
+
+def _frame(plot: Plot, points: Sequence[Point], values: Sequence[float], height: int) -> None:
+    """Axes that hold every bar, with round numbers."""
+    if not points:
+        return
+    x = reach([v_abs_v(point) for point in points], least=10.0)
+    edges = [value + sign * _half(p) for p, value in zip(points, values, strict=True) for sign in (-1, 1)]
+    y = reach(edges, least=0.1)
+    plot.xlim(*x)
+    plot.ylim(*y)
+    plot.xticks(*ticks(*x, 6))
+    plot.yticks(*ticks(*y, max(3, height // 2)))
+
+
+def _holds(plot: Plot, points: Sequence[Point], values: Sequence[float]) -> None:
+    """Points at `values` in N with their error bars."""
+    for point, value in zip(points, values, strict=True):
+        plot.plot([v_abs_v(point)] * 2, [value - _half(point), value + _half(point)], marker="│", color=GREY)
+    for steady, marker in ((True, "●"), (False, "○")):
+        chosen = [(v_abs_v(p), value) for p, value in zip(points, values, strict=True) if p.steady is steady]
+        if chosen:
+            plot.scatter([x for x, _ in chosen], [y for _, y in chosen], marker=marker, color=CYAN)

@@ -1,0 +1,77 @@
+"""One sitting at the console: run it, mind the signals, and always let the controller see the end of file."""
+
+from __future__ import annotations
+
+import asyncio
+import signal
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from rig.console.app import ConsoleApp
+from rig.console.feed import Feed
+from rig.console.view import View
+from rig.messages import Snapshot
+
+COMPLETED, NOT_COMPLETED = 0, 1
+LAST_WORD = 2.0
+"""s that the screen gets to restore the terminal after SIGHUP or SIGTERM; the link is closed before."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sitting:
+    """How a sitting ended."""
+
+    status: int
+    """Exit status: 0 campaign completed, or detached while it goes on; 1 it was stopped, tripped, or the controller or
+    the screen was lost; 128 + n after signal n."""
+    last: Snapshot | None
+    """The newest snapshot that came; None: none ever did."""
+    detached: bool
+    """True: the operator left on purpose and the controller did not refuse."""
+
+
+def run_console(feed: Feed, clock: Callable[[], float] = time.monotonic, again: str = "rig console") -> int:
+    """Run the console until the operator leaves; the exit status of `Sitting`."""
+    return attend(feed, clock, again).status
+
+
+def attend(feed: Feed, clock: Callable[[], float] = time.monotonic, again: str = "rig console") -> Sitting:
+    """Run the console until the operator leaves. `clock` gives s and never goes back; `again` is the command line that
+    attaches once more, shown before detaching. Closes `feed`."""
+    return asyncio.run(_sit(feed, clock, again))
+
+
+async def _sit(feed: Feed, clock: Callable[[], float], again: str) -> Sitting:
+    app = ConsoleApp(feed, clock, again)
+    loop = asyncio.get_running_loop()
+    caught: list[int] = []
+
+    def leave(number: int) -> None:
+        caught.append(number)
+        feed.close()
+        app.exit()
+        loop.call_later(LAST_WORD, sitting.cancel)
+
+    sitting = asyncio.ensure_future(app.run_async())
+    for number in (signal.SIGHUP, signal.SIGTERM):
+        loop.add_signal_handler(number, leave, number)
+    loop.add_signal_handler(signal.SIGINT, app.action_stop)
+    try:
+        await sitting
+    except asyncio.CancelledError:
+        if not caught:
+            raise
+    finally:
+        feed.close()
+    detached = app.parting is not None and app.parting.kind == "detach"
+    status = 128 + caught[0] if caught else max(app.return_code or 0, exit_status(app.state, detached))
+    return Sitting(status, app.state.snapshot, detached and not caught)
+
+
+def exit_status(view: View, detached: bool) -> int:
+    """0 when the campaign completed, or goes on and its console left on purpose; else 1."""
+    if detached:
+        return COMPLETED
+    snapshot = view.snapshot
+    return COMPLETED if snapshot is not None and snapshot.outcome == "completed" else NOT_COMPLETED

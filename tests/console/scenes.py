@@ -1,0 +1,83 @@
+"""What is on the pictures: a feed played up to a moment, the keys pressed then, and how long nothing came after."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, replace
+
+from textual.pilot import Pilot
+
+from rig.console.app import ConsoleApp
+from rig.messages import Snapshot
+
+from .feeds import CHECKS, ManualClock, PlayedFeed, campaign, running, snapshot
+
+
+@dataclass(frozen=True)
+class Scene:
+    snapshots: tuple[Snapshot, ...]
+    keys: tuple[str, ...] = ()
+    gone: bool = False
+    silence: float = 0.0
+    """s between the last snapshot and the picture."""
+
+
+NO_ANSWER = "no answer on ports/flow within 2.0 s; is it powered?"
+FAILED = tuple(replace(c, verdict="failed", text=NO_ANSWER) if c.name == "flow" else c for c in CHECKS)
+STALE = tuple(
+    replace(r, state="stale", age=1.9) if r.channel == "flow.flow_speed"
+    else replace(r, state="limit", value=41.2) if r.channel == "motor.current" else r
+    for r in running().readings
+)  # fmt: skip
+
+SCENES = {
+    "preflight": Scene((snapshot("preflight"),)),
+    "preflight_failed": Scene((snapshot("preflight", checks=FAILED),)),
+    "sweep": Scene((running(),)),
+    "fit": Scene((running(),), keys=("2",)),
+    "time": Scene((running(),), keys=("3",)),
+    "events": Scene((running(),), keys=("4",)),
+    "limit": Scene((running(readings=STALE),)),
+    "mount": Scene((running("mount", thruster="T3", command=0.0, points=(), trace=()),)),
+    "note": Scene((running(),), keys=("n", *"weed on duct")),
+    "leave": Scene((running(),), keys=("d",)),
+    "leave_attended": Scene((running(attended=True),), keys=("d",)),
+    "disconnected": Scene((running(),), gone=True, silence=14.3),
+    "stop_not_confirmed": Scene((running("stopping", command=0.0, stop_confirmed=False),)),
+    "end": Scene(campaign()),
+    "tripped": Scene((running("done", outcome="tripped", stop_confirmed=True, command=0.0,
+                              cause="motor.current 41.2 A is above its limit of 40 A."),)),
+}  # fmt: skip
+
+
+def prepare(scene: Scene) -> tuple[ConsoleApp, Callable[[Pilot[None]], Awaitable[None]]]:
+    """The application, and what has to be awaited until it shows the scene."""
+    feed, clock = PlayedFeed(*scene.snapshots), ManualClock()
+    app = ConsoleApp(feed, clock, "rig console recordings/2026-11-21_1502")
+
+    async def play(pilot: Pilot[None]) -> None:
+        await settle(pilot, lambda: app.state.snapshot is scene.snapshots[-1])
+        await pilot.press(*scene.keys)
+        if scene.gone:
+            feed.end()
+            await settle(pilot, lambda: not app.state.connected)
+        clock.now += scene.silence
+        await show(pilot, app)
+
+    return app, play
+
+
+async def settle(pilot: Pilot[None], reached: Callable[[], bool]) -> None:
+    """Let the application's messages run until `reached`; the test's own timeout ends it otherwise."""
+    while not reached():
+        await pilot.pause(0.01)
+
+
+async def show(pilot: Pilot[None], app: ConsoleApp) -> None:
+    """Draw now instead of at the next tick: pages first, and again when they have their sizes."""
+    for _ in range(3):
+        app.show_text()
+        app.show_plots()
+        await pilot.pause()
+    await pilot.wait_for_scheduled_animations()
+    await pilot.pause()
