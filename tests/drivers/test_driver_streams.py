@@ -81,7 +81,7 @@ def test_nothing_that_matches():
     with Peer(quiet) as peer:
         peer.streaming = b"hello\n"
         device = line_stream.LineStream("cell", stream_options(peer.port))
-        with pytest.raises(DeviceError, match="came .'hello'"):
+        with pytest.raises(DeviceError, match=r"came .'hello'"):
             device.open()
 
 
@@ -222,7 +222,7 @@ def transmitter(peer, request):
 def test_request_is_the_one_of_the_manual():
     (case,) = KELLER["request"]
     with Peer(transmitter, terminator=None) as peer:
-        device = keller.Keller("thermometer", keller.Options(peer.port, rate=20.0, timeout=0.5))
+        device = keller.Keller("thermometer", keller.Options(peer.port, rate=20.0, baud=115_200, timeout=0.5))
         device.open()
         device.close()
         assert bytes.fromhex(case["frame"]) in peer.heard
@@ -247,7 +247,7 @@ def test_a_float_takes_two_registers():
 
 def test_thermometer():
     with Peer(transmitter, terminator=None) as peer:
-        device = keller.Keller("thermometer", keller.Options(peer.port, rate=20.0, timeout=0.5))
+        device = keller.Keller("thermometer", keller.Options(peer.port, rate=20.0, baud=115_200, timeout=0.5))
         assert "Modbus address 1" in device.open()
         assert collect(device, 2)[0].values == (18.25, 1e5)
         assert [c.name for c in device.streams[0].channels] == ["water_temperature", "pressure"]
@@ -268,7 +268,7 @@ def test_timeouts_and_refusals_are_counted_and_polling_goes_on():
             transmitter(peer, request)
 
     with Peer(script, terminator=None) as peer:
-        device = keller.Keller("thermometer", keller.Options(peer.port, rate=20.0, timeout=0.1))
+        device = keller.Keller("thermometer", keller.Options(peer.port, rate=20.0, baud=115_200, timeout=0.1))
         device.open()
         wait_until(lambda: device.health().bad >= 2)
         seen = device.health().received
@@ -288,7 +288,7 @@ def test_no_thermometer():
 
 def test_a_pulled_thermometer():
     with Peer(transmitter, terminator=None) as peer:
-        device = keller.Keller("thermometer", keller.Options(peer.port, rate=20.0, timeout=0.1))
+        device = keller.Keller("thermometer", keller.Options(peer.port, rate=20.0, baud=115_200, timeout=0.1))
         device.open()
         peer.unplug()
         wait_until(lambda: not device.health().alive)
