@@ -26,8 +26,9 @@ from drivers.transcript import Transcript
 
 READ_TIMEOUT = 0.05
 """s; how soon an idle reader notices that it shall stop."""
-SEND_TIMEOUT = 0.05
-"""s; an adapter that takes no bytes for this long has lost its bus or its cable."""
+SEND_TIMEOUT = 0.2
+"""s; an adapter that takes no bytes for this long has lost its bus or its cable. pyserial counts time spent preempted too,
+even when every byte went out at once, so this is well above a scheduling hiccup and below the loop's allowed lateness."""
 JOIN_TIMEOUT = 2.0
 """s; forty times what the reader needs to stop."""
 CAPACITY = 100_000
