@@ -57,7 +57,8 @@ def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: 
             "give the bench a [mount] command or run one thruster at a time with --thruster"
         )
     folder = campaign_folder(output or config.output, config.name)
-    return follow(start_controller(campaign, folder, thrusters), headless, start=True)
+    run, _process = start_controller(campaign, folder, thrusters)
+    return follow(run, headless, start=True)
 
 
 @click.command("console")
@@ -93,8 +94,8 @@ def campaign_folder(output: Path, name: str) -> Path:
     return folder.resolve()
 
 
-def start_controller(campaign: Path, folder: Path, thrusters: Sequence[str]) -> Run:
-    """Start the controller process in a session of its own; returns once it listens."""
+def start_controller(campaign: Path, folder: Path, thrusters: Sequence[str]) -> tuple[Run, subprocess.Popen[bytes]]:
+    """Start the controller process in a session of its own; returns once it listens. It outlives us if it may."""
     with (folder / LOG_NAME).open("wb") as log:
         process = subprocess.Popen(
             [sys.executable, "-m", "rig.controller", str(campaign.resolve()), str(folder), *thrusters],
@@ -107,7 +108,7 @@ def start_controller(campaign: Path, folder: Path, thrusters: Sequence[str]) -> 
     while time.monotonic() < deadline:
         run = next((run for run in live_runs() if run.pid == process.pid), None)
         if run is not None:
-            return run
+            return run, process
         try:
             process.wait(0.05)
         except subprocess.TimeoutExpired:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import json
-import os
 import select
 import shutil
-import signal
 import subprocess
 import sys
 import time
@@ -62,6 +60,7 @@ class LiveBench:
     folder: Path
     process: subprocess.Popen[str]
     runs: list[Run] = field(default_factory=list)
+    controllers: list[subprocess.Popen[bytes]] = field(default_factory=list)
 
     def truth(self) -> list[dict[str, Any]]:
         lines = (self.folder / "ports" / "truth.jsonl").read_text().split("\n")
@@ -76,8 +75,10 @@ class LiveBench:
         campaign.write_text(text)
         folder = self.folder / "out" / f"run-{len(self.runs)}"
         folder.mkdir(parents=True)
-        self.runs.append(start_controller(campaign, folder, ()))
-        return self.runs[-1]
+        run, process = start_controller(campaign, folder, ())
+        self.runs.append(run)
+        self.controllers.append(process)
+        return run
 
     def tell(self, *words: str) -> None:
         """Script a fault over the bench's control port."""
@@ -102,21 +103,12 @@ def live_bench(folder: Path, edit: Callable[[str], str] = lambda text: text) -> 
                 break
         yield bench
     finally:
-        for run in bench.runs:
-            end(run.pid)
+        for controller in bench.controllers:
+            controller.kill()
+            controller.wait()
         process.terminate()
         process.wait(10)
         process.stdout.close()
-
-
-def end(pid: int) -> None:
-    """Kill a controller that is still there, and collect it."""
-    try:
-        if os.waitpid(pid, os.WNOHANG) == (0, 0):
-            os.kill(pid, signal.SIGKILL)
-            os.waitpid(pid, 0)
-    except (ChildProcessError, ProcessLookupError):
-        return
 
 
 @dataclass
@@ -150,7 +142,12 @@ def attach(run: Run) -> FrontEnd:
 
 def turning(volts: float) -> Callable[[Snapshot], bool]:
     """Is a hold of that voltage going on, and has the propeller answered?"""
-    return lambda s: s.state == "hold" and abs(s.command - volts) < 0.01 and bool(s.progress and s.progress.step_elapsed > 0.5)
+
+    def wanted(s: Snapshot) -> bool:
+        held = s.progress is not None and s.progress.step_elapsed > 0.5
+        return s.state == "hold" and abs(s.command - volts) < 0.01 and held
+
+    return wanted
 
 
 def zero_after(truth: list[dict[str, Any]], t_ns: int) -> float:
