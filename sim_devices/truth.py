@@ -1,9 +1,12 @@
-"""The truth log: what the motor really did, one JSON object a line, each line on the disk's side at once.
+"""The truth log: what the motor really did, one JSON object a line, flushed line by line.
 
 Every line has `event`, `t_ns` (time.monotonic_ns of this machine, the clock of the rig) and `thruster`.
-`header`: the true constants. `command`: a set-point accepted by the drive that differs from the one before.
-`state`: command and applied volts, rotation rate (rev/s), thrust and force (N), at most at 100 Hz.
-`timeout`, `fault`, `clear`, `mount`, `flow`: what the name says.
+`header`: the true constants.
+`command`: a set-point accepted by the drive that differs from the one before: `mode`, `value`, and `volts` where the
+mode has any (a duty; 0 for every command of nothing, also of no current; null for currents and speeds).
+`state`: command and applied volts, rotation rate (rev/s), current (A), thrust and force (N), at most at 100 Hz.
+`timeout`: the drive let go by itself, `after` s without a command.
+`fault`, `clear`, `mount`, `flow`: what the name says.
 """
 
 from __future__ import annotations

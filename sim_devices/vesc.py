@@ -175,7 +175,7 @@ class Vesc:
     def _release(self, t: float) -> None:
         self._timed_out = True
         self._mode, self._target = ("brake", self._options.brake_current)
-        self._log("timeout", after=t - self._last_command, brake_current=self._options.brake_current)
+        self._log("timeout", volts=0.0, after=t - self._last_command, brake_current=self._options.brake_current)
 
     # -- the bus -----------------------------------------------------------------------------------------------------
 
@@ -241,7 +241,7 @@ class Vesc:
         if mode != self._mode:
             self._integral = 0.0
         self._mode, self._target = mode, target
-        volts = target * self._bus if mode == "duty" else None
+        volts = target * self._bus if mode == "duty" else 0.0 if target == 0.0 else None
         self._log("command", mode=mode, value=target, volts=volts)
 
     # -- telemetry ---------------------------------------------------------------------------------------------------

@@ -3,34 +3,42 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from heapq import heapify, heapreplace
+from functools import reduce
 from itertools import pairwise
+from math import exp, sqrt
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
 
+from sim_devices.world.noise import Noise
 from sim_devices.world.settings import WorldSettings
+from sim_devices.world.state import State
 from sim_devices.world.world import World
 
 FINE_STEP = 0.001
 """s while anything moves."""
 COARSE_STEP = 0.01
 """s once the rotor has settled: a tenth of its fastest time constant, and its rest point is exact at any step."""
-SETTLED = 1e-9
-"""rev/s of change in one fine step."""
+SETTLED = 1e-6
+"""rev/s of change in one fine step: what is left of the motion is below 3e-4 rev/s and goes on shrinking."""
 ALWAYS_FINE = {"supply_sag", "stand_resonance", "time_skew", "periodic_disturbance", "inflow_dynamics", "reversal_loss"}
 """Effects whose own dynamics need the fine step."""
+SAME_TIME = 1e-9
+"""s: rounding of sample times."""
+
+Floats = NDArray[np.float64]
 
 
 class Trace(NamedTuple):
     """One sensor's run. All (n,), float64, SI."""
 
-    time: NDArray[np.float64]
+    time: Floats
     """s since the start of the run."""
-    value: NDArray[np.float64]
+    value: Floats
     """As measured: noise, clipping and faults in it; NaN where the sensor gave nothing."""
-    exact: NDArray[np.float64]
+    exact: Floats
     """The same sensor without noise, clipping and faults."""
 
 
@@ -55,21 +63,58 @@ def run(
     if any(not rate > 0 for rate in rates.values()):
         raise ValueError(f"run: every rate must be above zero, got {dict(rates)}")
     world = World(settings, rng)
-    walk = _Walk(world, coarse=not ALWAYS_FINE & set(settings.effects))
-    logs: dict[str, list[tuple[float, float, float]]] = {channel: [] for channel in rates}
     changes = sorted([(t, 0, v) for t, v in zip(time, volts, strict=True)] + [(t, 1, u) for t, u in flow])
-    due = [(0.0, 0, channel) for channel in rates]
-    heapify(due)
-    at = 0
-    while due and due[0][0] <= duration:
-        t, count, channel = due[0]
+    times = {channel: np.arange(int(duration * rate + SAME_TIME) + 1) / rate for channel, rate in rates.items()}
+    exact = _exact(world, changes, times, coarse=not ALWAYS_FINE & set(settings.effects))
+    traces = {}
+    for channel, values in exact.items():
+        noisy = values + noise_series(settings.noise.get(channel, Noise()), values, rates[channel], rng)
+        traces[channel] = Trace(times[channel], _measured(world, channel, times[channel], noisy), values)
+    return traces
+
+
+def noise_series(noise: Noise, values: Floats, rate: float, rng: np.random.Generator) -> Floats:
+    """Noise of one channel sampled at `rate` (1/s), in the channel's unit; same law as noise.NoiseSource."""
+    n = len(values)
+    total = (noise.white + noise.proportional * np.abs(values)) * rng.standard_normal(n)
+    if noise.slow:
+        keep = exp(-1.0 / (rate * noise.slow_time))
+        pushes = noise.slow * sqrt(1.0 - keep * keep) * rng.standard_normal(n)
+        pushes[:1] = noise.slow * rng.standard_normal(1)
+        total += lfilter([1.0], [1.0, -keep], pushes)
+    return np.asarray(total, dtype=np.float64)
+
+
+def _exact(
+    world: World, changes: list[tuple[float, int, float]], times: Mapping[str, Floats], *, coarse: bool
+) -> dict[str, Floats]:
+    """Walk the world past every change and every sample time."""
+    walk = _Walk(world, coarse=coarse)
+    channels = list(times)
+    stamps = np.concatenate([*times.values(), np.empty(0)])
+    owners = np.concatenate([*(np.full(len(t), i) for i, t in enumerate(times.values())), np.empty(0)])
+    order = np.argsort(stamps, kind="stable")
+    logs: list[list[float]] = [[] for _ in channels]
+    state, at = world.state, 0
+    for t, owner in zip(stamps[order].tolist(), owners[order].astype(int).tolist(), strict=True):
         while at < len(changes) and changes[at][0] <= t:
             walk.change(*changes[at])
             at += 1
-        walk.to(t)
-        logs[channel].append((t, world.sample(channel), world.exact(channel)))
-        heapreplace(due, ((count + 1) / rates[channel], count + 1, channel))
-    return {channel: Trace(*np.array(rows, dtype=np.float64).reshape(-1, 3).T) for channel, rows in logs.items()}
+        if t - state.t > SAME_TIME:
+            walk.to(t)
+        logs[owner].append(world.exact(channels[owner]))
+    return {channel: np.array(log, dtype=np.float64) for channel, log in zip(channels, logs, strict=True)}
+
+
+def _measured(world: World, channel: str, time: Floats, noisy: Floats) -> Floats:
+    """Clipping and faults of the channel, sample by sample where there are any."""
+    effects = world.output_effects(channel)
+    if not effects:
+        return noisy
+    state, out = State(), []
+    for state.t, value in zip(time.tolist(), noisy.tolist(), strict=True):
+        out.append(reduce(lambda v, effect: effect.apply(v, state, 0.0), effects, value))
+    return np.array(out, dtype=np.float64)
 
 
 class _Walk:
@@ -92,8 +137,8 @@ class _Walk:
     def to(self, t: float) -> None:
         """Advance to t (s)."""
         world, s, volts = self._world, self._world.state, self._volts
-        while (left := t - s.t) > 1e-9:  # s: rounding of sample times
+        while (left := t - s.t) > SAME_TIME:
             before = s.n
             world.step(min(self._step, left), volts)
-            settled = self._coarse and abs(s.n - before) < SETTLED and left >= self._step
-            self._step = COARSE_STEP if settled or self._step == COARSE_STEP else FINE_STEP
+            if self._coarse and self._step == FINE_STEP and left >= FINE_STEP and abs(s.n - before) < SETTLED:
+                self._step = COARSE_STEP

@@ -28,9 +28,7 @@ class World:
         self._hydro = self._of_stage("hydro")
         self._stand = self._of_stage("stand")
         self._cell = self._of_stage("cell")
-        outputs = self._of_stage("output")
-        self._clips = tuple(e for e in outputs if not isinstance(e, ChannelFault))
-        self._faults = {e.channel: e for e in outputs if isinstance(e, ChannelFault)}
+        self._outputs = {c: tuple(e for e in self._of_stage("output") if _concerns(e, c)) for c in CHANNELS}
         self.mounted = settings.mounted
         self._install()
 
@@ -100,11 +98,13 @@ class World:
         s = self.state
         value = self.exact(channel)
         value += self._noise[channel].sample(value, s.t)
-        if channel == "thrust":
-            for e in self._clips:
-                value = e.apply(value, s, 0.0)
-        fault = self._faults.get(channel)
-        return value if fault is None else fault.apply(value, s, 0.0)
+        for e in self._outputs[channel]:
+            value = e.apply(value, s, 0.0)
+        return value
+
+    def output_effects(self, channel: str) -> tuple[Effect, ...]:
+        """What changes each sample of a channel after its noise: clipping, then a fault."""
+        return self._outputs[channel]
 
     def exact(self, channel: str) -> float:
         """The sensor without noise and faults: gain error and zero offset of the cell are in it."""
@@ -132,3 +132,8 @@ class World:
                 return self.settings.tunnel.water_temperature + 5.0 + 0.5 * s.motor_rise
             case _:
                 raise ValueError(f"sample: expected one of {', '.join(CHANNELS)}, got {channel!r}")
+
+
+def _concerns(effect: Effect, channel: str) -> bool:
+    """A fault sits on the channel it names; what clips, clips the load cell."""
+    return channel == (effect.channel if isinstance(effect, ChannelFault) else "thrust")

@@ -107,7 +107,7 @@ def test_an_effect_changes_the_prediction(name):
 
 def test_what_is_not_named_is_exactly_absent():
     world = World(read_world(PLAIN), np.random.default_rng(1))
-    assert not any((world._command, world._hydro, world._stand, world._cell, world._clips, world._faults))
+    assert not any((world._command, world._hydro, world._stand, world._cell, *world._outputs.values()))
     assert np.array_equal(thrust({}), thrust({}, flow=((0.0, 0.0),)))
 
 
@@ -224,3 +224,59 @@ def test_the_world_of_the_example_bench_can_be_read():
     tables = tomllib.loads(WORLD_TOML.read_text())
     assert len(tables["thrusters"]) == 8
     assert read_world({k: tables[k] for k in ("thrusters", "tunnel", "cell", "noise")}).mounted == "T1"
+
+
+@pytest.mark.parametrize(
+    ("kind", "expected"),
+    [("frozen", 1.0), ("reversed", -40.0), ("unsigned", 40.0), ("rescaled", 20.0), ("nan", np.nan)],
+)
+def test_a_channel_lies_as_it_is_told(kind, expected):
+    fault = {"channel": "thrust", "kind": kind, "factor": 0.5, "start": 3.0, "duration": 6.0}
+    settings = read_world({**PLAIN, "effects": {"channel_fault": fault}, "cell": {"zero_offset": 0.0}})
+    volts = (5.0**0.5 / 2.0**0.5, 10.0)  # 1 N, then 40 N
+    value = run(settings, (0.0, 3.0), volts, 12.0, rates={"thrust": 10.0}, rng=np.random.default_rng(1))["thrust"].value
+    assert value[80] == pytest.approx(expected, rel=1e-2, nan_ok=True)
+    assert value[100] == pytest.approx(40.0, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("tables", "sentence"),
+    [
+        ({"channel_fault": {"channel": "thrst", "kind": "nan"}}, "channel must be one of"),
+        ({"channel_fault": {"channel": "thrust", "kind": "shy"}}, "kind must be one of"),
+        ({"channel_fault": {"channel": "thrust", "kind": "nan", "duration": -1.0}}, "duration must be above zero"),
+    ],
+)
+def test_a_lie_that_cannot_be_told(tables, sentence):
+    with pytest.raises(WorldError, match=sentence):
+        read_world({**PLAIN, "effects": tables})
+
+
+def test_blade_pass_is_silent_at_rest():
+    effects = {"periodic_disturbance": {"amplitude": 0.5, "blades": 3}}
+    assert at(effects, 0.0) == 0.0
+    rng = np.random.default_rng(1)
+    trace = run(read_world({**PLAIN, "effects": effects}), [0.0], [10.0], 20.0, rates={"thrust": 500.0}, rng=rng)
+    wave = trace["thrust"].exact[-5000:] - 100 * C
+    line = np.argmax(np.abs(np.fft.rfft(wave))) / 10.0
+    assert line == pytest.approx(30.0, abs=0.1)
+    assert np.max(wave) == pytest.approx(0.5, rel=0.01)
+
+
+def test_a_run_that_cannot_be():
+    settings, rng = read_world(PLAIN), np.random.default_rng(1)
+    with pytest.raises(ValueError, match="must ascend"):
+        run(settings, [1.0, 0.0], [0.0, 0.0], 2.0, rates={"thrust": 1.0}, rng=rng)
+    with pytest.raises(ValueError, match="above zero"):
+        run(settings, [0.0], [0.0], 2.0, rates={"thrust": 0.0}, rng=rng)
+    with pytest.raises(ValueError, match="expected one of thrust"):
+        run(settings, [0.0], [0.0], 2.0, rates={"thrst": 1.0}, rng=rng)
+
+
+def test_every_sensor_gives_its_quantity():
+    world = settled(World(read_world({**PLAIN, "tunnel": {"flow_speed": 0.3}}), np.random.default_rng(1)), 10.0)
+    expected = {"rotation_rate": 10.0, "bus_voltage": 48.0, "flow_speed": 0.3, "water_temperature": 18.0}
+    expected |= {"pressure": 1.04e5, "current": 25.0 / 7.2, "input_current": 25.0 / 7.2 * 10.0 / 48.0}
+    assert {name: world.sample(name) for name in expected} == pytest.approx(expected)
+    assert 18.0 < world.sample("motor_temperature") < 19.0
+    assert 23.0 < world.sample("fet_temperature") < 24.0
