@@ -109,7 +109,7 @@ def test_a_rate_stands_for_a_time(tmp_path):
     _, _, found = imported(tmp_path, text, "crazyflie_supply_sag")
     assert values(found["command_voltage"]) == [0, 4.2, 0]
     assert found["command_voltage"].time.tolist() == pytest.approx([0, 0.01, 0.03])
-    assert values(found["thrust"]) == [0, 0.009807, 0.980665, 0.490333]
+    assert values(found["thrust"]) == [0, 0.009807, 0.980665, 0.490332]
     assert values(found["rotation_rate"])[0] == 1
 
 

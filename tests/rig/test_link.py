@@ -4,6 +4,8 @@ import os
 import socket
 import stat
 import struct
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +41,11 @@ def snapshot(thrust=1.0):
         progress=None,
         files=("a.h5",),
     )
+
+
+def test_the_controllers_side_never_loads_hdf5():
+    code = "import sys, rig.link, rig.recorder_messages, rig.importer, rig.recover; print('h5py' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 
 def test_messages_arrive_in_order_and_whole():
