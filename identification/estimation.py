@@ -37,8 +37,8 @@ class Rows:
     """(n,), all finite and above zero; None when unknown."""
     dof: Floats | None = None
     """(n,) degrees of freedom of the standard errors."""
-    raw_dof: float = float("inf")
-    """Sum of the degrees of freedom behind all standard errors."""
+    most_dof: float = float("inf")
+    """Of all standard errors together: they share one spectrum of the noise, so their dof do not simply add up."""
     even: bool = False
     """Rows are samples even in time whose errors may be correlated."""
 
@@ -97,8 +97,8 @@ class Estimate:
         assert self.rows.dof is not None
         assert self.underfit is not None
         parts = (contrast @ self.fit.solver * self.rows.std_error) ** 2
-        known = float(parts.sum() ** 2 / np.sum(parts**2 / self.rows.dof)) if parts.any() else 0.0
-        known = min(known, self.rows.raw_dof)
+        doubt = float(np.sum(parts**2 / self.rows.dof))
+        known = min(float(parts.sum()) ** 2 / doubt if doubt > 0 else float("inf"), self.rows.most_dof)
         if not np.isfinite(known):
             return Spread(internal, known, internal)
         total = known + self.underfit.dof

@@ -93,7 +93,7 @@ def rows_of(runs: Sequence[Run], model: str) -> tuple[Rows, Literal["points", "s
         return Rows(H, thrust, names, blocks), "points"
     dof = np.concatenate([p.dof for p in points])
     shared = moderate(error, dof, np.abs(thrust))
-    return Rows(H, thrust, names, blocks, shared.std_error, shared.dof, float(dof.sum())), "points"
+    return Rows(H, thrust, names, blocks, shared.std_error, shared.dof, float(dof.max())), "points"
 
 
 def _parameter(found: Estimate, contrast: Floats, unit: str, gain: float) -> Parameter:
