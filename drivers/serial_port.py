@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import select
 import threading
 import time
 from collections.abc import Callable, Sequence
@@ -23,6 +25,8 @@ READ_TIMEOUT = 0.05
 """s; how soon an idle reader notices that it shall stop."""
 WRITE_TIMEOUT = 0.2
 """s; a port that takes no bytes for this long has lost its device."""
+CHUNK = 65_536
+"""Bytes taken at once, at most."""
 JOIN_TIMEOUT = 2.0
 """s; forty times what the reader needs to stop."""
 
@@ -124,8 +128,9 @@ class SerialPort(Generic[Record]):
     def _read(self, port: serial.Serial) -> None:
         end: str | None = f"the reader of {self.settings.port} stopped on an error of this program (see the log)"
         try:
+            read = _chunk_reader(port)
             while not self._closing.is_set():
-                data = port.read(port.in_waiting or 1)
+                data = read()
                 if data:
                     self._arrived(time.monotonic_ns(), data)
             end = None
@@ -141,6 +146,32 @@ class SerialPort(Generic[Record]):
         records = self._feed(data)
         if records:
             self.inbox.put(t_ns, records)
+
+
+def _chunk_reader(port: serial.Serial) -> Callable[[], bytes]:
+    """What has arrived, or nothing after READ_TIMEOUT. Raises OSError when the device is gone.
+
+    One poll and one read a chunk; pyserial's own read takes four system calls and half as much again in Python.
+    """
+    try:
+        descriptor = port.fileno()
+    except (OSError, NotImplementedError, AttributeError):  # loop:// and rfc2217:// have none
+        return lambda: port.read(port.in_waiting or 1)
+    poller = select.poll()
+    poller.register(descriptor, select.POLLIN)
+
+    def read() -> bytes:
+        if not poller.poll(READ_TIMEOUT * 1e3):
+            return b""
+        try:
+            data = os.read(descriptor, CHUNK)
+        except BlockingIOError:  # woken for nothing
+            return b""
+        if not data:
+            raise OSError("the device has gone")
+        return data
+
+    return read
 
 
 def _open_serial(settings: SerialSettings) -> serial.Serial:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import multiprocessing
-import os
 import threading
 import time
 from collections.abc import Iterator
@@ -20,7 +19,7 @@ def _open_files() -> set[str]:
     targets = set()
     for link in Path("/proc/self/fd").iterdir():
         try:
-            targets.add(os.readlink(link))
+            targets.add(str(link.readlink()))
         except OSError:
             continue
     return {target for target in targets if target.startswith("/") and not target.startswith(("/dev/null", "/proc/"))}
