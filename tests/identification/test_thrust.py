@@ -1,7 +1,15 @@
 import numpy as np
 import pytest
 from thrust_runs import (
-    LEVELS, ar1, level_table, rov_levels, sine, staircase, t200_levels, voltage_sine_stand, white,
+    LEVELS,
+    ar1,
+    level_table,
+    rov_levels,
+    sine,
+    staircase,
+    t200_levels,
+    voltage_sine_stand,
+    white,
 )  # fmt: skip
 
 from identification.estimation import Rows, estimate, excess_std

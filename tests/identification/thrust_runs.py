@@ -98,7 +98,8 @@ def voltage_sine_stand(number: int) -> Recording:
         if line.startswith("#") or "<" in line:
             continue
         stamp, *raw = line.split("\t")
-        rows.append((datetime.strptime(stamp.strip(), "%d-%b-%Y %H:%M:%S.%f").timestamp(), *map(float, raw[:4])))
+        when = datetime.strptime(f"{stamp.strip()} +0000", "%d-%b-%Y %H:%M:%S.%f %z")
+        rows.append((when.timestamp(), *map(float, raw[:4])))
     table = np.array(rows)
     t = table[:, 0] - table[0, 0]
     force = table[:, 1] * 885.739990234375 * 0.6669999957084656 * 4.4482216152605
