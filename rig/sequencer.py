@@ -102,6 +102,7 @@ class Sequencer:
             case "resume" if self._state == "paused":
                 self._end_row(time)
                 self._journal.say(time, "info", f"resumed: step {self._position} is retaken")
+                self._dt = 0.0  # 0 V once more: also a pause that was resumed in the same tick sends it
                 self._begin(time)
             case "skip" if self._state in ("hold", "sine", "free"):
                 self._journal.say(time, "info", f"step {self._position} ended early on request, its data are kept")

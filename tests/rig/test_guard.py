@@ -1,0 +1,110 @@
+"""The guard: every reason to stop, and none without one."""
+
+from math import inf, nan
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.protocols import Channel, LinkHealth, Stream
+from rig.config import LimitConfig
+from rig.guard import Allowances, Latest, Recorder, Trip, Vitals, Watch, allowances, check, watches
+
+CELL = Stream("load_cell", "mt_sics", (Channel("thrust", "thrust", "N"), Channel("stable", None, "1")), 1 / 92)
+FLOW = Stream("flow", "nortek", (Channel("flow_speed", "flow_speed", "m/s"),), 0.25)
+THRUST = Watch("load_cell.thrust", "N", 0.2, -300.0, 300.0)
+ALLOWED = Allowances()
+GOOD = LinkHealth(True, 1, 0, ())
+
+
+def ask(value: float = 1.0, at: float = 10.0, watch: Watch = THRUST, **vitals) -> Trip | None:
+    facts = {"now": 10.0, "started": 0.0} | vitals
+    return check((watch,), {watch.channel: Latest(value, at)}, Vitals(**facts), ALLOWED)
+
+
+def test_all_is_well():
+    recorder = Recorder(True, age=0.3)
+    assert ask(lateness=0.1, links={"motor": GOOD}, recorder=recorder, lease_age=0.5) is None
+    assert ask(-300.0) is None
+    assert ask(300.0) is None
+
+
+@given(st.floats())
+def test_a_value_passes_only_inside_its_limits(value):
+    trip = ask(value)
+    assert (trip is None) == (-300.0 <= value <= 300.0)
+    assert trip is None or (trip.kind, trip.channel) == ("cut", "load_cell.thrust")
+
+
+@pytest.mark.parametrize("limits", [{"min": 0.0}, {"max": 0.0}, {"min": -inf, "max": inf}, {}])
+def test_nan_fails_every_limit(limits):
+    trip = ask(nan, watch=Watch("load_cell.thrust", "N", 0.2, **limits))
+    assert trip is not None
+    assert trip.source == "nan"
+
+
+def test_trip_names_channel_value_and_limit():
+    trip = ask(301.5)
+    assert trip == Trip(
+        "load_cell.thrust is 301.5 N, above its limit of 300 N", "limit", 10.0, "load_cell.thrust", 301.5, 300.0
+    )
+    assert ask(-301.5).cause == "load_cell.thrust is -301.5 N, below its limit of -300 N"
+
+
+@given(st.floats(0, 5))
+def test_a_sample_that_is_too_old_trips(age):
+    trip = ask(at=10.0 - age)
+    assert (trip is None) == (10.0 - (10.0 - age) <= 0.2)
+    assert trip is None or trip.source == "stale"
+
+
+def test_silence_is_allowed_for_the_grace_only():
+    def silent(now: float) -> Trip | None:
+        return check((THRUST,), {}, Vitals(now, started=8.0), ALLOWED)
+
+    assert silent(10.0) is None
+    assert silent(10.1).cause == "load_cell.thrust gave no sample in 2.10 s since the start, 2 s are allowed"
+
+
+@pytest.mark.parametrize(
+    ("vitals", "source", "text"),
+    [
+        ({"links": {"motor": LinkHealth(False, 9, 0, (), "the cable was pulled")}}, "link", "the cable was pulled"),
+        ({"links": {"cell": GOOD, "motor": LinkHealth(False, 9, 0, ())}}, "link", "to motor is gone: its reader"),
+        ({"lateness": 0.3}, "late", "0.30 s late, 0.25 s are allowed"),
+        ({"recorder": Recorder(False)}, "recorder", "the recorder process is gone"),
+        ({"recorder": Recorder(True, overrun=True)}, "recorder", "recorder overrun"),
+        ({"recorder": Recorder(True, age=13.0)}, "recorder", "no sign of life for 13.0 s"),
+        ({"lease_age": 2.5}, "lease", "no operator was seen for 2.5 s"),
+        ({"lease_age": inf}, "lease", "no operator"),
+    ],
+)
+def test_the_rig_itself_is_guarded(vitals, source, text):
+    trip = ask(**vitals)
+    assert trip.source == source
+    assert text in trip.cause
+
+
+def test_the_bench_is_named_before_the_rig():
+    assert ask(400.0, lateness=1.0).source == "limit"
+
+
+def test_watches_take_their_defaults_from_the_streams():
+    limits = [LimitConfig("load_cell.thrust", max=5.0), LimitConfig("flow.flow_speed", max_age=9.0)]
+    found = watches(limits, (CELL, FLOW), essential=("load_cell.thrust", "load_cell.stable"))
+    assert found == (
+        Watch("load_cell.thrust", "N", 0.2, None, 5.0),
+        Watch("flow.flow_speed", "m/s", 9.0),
+        Watch("load_cell.stable", "1", 0.2),
+    )
+    assert watches([LimitConfig("flow.flow_speed")], (FLOW,))[0].max_age == 0.75  # three periods
+
+
+def test_unknown_channel_is_named():
+    with pytest.raises(ValueError, match=r"no device gives a channel flow\.speed; there are flow\.flow_speed"):
+        watches([LimitConfig("flow.speed")], (FLOW,))
+
+
+def test_lateness_follows_the_loop_rate():
+    assert allowances(50.0).lateness == 0.25
+    assert allowances(10.0).lateness == 0.5
