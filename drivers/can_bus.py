@@ -27,8 +27,9 @@ from drivers.transcript import Transcript
 READ_TIMEOUT = 0.05
 """s; how soon an idle reader notices that it shall stop."""
 SEND_TIMEOUT = 0.2
-"""s; an adapter that takes no bytes for this long has lost its bus or its cable. pyserial counts time spent preempted too,
-even when every byte went out at once, so this is well above a scheduling hiccup and below the loop's allowed lateness."""
+"""s; an adapter that takes no bytes for this long has lost its bus or its cable. Time spent preempted counts for
+pyserial too, even when every byte went out at once: hence well above a scheduling hiccup, and below the lateness that
+the loop allows."""
 JOIN_TIMEOUT = 2.0
 """s; forty times what the reader needs to stop."""
 CAPACITY = 100_000
@@ -98,7 +99,7 @@ class CanBus:
         self._inboxes = tuple(pair for pair in self._inboxes if pair[1] is not inbox)
 
     def send(self, frame: Frame) -> None:
-        """Send once. Raises LinkError when the bus is closed, lost, or takes nothing for 0.05 s."""
+        """Send once. Raises LinkError when the bus is closed, lost, or takes nothing for 0.2 s."""
         if self._bus is None or not self.alive:
             raise LinkError(f"CAN bus {self._channel}: {self.error or 'is not open'}")
         message = can.Message(arbitration_id=frame.id, is_extended_id=frame.extended, data=frame.data)
