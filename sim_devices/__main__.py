@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import signal
 import sys
+from collections.abc import Callable
 from pathlib import Path
 from types import FrameType
 from typing import NoReturn
@@ -38,28 +39,32 @@ def main() -> None:
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of all noise (default: from the world file).")
 def run(world: Path, links: Path | None, truth: Path | None, seed: int | None) -> None:
     """Start the bench of WORLD (TOML), print its ports and `ready`, live until SIGTERM or Ctrl+C."""
+    stop = stop_requests()
     try:
         bench = start(world, links, truth, seed)
     except WorldError as error:
         fail(str(error))
-    live(bench)
+    live(bench, stop)
 
 
-def live(bench: Bench) -> None:
-    """Print the ports, then run until SIGTERM, SIGINT or SIGHUP; the links are removed."""
-    stopped: list[int] = []
+def stop_requests() -> Callable[[], bool]:
+    """From now on SIGTERM, SIGINT and SIGHUP only make the returned function say True."""
+    asked: list[int] = []
 
-    def stop(number: int, _frame: FrameType | None) -> None:
-        stopped.append(number)
+    def ask_to_stop(number: int, _frame: FrameType | None) -> None:
+        asked.append(number)
 
     for each in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
-        signal.signal(each, stop)
+        signal.signal(each, ask_to_stop)
+    return lambda: bool(asked)
+
+
+def live(bench: Bench, stop: Callable[[], bool]) -> None:
+    """Print the ports and `ready`, then run until `stop()`; the links are removed however it ends."""
     try:
-        for line in bench.listing():
-            click.echo(line)
-        click.echo("ready")
+        click.echo("\n".join([*bench.listing(), "ready"]))
         sys.stdout.flush()
-        bench.run(lambda: bool(stopped))
+        bench.run(stop)
     finally:
         bench.close()
 

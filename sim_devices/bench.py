@@ -16,7 +16,8 @@ from sim_devices.control import clear, fault, obey
 from sim_devices.device import SerialDevice
 from sim_devices.keller import Keller, KellerOptions
 from sim_devices.motor_tap import MotorTap
-from sim_devices.mt_sics import MtSics, MtSicsOptions
+from sim_devices.mt_sics import MtSics
+from sim_devices.mt_sics_options import MtSicsOptions
 from sim_devices.nortek import Nortek, NortekOptions
 from sim_devices.ports import ControlSocket, PtyPort, wait
 from sim_devices.settings import BenchSettings, ScriptedFault, load

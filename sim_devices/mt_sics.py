@@ -9,56 +9,43 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass
 from math import inf, isnan
 
-STANDARD_GRAVITY = 9.80665
-"""m/s^2, exact (CGPM 1901): what balances that show mass are adjusted with."""
-UNITS = {"N": 1.0, "g": STANDARD_GRAVITY / 1000.0, "kg": STANDARD_GRAVITY}
-"""unit -> N."""
+from sim_devices.mt_sics_options import UNITS, MtSicsOptions, line, shown
+
 BALANCE_TIMEOUT = 30.0
 """s a command waits for stability."""
 BOOT_TIME = 2.0
 """s from power-up to the first word."""
 STABLE_WINDOW = 0.5
 """s over which a stable reading may not move by more than `stable_band`."""
+INTERNAL_ERROR = "Error 10b"
+"""EEPROM error, from the electronics (manual, internal faults)."""
+RATE_FAULTS = {"fast": 10.0, "slow": 0.1}
+"""readings come this many times as often as they should."""
+ERRORS = {"transmission_error": "ET", "logical_error": "EL"}
 COMMANDS = ("@", "I0", "I1", "I2", "I3", "I4", "I10", "I11", "S", "SI", "SIR", "Z", "ZI", "T", "TA", "TAC", "TI", "UPD")
 LEVEL_1 = ("T", "TA", "TAC", "TI")
 LEVEL_2 = ("UPD", "I10", "I11")
 
 
-@dataclass(frozen=True, slots=True)
-class MtSicsOptions:
-    """`[devices.<name>]` of kind mt_sics."""
-
-    kind: str
-    port: str
-    baud: int = 9600
-    model: str = "WXS-SIM"
-    serial: str = "B021002593"
-    unit: str = "N"
-    digit: float = 0.001
-    """Smallest step shown, in `unit`."""
-    capacity: float = 500.0
-    """N: beyond it the reply is `+` or `-`."""
-    rate: float = 92.0
-    """readings/s at power-up; UPD changes it."""
-    max_rate: float = 92.0
-    """readings/s, the most UPD accepts."""
-    stable_band: float = 0.3
-    """N."""
-
-    def __post_init__(self) -> None:
-        if self.unit not in UNITS:
-            raise ValueError(f"unit must be one of {', '.join(UNITS)}, got {self.unit!r}")
-        if not 0 < self.rate <= self.max_rate or self.digit <= 0:
-            raise ValueError("0 < rate <= max_rate and digit > 0 are needed")
-
-
 class MtSics:
     """One weigh module. `read` gives the force on the cell in N (NaN: the electronics have no number)."""
 
-    faults = ("frozen", "overload", "underload", "wrong_unit", "reboot", "silent", "transmission_error")
+    faults = (
+        "frozen",
+        "overload",
+        "underload",
+        "no_value",
+        "internal_error",
+        "wrong_unit",
+        "fast",
+        "slow",
+        "reboot",
+        "silent",
+        "transmission_error",
+        "logical_error",
+    )
 
     def __init__(self, options: MtSicsOptions, read: Callable[[], float]) -> None:
         self._options = options
@@ -86,8 +73,8 @@ class MtSics:
         self._buffer += data
         out = b""
         while (end := self._buffer.find(b"\n")) >= 0:
-            line, self._buffer = self._buffer[:end], self._buffer[end + 1 :]
-            out += self._answer(line.strip(b"\r "), t)
+            request, self._buffer = self._buffer[:end], self._buffer[end + 1 :]
+            out += self._answer(request.strip(b"\r "), t)
         return out
 
     def tick(self, t: float) -> bytes:
@@ -98,7 +85,7 @@ class MtSics:
             return self._identity()
         out = b""
         while self._next <= t:
-            self._next += 1.0 / self._rate
+            self._next += 1.0 / (self._rate * RATE_FAULTS.get(self._fault, 1.0))
             self._sample()
             out += self._on_reading(t)
         return b"" if self._fault == "silent" else out
@@ -141,20 +128,19 @@ class MtSics:
             return "+"
         if self._fault == "underload" or self._value < -self._options.capacity:
             return "-"
-        return "I" if isnan(self._value) else ""
+        return "I" if isnan(self._value) or self._fault == "no_value" else ""
 
     def _shown(self, newtons: float) -> str:
-        digit = self._options.digit
-        decimals = max(0, len(f"{digit:.9f}".rstrip("0").partition(".")[2]))
-        value = round(newtons / UNITS[self._unit] / digit) * digit + 0.0
-        return f"{value:10.{decimals}f} {self._unit}"
+        return shown(newtons, self._unit, self._options.digit)
 
     def _weight(self, identifier: str) -> bytes:
+        if self._fault == "internal_error":
+            return line(f"S S {INTERNAL_ERROR}")
         why = self._refusal()
         if why:
-            return _line(f"{identifier} {why}")
+            return line(f"{identifier} {why}")
         status = "S" if self._stable else "D"
-        return _line(f"{identifier} {status} {self._shown(self._value - self._zero - self._tare)}")
+        return line(f"{identifier} {status} {self._shown(self._value - self._zero - self._tare)}")
 
     def _on_reading(self, t: float) -> bytes:
         out = self._weight("S") if self._streaming else b""
@@ -166,22 +152,22 @@ class MtSics:
             return out + self._when_stable(command)
         if t - since > BALANCE_TIMEOUT:
             self._pending = None
-            return out + _line(f"{command} I")
+            return out + line(f"{command} I")
         return out
 
     # -- commands ---------------------------------------------------------------------------------------------------
 
-    def _answer(self, line: bytes, t: float) -> bytes:
-        if self._fault == "transmission_error" or not line.isascii():
-            return _line("ET")
-        words = line.decode("ascii").split()
+    def _answer(self, request: bytes, t: float) -> bytes:
+        if self._fault in ERRORS or not request.isascii():
+            return line(ERRORS.get(self._fault, "ET"))
+        words = request.decode("ascii").split()
         if not words:
             return b""
         command, arguments = words[0], words[1:]
         if command not in COMMANDS:
-            return _line("ES")
+            return line("ES")
         if arguments and command not in ("TA", "UPD"):
-            return _line("ES")
+            return line("EL")
         return self._execute(command, arguments, t)
 
     def _execute(self, command: str, arguments: list[str], t: float) -> bytes:
@@ -207,7 +193,7 @@ class MtSics:
                 return self._tare_now()
             case "TAC":
                 self._tare = 0.0
-                return _line("TAC A")
+                return line("TAC A")
             case "TA":
                 return self._preset_tare(arguments)
             case _:
@@ -223,56 +209,56 @@ class MtSics:
     def _when_stable(self, command: str) -> bytes:
         why = self._refusal()
         if command == "S" or why:
-            return self._weight("S") if command == "S" else _line(f"{command} {why}")
+            return self._weight("S") if command == "S" else line(f"{command} {why}")
         if command == "Z":
             self._zero, self._tare = self._value, 0.0
-            return _line("Z A")
+            return line("Z A")
         self._tare = self._value - self._zero
-        return _line(f"T S {self._shown(self._tare)}")
+        return line(f"T S {self._shown(self._tare)}")
 
     def _zero_now(self) -> bytes:
         why = self._refusal()
         if why:
-            return _line(f"ZI {why}")
+            return line(f"ZI {why}")
         self._zero, self._tare = self._value, 0.0
-        return _line(f"ZI {'S' if self._stable else 'D'}")
+        return line(f"ZI {'S' if self._stable else 'D'}")
 
     def _tare_now(self) -> bytes:
         why = self._refusal()
         if why:
-            return _line(f"TI {why}")
+            return line(f"TI {why}")
         self._tare = self._value - self._zero
-        return _line(f"TI {'S' if self._stable else 'D'} {self._shown(self._tare)}")
+        return line(f"TI {'S' if self._stable else 'D'} {self._shown(self._tare)}")
 
     def _preset_tare(self, arguments: list[str]) -> bytes:
         if not arguments:
-            return _line(f"TA A {self._shown(self._tare)}")
+            return line(f"TA A {self._shown(self._tare)}")
         try:
             value, unit = float(arguments[0]), arguments[1]
             newtons = value * UNITS[unit]
         except (ValueError, IndexError, KeyError):
-            return _line("TA L")
+            return line("TA L")
         self._tare = newtons
-        return _line(f"TA A {self._shown(self._tare)}")
+        return line(f"TA A {self._shown(self._tare)}")
 
     def _update_rate(self, arguments: list[str]) -> bytes:
         if not arguments:
-            return _line(f"UPD A {self._rate:.3f}")
+            return line(f"UPD A {self._rate:.3f}")
         try:
             rate = float(arguments[0])
         except ValueError:
-            return _line("UPD L")
+            return line("UPD L")
         if len(arguments) > 1 or not 0.1 <= rate <= self._options.max_rate:
-            return _line("UPD L")
+            return line("UPD L")
         self._rate = rate
         self._recent = deque(self._recent, maxlen=max(round(STABLE_WINDOW * rate), 2))
-        return _line("UPD A")
+        return line("UPD A")
 
     def _information(self, command: str) -> bytes:
         o = self._options
         if command == "I0":
             last = COMMANDS[-1]
-            return b"".join(_line(f'I0 {"A" if c == last else "B"} {_level(c)} "{c}"') for c in COMMANDS)
+            return b"".join(line(f'I0 {"A" if c == last else "B"} {_level(c)} "{c}"') for c in COMMANDS)
         texts = {
             "I1": '"012" "2.00" "2.20" "1.00"',
             "I2": f'"{o.model} {o.capacity / UNITS[o.unit]:.0f} {o.unit}"',
@@ -281,7 +267,7 @@ class MtSics:
             "I10": '"SIM"',
             "I11": f'"{o.model}"',
         }
-        return _line(f"{command} A {texts[command]}")
+        return line(f"{command} A {texts[command]}")
 
     def _identity(self) -> bytes:
         return self._information("I4")
@@ -293,7 +279,3 @@ class MtSics:
 
 def _level(command: str) -> int:
     return 1 if command in LEVEL_1 else 2 if command in LEVEL_2 else 0
-
-
-def _line(text: str) -> bytes:
-    return text.encode("ascii") + b"\r\n"

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sim_devices.keller import KellerOptions
-from sim_devices.mt_sics import MtSicsOptions
+from sim_devices.mt_sics_options import MtSicsOptions
 from sim_devices.nortek import NortekOptions
 from sim_devices.tables import WorldError, build, check_known
 from sim_devices.vesc import VescOptions

@@ -13,8 +13,9 @@ MAX_AGE = 0.25
 """s a finished message may wait for a host that does not read before it is dropped whole: a device has no memory."""
 MAX_BACKLOG = 1.0
 """s of line time that may be waiting; a device that talks more than its line carries loses whole messages."""
-WIRE_FAULTS = ("dropped", "duplicated", "corrupted", "delayed")
-"""dropped, duplicated, corrupted: this share of the messages (0..1). delayed: by this many seconds."""
+WIRE_FAULTS = ("dropped", "duplicated", "corrupted", "merged", "shifted", "delayed")
+"""This share of the messages (0..1) is dropped, comes twice, has one bit flipped, has lost its line end, has lost one
+byte. delayed: every message, by this many seconds."""
 DEFAULT_AMOUNT = 0.1
 
 
@@ -54,15 +55,19 @@ class Wire:
     def _spoilt(self, message: bytes) -> list[bytes]:
         if not self._faults:
             return [message]
-        if self._rng.random() < self._faults.get("dropped", 0.0):
+        if self._hits("dropped"):
             return []
-        if self._rng.random() < self._faults.get("corrupted", 0.0):
-            spoilt = bytearray(message)
-            at = int(self._rng.integers(len(spoilt)))
-            spoilt[at] ^= 1 << int(self._rng.integers(8))
-            message = bytes(spoilt)
-        twice = self._rng.random() < self._faults.get("duplicated", 0.0)
-        return [message, message] if twice else [message]
+        spoilt = bytearray(message)
+        if self._hits("corrupted"):
+            spoilt[int(self._rng.integers(len(spoilt)))] ^= 1 << int(self._rng.integers(8))
+        if self._hits("merged"):
+            spoilt = spoilt.rstrip(b"\r\n")
+        if self._hits("shifted"):
+            del spoilt[int(self._rng.integers(len(spoilt)))]
+        return [bytes(spoilt)] * (2 if self._hits("duplicated") else 1)
+
+    def _hits(self, name: str) -> bool:
+        return name in self._faults and self._rng.random() < self._faults[name]
 
     @property
     def due(self) -> float:

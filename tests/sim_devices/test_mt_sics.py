@@ -4,7 +4,8 @@ from math import nan
 
 import pytest
 
-from sim_devices.mt_sics import MtSics, MtSicsOptions
+from sim_devices.mt_sics import MtSics
+from sim_devices.mt_sics_options import MtSicsOptions
 
 
 class Cell:
@@ -128,7 +129,7 @@ def test_what_it_does_not_understand():
     cell = Cell()
     assert cell.say("HELLO") == b"ES\r\n"
     assert cell.say("si") == b"ES\r\n"
-    assert cell.say("SI now") == b"ES\r\n"
+    assert cell.say("SI now") == b"EL\r\n"
     assert cell.module.feed(b"\xff\r\n", cell.t) == b"ET\r\n"
     assert cell.say("") == b""
 
@@ -164,6 +165,12 @@ def test_faults():
     assert cell.say("SI") == b"S -\r\n"
     cell.module.fault("transmission_error", cell.t)
     assert cell.say("SI") == b"ET\r\n"
+    cell.module.fault("logical_error", cell.t)
+    assert cell.say("SI") == b"EL\r\n"
+    cell.module.fault("no_value", cell.t)
+    assert cell.say("SI") == b"S I\r\n"
+    cell.module.fault("internal_error", cell.t)
+    assert cell.say("SI") == b"S S Error 10b\r\n"
     cell.module.fault("silent", cell.t)
     assert cell.say("SI") == b""
     with pytest.raises(ValueError, match="expected one of frozen"):
@@ -187,3 +194,12 @@ def test_a_reboot_loses_tare_and_repeating():
 def test_options_that_cannot_be(options):
     with pytest.raises(ValueError, match=r"must be|needed"):
         MtSicsOptions("mt_sics", "cell", **options)
+
+
+def test_a_module_that_runs_away_or_falls_asleep():
+    cell = Cell()
+    cell.say("SIR")
+    cell.module.fault("fast", cell.t)
+    assert cell.wait(2.0).count(b"N\r\n") == pytest.approx(200, abs=12)
+    cell.module.fault("slow", cell.t)
+    assert cell.wait(5.0).count(b"N\r\n") == pytest.approx(5, abs=2)

@@ -83,6 +83,14 @@ def test_faults_spoil_their_share():
     (spoilt,) = drain(line, 2.0)
     assert sum(bin(a ^ b).count("1") for a, b in zip(spoilt, b"abcd\r\n", strict=True)) == 1
     line.clear()
+    line.fault("merged", 1.0)
+    line.put(b"abcd\r\n", 2.1)
+    assert drain(line, 2.1) == [b"abcd"]
+    line.clear()
+    line.fault("shifted", 1.0)
+    line.put(b"abcd\r\n", 2.2)
+    assert len(drain(line, 2.2)[0]) == 5
+    line.clear()
     line.fault("delayed", 0.2)
     line.put(b"abcd\r\n", 3.0)
     assert drain(line, 3.1) == []
