@@ -17,7 +17,7 @@ from rig.errors import ConfigError, PlanError
 from rig.loading import load_campaign
 from rig.plan import Duration, FixedDwell, Step
 from rig.sequencer import settings_for
-from rig.steady import LEAST_BATCHES
+from rig.steady import LEAST_SAMPLES
 
 
 @dataclass(frozen=True, slots=True)
@@ -139,10 +139,10 @@ def _require_samples(campaign: CampaignConfig, force: Instrument) -> None:
         key = "duration" if isinstance(dwell, FixedDwell) else "min"
         windows.append((f"plan.dwell.{key} less settle", dwell.bounds[0] - dwell.settle))
     for key, seconds in windows:
-        if seconds * rate < LEAST_BATCHES:
+        if seconds * rate < LEAST_SAMPLES:
             raise PlanError(
                 f"{campaign.path}: {key} is {seconds:g} s, in which {campaign.bench.force!r} gives "
-                f"{seconds * rate:.0f} samples at {rate:g}/s, but {LEAST_BATCHES} are needed: make it longer"
+                f"{seconds * rate:.0f} samples at {rate:g}/s, but {LEAST_SAMPLES} are needed: make it longer"
             )
 
 

@@ -11,6 +11,8 @@ from rig.ticks import Settings
 
 EPSILON = 1e-9
 """s, slack for float arithmetic."""
+LOOK_PERIOD = 0.1
+"""s between two looks whether it is steady: looking in every tick would find more lucky moments and cost more."""
 
 
 class Holding:
@@ -18,26 +20,28 @@ class Holding:
 
     def __init__(self, start: float, step: Step, settings: Settings) -> None:
         self._start, self._step, self._settings = start, step, settings
+        self._next_look = step.min_duration
         self._window = Window(start + step.settle, settings.estimator)
 
     def advance(self, time: float, rows: tuple[tuple[float, float], ...]) -> bool:
         """True when the hold is over. `rows`: (s, N) thrust samples since the last call, raw."""
         self._window.add(rows)
         elapsed = time - self._start + EPSILON
-        until_steady = self._settings.max_std_error is not None
-        return elapsed >= self._step.max_duration or (
-            until_steady and elapsed >= self._step.min_duration and self._steady()
-        )
+        if self._settings.max_std_error is None or elapsed < self._next_look:
+            return elapsed >= self._step.max_duration
+        self._next_look = elapsed + LOOK_PERIOD
+        return elapsed >= self._step.max_duration or self._steady()
 
     def point(self, time: float, tare: float) -> Point | None:
         """The point of a hold that ends at `time` s, less `tare` N; None with too few samples for an error."""
-        if isnan(self._window.std_error):
+        estimate = self._window.estimate
+        if isnan(estimate.std_error):
             return None
         return Point(
             step=self._step.index,
             voltage=self._step.voltage,
-            thrust=self._window.mean - tare,
-            std_error=self._window.std_error,
+            thrust=estimate.mean - tare,
+            std_error=estimate.std_error,
             duration=time - self._start,
             steady=self._steady(),
             thruster=self._settings.thruster,

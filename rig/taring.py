@@ -38,7 +38,7 @@ class Taring:
             return TareStep("waiting")
         window, wanted = self._window, self._wanted
         if window.steady(wanted.max_std_error, wanted.max_drift):
-            return TareStep("accepted", window.mean, f"tare {window}")
+            return TareStep("accepted", window.estimate.mean, f"tare {window}")
         text = (
             f"tare attempt {self._attempt} of {wanted.attempts} is not stable: {window}; "
             f"{wanted.max_std_error:g} N and {wanted.max_drift:g} N/s are allowed"
