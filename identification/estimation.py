@@ -1,10 +1,10 @@
 """From rows with known, unknown or correlated errors to parameters and the uncertainty of any combination of them.
 
-Three cases. *Known* standard errors (points of holds): weighted least squares (eq. 4.8, 4.9) and a chi-square test.
+Two cases. *Known* standard errors (points of holds): weighted least squares (eq. 4.8, 4.9) and a chi-square test.
 Where points scatter more than their errors allow, a common excess is added to every variance until chi-square equals
 its degrees of freedom (Mandel and Paule, Anal. Chem. 1970): lack of fit and repeatability are the same for quiet and
-for noisy holds. *Unknown* ones (level tables): least squares, sigma^2 from eq. 4.12, no chi-square test.
-*Even samples*: least squares with the sandwich covariance of correlated noise.
+for noisy holds. *Unknown* ones (level tables, even samples): least squares with the sandwich covariance of errors
+correlated along the rows, sigma^2 from eq. 4.12, and no chi-square test.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class Rows:
     most_dof: float = float("inf")
     """Of all standard errors together: they share one spectrum of the noise, so their dof do not simply add up."""
     even: bool = False
-    """Rows are samples even in time whose errors may be correlated."""
+    """Errors may be correlated along the rows: even samples, or levels in the order in which they were taken."""
 
 
 @dataclass(frozen=True, slots=True)

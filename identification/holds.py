@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.recording import Channel, Floats, Recording
 
@@ -35,44 +36,44 @@ def from_steps(recording: Recording) -> tuple[Window, ...]:
     )
 
 
-def _runs(value: Floats, tolerance: float) -> list[tuple[int, int]]:
-    """Half-open index ranges in which the value stays within `tolerance` of the run's first value; NaN ends a run."""
-    runs = []
-    start = 0
-    for i in range(1, value.size + 1):
-        ends = i == value.size or not abs(value[i] - value[start]) <= tolerance
-        if ends:
-            if np.isfinite(value[start]):
-                runs.append((start, i))
-            start = i
-    return runs
+def _starts(value: Floats, tolerance: float, measured: bool) -> NDArray[np.intp]:
+    """First index of each run. A command's run ends at a change; a measured one where it leaves its first value."""
+    if not measured:
+        return np.concatenate([[0], np.flatnonzero(~(np.abs(np.diff(value)) <= tolerance)) + 1]).astype(np.intp)
+    starts, first = [0], float(value[0])
+    for i, v in enumerate(value.tolist()):
+        if not abs(v - first) <= tolerance and i > 0:
+            starts.append(i)
+            first = v
+    return np.array(starts, dtype=np.intp)
 
 
-def from_voltage(channel: Channel, t_last: float) -> tuple[Window, ...]:
-    """Runs of constant value. Rows may be changes or dense samples; the last run lasts until `t_last`.
+def from_voltage(channel: Channel, times: Floats, least: int = 1) -> tuple[Window, ...]:
+    """Runs of constant value that hold at least `least` of `times`. Rows may be changes or dense samples.
 
     A command is compared exactly; a measured voltage within its own noise, found from second differences (they
     ignore slopes, so a ramp or sine stays a ramp or sine).
 
-    >>> time = np.array([0.0, 1.0, 2.0])
-    >>> command = Channel("u", "command", "command_voltage", "V", time, np.array([0.0, 0.0, 5.0]))
-    >>> [(w.voltage, w.t_start, w.t_end) for w in from_voltage(command, 4.0)]
-    [(0.0, 0.0, 2.0), (5.0, 2.0, 4.0)]
+    >>> rows = np.array([0.0, 1.0, 2.0])
+    >>> command = Channel("u", "command", "command_voltage", "V", rows, np.array([0.0, 0.0, 5.0]))
+    >>> [(w.voltage, w.t_start, w.t_end) for w in from_voltage(command, np.array([0.5, 2.5, 4.0]))]
+    [(0.0, 0.0, 2.0), (5.0, 2.0, 4.000000000000001)]
     """
     time, value = channel.time, channel.value
     finite = value[np.isfinite(value)]
-    if finite.size == 0:
+    if finite.size == 0 or times.size == 0:
         return ()
     tolerance = EQUAL * max(float(np.abs(finite).max()), 1e-9)
-    if channel.quantity != "command_voltage" and finite.size > 8:
+    measured = channel.quantity != "command_voltage"
+    if measured and finite.size > 8:
         curvature = np.abs(np.diff(finite, 2))
         tolerance = max(tolerance, NOISE_WIDTH * float(np.median(curvature)) * 1.4826 / float(np.sqrt(6.0)))
-    windows = []
-    for start, end in _runs(value, tolerance):
-        t_end = float(time[end]) if end < time.size else max(t_last, float(time[end - 1]))
-        if t_end > time[start]:
-            windows.append(Window(float(np.mean(value[start:end])), float(time[start]), t_end, "hold"))
-    return tuple(windows)
+    starts = _starts(value, tolerance, measured)
+    ends = np.append(time[starts[1:]], max(float(np.nextafter(times[-1], np.inf)), float(time[-1])))
+    levels = np.add.reduceat(value, starts) / np.diff(np.append(starts, value.size))
+    counts = np.searchsorted(times, ends) - np.searchsorted(times, time[starts])
+    kept = np.flatnonzero((counts >= least) & np.isfinite(levels) & (ends > time[starts]))
+    return tuple(Window(float(levels[k]), float(time[starts[k]]), float(ends[k]), "hold") for k in kept)
 
 
 def overlap_free(windows: tuple[Window, ...]) -> bool:

@@ -83,14 +83,10 @@ def find_windows(recording: Recording, voltage: Channel, thrust: Channel) -> tup
     command = recording.first_of("command_voltage")
     usable = command is not None and bool(np.any(np.isfinite(command.value)))
     source = command if command is not None and usable else voltage
-    if thrust.time.size == 0:
-        return ()
-    runs = from_voltage(source, float(np.nextafter(thrust.time[-1], np.inf)))
     good = thrust.time[np.isfinite(thrust.value)]
-    counts = [int(np.diff(np.searchsorted(good, (w.t_start, w.t_end)))[0]) for w in runs]
-    kept = tuple(w for w, count in zip(runs, counts, strict=True) if count >= MIN_HOLD_SAMPLES)
-    covered = sum(count for count in counts if count >= MIN_HOLD_SAMPLES)
-    return kept if len(kept) > 1 and covered >= MIN_SHARE * good.size else ()
+    runs = from_voltage(source, good, MIN_HOLD_SAMPLES)
+    covered = sum(int(np.diff(np.searchsorted(good, (w.t_start, w.t_end)))[0]) for w in runs)
+    return runs if len(runs) > 1 and covered >= MIN_SHARE * good.size else ()
 
 
 def reduce_to_points(recording: Recording, voltage: Channel, thrust: Channel) -> Points | None:

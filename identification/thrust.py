@@ -90,7 +90,7 @@ def rows_of(runs: Sequence[Run], model: str) -> tuple[Rows, Literal["points", "s
         return Rows(H, thrust, names, blocks, even=True), "samples"
     error = np.concatenate([p.std_error for p in points])
     if not np.all(np.isfinite(error) & (error > 0)):
-        return Rows(H, thrust, names, blocks), "points"
+        return Rows(H, thrust, names, blocks, even=True), "points"
     dof = np.concatenate([p.dof for p in points])
     shared = moderate(error, dof, np.abs(thrust))
     return Rows(H, thrust, names, blocks, shared.std_error, shared.dof, float(dof.max())), "points"

@@ -90,7 +90,9 @@ def verdicts(fit: ThrustFit, alternatives: Sequence[ThrustFit] = ()) -> Iterator
     """One sentence for each thing to know before the numbers are used."""
     judged = fit.estimate.underfit
     if judged is None:
-        how = "correlated samples" if fit.estimate.rows.even else "no standard error of single points"
+        how = (
+            f"correlation of neighbouring {fit.rmse_of} allowed for" if fit.estimate.noise else "taken as uncorrelated"
+        )
         yield f"fit not judged: noise was estimated from the residual itself (eq. 4.12; {how})"
     else:
         yield judged.statement

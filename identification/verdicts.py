@@ -104,8 +104,12 @@ class Whiteness:
 
     @property
     def statement(self) -> str:
-        word = "white" if self.white else "not white: neighbours in time share something the model lacks"
-        return f"residual {word} (Ljung-Box over {self.lags} lags, p = {self.p_value:.2g})"
+        word = (
+            "white"
+            if self.white
+            else "not white: neighbours in time are alike (slow noise, or something the model lacks)"
+        )
+        return f"residual {word}; Ljung-Box over {self.lags} lags, p = {max(self.p_value, 1e-300):.2g}"
 
 
 def whiteness(residual: Floats, alpha: float = ALPHA) -> Whiteness | None:

@@ -93,9 +93,12 @@ def test_phases_that_are_no_holds_and_broken_rows_are_left_out():
 def test_nan_commands_end_a_run():
     t = np.arange(4.0)
     command = Channel("u", "c", "command_voltage", "V", t, np.array([1.0, np.nan, 1.0, 1.0]))
-    assert [(w.t_start, w.t_end) for w in from_voltage(command, 5.0)] == [(0, 1), (2, 5)]
+    assert [(w.t_start, w.t_end) for w in from_voltage(command, np.array([0.5, 2.5, 5.0]))] == [
+        (0, 1),
+        (2, pytest.approx(5)),
+    ]
     nothing = Channel("u", "c", "command_voltage", "V", t, np.full(4, np.nan))
-    assert from_voltage(nothing, 5.0) == ()
+    assert from_voltage(nothing, t) == ()
 
 
 def test_voltage_falls_back_to_what_was_measured():
