@@ -35,6 +35,19 @@ def reach(values: Sequence[float], margin: float = 0.05, least: float = 1e-6) ->
     return low - room, high + room
 
 
+def to_row(value: float, low: float, high: float, rows: int) -> float:
+    """Where on an axis `low` .. `high` of `rows` cells a full-cell mark must be put to fall into the cell with the
+    braille dot of `value`: plotext rounds the two on different grids, up to a cell apart.
+
+    >>> round(to_row(0.6, 0.0, 1.0, 3), 3)
+    0.5
+    """
+    if rows < 2:
+        return value
+    dot = math.floor(0.5 + (4 * rows - 1) * (value - low) / (high - low))
+    return low + (high - low) * (dot // 4) / (rows - 1)
+
+
 def thin(rows: Sequence[tuple[float, float]], buckets: int) -> tuple[list[float], list[float]]:
     """At most two rows, the least and the greatest, in each of `buckets` equal spans of time: no peak is lost.
     NaN rows go."""

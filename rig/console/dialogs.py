@@ -31,6 +31,9 @@ class NoteDialog(ModalScreen[str]):
                 "Enter keeps it, Escape drops it. Ctrl+C or F9 stops the motor, here too.", classes="dialog-hint"
             )
 
+    def on_mount(self) -> None:
+        self.query_one(Input).cursor_blink = False  # nothing on this screen moves but what is measured
+
     def show(self, view: View) -> None:
         for head in self.query(Head):
             head.show(view)

@@ -9,7 +9,7 @@ from typing import Final
 from textual_plotext import PlotextPlot
 from textual_plotext.plot import Plot
 
-from rig.console.axes import reach, thin, ticks
+from rig.console.axes import reach, thin, ticks, to_row
 from rig.console.fit import RunningFit, in_words, running_fit, usable, v_abs_v
 from rig.console.view import TraceRow, View
 from rig.messages import Point
@@ -19,8 +19,9 @@ WINDOW: Final = 120.0
 BAR: Final = 1.96
 """Standard errors in an error bar: 95 %."""
 CYAN, GREEN, AMBER, GREY = (90, 200, 250), (127, 216, 143), (240, 192, 64), (170, 170, 170)
-RIGHT: Final = 2
-"""Number of plotext's right axis, where its signatures ask for a number."""
+LEFT, RIGHT = 1, 2
+"""Plotext's numbers of the y axes, where its signatures ask for a number."""
+Span = tuple[float, float]
 LEAST_THRUST: Final = 1.0
 """N, smallest span of a thrust axis: noise at rest shall not fill the plot."""
 
@@ -52,11 +53,14 @@ class FitPlot(Curve):
         self.border_subtitle = in_words(fit)
 
         def draw(plot: Plot) -> None:
-            _frame(plot, points, [point.thrust for point in points], self.size.height)
+            if not points:
+                return
+            thrust = [point.thrust for point in points]
+            row = _frame(plot, points, thrust, self.size.height)
             if fit is not None:
                 ends = [min(map(v_abs_v, points)), max(map(v_abs_v, points))]
                 plot.plot(ends, [fit.predict(end) for end in ends], marker="braille", color=GREEN)
-            _holds(plot, points, [point.thrust for point in points])
+            _holds(plot, points, thrust, row)
 
         self.redraw((points, self.size), draw)
 
@@ -75,10 +79,10 @@ class ResidualPlot(Curve):
         if fit is None:
             return
         left = [point.thrust - fit.predict(v_abs_v(point)) for point in points]
-        _frame(plot, points, left, self.size.height)
+        row = _frame(plot, points, left, self.size.height)
         ends = [min(map(v_abs_v, points)), max(map(v_abs_v, points))]
         plot.plot(ends, [0.0, 0.0], marker="braille", color=GREEN)
-        _holds(plot, points, left)
+        _holds(plot, points, left, row)
 
 
 class TimePlot(Curve):
@@ -96,12 +100,17 @@ class TimePlot(Curve):
         command_time, volts = thin([(t, volts) for t, volts, _ in rows], dots)
         if not time or not volts:
             return
-        low, high = reach(thrust, least=LEAST_THRUST)
-        plot.ylim(low - 0.6 * (high - low), high)  # thrust in the upper five eighths
-        plot.yticks(*ticks(low, high, max(4, self.size.height // 2)))
-        least, most = reach(volts, least=1.0)
-        plot.ylim(least, most + 2.2 * (most - least), yside=RIGHT)  # the command in the lower third
-        plot.yticks(*ticks(least, most, 3), yside=RIGHT)
+        height, (low, high), (least, most) = (
+            self.size.height,
+            reach(thrust, least=LEAST_THRUST),
+            reach(volts, least=1.0),
+        )
+        upper = (low - 0.6 * (high - low), high)  # thrust in the upper five eighths
+        lower = (least, most + 2.2 * (most - least))  # the command in the lower third
+        plot.ylim(*upper)
+        plot.ylim(*lower, yside=RIGHT)
+        _row_ticks(plot, (low, high), upper, height)
+        _row_ticks(plot, (least, most), lower, height, RIGHT)
         plot.xlim(rows[0][0], max(rows[-1][0], rows[0][0] + 10.0))
         plot.xticks(*ticks(rows[0][0], max(rows[-1][0], rows[0][0] + 10.0), 6))
         plot.scatter(command_time, volts, marker="braille", color=AMBER, yside="right")
@@ -118,24 +127,30 @@ def _half(point: Point) -> float:
     return BAR * point.std_error if usable(point) else 0.0
 
 
-def _frame(plot: Plot, points: Sequence[Point], values: Sequence[float], height: int) -> None:
-    """Axes that hold every bar, with round numbers."""
-    if not points:
-        return
+def _frame(plot: Plot, points: Sequence[Point], values: Sequence[float], height: int) -> Callable[[float], float]:
+    """Axes that hold every bar, with round numbers. Returns where full-cell marks go, see `to_row`."""
     x = reach([v_abs_v(point) for point in points], least=10.0)
     edges = [value + sign * _half(p) for p, value in zip(points, values, strict=True) for sign in (-1, 1)]
-    y = reach(edges, least=0.1)
+    low, high = reach(edges, least=0.1)
     plot.xlim(*x)
-    plot.ylim(*y)
+    plot.ylim(low, high)
     plot.xticks(*ticks(*x, 6))
-    plot.yticks(*ticks(*y, max(3, height // 2)))
+    return _row_ticks(plot, (low, high), (low, high), height)
 
 
-def _holds(plot: Plot, points: Sequence[Point], values: Sequence[float]) -> None:
+def _row_ticks(plot: Plot, band: Span, axis: Span, height: int, side: int = LEFT) -> Callable[[float], float]:
+    """Round numbers within `band` of an axis, on the rows where the curve is. Frame and x ticks take three rows."""
+    rows = height - 3
+    places, labels = ticks(*band, max(4, round(rows / 2 * (band[1] - band[0]) / (axis[1] - axis[0]))))
+    plot.yticks([to_row(place, *axis, rows) for place in places], labels, yside=side)
+    return lambda value: to_row(value, *axis, rows)
+
+
+def _holds(plot: Plot, points: Sequence[Point], values: Sequence[float], row: Callable[[float], float]) -> None:
     """Points at `values` in N with their error bars."""
     for point, value in zip(points, values, strict=True):
-        plot.plot([v_abs_v(point)] * 2, [value - _half(point), value + _half(point)], marker="│", color=GREY)
+        plot.plot([v_abs_v(point)] * 2, [value - _half(point), value + _half(point)], marker="braille", color=GREY)
     for steady, marker in ((True, "●"), (False, "○")):
-        chosen = [(v_abs_v(p), value) for p, value in zip(points, values, strict=True) if p.steady is steady]
+        chosen = [(v_abs_v(p), row(value)) for p, value in zip(points, values, strict=True) if p.steady is steady]
         if chosen:
             plot.scatter([x for x, _ in chosen], [y for _, y in chosen], marker=marker, color=CYAN)

@@ -54,7 +54,7 @@ def test_running_fit_against_polyfit():
     assert fit is not None
     x, y = [v_abs_v(p) for p in held], [p.thrust for p in held]
     (slope, rest), cov = np.polyfit(x, y, 1, w=[1 / p.std_error for p in held], cov="unscaled")
-    assert fit.C == pytest.approx(slope, rel=1e-9)
+    assert pytest.approx(slope, rel=1e-9) == fit.C
     assert fit.tare == pytest.approx(rest, abs=1e-9)
     assert fit.C_std >= math.sqrt(cov[0, 0]) * (1 - 1e-9)
     assert abs(fit.C - C["T1"]) < 4 * fit.C_std
@@ -101,8 +101,15 @@ def test_an_axis_has_some_span():
 
 @pytest.mark.parametrize(
     ("value", "unit", "text"),
-    [(1.234, "N", "1.23"), (None, "N", "—"), (math.nan, "V", "—"), (48211.0, "1", "48211"), (0.25, "1", "0.250"), (101873.2, "Pa", "101873")],
-)  # fmt: skip
+    [
+        (1.234, "N", "1.23"),
+        (None, "N", "—"),
+        (math.nan, "V", "—"),
+        (48211.0, "1", "48211"),
+        (0.25, "1", "0.250"),
+        (101873.2, "Pa", "101873"),
+    ],
+)
 def test_numbers(value, unit, text):
     assert wording.number(value, unit) == text
 

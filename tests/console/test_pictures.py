@@ -1,4 +1,4 @@
-"""What the console looks like, against accepted pictures (`pytest tests/console --snapshot-update` accepts new ones)."""
+"""What the console looks like, against accepted pictures; `pytest tests/console --snapshot-update` accepts new ones."""
 
 from __future__ import annotations
 
