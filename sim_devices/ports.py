@@ -109,9 +109,9 @@ class ControlSocket:
     """
 
     def __init__(self, link: Path) -> None:
-        """Raises WorldError when a bench answers at this link already."""
-        if _answers(link):
-            raise WorldError(f"{link}: a simulated bench runs here already; stop it, or give this one other --links")
+        """Raises WorldError when another bench has this folder."""
+        link.parent.mkdir(parents=True, exist_ok=True)
+        self._lock = _locked(link.parent)
         self.link = link
         self._folder = tempfile.mkdtemp(prefix="sim_bench_")
         self.path = f"{self._folder}/control"
@@ -120,7 +120,6 @@ class ControlSocket:
         self._server.listen(8)
         self._server.setblocking(False)
         self._clients: dict[socket.socket, bytes] = {}
-        link.parent.mkdir(parents=True, exist_ok=True)
         link.unlink(missing_ok=True)
         link.symlink_to(self.path)
 
@@ -155,15 +154,23 @@ class ControlSocket:
         if self.link.is_symlink() and str(self.link.readlink()).startswith(self._folder):
             self.link.unlink()
         shutil.rmtree(self._folder, ignore_errors=True)
+        os.close(self._lock)
 
 
-def _answers(control: Path) -> bool:
-    with socket.socket(socket.AF_UNIX, socket.SOCK_STREAM) as client:
-        try:
-            client.connect(str(control.resolve()))
-        except OSError:
-            return False
-        return True
+def _locked(folder: Path) -> int:
+    """Lock a links folder for as long as this process lives: two benches in one would share links and truth log.
+
+    The lock is on the folder itself, so it leaves no file behind and needs none that somebody may clean away.
+    """
+    lock = os.open(folder, os.O_RDONLY)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError as error:
+        os.close(lock)
+        raise WorldError(
+            f"{folder}: a simulated bench runs here already; stop it, or give this one other --links"
+        ) from error
+    return lock
 
 
 def ask(control: Path, line: str, timeout: float = 5.0) -> str:

@@ -2,6 +2,7 @@
 
 import os
 import select
+import shutil
 import struct
 import subprocess
 import sys
@@ -212,6 +213,13 @@ def test_a_second_bench_on_the_same_links_is_refused(bench):
     with pytest.raises(RuntimeError, match="runs here already"), running(WORLD, bench.links):
         pass
     assert "T1" in bench.tell("status")
+
+
+def test_a_cleaned_temporary_folder_does_not_let_a_second_bench_in(bench):
+    shutil.rmtree((bench.links / "control").resolve().parent)
+    with pytest.raises(RuntimeError, match="runs here already"), running(WORLD, bench.links):
+        pass
+    assert bench.truth("header")
 
 
 def test_what_a_dead_host_left_unread_is_gone_when_the_next_one_opens(bench):
