@@ -2,7 +2,7 @@
 
     python benchmarks/fit_coverage.py [RUNS]
 
-Beside it the coverage of the plain alternative (s / sqrt(n) per hold, `numpy.linalg.lstsq`) and the CPU time of one fit.
+Beside it the coverage of the plain alternative (s / sqrt(n) per hold, `numpy.linalg.lstsq`) and the CPU time of a fit.
 """
 
 from __future__ import annotations
