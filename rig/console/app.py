@@ -114,6 +114,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
     def show_text(self) -> None:
         """Everything but the plots, from the view."""
         self.state = replace(self.state, now=self.clock())
+        self._part()
         if not self._standing():
             return
         view, base = self.state, self.screen_stack[0]

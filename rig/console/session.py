@@ -7,6 +7,7 @@ import signal
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import FrameType
 
 from rig.console.app import ConsoleApp
 from rig.console.feed import Feed
@@ -14,8 +15,9 @@ from rig.console.view import View
 from rig.messages import Snapshot
 
 COMPLETED, NOT_COMPLETED = 0, 1
-LAST_WORD = 2.0
-"""s that the screen gets to restore the terminal after SIGHUP or SIGTERM; the link is closed before."""
+LAST_WORD = 2
+"""s that the screen gets to restore the terminal after SIGHUP or SIGTERM; then SIGALRM ends the process. A terminal
+that is gone or does not read can hold the screen's writer for ever, and this process must let go of its socket."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,23 +49,25 @@ async def _sit(feed: Feed, clock: Callable[[], float], again: str) -> Sitting:
     loop = asyncio.get_running_loop()
     caught: list[int] = []
 
-    def leave(number: int) -> None:
-        caught.append(number)
+    def leave() -> None:
         feed.close()
         app.exit()
-        loop.call_later(LAST_WORD, sitting.cancel)
 
-    sitting = asyncio.ensure_future(app.run_async())
-    for number in (signal.SIGHUP, signal.SIGTERM):
-        loop.add_signal_handler(number, leave, number)
+    def on_signal(number: int, _: FrameType | None) -> None:
+        signal.alarm(LAST_WORD)  # at once and by the kernel: the event loop may be stuck in a write
+        caught.append(number)
+        loop.call_soon_threadsafe(leave)
+
+    before = {number: signal.signal(number, on_signal) for number in (signal.SIGHUP, signal.SIGTERM)}
     loop.add_signal_handler(signal.SIGINT, app.action_stop)
     try:
-        await sitting
-    except asyncio.CancelledError:
-        if not caught:
-            raise
+        await app.run_async()
     finally:
         feed.close()
+        loop.remove_signal_handler(signal.SIGINT)
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        signal.alarm(0)
     detached = app.parting is not None and app.parting.kind == "detach"
     status = 128 + caught[0] if caught else max(app.return_code or 0, exit_status(app.state, detached))
     return Sitting(status, app.state.snapshot, detached and not caught)

@@ -1,0 +1,16 @@
+"""`python -m tests.console.seated OUT`: a console in this terminal with a played feed; what came of it goes to OUT."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from rig.console import attend
+
+from .feeds import PlayedFeed, running
+
+if __name__ == "__main__":
+    feed = PlayedFeed(running())
+    sitting = attend(feed)
+    Path(sys.argv[1]).write_text(f"{sitting.status} {feed.closed} {' '.join(feed.kinds())}".strip())
+    sys.exit(sitting.status)
