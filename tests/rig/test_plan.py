@@ -40,7 +40,8 @@ def test_steps_in_full():
     plan = Plan(Levels((5.0, -5.0, 5.0)), DWELL, 10.0, zero_every=2, rest=1.0)
     assert [(s.index, s.phase, s.voltage) for s in plan] == [
         (0, "tare", 0), (1, "ramp", 5), (2, "hold", 5), (3, "ramp", -5), (4, "hold", -5), (5, "ramp", 0),
-        (6, "rest", 0), (7, "tare", 0), (8, "ramp", 5), (9, "hold", 5), (10, "ramp", 0), (11, "rest", 0), (12, "tare", 0),
+        (6, "rest", 0), (7, "tare", 0), (8, "ramp", 5), (9, "hold", 5), (10, "ramp", 0), (11, "rest", 0),
+        (12, "tare", 0),
     ]  # fmt: skip
 
 
