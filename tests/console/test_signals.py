@@ -54,7 +54,7 @@ runpy.run_module("tests.console.seated", run_name="__main__")"""
 
 @contextmanager
 def seated(out: Path) -> Iterator[tuple[subprocess.Popen[bytes], Terminal]]:
-    """A console process that has drawn its first screen on a controlling terminal of its own. Leaving waits for its end."""
+    """A console process that has drawn its first screen on a terminal of its own. Leaving waits for its end."""
     terminal = Terminal()
     process = subprocess.Popen(
         [sys.executable, "-c", COMMAND, str(out)],
