@@ -36,8 +36,8 @@ from rig.ticks import Output, Tick, settings_for
 Level = Literal["info", "warning", "trip", "error"]
 
 SOCKET_NAME = "controller.sock"
-SETTLE = 1.5
-"""s of samples before the preflight judges rates."""
+SETTLE_ROWS = 5
+"""Rows of the slowest stream that are waited for before the preflight judges rates."""
 RECORDER_WAIT = 20.0
 """s for the recorder to open or close a file."""
 FAREWELL = 3.0
@@ -121,12 +121,12 @@ class CampaignRun:
 
     def _preflight(self) -> None:
         """Judge the bench until the operator starts it; the checks go on while he looks."""
-        self.status.state = "preflight"
         devices = list(self.status.checks)
-        self._turn_for(SETTLE)
+        self._turn_for(SETTLE_ROWS * max(stream.period_s for _, stream in self.bench.streams()))
         started = False
         while not started:
             requests = self._turn()
+            self.status.state = "preflight"
             checks = all_checks(self.campaign.bench, self.loop.readings, self.bench.motor.watchdog, self.loop.now)
             self.status.checks = devices + checks
             failed = [check for check in checks if check.verdict == "failed"]

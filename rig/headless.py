@@ -62,8 +62,12 @@ class Headless:
             snapshot.state == "preflight" and start and all(c.verdict in ("passed", "warning") for c in snapshot.checks)
         ):
             self._ask("start")
-        elif snapshot.state == "preflight" and any(c.verdict == "failed" for c in snapshot.checks):
-            self._ask("stop", "the preflight failed")
+        elif (
+            snapshot.state == "preflight"
+            and start
+            and (failed := [c for c in snapshot.checks if c.verdict == "failed"])
+        ):
+            self._ask("stop", "the preflight: " + "; ".join(f"{c.name}: {c.text}" for c in failed))
 
     def _ask(self, kind: str, text: str = "") -> None:
         if kind in self.asked:

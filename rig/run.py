@@ -121,23 +121,29 @@ def start_controller(campaign: Path, folder: Path, thrusters: Sequence[str]) -> 
 def follow(run: Run, headless: bool, *, start: bool) -> int:
     """Attach a front end until it ends or detaches; then the table, where the files are, and the exit status."""
     peer = connect(Path(run.socket), "the controller")
-    console = Console(stderr=True)
+    again = f"rig console {run.folder}"
     try:
-        last = check_alive(Headless(peer, console).follow(start) if headless else _console(peer))
+        last, detached = _progress_bar(peer, start=start) if headless else _console(peer, again)
     finally:
         peer.close()
-    if last.state != "done" and _exists(run.pid):
-        click.echo(f"the run goes on in {run.folder}; attach again with: rig console {run.folder}")
+    if detached:
+        click.echo(f"the run goes on in {run.folder}; attach again with: {again}")
         return 0
     _await_end(run.pid)
-    return _conclude(last, Path(run.folder))
+    return _conclude(check_alive(last), Path(run.folder))
 
 
-def _console(peer: Peer) -> Snapshot | None:
-    from rig.console import run_console
-    from rig.console.feed import SocketFeed
+def _progress_bar(peer: Peer, *, start: bool) -> tuple[Snapshot | None, bool]:
+    """Last snapshot, and that nobody can detach here."""
+    return Headless(peer, Console(stderr=True)).follow(start), False
 
-    return run_console(SocketFeed(peer))
+
+def _console(peer: Peer, again: str) -> tuple[Snapshot | None, bool]:
+    """Last snapshot, and whether the operator left on purpose while the run goes on."""
+    from rig.console import SocketFeed, attend
+
+    sitting = attend(SocketFeed(peer), again=again)
+    return sitting.last, sitting.detached
 
 
 def _conclude(last: Snapshot, folder: Path) -> int:

@@ -41,7 +41,16 @@ def print_summary(recordings: Sequence[Path], folder: Path) -> None:
 
 def _table(answers: Sequence[Answer]) -> Table:
     table = Table(title="tau = C V|V|, one row per thruster")
-    for heading in ("thruster", "C [N/V^2]", "std. error", "95 % interval", "points", "tare [N]", "RMSE [N]", "chi2/dof"):
+    for heading in (
+        "thruster",
+        "C [N/V^2]",
+        "std. error",
+        "95 % interval",
+        "points",
+        "tare [N]",
+        "RMSE [N]",
+        "chi2/dof",
+    ):
         table.add_column(heading, justify="left" if heading == "thruster" else "right")
     for answer in answers:
         fit = answer.fit
@@ -49,6 +58,13 @@ def _table(answers: Sequence[Answer]) -> Table:
         chi2 = "-" if fit.chi2_per_dof is None else f"{fit.chi2_per_dof:.2f}"
         interval = f"{C.low:.5f} .. {C.high:.5f}"
         table.add_row(
-            fit.thruster, f"{C.value:.5f}", f"{C.std:.5f}", interval, str(fit.estimate.rows.y.size), f"{tare.value:.3f}", f"{fit.rmse:.3f}", chi2
+            fit.thruster,
+            f"{C.value:.5f}",
+            f"{C.std:.5f}",
+            interval,
+            str(fit.estimate.rows.y.size),
+            f"{tare.value:.3f}",
+            f"{fit.rmse:.3f}",
+            chi2,
         )
     return table

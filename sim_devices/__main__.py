@@ -13,9 +13,14 @@ import click
 
 from sim_devices.bench import Bench, start
 from sim_devices.ports import ask
+from sim_devices.process import running
+from sim_devices.settings import load
 from sim_devices.tables import WorldError
+from sim_devices.truth_table import SUSPICIOUS, compare, table
 
 FILE = click.Path(path_type=Path)
+FITS = "fits.json"
+"""What `rig run` leaves in a campaign's folder."""
 
 
 class BenchByDefault(click.Group):
@@ -37,14 +42,41 @@ def main() -> None:
 @click.option("--links", type=FILE, help="Folder for the links to the ports (default: from the world file).")
 @click.option("--truth", type=FILE, help="Truth log, JSON lines (default: from the world file).")
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of all noise (default: from the world file).")
-def run(world: Path, links: Path | None, truth: Path | None, seed: int | None) -> None:
+@click.option("--campaign", type=FILE, help="Run this campaign on the bench with `rig run`, compare its fits, and end.")
+@click.option("--output", type=FILE, default=Path("recordings"), help="Where --campaign records (default: recordings).")
+def run(
+    world: Path, links: Path | None, truth: Path | None, seed: int | None, campaign: Path | None, output: Path
+) -> None:
     """Start the bench of WORLD (TOML), print its ports and `ready`, live until SIGTERM or Ctrl+C."""
+    if campaign is not None:
+        raise SystemExit(calibrate(world, links, seed, campaign, output))
     stop = stop_requests()
     try:
         bench = start(world, links, truth, seed)
     except WorldError as error:
         fail(str(error))
     live(bench, stop)
+
+
+def calibrate(world: Path, links: Path | None, seed: int | None, campaign: Path, output: Path) -> int:
+    """The bench in a process of its own, `rig run` on it, then each fit beside the truth. 0 when all agree.
+
+    The console opens where there is a terminal, the progress bar elsewhere.
+    """
+    from rig.cli import main as rig
+
+    before = set(output.glob(f"*/{FITS}"))
+    words = ["run", str(campaign), "--output", str(output), *([] if sys.stdout.isatty() else ["--headless"])]
+    try:
+        folder = links or load(world).links
+        with running(world, folder, seed) as bench:
+            status = rig(words)
+            constants = bench.truth("header")[0]["C"]
+    except (WorldError, RuntimeError) as error:
+        fail(str(error))
+    rows = [row for fits in sorted(set(output.glob(f"*/{FITS}")) - before) for row in compare(fits, constants)]
+    click.echo(table(rows))
+    return status or int(not rows or any(abs(row.z) > SUSPICIOUS for row in rows))
 
 
 def stop_requests() -> Callable[[], bool]:
