@@ -70,7 +70,7 @@ def read_table(data: bytes, form: FileMap, refused: Refused) -> Table:
     for number, line in enumerate(text.splitlines(), start=1):
         if not line.strip() or any(mark in line for mark in form.ignore):
             continue
-        cells = list(split(line, form))
+        cells: Sequence[str] = list(split(line, form))
         if number <= form.skip_rows or (form.comment and line.lstrip().startswith(form.comment)):
             above.append(cells)
         else:
@@ -79,7 +79,7 @@ def read_table(data: bytes, form: FileMap, refused: Refused) -> Table:
     if form.header and body:
         names = tuple(_normal(cell) for cell in _trimmed(body.pop(0)[1], 0))
     width = form.width or len(names) or _usual_width(body)
-    body = [(number, _trimmed(cells, width)) for number, cells in body]
+    body = [(number, _trimmed(row, width)) for number, row in body]
     good = tuple((number, cells) for number, cells in body if len(cells) == width)
     for number, cells in body:
         if len(cells) != width:

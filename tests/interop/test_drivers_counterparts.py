@@ -30,9 +30,9 @@ def drain(device, count):
 
 
 @pytest.mark.parametrize(("profile", "newtons"), [("mt-ms3002s", 1e-3 * 9.80665), ("mt-ind570", 9.80665)])
-def test_mt_sics_emulator(profile, newtons):
+def test_mt_sics_emulator(profile, newtons, third_party):
     """Its deviations (identifier SI, I2 = serial number, no UPD) are accepted; none of them is needed."""
-    profiles = pytest.importorskip("mtsics.profiles")
+    profiles = third_party("mtsics.profiles")
     from mtsics.core.state import ScaleState
     from mtsics.protocol.engine import MTSICSEngine
 
@@ -57,9 +57,9 @@ def test_mt_sics_emulator(profile, newtons):
         device.close()
 
 
-def test_labmcp_balance():
+def test_labmcp_balance(third_party):
     """It has no SIR; the script repeats its SI, as a device with SIR does."""
-    simulator = pytest.importorskip("labmcp_mettler_toledo.simulator").MTSICSSimulator(load_g=50.0)
+    simulator = third_party("labmcp_mettler_toledo.simulator").MTSICSSimulator(load_g=50.0)
 
     def script(peer, request):
         command = request.decode()
@@ -79,9 +79,9 @@ def test_labmcp_balance():
         device.close()
 
 
-def test_set_commands_carry_the_bytes_of_pyvesc():
+def test_set_commands_carry_the_bytes_of_pyvesc(third_party):
     """The same command by UART is 02 length id payload crc 03; on CAN the payload is the frame's data."""
-    pyvesc = pytest.importorskip("pyvesc")
+    pyvesc = third_party("pyvesc")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         for duty in (0.25, -0.5, 0.0, 0.9):

@@ -1,8 +1,6 @@
 """Programs that are not ours, against the simulated devices."""
 
-import importlib
 import logging
-import os
 from pathlib import Path
 
 import pytest
@@ -13,20 +11,13 @@ WORLD = Path(__file__).parents[2] / "benches" / "simulated" / "world.toml"
 pytestmark = pytest.mark.interop
 
 
-def third_party(name):
-    """The module, or a skip with the reason; on the checking machine (THRUSTER_RIG_CI) a missing one is a failure."""
-    if os.environ.get("THRUSTER_RIG_CI"):
-        return importlib.import_module(name)
-    return pytest.importorskip(name, reason=f"{name} is not installed (pip install -e .[test])")
-
-
 @pytest.fixture
 def bench(tmp_path):
     with running(WORLD, tmp_path / "ports", seed=1) as each:
         yield each
 
 
-def test_labmcp_weighs_on_our_load_cell(bench):
+def test_labmcp_weighs_on_our_load_cell(bench, third_party):
     driver = third_party("labmcp_mettler_toledo.driver")
     transports = third_party("labmcp.transports.serial")
     transport = transports.SerialTransport(str(bench.links / "load_cell"), baudrate=38400)
@@ -52,7 +43,7 @@ def test_labmcp_weighs_on_our_load_cell(bench):
         balance.close()
 
 
-def test_pybldc_finds_our_vesc_through_our_adapter(bench):
+def test_pybldc_finds_our_vesc_through_our_adapter(bench, third_party):
     pybldc = third_party("pybldc")
     client = pybldc.PyBldcCan(logging.getLogger("pybldc"), 23, interface="slcan", channel=str(bench.links / "can0"))
     try:
@@ -61,7 +52,7 @@ def test_pybldc_finds_our_vesc_through_our_adapter(bench):
         client.shutdown()
 
 
-def test_python_can_hears_our_vesc_and_turns_it(bench):
+def test_python_can_hears_our_vesc_and_turns_it(bench, third_party):
     can = third_party("can")
     with can.Bus(interface="slcan", channel=str(bench.links / "can0"), bitrate=500000, sleep_after_open=0) as bus:
         duty = bytes.fromhex("000061a8")  # 0.25: 12 V
@@ -78,7 +69,7 @@ def test_python_can_hears_our_vesc_and_turns_it(bench):
         assert erpm == pytest.approx(12.0 * 60 * 7, abs=20)
 
 
-def test_minimalmodbus_reads_our_transmitter(bench):
+def test_minimalmodbus_reads_our_transmitter(bench, third_party):
     minimalmodbus = third_party("minimalmodbus")
     instrument = minimalmodbus.Instrument(str(bench.links / "thermometer"), 1)
     instrument.serial.baudrate = 9600
@@ -92,7 +83,7 @@ def test_minimalmodbus_reads_our_transmitter(bench):
         instrument.serial.close()
 
 
-def test_pymodbus_reads_our_transmitter(bench):
+def test_pymodbus_reads_our_transmitter(bench, third_party):
     modbus = third_party("pymodbus.client")
     with modbus.ModbusSerialClient(str(bench.links / "thermometer"), baudrate=9600, timeout=2.0) as client:
         registers = client.read_holding_registers(0x0008, count=2, device_id=1).registers
