@@ -1,38 +1,66 @@
 """The command line: every command, its exit status, and the one place that reads argv and writes to the terminal.
 
 Exit status: 0 done as asked, 1 the run ended otherwise than completed, 2 input that can't be used (one sentence why).
+A command's module is imported when the command is called: `rig stop` shall not wait for scipy.
 """
 
 from __future__ import annotations
 
 import sys
+from importlib import import_module
+from typing import Final, NamedTuple
 
 import click
 
-from rig.check import check_command
 from rig.errors import RigError
-from rig.fit import fit_command
-from rig.importer import import_command
-from rig.recover import recover_command
-from rig.run import console_command, run_command, stop_command
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+class Entry(NamedTuple):
+    """Where a command is, and its line in the list of commands."""
+
+    place: str
+    """`module:attribute`"""
+    help: str
+
+
+COMMANDS: Final = {
+    "check": Entry("rig.check:check_command", "Check a campaign and its bench without opening a port."),
+    "run": Entry("rig.run:run_command", "Run a campaign on its bench: console, recording, table of the fits."),
+    "console": Entry("rig.run:console_command", "Attach to a run that is going on."),
+    "stop": Entry("rig.run:stop_command", "Stop a run that is going on: zero volts now, close the recording."),
+    "fit": Entry("rig.fit:fit_command", "Fit tau = C V|V| to recordings."),
+    "import": Entry("rig.importer:import_command", "Make a recording of another program's table or log."),
+    "recover": Entry("rig.recover:recover_command", "Copy a recording that was not closed in order into a plain file."),
+}
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are the rows of COMMANDS."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """In the order of the table: the order of work."""
+        del ctx
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        del ctx
+        if cmd_name not in COMMANDS:
+            return None
+        module, _, attribute = COMMANDS[cmd_name].place.partition(":")
+        command: click.Command = getattr(import_module(module), attribute)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """The list in `rig --help`, from the table alone."""
+        del ctx
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, entry.help) for name, entry in COMMANDS.items()])
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
 @click.version_option(package_name="thruster-rig", prog_name="rig")
 def rig() -> None:
     """Calibrate thrusters on a test rig: sequence, record, identify."""
-
-
-for command in (
-    check_command,
-    run_command,
-    console_command,
-    stop_command,
-    fit_command,
-    import_command,
-    recover_command,
-):
-    rig.add_command(command)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -70,7 +70,7 @@ class Point:
 @dataclass(frozen=True, slots=True)
 class LogLine:
     time: float
-    """s since the start of the run."""
+    """s since the controller began; in the recording's own events since its t0."""
     level: Literal["info", "warning", "trip", "error"]
     text: str
 
@@ -128,6 +128,8 @@ class Snapshot:
     attended: bool = True
     """False: the campaign may go on with no front end connected (`unattended = true`)."""
     clients: int = 0
+    mounted_by_hand: bool = False
+    """True: in the state `mount` an operator puts the thruster on the bench and sends `mounted`; False: a command does."""
 
 
 RequestKind = Literal[

@@ -1,4 +1,4 @@
-"""rig run, console and stop: start a controller process, attach a front end to it, and say at the end what came of it."""
+"""rig run, console and stop: start a controller process, attach a front end, and say what came of it."""
 
 from __future__ import annotations
 
@@ -7,20 +7,18 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
 
 import click
-from rich.console import Console
 
-from rig.check import check_campaign
 from rig.errors import LinkError, RigError
-from rig.headless import Headless, check_alive
+from rig.headless import Headless, check_alive, operator_terminal
 from rig.link import Peer, connect
 from rig.messages import Request, Snapshot
 from rig.runs import Run, find_run, live_runs
-from rig.summary import print_summary
 
 START_TIMEOUT = 15.0
 """s for a controller process to open its socket (imports included)."""
@@ -41,6 +39,8 @@ LOG_NAME = "controller.log"
 @click.option("--thruster", "thrusters", multiple=True, help="Only this thruster of the campaign; may be repeated.")
 def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: tuple[str, ...]) -> int:
     """Run CAMPAIGN on its bench: console, recording, table of the fits."""
+    from rig.check import check_campaign  # a second of scipy that `rig stop` does not need
+
     report = check_campaign(campaign)
     config = report.campaign
     unknown = [name for name in thrusters if name not in config.thrusters]
@@ -56,9 +56,10 @@ def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: 
             f"{campaign}: {len(chosen)} thrusters, and nobody at this terminal to put the next one on the bench; "
             "give the bench a [mount] command or run one thruster at a time with --thruster"
         )
+    front = _progress_bar(start=True) if headless else _console()
     folder = campaign_folder(output or config.output, config.name)
     run, _process = start_controller(campaign, folder, thrusters)
-    return follow(run, headless, start=True)
+    return follow(run, front)
 
 
 @click.command("console")
@@ -66,7 +67,10 @@ def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: 
 @click.option("--headless", is_flag=True, help="Follow with a progress bar instead.")
 def console_command(folder: Path | None, headless: bool) -> int:
     """Attach to a run that is going on: the one in FOLDER, or the only one on this machine."""
-    return follow(find_run(folder), headless, start=False)
+    if not headless and not sys.stdout.isatty():
+        raise RigError("rig console needs a terminal; use --headless where there is none")
+    front = _progress_bar(start=False) if headless else _console()
+    return follow(find_run(folder), front)
 
 
 @click.command("stop")
@@ -75,7 +79,7 @@ def stop_command(folder: Path | None) -> int:
     """Stop a run that is going on: zero volts now, close the recording."""
     peer = connect(Path(find_run(folder).socket), "the controller")
     peer.send(Request("stop", "rig stop"))
-    last = Headless(peer, Console(stderr=True)).follow(start=False)
+    last = Headless(peer).follow(start=False)
     peer.close()
     if last is None or last.stop_confirmed is False:
         raise LinkError("STOP NOT CONFIRMED by a measurement: look at the propeller, cut the supply")
@@ -104,49 +108,80 @@ def start_controller(campaign: Path, folder: Path, thrusters: Sequence[str]) -> 
             stderr=log,
             start_new_session=True,
         )
+    try:
+        return _listening(process, folder), process
+    except BaseException:  # Ctrl+C while it starts: nobody would ever attach to it
+        process.terminate()
+        raise
+
+
+def _listening(process: subprocess.Popen[bytes], folder: Path) -> Run:
+    """The run, once its controller has announced it."""
     deadline = time.monotonic() + START_TIMEOUT
     while time.monotonic() < deadline:
         run = next((run for run in live_runs() if run.pid == process.pid), None)
         if run is not None:
-            return run, process
+            return run
         try:
             process.wait(0.05)
         except subprocess.TimeoutExpired:
             continue
         raise LinkError(f"the controller ended at once: {_last_words(folder)}")
-    process.kill()
     raise LinkError(f"the controller did not open its socket within {START_TIMEOUT:g} s; see {folder / LOG_NAME}")
 
 
-def follow(run: Run, headless: bool, *, start: bool) -> int:
+@dataclass(frozen=True, slots=True)
+class Left:
+    """How a front end ended."""
+
+    last: Snapshot | None
+    """The newest snapshot that came; None: none ever did."""
+    detached: bool = False
+    """The operator left on purpose, and the run goes on."""
+    signal: int = 0
+    """The signal that ended it; 0: none did."""
+
+
+FrontEnd = Callable[[Peer, str], Left]
+"""Takes the link and the command line that attaches once more."""
+
+
+def follow(run: Run, front: FrontEnd) -> int:
     """Attach a front end until it ends or detaches; then the table, where the files are, and the exit status."""
     peer = connect(Path(run.socket), "the controller")
     again = f"rig console {run.folder}"
     try:
-        last, detached = _progress_bar(peer, start=start) if headless else _console(peer, again)
+        left = front(peer, again)
     finally:
         peer.close()
-    if detached:
+    if left.signal:
+        return 128 + left.signal
+    if left.detached:
         click.echo(f"the run goes on in {run.folder}; attach again with: {again}")
         return 0
     _await_end(run.pid)
-    return _conclude(check_alive(last), Path(run.folder))
+    return _conclude(check_alive(left.last), Path(run.folder))
 
 
-def _progress_bar(peer: Peer, *, start: bool) -> tuple[Snapshot | None, bool]:
-    """Last snapshot, and that nobody can detach here."""
-    return Headless(peer, Console(stderr=True)).follow(start), False
+def _progress_bar(*, start: bool) -> FrontEnd:
+    """Nobody can detach here; `start` starts the run when the preflight has passed."""
+    return lambda peer, _: Left(Headless(peer, terminal=operator_terminal()).follow(start))
 
 
-def _console(peer: Peer, again: str) -> tuple[Snapshot | None, bool]:
-    """Last snapshot, and whether the operator left on purpose while the run goes on."""
+def _console() -> FrontEnd:
+    """Imported before a controller is started: Ctrl+C in that second leaves nothing behind."""
     from rig.console import SocketFeed, attend
 
-    sitting = attend(SocketFeed(peer), again=again)
-    return sitting.last, sitting.detached
+    def front(peer: Peer, again: str) -> Left:
+        sitting = attend(SocketFeed(peer), again=again)
+        return Left(sitting.last, sitting.detached, max(sitting.status - 128, 0))
+
+    return front
 
 
 def _conclude(last: Snapshot, folder: Path) -> int:
+    from rig.summary import print_summary  # scipy and h5py: only now, and not for `rig stop`
+
     print_summary([Path(file) for file in last.files], folder)
     outcome = last.outcome if last.state == "done" else "aborted"
     if outcome == "completed":

@@ -66,6 +66,7 @@ class Status:
             cause=self.cause,
             stop_confirmed=self.stop_confirmed,
             attended=not self.campaign.unattended,
+            mounted_by_hand=not self.campaign.bench.mount.command,
         )
 
     def _progress(self, now: float) -> Progress | None:

@@ -10,11 +10,13 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from identification.thrust_report import sentence
+from identification.thrust import ThrustFit
 from rig.errors import RecordingError
 from rig.fit import Answer, answer_json, fit_files
 
 FIT_FILE = "fits.json"
+WIDTH = 80
+"""Columns that the table needs; a narrower terminal folds its lines rather than its cells."""
 
 
 def print_summary(recordings: Sequence[Path], folder: Path) -> None:
@@ -29,9 +31,10 @@ def print_summary(recordings: Sequence[Path], folder: Path) -> None:
         except RecordingError as error:
             click.echo(f"no fit: {error}")
     if answers:
-        Console().print(_table(answers))
-        for answer in answers:
-            click.echo(sentence(answer.fit))
+        console = Console()
+        console.width = max(console.width, WIDTH)
+        click.echo("thrust = C V|V| + tare; C in N/V^2, n points, tare and RMSE in N")
+        console.print(table(answers))
         text = json.dumps(answer_json(answers), indent=1, allow_nan=False)
         (folder / FIT_FILE).write_text(text + "\n", encoding="utf-8")
     click.echo(f"recordings, fits and logs: {folder}")
@@ -39,32 +42,25 @@ def print_summary(recordings: Sequence[Path], folder: Path) -> None:
         click.echo(f"  {path.name}")
 
 
-def _table(answers: Sequence[Answer]) -> Table:
-    table = Table(title="tau = C V|V|, one row per thruster")
-    for heading in (
-        "thruster",
-        "C [N/V^2]",
-        "std. error",
-        "95 % interval",
-        "points",
-        "tare [N]",
-        "RMSE [N]",
-        "chi2/dof",
-    ):
-        table.add_column(heading, justify="left" if heading == "thruster" else "right")
+def table(answers: Sequence[Answer]) -> Table:
+    """One row per thruster, in 80 columns; intervals are those of the t distribution, calibration included."""
+    shown = Table(box=None, padding=(0, 2, 0, 0), pad_edge=False, header_style="bold")
+    for heading in ("thruster", "C", "std", "95 % interval", "n", "tare", "RMSE", "chi2/dof"):
+        shown.add_column(heading, justify="left" if heading == "thruster" else "right", no_wrap=True)
     for answer in answers:
-        fit = answer.fit
-        C, (tare,) = fit.parameters["C"], fit.tare.values()
-        chi2 = "-" if fit.chi2_per_dof is None else f"{fit.chi2_per_dof:.2f}"
-        interval = f"{C.low:.5f} .. {C.high:.5f}"
-        table.add_row(
-            fit.thruster,
-            f"{C.value:.5f}",
-            f"{C.std:.5f}",
-            interval,
-            str(fit.estimate.rows.y.size),
-            f"{tare.value:.3f}",
-            f"{fit.rmse:.3f}",
-            chi2,
-        )
-    return table
+        shown.add_row(*_row(answer.fit))
+    return shown
+
+
+def _row(fit: ThrustFit) -> tuple[str, ...]:
+    C, (tare,) = fit.parameters["C"], fit.tare.values()
+    return (
+        fit.thruster or "?",
+        f"{C.value:.5f}",
+        f"{C.std:.5f}",
+        f"{C.low:.5f} .. {C.high:.5f}",
+        str(fit.estimate.rows.y.size),
+        f"{tare.value:.3f}",
+        f"{fit.rmse:.3f}",
+        "-" if fit.chi2_per_dof is None else f"{fit.chi2_per_dof:.2f}",
+    )
