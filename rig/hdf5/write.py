@@ -71,7 +71,7 @@ class StreamWriter:
         _attributes(group, {"source": spec.source, "device_id": spec.device_id, "note": spec.note})
         self._channels = [Column(_channel(group, channel)) for channel in spec.channels]
         self._time = Column(_table(group, "time", np.dtype("<f8"), CHUNK_ROWS))
-        group["time"].attrs.create("unit", fixed("s"))
+        group["time"].attrs.create("unit", "s")
 
     @property
     def rows(self) -> int:
@@ -118,8 +118,7 @@ class RecordingFile:
             raise RecordingError(f"{path}: cannot create the recording: {error}") from error
         self.path = path
         _attributes(self._file, {"format": FORMAT, "format_version": FORMAT_VERSION, "complete": False})
-        self._file.attrs.create("outcome", fixed("running", OUTCOME_BYTES))
-        _attributes(self._file, attributes)
+        _attributes(self._file, {"outcome": "running", **attributes})
         groups = self._file.create_group("streams", track_order=True)
         self.streams = [StreamWriter(groups.create_group(spec.name, track_order=True), spec, t0_ns) for spec in streams]
         self._steps = Column(_table(self._file, "steps", STEP_TYPE, 64))
@@ -171,7 +170,7 @@ class RecordingFile:
         end["cause"][0] = fixed(cause, CAUSE_BYTES)
         end["outcome"][0] = fixed(outcome, OUTCOME_BYTES)
         end["complete"][0] = True
-        h5py.h5a.open(self._file.id, b"outcome").write(fixed(outcome, OUTCOME_BYTES))
+        h5py.h5a.open(self._file.id, b"outcome").write(np.array(outcome, dtype=h5py.string_dtype()))
         h5py.h5a.open(self._file.id, b"complete").write(np.array(True))
         self.flush()
         self._file.close()
@@ -201,11 +200,10 @@ def _check_calibration(channel: str, calibration: str) -> None:
 
 
 def _attributes(target: h5py.Group | h5py.Dataset, attributes: Mapping[str, Attribute | None]) -> None:
+    """Those that say something. Text is variable-length, which h5py and MATLAB read as text; it is on the disk before the
+    first row and, but for `outcome` at the very end, never touched again, so a kill can't hurt it as it does in tables."""
     for name, value in attributes.items():
-        if isinstance(value, str):
-            if value:
-                target.attrs.create(name, fixed(value))
-        elif value is not None:
+        if value is not None and value != "":
             target.attrs.create(name, value)
 
 
