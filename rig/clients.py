@@ -5,8 +5,10 @@ from __future__ import annotations
 import socket
 from collections import deque
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 
-from rig.link import LinkError, Overrun, Peer, accept
+from rig.errors import LinkError
+from rig.link import Overrun, Peer, accept, remove
 from rig.messages import Request, Snapshot
 
 TRACE_ROWS = 12_000
@@ -32,18 +34,19 @@ class Clients:
     connected: list[Client] = field(default_factory=list)
     trace: deque[TraceRow] = field(default_factory=lambda: deque(maxlen=TRACE_ROWS))
     last_lease: float | None = None
-    """s, when any front end last said that somebody attends; from the first on an attended campaign needs one."""
+    """s, when any front end last said that somebody attends, by a lease or by starting the campaign; from the first on
+    an attended campaign needs one."""
 
     def poll(self, now: float) -> list[Request]:
         """Accept who waits, take all requests; leases are renewed here and not passed on."""
-        self._accept(now)
+        self._accept()
         requests: list[Request] = []
         for client in list(self.connected):
             requests += self._take(client, now)
         return requests
 
     def lease_age(self, now: float) -> float:
-        """s since any front end said that somebody attends; 0 before the first ever did."""
+        """Seconds since any front end said that somebody attends; 0 before the first ever did."""
         return 0.0 if self.last_lease is None else now - self.last_lease
 
     def add_trace(self, row: TraceRow) -> None:
@@ -69,9 +72,11 @@ class Clients:
     def close(self) -> None:
         for client in list(self.connected):
             self._drop(client)
+        path = self.listener.getsockname()
         self.listener.close()
+        remove(Path(path))
 
-    def _accept(self, now: float) -> None:
+    def _accept(self) -> None:
         while (peer := accept(self.listener, "front end", CLIENT_BOUND)) is not None:
             if len(self.connected) >= MAX_CLIENTS:
                 peer.close()
@@ -85,14 +90,14 @@ class Clients:
         except LinkError:
             self._drop(client)
             return []
-        requests = []
+        requests: list[Request] = []
         for message in messages:
             if not isinstance(message, Request):
                 self._drop(client)
                 return requests
-            if message.kind == "lease":
+            if message.kind in ("lease", "start"):
                 self.last_lease = now
-            else:
+            if message.kind != "lease":
                 requests.append(message)
         if client.peer.closed:
             self._drop(client)

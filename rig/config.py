@@ -38,6 +38,9 @@ class LimitConfig:
     max: float | None = None
     max_age: float | None = None
     """s; default max(3 sample periods, 0.2 s)."""
+    max_frozen: float | None = None
+    """s for which the value may stay the very same while the command is not 0 V. Default for the modelled thrust: 20
+    times the longest such time so far, 2 s at least; for other channels: not judged. `inf` switches it off."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,17 +5,19 @@ python -m rig.controller CAMPAIGN FOLDER [THRUSTER ...]
 
 from __future__ import annotations
 
+import logging
 import os
 import signal
 import sys
 from pathlib import Path
 
-from rig.campaign import SOCKET_NAME, CampaignRun
-from rig.loading import load_campaign
+from rig.campaign import SOCKET_NAME, open_session, run
 from rig.errors import RigError
 from rig.link import socket_path
+from rig.loading import load_campaign
 from rig.messages import Request
 from rig.runs import Run, lock_bench, register
+from rig.session import Session
 
 
 def main(campaign_path: str, folder_path: str, *thrusters: str) -> int:
@@ -24,12 +26,12 @@ def main(campaign_path: str, folder_path: str, *thrusters: str) -> int:
     try:
         campaign = load_campaign(Path(campaign_path))
         with lock_bench(campaign.bench.path):
-            run = CampaignRun(campaign, folder, thrusters)
-            stop_on_signals(run)
+            session = open_session(campaign, folder, thrusters)
+            stop_on_signals(session)
             socket = str(socket_path(folder, SOCKET_NAME))
             announcement = register(Run(os.getpid(), socket, str(folder), campaign.name, str(campaign.bench.path)))
             try:
-                run.run()
+                run(session)
             finally:
                 announcement.unlink(missing_ok=True)
     except RigError as error:
@@ -38,15 +40,28 @@ def main(campaign_path: str, folder_path: str, *thrusters: str) -> int:
     return 0
 
 
-def stop_on_signals(run: CampaignRun) -> None:
+def stop_on_signals(session: Session) -> None:
     """SIGTERM, SIGINT and SIGHUP are stop requests, carried out by the next tick (reliability.md, promise 2)."""
 
     def stop(number: int, _: object) -> None:
-        run.loop.signals.append(Request("stop", signal.Signals(number).name))
+        session.loop.signals.append(Request("stop", signal.Signals(number).name))
 
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         signal.signal(number, stop)
 
 
+def end_with(arguments: list[str]) -> None:
+    """Run, then leave without waiting for any thread: a reader that hangs in its driver must not hold the bench."""
+    status = 1
+    try:
+        status = main(*arguments)
+    except Exception:  # the top of a process: everything is closed, and the log says why
+        logging.exception("the controller failed")
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(status)
+
+
 if __name__ == "__main__":
-    sys.exit(main(*sys.argv[1:]))
+    end_with(sys.argv[1:])

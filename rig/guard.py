@@ -1,7 +1,7 @@
 """The guard: asked before every command whether the motor may go on. Pure: readings and time are arguments.
 
-It trips on a limit, on a value that is too old or NaN, on its own lateness, on a dead link, on a recorder that is gone
-or late, and on an operator who is gone. Whoever gets a Trip commands 0 V at once.
+It trips on a limit, on a value that is too old, NaN or frozen, on its own lateness, on a dead link, on a recorder that
+is gone or late, and on an operator who is gone. Whoever gets a Trip commands 0 V at once.
 """
 
 from __future__ import annotations
@@ -14,12 +14,19 @@ from typing import Literal, NamedTuple
 from drivers.protocols import LinkHealth, Stream
 from rig.config import LimitConfig
 
-Source = Literal["limit", "nan", "stale", "late", "link", "recorder", "lease"]
+Source = Literal["limit", "nan", "stale", "frozen", "rate", "corrupt", "late", "link", "recorder", "lease"]
 
 MIN_AGE = 0.2
 """s, shortest default sample age (reliability.md, promise 7: within max(3 sample periods, 0.2 s))."""
 MIN_LATENESS = 0.25
 """s, shortest tolerated lateness of a loop tick."""
+LEAST_FROZEN = 2.0
+"""s, shortest default time for which a driven channel may keep the very same value."""
+FROZEN_TIMES = 20.0
+"""Default: this many times the longest such time in its earlier data. Noise that changes a digit ten times a second all
+the same for 2 s is not believed; a coarse digit that stood still for 3 s at rest is allowed a minute."""
+UNSEEN_FROZEN = 10.0
+"""s, default while the value has never changed at all, so that its noise says nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,13 +53,18 @@ class Watch:
     max_age: float
     min: float | None = None
     max: float | None = None
+    max_frozen: float | None = None
+    """s; None: not judged. 0: by its earlier variation (`frozen_limit`)."""
 
 
 class Latest(NamedTuple):
-    """Newest value of a channel and its arrival in s."""
+    """Newest value of a channel and its arrival in s; for how many s up to then it has been the very same."""
 
     value: float
     time: float
+    same: float = 0.0
+    longest: float | None = None
+    """s, longest time of the very same value that ended with a change; None: it has never changed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +93,8 @@ class Vitals:
     """None: nothing is recorded now."""
     lease_age: float | None = None
     """s since an operator said `I am here`; None: unattended, no lease asked for."""
+    driven: float = 0.0
+    """s for which the command has been other than 0 V without a break; a sensor may stand still at rest."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,9 +115,10 @@ def allowances(loop_rate: float) -> Allowances:
 
 
 def watches(
-    limits: Iterable[LimitConfig], streams: Iterable[Stream], essential: Iterable[str] = ()
+    limits: Iterable[LimitConfig], streams: Iterable[Stream], essential: Iterable[str] = (), thrust: str = ""
 ) -> tuple[Watch, ...]:
     """Resolve configured limits against the bench's streams; `essential` channels are watched for age and NaN anyway.
+    The `thrust` channel is watched for a frozen value as well, by its own earlier variation if nothing is configured.
 
     Channels are `<stream>.<channel>`. Raises ValueError naming a channel that no stream has.
     """
@@ -113,8 +128,16 @@ def watches(
     for channel in wanted:
         if channel not in known:
             raise ValueError(f"no device gives a channel {channel}; there are {', '.join(sorted(known))}")
+    learned = {thrust: 0.0}
     return tuple(
-        Watch(channel, known[channel][0], known[channel][1] if c.max_age is None else c.max_age, c.min, c.max)
+        Watch(
+            channel,
+            known[channel][0],
+            known[channel][1] if c.max_age is None else c.max_age,
+            c.min,
+            c.max,
+            learned.get(channel) if c.max_frozen is None else c.max_frozen,
+        )
         for channel, c in wanted.items()
     )
 
@@ -134,7 +157,9 @@ def assess(watch: Watch, newest: Latest | None, vitals: Vitals, allowed: Allowan
     if isnan(newest.value):
         cause = f"{watch.channel} is NaN: the device sent a row without a usable value"
         return Trip(cause, "nan", vitals.now, watch.channel, newest.value)
-    return _outside(watch, newest.value, vitals.now) or _stale(watch, newest, vitals.now)
+    return (
+        _outside(watch, newest.value, vitals.now) or _stale(watch, newest, vitals.now) or _frozen(watch, newest, vitals)
+    )
 
 
 def _silent(watch: Watch, vitals: Vitals, allowed: Allowances) -> Trip | None:
@@ -162,6 +187,27 @@ def _stale(watch: Watch, newest: Latest, now: float) -> Trip | None:
         return None
     cause = f"{watch.channel} is stale: its last sample is {age:.2f} s old, {watch.max_age:g} s are allowed"
     return Trip(cause, "stale", now, watch.channel, newest.value, watch.max_age)
+
+
+def frozen_limit(watch: Watch, longest: float | None) -> float:
+    """How long in s a driven channel may keep the very same value: as configured, or by its earlier variation."""
+    if watch.max_frozen:
+        return watch.max_frozen
+    return UNSEEN_FROZEN if longest is None else max(LEAST_FROZEN, FROZEN_TIMES * longest)
+
+
+def _frozen(watch: Watch, newest: Latest, vitals: Vitals) -> Trip | None:
+    """Judged while the motor is driven only: water at rest may leave a coarse digit alone."""
+    if watch.max_frozen is None or not vitals.driven:
+        return None
+    same, limit = min(newest.same, vitals.driven), frozen_limit(watch, newest.longest)
+    if same <= limit:
+        return None
+    cause = (
+        f"{watch.channel} is frozen: {newest.value:.6g} {watch.unit} without any change for {same:.1f} s of driving, "
+        f"{limit:.3g} s are allowed"
+    )
+    return Trip(cause, "frozen", vitals.now, watch.channel, newest.value, limit)
 
 
 def _rig_trip(vitals: Vitals, allowed: Allowances) -> Trip | None:

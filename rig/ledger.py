@@ -1,42 +1,51 @@
-"""campaign.jsonl: what was done, one line per fact, on the disk before the next step begins. What `rig resume` believes."""
+"""campaign.jsonl: what was done, one line per fact, fsynced within the next steps. What `rig resume` believes."""
 
 from __future__ import annotations
 
 import json
-import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from io import TextIOWrapper
 from pathlib import Path
 from typing import Any
 
 from rig.errors import RecordingError
+from rig.line_writer import LineWriter
 
 FILE_NAME = "campaign.jsonl"
 
+Fact = Mapping[str, Any]
 
-@dataclass
+
+@dataclass(frozen=True)
 class Ledger:
-    """Appends facts; every `write` is fsynced before it returns."""
+    """Appends facts; each is fsynced by a thread, so that a slow disk does not hold the control loop."""
 
     path: Path
-    file: TextIOWrapper
+    writer: LineWriter
 
     @classmethod
     def open(cls, folder: Path) -> Ledger:
+        """Also one that is there already, after a kill: a last line that was torn is no fact and is cut off."""
         path = folder / FILE_NAME
-        return cls(path, path.open("a", encoding="utf-8"))
+        file = path.open("ab")
+        file.truncate(path.read_bytes().rfind(b"\n") + 1)
+        return cls(path, LineWriter(file, sync=True))
+
+    @property
+    def error(self) -> str:
+        """Why facts are no longer written, as a sentence; empty while they are."""
+        return self.writer.error
 
     def write(self, fact: str, **details: Any) -> None:
-        self.file.write(json.dumps({"fact": fact, **details}) + "\n")
-        self.file.flush()
-        os.fsync(self.file.fileno())
+        """Never blocks."""
+        self.writer.write(json.dumps({"fact": fact, **details}))
 
     def close(self) -> None:
-        self.file.close()
+        """All facts are on the disk when this returns, if it takes them."""
+        self.writer.close()
 
 
-def read(folder: Path) -> list[Mapping[str, Any]]:
+def read(folder: Path) -> list[Fact]:
     """All facts of a campaign folder; a torn last line (power cut while writing) is left out."""
     path = folder / FILE_NAME
     if not path.exists():
@@ -55,8 +64,12 @@ def read(folder: Path) -> list[Mapping[str, Any]]:
     return facts
 
 
-def finished_thrusters(folder: Path) -> tuple[str, ...]:
-    """Thrusters whose run ended `completed`, in the order they were run."""
-    return tuple(
-        fact["thruster"] for fact in read(folder) if fact["fact"] == "run_end" and fact["outcome"] == "completed"
-    )
+def finished_runs(facts: Sequence[Fact]) -> dict[str, str]:
+    """Thruster -> recording of the runs that ended `completed`, in the order they were run."""
+    ends = (fact for fact in facts if fact["fact"] == "run_end" and fact["outcome"] == "completed")
+    return {fact["thruster"]: fact["recording"] for fact in ends}
+
+
+def attempts(facts: Sequence[Fact], thruster: str) -> int:
+    """How often a run of that thruster was begun."""
+    return sum(fact["fact"] == "run_start" and fact["thruster"] == thruster for fact in facts)

@@ -128,6 +128,10 @@ def _limit(path: Path, channel: str, table: Table) -> LimitConfig:
         raise ConfigError(f"{path}: {prefix}.min ({limit.min:g}) must be below max ({limit.max:g})")
     if limit.max_age is not None:
         _require_above_zero(path, f"{prefix}.max_age", limit.max_age, "s")
+    if limit.max_frozen is not None and not limit.max_frozen > 0:
+        raise ConfigError(
+            f"{path}: {prefix}.max_frozen must be above 0 s (inf: not judged), but is {limit.max_frozen:g}"
+        )
     return limit
 
 

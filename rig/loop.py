@@ -1,12 +1,14 @@
 """The control loop: drain -> guard -> decide -> command -> publish. The only caller of MotorController.command.
 
-Every tick re-sends the present set-point, so the motor's own watchdog is fed by a fresh tick of this loop and by nothing else
-(reliability.md, rule 3). What is to be commanded is decided by whoever runs the tick: idle stages or the sequencer.
+Every tick re-sends the present set-point, so the motor's own watchdog is fed by a fresh tick of this loop and by
+nothing else (reliability.md, rule 3). What is to be commanded is decided by whoever runs the tick: idle stages or the
+sequencer.
 """
 
 from __future__ import annotations
 
 import time
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, nan
@@ -18,7 +20,9 @@ from rig import guard
 from rig.bench import COMMAND_STREAM, Bench
 from rig.clients import Clients
 from rig.guard import Recorder, Trip, Vitals
+from rig.ledger import Ledger
 from rig.messages import Request
+from rig.pace import Pace
 from rig.readings import Readings
 from rig.recorder_link import RecorderLink
 
@@ -76,11 +80,13 @@ class Loop:
     bench: Bench
     readings: Readings
     recorder: RecorderLink
+    ledger: Ledger
     clients: Clients
     clock: Clock
     unattended: bool
     publish: Callable[[float], None]
-    signals: list[Request] = field(default_factory=list)
+    signals: deque[Request] = field(default_factory=deque)
+    """Requests that came by another way than a front end; a signal handler may append at any instant."""
     guarded: bool = False
     guarded_since: float = 0.0
     recording_since_ns: int | None = None
@@ -90,12 +96,18 @@ class Loop:
     lateness: float = 0.0
     """s, of the running tick."""
     worst_lateness: float = 0.0
+    """s, since the recording began."""
+    driven_since: float | None = None
+    """s, when the command last left 0 V; None: it is 0 V."""
+    has_driven: bool = False
     _command_error: str = ""
     _recorded_command: tuple[float | None] | None = None
     """Last row of the command stream; (None,) while nothing is sent, which is recorded as NaN."""
     _due_ns: int = 0
     _published: float = -inf
     _traced: float = -inf
+    _paces: tuple[tuple[str, Pace], ...] = ()
+    _counted: dict[str, int] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         config = self.bench.config
@@ -104,16 +116,26 @@ class Loop:
         self.thrust_channel = f"{force}.thrust"
         self.rotation_channel = rotation_channel(self.bench)
         essential = [self.thrust_channel] + ([self.rotation_channel] if self.rotation_channel else [])
-        self.watched = guard.watches(config.limits, self.readings.streams.values(), essential)
+        streams = self.readings.streams.values()
+        self.watched = guard.watches(config.limits, streams, essential, self.thrust_channel)
         self.allowed = guard.allowances(config.loop_rate)
+        self.readings.watch_sameness(w.channel for w in self.watched if w.max_frozen is not None)
 
     def watch(self) -> None:
         """From now on the guard judges every tick."""
-        self.guarded, self.guarded_since = True, self.now
+        now = self.now
+        self.guarded, self.guarded_since = True, now
+        watched = {self.readings.place[watch.channel][0] for watch in self.watched}
+        self._paces = tuple(
+            (stream.name, Pace(stream.name, device, stream.period_s, now))
+            for device, stream in self.bench.streams()
+            if stream.name in watched
+        )
+        self._counted = dict(self.readings.rows)
 
     @property
     def now(self) -> float:
-        """s on the monotonic clock."""
+        """Seconds on the monotonic clock."""
         return self.clock.now_ns() * 1e-9
 
     def tick(self, motor: MotorController | None, decide: Callable[[Inputs], Decision]) -> None:
@@ -123,22 +145,22 @@ class Loop:
         samples = self.bench.drain()
         self.readings.update(samples)
         self.recorder.poll(now)
-        requests = (*self.clients.poll(now), *self.signals)
-        self.signals.clear()
+        requests = self._requests(now)
         trip = self._judge(now) if self.guarded else None
         decision = decide(Inputs(now, tuple(samples), requests, trip, self.rotation(now)))
         if motor is not None:
-            self._send(motor, decision)
+            self._send(motor, decision, now)
         self._record(samples, decision, now_ns)
         self._show(now)
         self.clock.sleep_until_ns(self._due_ns)
 
+    def zero(self, motor: MotorController) -> None:
+        """0 V by both ways, now, whatever else fails."""
+        self._send(motor, Decision(0.0, release=True), self.now)
+
     def rotation(self, now: float) -> float | None:
         """Newest rotation rate in rev/s, None when it is not measured, NaN or old."""
-        if self.rotation_channel is None:
-            return None
-        reading = next(r for r in self.readings.view(now) if r.channel == self.rotation_channel)
-        return reading.value if reading.state in ("ok", "limit") else None
+        return None if self.rotation_channel is None else self.readings.fresh(self.rotation_channel, now)
 
     def thrust_rows(self, samples: tuple[Sample, ...], since_ns: int) -> tuple[tuple[float, float], ...]:
         """(s since `since_ns`, N) of the force device's rows, oldest first."""
@@ -150,10 +172,17 @@ class Loop:
         )
 
     def begin_recording(self, t0_ns: int) -> None:
-        self.recording_since_ns, self._recorded_command = t0_ns, None
+        self.recording_since_ns, self._recorded_command, self.worst_lateness = t0_ns, None, 0.0
 
     def end_recording(self) -> None:
         self.recording_since_ns = None
+
+    def _requests(self, now: float) -> tuple[Request, ...]:
+        """Taken one by one: a signal that comes meanwhile is in this tick or in the next, and never lost."""
+        requests = self.clients.poll(now)
+        while self.signals:
+            requests.append(self.signals.popleft())
+        return tuple(requests)
 
     def _begin(self) -> int:
         now_ns = self.clock.now_ns()
@@ -170,26 +199,49 @@ class Loop:
             )
         if not self.unattended and self.clients.last_lease is not None and not self.clients.connected:
             return Trip("the operator is gone: the last front end has closed its connection", "lease", now)
-        trouble = self.recorder.trouble(now)
-        if trouble is not None:
+        trouble = self.recorder.trouble(now) or self.ledger.error
+        if trouble:
             return Trip(trouble, "recorder", now)
         newest = {watch.channel: self.readings.newest(watch.channel) for watch in self.watched}
-        return guard.check(self.watched, newest, self._vitals(now), self.allowed)
+        vitals = self._vitals(now)
+        trip = guard.check(self.watched, newest, vitals, self.allowed)
+        return trip or self._pace(vitals)
+
+    def _pace(self, vitals: Vitals) -> Trip | None:
+        trips = []
+        for stream, pace in self._paces:
+            rows = self.readings.rows.get(stream, 0)
+            trips.append(pace.advance(rows - self._counted.get(stream, 0), vitals))
+            self._counted[stream] = rows
+        return next((trip for trip in trips if trip), None)
 
     def _vitals(self, now: float) -> Vitals:
         links = {name: instrument.health() for name, instrument in self.bench.instruments.items()}
         lease = None if self.unattended else self.clients.lease_age(now)
-        return Vitals(now, self.guarded_since, self.lateness, links, Recorder(alive=True), lease)
+        driven = 0.0 if self.driven_since is None else now - self.driven_since
+        return Vitals(now, self.guarded_since, self.lateness, links, Recorder(alive=True), lease, driven)
 
-    def _send(self, motor: MotorController, decision: Decision) -> None:
-        try:
-            if decision.volts is not None:
+    def _send(self, motor: MotorController, decision: Decision, now: float) -> None:
+        """The second way to stop is tried also when the first is refused."""
+        if decision.volts is not None:
+            self._note_command(decision.volts, now)
+            try:
                 motor.command(decision.volts)
-                self.command = decision.volts
-            if decision.release:
+            except LinkError as error:
+                self._command_error = str(error)
+        if decision.release:
+            try:
                 motor.release()
-        except LinkError as error:
-            self._command_error = str(error)
+            except LinkError as error:
+                self._command_error = str(error)
+
+    def _note_command(self, volts: float, now: float) -> None:
+        self.command = volts
+        self.has_driven = self.has_driven or volts != 0.0
+        if volts == 0.0:
+            self.driven_since = None
+        elif self.driven_since is None:
+            self.driven_since = now
 
     def _record(self, samples: list[Sample], decision: Decision, now_ns: int) -> None:
         since = self.recording_since_ns

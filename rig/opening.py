@@ -1,4 +1,4 @@
-"""What a recording says before its first row: every stream with its channels, and both configuration texts, verbatim."""
+"""What a recording says before its first row: every stream with its channels, and both files, verbatim."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ COMMAND_CHANNEL = ChannelSpec(
 )  # fmt: skip
 
 
-def opening(campaign: CampaignConfig, bench: Bench, thruster: str, path: Path, t0_ns: int) -> Open:
-    """The Open message of one run."""
+def opening(campaign: CampaignConfig, bench: Bench, thruster: str, path: Path, t0_ns: int, attempt: int = 1) -> Open:
+    """The Open message of one run; `attempt` counts the runs of that thruster in this campaign, from 1."""
     streams = [
         stream_spec(stream, bench.identities.get(device, ""), device == bench.config.force)
         for device, stream in bench.streams()
     ]
     streams.append(StreamSpec(COMMAND_STREAM, "rig", (COMMAND_CHANNEL,)))
     size = expected_bytes((stream for _, stream in bench.streams()), campaign)
-    return Open(str(path), t0_ns, tuple(streams), _attributes(campaign, thruster), size)
+    return Open(str(path), t0_ns, tuple(streams), _attributes(campaign, thruster, attempt), size)
 
 
 def stream_spec(stream: Stream, device_id: str, primary: bool) -> StreamSpec:
@@ -67,11 +67,12 @@ def _channel_spec(channel: Channel, primary: bool) -> ChannelSpec:
     )
 
 
-def _attributes(campaign: CampaignConfig, thruster: str) -> dict[str, Attribute]:
+def _attributes(campaign: CampaignConfig, thruster: str, attempt: int) -> dict[str, Attribute]:
     attributes: dict[str, Attribute] = {
         "recording_id": str(uuid.uuid4()),
         "created": datetime.now(UTC).isoformat(),
         "thruster": thruster,
+        "attempt": attempt,
         "kind": campaign.kind,
         "campaign": campaign.name,
         "operator": campaign.operator,

@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from typing import Literal
 
 from drivers.protocols import Stream, Watchdog
 from rig.config import BenchConfig
 from rig.messages import Check, Reading
+from rig.pace import FASTEST, SLOWEST
 from rig.readings import Readings
+
+Verdict = Literal["waiting", "passed", "warning", "failed"]
 
 RATE_TOLERANCE = 0.25
 """Relative difference between a stream's real and nominal rate that is still taken as healthy."""
@@ -32,7 +36,10 @@ def rate_check(stream: Stream, rate: float | None) -> Check:
     name = f"{stream.name} rate"
     if rate is None:
         return Check(name, "failed", f"no samples came; {nominal:.3g}/s are expected")
-    verdict = "passed" if abs(rate / nominal - 1.0) <= RATE_TOLERANCE else "warning"
+    if not SLOWEST <= rate / nominal <= FASTEST:
+        text = f"{rate:.3g}/s of {nominal:.3g}/s: a run would be stopped for it; correct the device or the bench file"
+        return Check(name, "failed", text)
+    verdict: Verdict = "passed" if abs(rate / nominal - 1.0) <= RATE_TOLERANCE else "warning"
     return Check(name, verdict, f"{rate:.3g}/s of {nominal:.3g}/s")
 
 
@@ -79,7 +86,7 @@ def limit_checks(readings: Iterable[Reading]) -> list[Check]:
         value = "nothing came" if r.value is None else f"{r.value:.4g} {r.unit}"
         low = "-inf" if r.low is None else f"{r.low:g}"
         high = "inf" if r.high is None else f"{r.high:g}"
-        verdict = "passed" if r.state == "ok" else "failed"
+        verdict: Verdict = "passed" if r.state == "ok" else "failed"
         checks.append(Check(r.channel, verdict, f"{value} within [{low}, {high}], {r.state}"))
     return checks
 

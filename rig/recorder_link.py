@@ -1,7 +1,8 @@
-"""The controller's side of the recorder process: start it, feed it, know when it is gone or late. Never blocks, no h5py."""
+"""The controller's side of the recorder process: start it, feed it, know when it is gone or late. Never blocks."""
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 from collections.abc import Iterable, Sequence
@@ -12,11 +13,14 @@ from typing import IO
 import numpy as np
 
 from drivers.protocols import Sample
-from rig.link import LinkError, Overrun, Peer, pair
+from rig.errors import LinkError
+from rig.link import Overrun, Peer, pair
 from rig.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Outcome, Ready, Rows, StepRow
 
 ACK_TIMEOUT = 15.0
-"""s without a flush before the recorder counts as gone: above the 10 s stall that reliability.md's promise 18 tolerates."""
+"""s without a flush before the recorder counts as gone: above the 10 s stall that promise 18 tolerates."""
+SHUT_DOWN_TIMEOUT = 10.0
+"""s for the recorder to close its file after the motor has been stopped."""
 RESERVE_BYTES = 64 * 2**20
 """Free disk space below which the run ends in order (promise 17)."""
 
@@ -26,7 +30,8 @@ class RecorderLink:
     """One recorder process; several files one after another."""
 
     peer: Peer
-    process: subprocess.Popen[bytes]
+    process: subprocess.Popen[bytes] | None
+    """None: the other end of the link is not a child of ours."""
     streams: tuple[str, ...] = ()
     ready: bool = False
     closed: Closed | None = None
@@ -107,12 +112,16 @@ class RecorderLink:
         if self.ready and now - self.last_heard > ACK_TIMEOUT:
             return f"recorder: nothing was flushed for {now - self.last_heard:.0f} s; its disk may be stuck"
         if self.ready and self.last_ack is not None and self.last_ack.free_bytes < RESERVE_BYTES:
-            return f"recorder: only {self.last_ack.free_bytes / 2**20:.0f} MiB left on the disk; the run ends while the file can still be closed"
+            left = self.last_ack.free_bytes / 2**20
+            return f"recorder: only {left:.0f} MiB left on the disk; the run ends while the file can still be closed"
         return None
 
     def shut_down(self) -> None:
-        """Let the link go: the recorder closes what is open and ends."""
+        """Let the link go: the recorder closes what is open and ends. Waits for that; a stuck disk is left alone."""
         self.peer.close()
+        if self.process is not None:
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.process.wait(SHUT_DOWN_TIMEOUT)
 
     def _send(self, message: Open | Rows | StepRow | EventRow | Close) -> None:
         if self.failed:

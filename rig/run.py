@@ -100,7 +100,7 @@ def campaign_folder(output: Path, name: str) -> Path:
 
 def start_controller(campaign: Path, folder: Path, thrusters: Sequence[str]) -> tuple[Run, subprocess.Popen[bytes]]:
     """Start the controller process in a session of its own; returns once it listens. It outlives us if it may."""
-    with (folder / LOG_NAME).open("wb") as log:
+    with (folder / LOG_NAME).open("ab") as log:
         process = subprocess.Popen(
             [sys.executable, "-m", "rig.controller", str(campaign.resolve()), str(folder), *thrusters],
             stdin=subprocess.DEVNULL,

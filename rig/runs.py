@@ -8,6 +8,7 @@ import json
 import os
 import tempfile
 from dataclasses import asdict, dataclass
+from operator import itemgetter
 from pathlib import Path
 from typing import IO
 
@@ -39,20 +40,25 @@ def _private_folder() -> Path:
 def register(run: Run) -> Path:
     """Announce a run; the caller removes the returned file at its end."""
     path = _private_folder() / f"run-{run.pid}.json"
-    path.write_text(json.dumps(asdict(run)), encoding="utf-8")
+    draft = path.with_suffix(".draft")  # whoever looks meanwhile sees the whole file or none
+    draft.write_text(json.dumps(asdict(run)), encoding="utf-8")
+    draft.replace(path)
     return path
 
 
 def live_runs() -> list[Run]:
     """Runs whose controller process still exists; files of dead ones are removed."""
     found = []
-    for path in sorted(_private_folder().glob("run-*.json"), key=lambda p: p.stat().st_mtime):
-        run = Run(**json.loads(path.read_text(encoding="utf-8")))
+    for path in _private_folder().glob("run-*.json"):
+        try:
+            run, since = Run(**json.loads(path.read_text(encoding="utf-8"))), path.stat().st_mtime
+        except (FileNotFoundError, ValueError, TypeError):
+            continue  # it ended just now, or its file is of another version
         if _alive(run.pid):
-            found.append(run)
+            found.append((since, run))
         else:
             path.unlink(missing_ok=True)
-    return found
+    return [run for _, run in sorted(found, key=itemgetter(0))]
 
 
 def find_run(folder: Path | None) -> Run:

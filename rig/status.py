@@ -35,6 +35,11 @@ class Status:
     output: Output | None = None
     """Of the running sequencer."""
     sequence: int = 0
+    run_expected: float = field(init=False)
+    """s of one run by plan; reckoned once, a long plan has thousands of steps."""
+
+    def __post_init__(self) -> None:
+        self.run_expected = self.campaign.plan.duration().expected
 
     @property
     def thruster(self) -> str:
@@ -75,7 +80,7 @@ class Status:
         out = self.output
         elapsed = now - self.started
         left = len(self.thrusters) - self.run - (1 if out else 0)
-        eta = (out.remaining if out else 0.0) + max(left, 0) * self.campaign.plan.duration().expected
+        eta = (out.remaining if out else 0.0) + max(left, 0) * self.run_expected
         if self.state == "done":
             eta = 0.0
         return Progress(

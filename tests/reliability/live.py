@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import select
-import shutil
 import subprocess
 import sys
 import time
@@ -31,7 +30,7 @@ CAMPAIGN = """
 [campaign]
 name = "reliability"
 bench = "bench.toml"
-thrusters = ["T1"]
+thrusters = {thrusters}
 output = "out"
 unattended = {unattended}
 expected_C = 0.5
@@ -44,7 +43,7 @@ max_drift = 1.0
 
 [plan]
 kind = "levels"
-voltages = [6.0, -6.0, 10.0, -10.0]
+voltages = [10.0, -10.0, 6.0, -6.0]
 slew = 24.0
 zero_every = 2
 [plan.dwell]
@@ -66,9 +65,19 @@ class LiveBench:
         lines = (self.folder / "ports" / "truth.jsonl").read_text().split("\n")
         return [json.loads(line) for line in lines[:-1]]
 
-    def start(self, *, unattended: bool = True, prove: bool = False, dwell: float = 2.0, **names: str) -> Run:
+    def start(
+        self,
+        *,
+        unattended: bool = True,
+        prove: bool = False,
+        dwell: float = 2.0,
+        thrusters: tuple[str, ...] = ("T1",),
+        **names: str,
+    ) -> Run:
         """A controller process on this bench, listening."""
-        text = CAMPAIGN.format(unattended=str(unattended).lower(), prove=str(prove).lower(), dwell=dwell)
+        text = CAMPAIGN.format(
+            unattended=str(unattended).lower(), prove=str(prove).lower(), dwell=dwell, thrusters=json.dumps(thrusters)
+        )
         for old, new in names.items():
             text = text.replace(old, new)
         campaign = self.folder / "campaign.toml"
@@ -86,10 +95,16 @@ class LiveBench:
         subprocess.run([sys.executable, "-m", "sim_devices", "tell", control, *words], check=True, cwd=PROJECT)
 
 
+def unchanged(text: str) -> str:
+    return text
+
+
 @contextmanager
-def live_bench(folder: Path, edit: Callable[[str], str] = lambda text: text) -> Iterator[LiveBench]:
-    """Start the bench of benches/simulated with its world file edited; everything is ended at the end."""
-    shutil.copy(PROJECT / "benches/simulated/bench.toml", folder)
+def live_bench(
+    folder: Path, edit: Callable[[str], str] = unchanged, edit_bench: Callable[[str], str] = unchanged
+) -> Iterator[LiveBench]:
+    """Start the bench of benches/simulated with its world and bench files edited; everything is ended at the end."""
+    (folder / "bench.toml").write_text(edit_bench((PROJECT / "benches/simulated/bench.toml").read_text()))
     world = folder / "world.toml"
     world.write_text(edit((PROJECT / "benches/simulated/world.toml").read_text()))
     process = subprocess.Popen(

@@ -56,7 +56,7 @@ def test_campaign_completes_and_the_watchdog_is_proved(tmp_path, report):
         recording = the_recording(bench)
         assert recording.outcome == "completed"
         assert recording.complete
-        assert [s.command_voltage for s in recording.steps if s.phase == "hold"] == [6.0, -6.0, 10.0, -10.0]
+        assert [s.command_voltage for s in recording.steps if s.phase == "hold"] == [10.0, -10.0, 6.0, -6.0]
         end = next(fact for fact in read(Path(bench.runs[0].folder)) if fact["fact"] == "run_end")
         assert WATCHDOG <= end["time_to_zero_s"] < WATCHDOG + 3.0
         report("watchdog proof: time to zero", end["time_to_zero_s"], "s")
@@ -205,7 +205,7 @@ def test_motor_without_an_effective_watchdog_is_refused(tmp_path):
 
 def test_unattended_run_goes_on_without_front_ends_and_is_attached_again(tmp_path):
     with live_bench(tmp_path) as bench:
-        front, _ = under_way(bench, volts=6.0)
+        front, _ = under_way(bench)
         front.peer.send(Request("detach"))
         front.peer.close()
         again = FrontEnd(connect(Path(bench.runs[0].socket), "the controller"))
@@ -220,7 +220,7 @@ def test_unattended_run_goes_on_without_front_ends_and_is_attached_again(tmp_pat
 
 def test_second_controller_on_the_same_bench_is_refused(tmp_path):
     with live_bench(tmp_path) as bench:
-        front, _ = under_way(bench, volts=6.0)
+        front, _ = under_way(bench)
         with pytest.raises(Exception, match="in use by process"):
             bench.start()
         front.peer.close()

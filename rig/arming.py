@@ -1,0 +1,115 @@
+"""The stages before a propeller may turn: open the devices, judge the bench until the operator starts it."""
+
+from __future__ import annotations
+
+import gc
+import hashlib
+import os
+
+from rig.chronicle import Level
+from rig.config import CampaignConfig
+from rig.errors import DeviceError, LinkError
+from rig.preflight import all_checks, device_checks
+from rig.session import Session, Stopped
+
+SETTLE_ROWS = 5
+"""Rows of the slowest stream that are waited for before the preflight judges rates."""
+UNSEEN = 60.0
+"""s for which a campaign that nobody has started waits without any front end: it holds the bench."""
+
+
+def connect(session: Session) -> None:
+    """Open the devices one by one, and say how it went; a device that fails ends the campaign here."""
+    failures: dict[str, str] = {}
+    names = tuple(session.bench.instruments)
+    for name in names:
+        session.status.checks = device_checks(session.bench.identities, failures, names)
+        session.turn()
+        try:
+            session.say("info", f"{name}: {session.bench.open_device(name)}", of_bench=True)
+        except (LinkError, DeviceError) as error:
+            failures[name] = str(error)
+            session.say("error", str(error))
+        if name == session.campaign.bench.motor and name not in failures:
+            session.motor = session.bench.motor
+    session.status.checks = device_checks(session.bench.identities, failures, names)
+    if failures:
+        session.turn()
+        raise DeviceError(next(iter(failures.values())))
+    _require_same_devices(session)
+    session.say("info", real_time(), of_bench=True)
+
+
+def _require_same_devices(session: Session) -> None:
+    """A resumed campaign goes on with the devices it began with (reliability.md, promise 23)."""
+    begun: dict[str, str] = next((fact["identities"] for fact in session.before if fact["fact"] == "start"), {})
+    for name, identity in session.bench.identities.items():
+        if begun.get(name, identity) != identity:
+            raise DeviceError(
+                f"{name} is {identity}, but the campaign was begun with {begun[name]}: put that back, or begin anew"
+            )
+
+
+def preflight(session: Session) -> None:
+    """Judge the bench until the operator starts it; the checks go on while he looks."""
+    devices = list(session.status.checks)
+    session.turn_for(SETTLE_ROWS * max(stream.period_s for _, stream in session.bench.streams()))
+    started, seen = False, session.loop.now
+    while not started:
+        requests = session.turn()
+        session.status.state = "preflight"
+        seen = session.loop.now if session.loop.clients.connected else seen
+        if session.loop.now - seen > UNSEEN:
+            raise Stopped("aborted", f"nobody started the campaign, and no front end was there for {UNSEEN:g} s")
+        checks = all_checks(
+            session.campaign.bench, session.loop.readings, session.bench.motor.watchdog, session.loop.now
+        )
+        session.status.checks = devices + checks
+        failed = [check for check in checks if check.verdict == "failed"]
+        if any(request.kind == "start" for request in requests):
+            started = not failed
+            if failed:
+                session.say("warning", f"not started: {failed[0].name}: {failed[0].text}")
+    for check in checks:
+        level: Level = "warning" if check.verdict == "warning" else "info"
+        session.say(level, f"preflight: {check.name}: {check.text}", of_bench=True)
+    _start(session)
+
+
+def _start(session: Session) -> None:
+    session.status.started = session.loop.now
+    session.status.outcome = "running"
+    session.ledger.write(
+        "resume" if session.before else "start",
+        campaign=session.campaign.name,
+        thrusters=session.status.thrusters,
+        identities=session.bench.identities,
+        **file_facts(session.campaign),
+    )
+    session.loop.watch()
+
+
+def file_facts(campaign: CampaignConfig) -> dict[str, str]:
+    """Both files, verbatim and by their hash: what a resumed campaign must find unchanged."""
+    return {
+        "campaign_file": str(campaign.path.resolve()),
+        "campaign_sha256": sha256(campaign.text),
+        "bench_sha256": sha256(campaign.bench.text),
+        "campaign_toml": campaign.text,
+        "bench_toml": campaign.bench.text,
+    }
+
+
+def sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def real_time() -> str:
+    """Ask for real-time scheduling of this thread; says what came of it (performance.md, loop lateness)."""
+    gc.collect()
+    gc.freeze()
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(10))
+    except PermissionError:
+        return "no real-time scheduling: not permitted to this user; the loop shares the processor with everything else"
+    return "real-time scheduling (SCHED_FIFO) for the control loop"
