@@ -80,7 +80,7 @@ def _start(session: Session) -> None:
     session.status.started = session.loop.now
     session.status.outcome = "running"
     session.ledger.write(
-        "resume" if session.before else "start",
+        "resume" if any(fact["fact"] == "start" for fact in session.before) else "start",
         campaign=session.campaign.name,
         thrusters=session.status.thrusters,
         identities=session.bench.identities,

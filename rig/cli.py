@@ -26,6 +26,9 @@ class Entry(NamedTuple):
 COMMANDS: Final = {
     "check": Entry("rig.check:check_command", "Check a campaign and its bench without opening a port."),
     "run": Entry("rig.run:run_command", "Run a campaign on its bench: console, recording, table of the fits."),
+    "resume": Entry(
+        "rig.resume:resume_command", "Go on with a campaign that was cut, at its first unfinished thruster."
+    ),
     "console": Entry("rig.run:console_command", "Attach to a run that is going on."),
     "stop": Entry("rig.run:stop_command", "Stop a run that is going on: zero volts now, close the recording."),
     "fit": Entry("rig.fit:fit_command", "Fit tau = C V|V| to recordings."),

@@ -56,7 +56,7 @@ def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: 
             f"{campaign}: {len(chosen)} thrusters, and nobody at this terminal to put the next one on the bench; "
             "give the bench a [mount] command or run one thruster at a time with --thruster"
         )
-    front = _progress_bar(start=True) if headless else _console()
+    front = progress_bar(start=True) if headless else console_screen()
     folder = campaign_folder(output or config.output, config.name)
     run, _process = start_controller(campaign, folder, thrusters)
     return follow(run, front)
@@ -69,7 +69,7 @@ def console_command(folder: Path | None, headless: bool) -> int:
     """Attach to a run that is going on: the one in FOLDER, or the only one on this machine."""
     if not headless and not sys.stdout.isatty():
         raise RigError("rig console needs a terminal; use --headless where there is none")
-    front = _progress_bar(start=False) if headless else _console()
+    front = progress_bar(start=False) if headless else console_screen()
     return follow(find_run(folder), front)
 
 
@@ -163,12 +163,12 @@ def follow(run: Run, front: FrontEnd) -> int:
     return _conclude(check_alive(left.last), Path(run.folder))
 
 
-def _progress_bar(*, start: bool) -> FrontEnd:
+def progress_bar(*, start: bool) -> FrontEnd:
     """Nobody can detach here; `start` starts the run when the preflight has passed."""
     return lambda peer, _: Left(Headless(peer, terminal=operator_terminal()).follow(start))
 
 
-def _console() -> FrontEnd:
+def console_screen() -> FrontEnd:
     """Imported before a controller is started: Ctrl+C in that second leaves nothing behind."""
     from rig.console import SocketFeed, attend
 
