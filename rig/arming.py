@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gc
 import hashlib
-import os
 
 from rig.chronicle import Level
 from rig.config import CampaignConfig
@@ -37,7 +35,6 @@ def connect(session: Session) -> None:
         session.turn()
         raise DeviceError(next(iter(failures.values())))
     _require_same_devices(session)
-    session.say("info", real_time(), of_bench=True)
 
 
 def _require_same_devices(session: Session) -> None:
@@ -102,14 +99,3 @@ def file_facts(campaign: CampaignConfig) -> dict[str, str]:
 
 def sha256(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()
-
-
-def real_time() -> str:
-    """Ask for real-time scheduling of this thread; says what came of it (performance.md, loop lateness)."""
-    gc.collect()
-    gc.freeze()
-    try:
-        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(10))
-    except PermissionError:
-        return "no real-time scheduling: not permitted to this user; the loop shares the processor with everything else"
-    return "real-time scheduling (SCHED_FIFO) for the control loop"

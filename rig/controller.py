@@ -5,6 +5,7 @@ python -m rig.controller CAMPAIGN FOLDER [THRUSTER ...]
 
 from __future__ import annotations
 
+import gc
 import logging
 import os
 import signal
@@ -28,6 +29,7 @@ def main(campaign_path: str, folder_path: str, *thrusters: str) -> int:
         with lock_bench(campaign.bench.path):
             session = open_session(campaign, folder, thrusters)
             stop_on_signals(session)
+            session.say("info", real_time(), of_bench=True)
             socket = str(socket_path(folder, SOCKET_NAME))
             announcement = register(Run(os.getpid(), socket, str(folder), campaign.name, str(campaign.bench.path)))
             try:
@@ -48,6 +50,17 @@ def stop_on_signals(session: Session) -> None:
 
     for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         signal.signal(number, stop)
+
+
+def real_time() -> str:
+    """Ask for real-time scheduling of this thread; says what came of it (performance.md, loop lateness)."""
+    gc.collect()
+    gc.freeze()
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO | os.SCHED_RESET_ON_FORK, os.sched_param(10))
+    except PermissionError:
+        return "no real-time scheduling: not permitted to this user; the loop shares the processor with everything else"
+    return "real-time scheduling (SCHED_FIFO) for the control loop"
 
 
 def end_with(arguments: list[str]) -> None:
