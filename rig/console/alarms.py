@@ -46,7 +46,7 @@ def _rotation(snapshot: Snapshot) -> str:
 def _disconnected(view: View) -> Alarm:
     last = f"figures are {age(view.silence)} old" if view.snapshot is not None else "no data ever came"
     if view.snapshot is not None and view.snapshot.state == "done":
-        return Alarm("info", f"DISCONNECTED — the campaign has ended and the controller with it; {last}.")
+        return _ended(view.snapshot)
     return Alarm(
         "danger",
         f"DISCONNECTED — the controller is gone; {last}. {_unsure(view)}"
@@ -70,7 +70,7 @@ def _running(view: View, snapshot: Snapshot) -> Alarm:
         return Alarm("warning", "STOPPING — command is 0 V; waiting until the measured rotation is at rest.")
     if snapshot.state == "done":
         return _ended(snapshot)
-    if snapshot.state == "mount":
+    if snapshot.state == "mount" and snapshot.mounted_by_hand:
         return Alarm("warning", f"Put {snapshot.thruster} on the bench, then press F5. The motor turns after that.")
     if snapshot.state == "paused":
         return Alarm("warning", "PAUSED at 0 V — press r to resume; the step is taken again.")

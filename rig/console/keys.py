@@ -35,7 +35,7 @@ def _doing(view: View) -> tuple[tuple[str, str], ...]:
     if snapshot.state == "preflight":
         return (("F5", "start"), *leave)
     if snapshot.state == "mount":
-        return (("F5", "mounted"), *leave)
+        return (("F5", "mounted"), *leave) if snapshot.mounted_by_hand else leave
     if snapshot.state == "paused":
         return (("r", "resume"), *leave)
     return (("p", "pause"), ("k", "skip"), *leave)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Hashable
 
 from rich.console import Group
+from rich.table import Table
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
@@ -113,7 +114,8 @@ class ChecksPanel(Panel):
 
     def show(self, view: View) -> None:
         checks = view.snapshot.checks if view.snapshot is not None else ()
-        self.put(checks, Group(checks_table(checks), Text(), verdict_summary(checks)))
+        state = view.snapshot.state if view.snapshot is not None else "connecting"
+        self.put((checks, state), Group(verdict_summary(checks, state), Text(), checks_table(checks)))
 
 
 class ResultsPanel(Panel):
@@ -155,7 +157,7 @@ class LogPanel(RichLog):
         new = min(view.snapshot.log_count - self.count, len(self.lines_known))
         self.count = view.snapshot.log_count
         for line in self.lines_known[len(self.lines_known) - new :] if new > 0 else ():
-            self.write(event_text(line), expand=True)
+            self.write(event_row(line), expand=True)
 
     def on_resize(self, _: Resize) -> None:
         """Lines were wrapped for the old width: the next `show` writes them all again."""
@@ -163,6 +165,11 @@ class LogPanel(RichLog):
         self.count = 0
 
 
-def event_text(line: LogLine) -> Text:
-    """`   12.3 s  WARN  text`: the level is a word too."""
-    return Text(f"{line.time:8.1f} s  {LOG_WORDS[line.level]}  {line.text}", LOG_STYLES[line.level])
+def event_row(line: LogLine) -> Table:
+    """`   12.3 s  WARN  text`, a long text in its own column: the level is a word too."""
+    row = Table.grid(padding=(0, 2))
+    row.add_column(no_wrap=True)
+    row.add_column(ratio=1)
+    style = LOG_STYLES[line.level]
+    row.add_row(Text(f"{line.time:8.1f} s  {LOG_WORDS[line.level]}", style), Text(line.text, style))
+    return row

@@ -12,7 +12,7 @@ from rich.text import Text
 from rig.console import wording
 from rig.console.fit import decimals, running_fit
 from rig.console.view import View
-from rig.messages import Check, Point, Reading, Snapshot
+from rig.messages import Check, Point, Reading, Snapshot, State
 
 STATE_STYLES: Final = {
     "ok": "#7fd88f",
@@ -28,6 +28,7 @@ CHECK_WORDS: Final = {
     "failed": ("✗ FAILED", "bold #ff6070"),
     "waiting": ("… waiting", "#9a9a9a"),
 }
+TROUBLE_FIRST: Final = ("failed", "waiting", "warning", "passed")
 NAME, VALUE, UNIT, LIMIT, AGE, STATE = 17, 9, 5, 11, 7, 7
 """Cells per column of the readings."""
 
@@ -53,6 +54,7 @@ def readings_text(view: View) -> Text:
             wording.age(age),
         )
         _line(text, columns, wording.verdict(reading, live), live)
+    text.right_crop(1)  # the last line's end would be a line of its own, and scroll
     return text
 
 
@@ -77,22 +79,23 @@ def _tail(reading: Reading) -> str:
 
 
 def checks_table(checks: tuple[Check, ...]) -> Table:
-    """The preflight list."""
+    """The preflight list, trouble first: it may be longer than the screen."""
     table = Table.grid(padding=(0, 2))
     table.add_column(width=10)
     table.add_column(no_wrap=True)
     table.add_column(ratio=1)
-    for check in checks:
+    for check in sorted(checks, key=lambda check: TROUBLE_FIRST.index(check.verdict)):
         word, style = CHECK_WORDS[check.verdict]
         table.add_row(Text(word, style), Text(check.name, "bold"), check.text)
     return table
 
 
 def results_table(points: Mapping[str, tuple[Point, ...]]) -> Table:
-    """One row per thruster seen by this console: the fit over its holds."""
+    """One row per thruster seen by this console: the fit over its holds. `scatter` is the standard deviation of C that
+    follows from the points alone; `rig fit` adds the calibration's."""
     table = Table(box=None, padding=(0, 1), header_style="bold")
-    table.add_column("thruster")
-    for heading in ("C [N/V²]", "std [N/V²]", "std [%]", "rest [N]", "holds", "not steady", "left out"):
+    table.add_column("thruster", no_wrap=True)
+    for heading in ("C [N/V²]", "scatter", "[%]", "rest [N]", "holds", "not steady", "left out"):
         table.add_column(heading, justify="right", no_wrap=True)
     for thruster, held in points.items():
         table.add_row(thruster or "?", *_result(held))
@@ -110,8 +113,10 @@ def _result(held: tuple[Point, ...]) -> tuple[str, ...]:
     return (C, std, percent, f"{fit.tare:+.2f}", str(len(held)), unsteady, str(fit.left_out))
 
 
-def verdict_summary(checks: tuple[Check, ...]) -> Text:
+def verdict_summary(checks: tuple[Check, ...], state: State) -> Text:
     """The preflight in one sentence, and the key that follows from it."""
+    if state == "connecting":
+        return Text("The devices are opened, then watched for a moment: the checks of what they send follow.", "bold")
     count = Counter(check.verdict for check in checks)
     if count["failed"]:
         return Text(

@@ -110,6 +110,8 @@ def link(view: View) -> str:
         return f"LIVE, data {view.silence:.1f} s old"
     if view.condition == "waiting":
         return "waiting for the controller"
+    if view.condition == "disconnected" and view.snapshot is not None and view.snapshot.state == "done":
+        return "the controller has ended, as it should after a campaign"
     name = "NO FRESH DATA" if view.condition == "stale" else "DISCONNECTED"
     return f"{name}, last came {age(view.silence)} ago"
 
@@ -123,6 +125,8 @@ def campaign_line(progress: Progress, thruster: str, width: int) -> str:
 
 def step_line(progress: Progress, snapshot: Snapshot, width: int) -> str:
     """Progress of the step in one line of `width` cells."""
+    if not progress.steps:
+        return STATE_WORDS[snapshot.state]
     head = f"step {progress.step + 1:>3} of {progress.steps:<3} {STATE_WORDS[snapshot.state]:<8.8} "
     expected = progress.step_expected
     tail = f" {progress.step_elapsed:5.1f} s of about {expected:.1f} s"

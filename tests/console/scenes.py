@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from textual.pilot import Pilot
 
 from rig.console.app import ConsoleApp
-from rig.messages import Snapshot
+from rig.messages import Progress, Snapshot
 
 from .feeds import CHECKS, ManualClock, PlayedFeed, campaign, running, snapshot
 
@@ -38,7 +38,9 @@ SCENES = {
     "time": Scene((running(),), keys=("3",)),
     "events": Scene((running(),), keys=("4",)),
     "limit": Scene((running(readings=STALE),)),
-    "mount": Scene((running("mount", thruster="T3", command=0.0, points=(), trace=()),)),
+    "mount": Scene((
+        running("mount", thruster="T3", command=0.0, points=(), trace=(), mounted_by_hand=True,
+                progress=Progress(0, 0, 0.0, 0.0, 1, 2, 60.0, 241.0, 0.2)),)),
     "note": Scene((running(),), keys=("n", *"weed on duct")),
     "leave": Scene((running(),), keys=("d",)),
     "leave_attended": Scene((running(attended=True),), keys=("d",)),

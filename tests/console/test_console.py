@@ -31,10 +31,29 @@ async def test_a_failed_check_is_said_in_words():
 
 
 async def test_f5_says_that_the_thruster_is_mounted():
-    async with sitting(running("mount", thruster="T3")) as desk:
+    async with sitting(running("mount", thruster="T3", mounted_by_hand=True)) as desk:
         assert "Put T3 on the bench" in desk.alarm()
+        assert "F5 mounted" in " ".join(desk.text("#keys").split())
         await desk.press("f5")
         assert desk.kinds() == ["mounted"]
+
+
+async def test_a_thruster_that_a_command_mounts_is_not_asked_of_the_operator():
+    async with sitting(running("mount", thruster="T3")) as desk:
+        assert desk.alarm() == ""
+        assert "F5" not in desk.text("#keys")
+
+
+async def test_while_devices_are_opened_nobody_is_told_to_start():
+    async with sitting(snapshot("connecting")) as desk:
+        assert "F5" not in desk.text(ChecksPanel)
+
+
+async def test_a_controller_that_ends_after_its_campaign_is_no_alarm():
+    async with sitting(campaign()[-1]) as desk:
+        await desk.lose()
+        assert "COMPLETED. Propeller measured at rest." in desk.alarm()
+        assert "as it should" in desk.text(".head-state")
 
 
 async def test_f5_during_a_hold_asks_for_nothing():

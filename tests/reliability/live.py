@@ -89,6 +89,17 @@ class LiveBench:
         self.controllers.append(process)
         return run
 
+    def until_held(self, volts: float, seconds: float, timeout: float = 40.0) -> None:
+        """Wait until the drive has had the same command of `volts` for so many `seconds`."""
+        deadline = time.monotonic() + timeout
+        while time.monotonic() < deadline:
+            commands = [line for line in self.truth() if line["event"] == "command"]
+            held = bool(commands) and abs((commands[-1]["volts"] or 0.0) - volts) < 0.01
+            if held and time.monotonic_ns() - commands[-1]["t_ns"] > seconds * 1e9:
+                return
+            select.select([], [], [], 0.02)
+        raise AssertionError(f"{volts} V were not held within {timeout} s")
+
     def tell(self, *words: str) -> None:
         """Script a fault over the bench's control port."""
         control = str(self.folder / "ports" / "control")
