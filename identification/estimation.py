@@ -114,16 +114,14 @@ def _part(fit: LinearFit, contrast: Floats) -> float:
 
 
 def _judge(rows: Rows, fit: LinearFit) -> Underfit:
-    """Chi-square test; a residual over an uncertain standard error counts as the normal deviate of equal rarity."""
+    """Chi-square (F) test; a residual over an uncertain standard error counts as the normal deviate of equal rarity."""
     assert rows.std_error is not None
     assert rows.dof is not None
-    assert fit.chi2 is not None
     z = np.abs(fit.residual / rows.std_error)
     finite = np.isfinite(rows.dof)
     rare = np.where(finite, student.sf(z, np.where(finite, rows.dof, 1.0)), norm.sf(z))
     deviate = np.where(rare > 1e-300, norm.isf(np.maximum(rare, 1e-300)), z)
-    judged = underfit(float(deviate @ deviate), fit.dof)
-    return Underfit(fit.chi2, fit.dof, judged.p_value, judged.underfitted)
+    return underfit(float(deviate @ deviate), fit.dof, scale_dof=rows.most_dof)
 
 
 def excess_std(rows: Rows) -> float:

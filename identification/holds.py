@@ -36,6 +36,18 @@ def from_steps(recording: Recording) -> tuple[Window, ...]:
     )
 
 
+def without_waiting(windows: tuple[Window, ...]) -> tuple[Window, ...]:
+    """Without rests where there are tares: such a rest is the wait for a released rotor, the tare is the measurement.
+
+    >>> windows = (Window(0.0, 0.0, 1.0, "rest"), Window(0.0, 1.0, 3.0, "tare"), Window(5.0, 3.0, 4.0, "hold"))
+    >>> [w.phase for w in without_waiting(windows)]
+    ['tare', 'hold']
+    """
+    if not any(w.phase == "tare" for w in windows):
+        return windows
+    return tuple(w for w in windows if w.phase != "rest")
+
+
 def _starts(value: Floats, tolerance: float, measured: bool) -> NDArray[np.intp]:
     """First index of each run. A command's run ends at a change; a measured one where it leaves its first value."""
     if not measured:

@@ -9,18 +9,17 @@ the mean has a mixture of normals as posterior, summed up by a standard deviatio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 from scipy.fft import dct
-from scipy.special import logsumexp, ndtr
+from scipy.special import ndtr
 from scipy.stats import t as student
 
 from identification.recording import Floats
 
-SHARES = (0.0, 0.03, 0.1, 0.3, 0.6, 0.85, 0.97, 1.0)
+SHARES = (0.0, 0.01, 0.03, 0.1, 0.3, 0.6, 0.85, 0.97, 1.0)
 """Share of the variance that is correlated, grid of the posterior; white noise has half of the prior."""
 TAU_MIN = 0.5
 """Samples; the grid of time constants goes up by sqrt(2)."""
@@ -91,9 +90,9 @@ def _bins(n: int) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     return np.array(edges, dtype=np.intp)
 
 
-def _constants(n: int) -> int:
-    """How many time constants the grid of a window of n samples has."""
-    return 2 + int(2 * np.log2(max(TAU_MAX * n / TAU_MIN, 4.0)))
+def time_constants(n: int, longest: float = TAU_MAX) -> int:
+    """How many time constants the grid of a window of n samples has, the last one near `longest` x n."""
+    return 2 + int(2 * np.log2(max(longest * n / TAU_MIN, 4.0)))
 
 
 @lru_cache(maxsize=512)
@@ -186,7 +185,7 @@ def _half_width(weight: Floats, std: Floats, outside: float) -> float:
 
 
 @dataclass(frozen=True, eq=False)
-class _Likelihood:
+class Likelihood:
     n: int
     grid: _Grid
     log: Floats
@@ -195,7 +194,7 @@ class _Likelihood:
     """(G,) posterior mean of the scale."""
 
 
-def _likelihood(residual: Floats, constants: int, lost: Floats | None) -> _Likelihood:
+def likelihood(residual: Floats, constants: int, lost: Floats | None) -> Likelihood:
     n = residual.size
     if n < MIN_SAMPLES:
         raise ValueError(f"fit_noise needs at least {MIN_SAMPLES} samples, got {n}")
@@ -210,7 +209,7 @@ def _likelihood(residual: Floats, constants: int, lost: Floats | None) -> _Likel
     total = np.maximum((1 / grid.spectra) @ binned, 1e-300)
     log = -0.5 * grid.log_spectra @ counts - 0.5 * used * np.log(total)
     variance = total / max(used - 2, 1.0) * (total > 1e-299)
-    return _Likelihood(n, grid, log, variance)
+    return Likelihood(n, grid, log, variance)
 
 
 def fit_noise(residual: Floats, lost: Floats | None = None) -> NoiseModel:
@@ -223,26 +222,11 @@ def fit_noise(residual: Floats, lost: Floats | None = None) -> NoiseModel:
     >>> bool(abs(model.std - 2.0) < 0.1)
     True
     """
-    found = _likelihood(residual, _constants(residual.size), lost)
-    return _posterior(found, found.log + found.grid.log_prior)
+    found = likelihood(residual, time_constants(residual.size), lost)
+    return posterior(found, found.log + found.grid.log_prior)
 
 
-def fit_noise_jointly(residuals: Sequence[Floats]) -> tuple[NoiseModel, ...]:
-    """Windows of one run, each n >= 5: they share the kind and time constant of the noise, not its size or share.
-
-    One short window hardly knows its own correlation time; a dozen of them together do.
-    """
-    constants = _constants(max((r.size for r in residuals), default=0))
-    found = [_likelihood(residual, constants, None) for residual in residuals]
-    logs = [(f.log + f.grid.log_prior).reshape(len(SHARES), -1) for f in found]
-    by_shape = [logsumexp(log, axis=0) for log in logs]
-    together = np.sum(by_shape, axis=0)
-    return tuple(
-        _posterior(f, (log + together - own).ravel()) for f, log, own in zip(found, logs, by_shape, strict=True)
-    )
-
-
-def _posterior(found: _Likelihood, log_weight: Floats) -> NoiseModel:
+def posterior(found: Likelihood, log_weight: Floats) -> NoiseModel:
     weight = np.exp(log_weight - log_weight.max())
     return NoiseModel(found.n, weight / weight.sum(), found.variance, found.grid)
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.holds import Window, from_steps, from_voltage, overlap_free
+from identification.holds import Window, from_steps, from_voltage, overlap_free, without_waiting
 from identification.recording import Channel, Floats, Recording
 from identification.steady import MeanEstimate, settled_estimates
 
@@ -77,7 +77,7 @@ def find_windows(recording: Recording, voltage: Channel, thrust: Channel) -> tup
     Steps are believed when they are there and name at least two levels. Without them, holds are runs of the command
     (of the measured voltage only if there is no command) that are long enough and make up most of the run.
     """
-    marked = from_steps(recording)
+    marked = without_waiting(from_steps(recording))
     if len({w.voltage for w in marked}) > 1 and overlap_free(marked):
         return marked
     command = recording.first_of("command_voltage")

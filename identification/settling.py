@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import t as student
 
+from identification.noise import MIN_SAMPLES, fit_noise, leverage
 from identification.recording import Floats
 
 BATCH = 5
@@ -13,11 +15,9 @@ BATCH = 5
 MSER_CERTAIN = 0.4
 """A cut that lowers MSER's statistic to this share of the uncut one is believed without a further test."""
 LONGEST_CUT = 0.5
-"""MSER may leave out this share of a hold; a hold that asks for more has not settled."""
-LONGEST_EXPONENTIAL_CUT = 0.75
-"""The same for a fitted exponential, whose end is known better."""
+"""This share of a hold may be left out; one that asks for more is still settling in the rest of it."""
 F_SHIFT = 14.0
-"""F statistic from which a different start is believed, correlation of the rest allowed for; about 1 in 5000 by chance,
+"""F statistic from which a different start is believed, correlation allowed for: 3.7 standard deviations, one in 5000,
 since the place of the cut and the time constant were searched for."""
 BIAS_SHARE = 0.1
 """What is left of the exponential may shift the mean by this share of its (white) standard error."""
@@ -25,7 +25,7 @@ BIAS_SHARE = 0.1
 
 @dataclass(frozen=True, slots=True)
 class Settling:
-    """`cut` samples to leave out; `settled` False when the best cut lies at the limit; `time_constant` in samples."""
+    """`cut` samples to leave out; `settled` False when the rest still settles; `time_constant` in samples."""
 
     cut: int
     settled: bool
@@ -63,11 +63,28 @@ def _correlation(values: Floats) -> float:
     return (1 + r) / (1 - r)
 
 
+def _believed(size: float, residual: Floats, column: Floats) -> bool:
+    """Is a least-squares `size` of a zero-mean `column` more than slow noise makes? `residual`: what it leaves.
+
+    White noise upon slow noise has a small lag-1 correlation and still long lumps: the whole spectrum is asked.
+    """
+    if residual.size < MIN_SAMPLES:
+        return False
+    power = float(column @ column)
+    std, dof = fit_noise(residual, leverage(column[:, None] / np.sqrt(power))).combination_std(column / power)
+    return bool(abs(size) > np.sqrt(F_SHIFT) / 1.96 * float(student.ppf(0.975, dof)) * std)
+
+
 def _shifted(values: Floats, cut: int) -> bool:
     """Is the mean of the first `cut` samples different from that of the rest?"""
     head, rest = values[:cut], values[cut:]
     variance = float(rest.var(ddof=1)) * _correlation(rest) * (1 / cut + 1 / rest.size)
-    return float(head.mean() - rest.mean()) ** 2 > F_SHIFT * variance
+    shift = float(head.mean() - rest.mean())
+    if shift**2 <= F_SHIFT * variance:
+        return False
+    step = np.where(np.arange(values.size) < cut, 1.0, 0.0)
+    residual = np.concatenate([head - head.mean(), rest - rest.mean()])
+    return _believed(shift, residual, step - step.mean())
 
 
 def exponential_cut(values: Floats) -> tuple[int, float | None]:
@@ -91,6 +108,8 @@ def exponential_cut(values: Floats) -> tuple[int, float | None]:
     left = float(rest @ rest)
     if gained[best] == 0.0 or gained[best] * (n - 3) <= F_SHIFT * left * _correlation(rest):
         return 0, None
+    if not _believed(float(amplitude[best]), rest, column[best]):
+        return 0, None
     constant, start = float(constants[best]), abs(float(amplitude[best]))
     noise = max(float(np.sqrt(left / (n - 3))), 1e-6 * start)
     ratio = start * constant / (BIAS_SHARE * noise * np.sqrt(n / 2))
@@ -107,6 +126,8 @@ def settle(values: Floats) -> Settling:
     """
     exponential, constant = exponential_cut(values)
     mser = mser_cut(values)
-    limit = int(values.size * LONGEST_EXPONENTIAL_CUT)
-    at_limit = mser > 0 and mser >= int(values.size * LONGEST_CUT) - BATCH and exponential < mser
-    return Settling(min(max(exponential, mser), limit), exponential <= limit and not at_limit, constant)
+    half = int(values.size * LONGEST_CUT)
+    if exponential > half:
+        return Settling(half, False, constant)
+    at_limit = mser > 0 and mser >= half - BATCH and exponential < mser
+    return Settling(max(exponential, mser), not at_limit, constant)

@@ -8,14 +8,20 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import t as student
 
-from identification.noise import MIN_SAMPLES, NoiseModel, fit_noise, fit_noise_jointly, leverage
+from identification.asymptote import Asymptote, asymptote
+from identification.noise import MIN_SAMPLES, NoiseModel, fit_noise, leverage
 from identification.recording import Floats
 from identification.settling import settle
+from identification.shared_noise import fit_noise_jointly
 
 MOST_SAMPLES = 512
 """The monitor averages neighbours above this: a tick stays cheap, the mean and slow noise stay as they are."""
 DRIFT_ALPHA = 0.01
 """Chance of calling a drift-free window drifting."""
+LEAST_SETTLING = 8
+"""Fewer samples cannot tell an approach from its end."""
+STILL_MISSING = 2.0
+"""A hold has settled when it is within this many standard errors of where it is going."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,27 +93,75 @@ def _slope(time: Floats, value: Floats) -> tuple[float, float, float]:
     return slope, std, dof
 
 
+@dataclass(frozen=True, eq=False)
+class _Kept:
+    """What remains of a window: its samples, and the approach to its end value where there is one."""
+
+    time: Floats
+    value: Floats
+    settled: bool
+    approach: Asymptote | None
+
+    @property
+    def residual(self) -> Floats:
+        return self.value if self.approach is None else self.value - self.approach.approach
+
+    @property
+    def lost(self) -> Floats | None:
+        return None if self.approach is None else leverage(self.approach.basis)
+
+
+def _kept(time: Floats, value: Floats) -> _Kept:
+    found = settle(value)
+    late = value[found.cut :]
+    if found.settled or late.size < LEAST_SETTLING:
+        return _Kept(time[found.cut :], late, found.settled, None)
+    return _Kept(time[found.cut :], late, False, asymptote(late))
+
+
+def _settling_estimate(kept: _Kept, model: NoiseModel) -> MeanEstimate:
+    """The value the window is going to; settled when what is missing of it at the window's end is within its error."""
+    assert kept.approach is not None
+    noise, dof = model.combination_std(kept.approach.weights)
+    std = float(np.hypot(noise, kept.approach.spread))
+    missing = abs(float(kept.approach.approach[-1]))
+    effective = float(np.clip((model.std / std) ** 2, 1.0, kept.value.size)) if std > 0 else float(kept.value.size)
+    return MeanEstimate(
+        kept.approach.value,
+        std,
+        dof,
+        kept.value.size,
+        effective,
+        *_slope(kept.time, kept.value),
+        float(kept.time[0]),
+        float(kept.time[-1]),
+        missing <= STILL_MISSING * std,
+    )
+
+
 def settled_estimate(time: Floats, value: Floats, noise_std: float | None = None) -> MeanEstimate:
     """`mean_estimate` of what remains after the start of a hold is left out (identification.settling)."""
-    found = settle(value)
-    e = mean_estimate(time[found.cut :], value[found.cut :], noise_std)
-    return replace(e, settled=found.settled)
+    return settled_estimates([(time, value)], noise_std)[0]
 
 
 def settled_estimates(
     windows: Sequence[tuple[Floats, Floats]], noise_std: float | None = None
 ) -> tuple[MeanEstimate, ...]:
-    """`settled_estimate` of each (time, value), their noise found together (identification.noise.fit_noise_jointly)."""
-    found = [settle(value) for _, value in windows]
-    kept = [(time[s.cut :], value[s.cut :]) for s, (time, value) in zip(found, windows, strict=True)]
-    models = iter(fit_noise_jointly([value for _, value in kept if value.size >= MIN_SAMPLES]))
-    return tuple(
-        replace(
-            mean_estimate(time, value, noise_std, next(models) if value.size >= MIN_SAMPLES else None),
-            settled=s.settled,
-        )
-        for s, (time, value) in zip(found, kept, strict=True)
-    )
+    """Estimate of each (time, value) without its settling, their noise found together (identification.shared_noise).
+
+    A window that settles over more than half of its length gives the value it is going to (identification.asymptote).
+    """
+    kept = [_kept(time, value) for time, value in windows]
+    enough = [k for k in kept if k.value.size >= MIN_SAMPLES]
+    models = iter(fit_noise_jointly([k.residual for k in enough], [k.lost for k in enough]))
+    out = []
+    for k in kept:
+        model = next(models) if k.value.size >= MIN_SAMPLES else None
+        if k.approach is not None and model is not None:
+            out.append(_settling_estimate(k, model))
+        else:
+            out.append(replace(mean_estimate(k.time, k.value, noise_std, model), settled=k.settled))
+    return tuple(out)
 
 
 class SteadyMonitor:

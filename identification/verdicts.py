@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.stats import chi2 as chi2_law
+from scipy.stats import f as f_law
 from scipy.stats import t as student
 
 from identification.recording import Floats
@@ -72,13 +73,21 @@ class Underfit:
         return f"{word} (chi2/dof {self.per_dof:.3g} with {self.dof} dof, p = {self.p_value:.2g})"
 
 
-def underfit(chi2: float, dof: int, alpha: float = ALPHA) -> Underfit:
+def underfit(chi2: float, dof: int, alpha: float = ALPHA, scale_dof: float = float("inf")) -> Underfit:
     """Is J / sigma^2 too large for chi^2(dof)?
 
-    >>> underfit(10.0, 10).underfitted, underfit(30.0, 10).underfitted
-    (False, True)
+    `scale_dof`: degrees of freedom behind sigma itself, where all points owe theirs to one estimate of the noise; then
+    J / (sigma^2 dof) follows F(dof, scale_dof).
+
+    >>> underfit(10.0, 10).underfitted, underfit(30.0, 10).underfitted, underfit(30.0, 10, scale_dof=5).underfitted
+    (False, True, False)
     """
-    p_value = float(chi2_law.sf(chi2, dof)) if dof > 0 else 1.0
+    if dof <= 0:
+        p_value = 1.0
+    elif np.isfinite(scale_dof):
+        p_value = float(f_law.sf(chi2 / dof, dof, scale_dof))
+    else:
+        p_value = float(chi2_law.sf(chi2, dof))
     return Underfit(chi2, dof, p_value, p_value < alpha)
 
 
