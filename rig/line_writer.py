@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import threading
 from queue import Full, Queue
@@ -32,10 +33,11 @@ class LineWriter:
 
     def close(self) -> None:
         """Wait until all is written, then let the file go; a disk that is stuck is left alone after a while."""
-        self._put(None)
+        with contextlib.suppress(Full):
+            self._waiting.put(None, timeout=CLOSE_TIMEOUT)
         self._thread.join(CLOSE_TIMEOUT)
 
-    def _put(self, line: bytes | None) -> None:
+    def _put(self, line: bytes) -> None:
         try:
             self._waiting.put_nowait(line)
         except Full:
@@ -47,7 +49,8 @@ class LineWriter:
                 if not self.error:
                     self._store(line)
         finally:
-            self._file.close()
+            with contextlib.suppress(OSError):  # what it still held is lost, and `error` says why
+                self._file.close()
 
     def _store(self, line: bytes) -> None:
         try:

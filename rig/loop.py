@@ -20,6 +20,7 @@ from rig import guard
 from rig.bench import COMMAND_STREAM, Bench
 from rig.clients import Clients
 from rig.guard import Recorder, Trip, Vitals
+from rig.lateness import Lateness
 from rig.ledger import Ledger
 from rig.messages import Request
 from rig.pace import Pace
@@ -95,8 +96,8 @@ class Loop:
     """V, last sent."""
     lateness: float = 0.0
     """s, of the running tick."""
-    worst_lateness: float = 0.0
-    """s, since the recording began."""
+    late: Lateness = field(default_factory=Lateness)
+    """Of all ticks since the recording began."""
     driven_since: float | None = None
     """s, when the command last left 0 V; None: it is 0 V."""
     has_driven: bool = False
@@ -172,7 +173,8 @@ class Loop:
         )
 
     def begin_recording(self, t0_ns: int) -> None:
-        self.recording_since_ns, self._recorded_command, self.worst_lateness = t0_ns, None, 0.0
+        self.recording_since_ns, self._recorded_command = t0_ns, None
+        self.late.clear()
 
     def end_recording(self) -> None:
         self.recording_since_ns = None
@@ -188,7 +190,7 @@ class Loop:
         now_ns = self.clock.now_ns()
         behind = now_ns - self._due_ns if self._due_ns else 0
         self.lateness = max(behind, 0) * 1e-9
-        self.worst_lateness = max(self.worst_lateness, self.lateness)
+        self.late.add(self.lateness)
         self._due_ns = (self._due_ns if 0 <= behind < self.period_ns else now_ns) + self.period_ns
         return now_ns
 

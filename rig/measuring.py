@@ -139,4 +139,4 @@ def _last_words(session: Session) -> None:
             session.say("warning", text)
         if health.dropped:
             session.say("warning", f"{name}: {health.dropped} frames were lost: the loop did not take them in time")
-    session.say("info", f"control loop: worst lateness {session.loop.worst_lateness * 1e3:.1f} ms")
+    session.say("info", f"control loop: {session.loop.late}")

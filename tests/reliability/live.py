@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
 import select
+import signal
 import subprocess
 import sys
 import time
@@ -13,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rig.hdf5 import load
 from rig.link import Peer, connect
 from rig.messages import Request, Snapshot
 from rig.run import start_controller
@@ -183,6 +186,41 @@ def zero_after(truth: list[dict[str, Any]], t_ns: int) -> float:
     driven_again = [line for line in changes if line["t_ns"] > zero["t_ns"] and line.get("value")]
     assert not driven_again, f"the motor was driven again: {driven_again[:3]}"
     return (zero["t_ns"] - t_ns) * 1e-9
+
+
+@dataclass(frozen=True)
+class Killed:
+    """What came of one kill -9."""
+
+    state: str
+    """Of the campaign when it was killed."""
+    release: float
+    """s until the motor was no longer driven."""
+    rested: bool
+    outcome: str
+    complete: bool
+    lost: float
+    """s of thrust samples that were there and are not in the file."""
+
+
+def kill_once(bench: LiveBench, after: float) -> Killed:
+    """Start a run and kill -9 its controller `after` s after its first tare began."""
+    run = bench.start(dwell=1.0)
+    front = attach(run)
+    front.until(lambda s: s.state == "tare")
+    end = time.monotonic() + after
+    seen = front.until(lambda s: time.monotonic() >= end or s.state == "done")
+    os.kill(run.pid, signal.SIGKILL)
+    t_ns = time.monotonic_ns()
+    bench.controllers[-1].wait(15)
+    front.peer.close()
+    rested = at_rest(bench)
+    (path,) = Path(run.folder).glob("*.h5")
+    recording = load(path)
+    thrust = recording.first_of("thrust")
+    recorded = float(thrust.time[-1]) if thrust is not None else 0.0
+    lost = max(seen.time - recorded, 0.0)
+    return Killed(seen.state, zero_after(bench.truth(), t_ns), rested, recording.outcome, recording.complete, lost)
 
 
 def at_rest(bench: LiveBench, timeout: float = 5.0) -> bool:

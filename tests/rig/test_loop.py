@@ -164,7 +164,7 @@ def test_late_tick_trips_before_anything_is_driven(tmp_path):
         turn(1.0)
         assert trips
         assert [volts for _, volts in world.motor.sent[before:]] == [0.0]
-        assert world.session.loop.worst_lateness >= 0.95
+        assert world.session.loop.late.worst >= 0.95
 
 
 def test_schedule_is_kept_after_a_small_delay_and_begun_anew_after_a_long_one(tmp_path):

@@ -1,0 +1,151 @@
+"""More promises of the rig, each measured on a simulated bench in another process."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from rig.hdf5 import load
+from rig.ledger import read
+from rig.messages import Request
+from tests.reliability.live import PROJECT, SLACK, TICK, WATCHDOG, at_rest, attach, kill_once, live_bench, turning
+
+pytestmark = [pytest.mark.reliability, pytest.mark.timeout(150)]
+
+
+def test_watchdog_longer_than_the_limit_is_refused_at_preflight(tmp_path):
+    """Promise 9."""
+
+    def longer(text: str) -> str:
+        return text.replace("watchdog_timeout = 0.5", "watchdog_timeout = 1.5")
+
+    with live_bench(tmp_path, edit_bench=longer) as bench:
+        front = attach(bench.start())
+        seen = front.until(lambda s: any("not started: watchdog" in line.text for line in s.log))
+        assert seen.state == "preflight"
+        front.peer.send(Request("stop", "a test"))
+        front.until(lambda s: s.state == "done")
+        front.peer.close()
+        assert all(not line.get("value") for line in bench.truth() if line["event"] == "command")
+
+
+def test_motor_that_ignores_stop_is_never_called_idle(tmp_path):
+    """Promise 11: neither command 0 nor release is obeyed, and the device's own watchdog is off."""
+    with live_bench(tmp_path, lambda text: text.replace("timeout = 0.5 ", "timeout = 0.0 ")) as bench:
+        front = attach(bench.start())
+        front.until(turning(10.0))
+        bench.tell("fault", "motor", "ignores_commands")
+        front.peer.send(Request("stop", "a test"))
+        last = front.until(lambda s: s.state == "done")
+        assert last.stop_confirmed is False
+        assert any("STOP NOT CONFIRMED" in line.text and line.level == "error" for line in last.log)
+        bench.controllers[0].wait(20)
+        (path,) = Path(bench.runs[0].folder).glob("*.h5")
+        assert any("STOP NOT CONFIRMED" in event.text for event in load(path).events)
+        front.peer.close()
+
+
+@pytest.mark.parametrize(
+    ("device", "fault", "amount", "cause", "within"),
+    [
+        ("load_cell", "frozen", (), "frozen", 2.0 + 0.5),
+        ("load_cell", "overload", (), "load_cell.thrust", 0.3),
+        ("load_cell", "corrupted", ("0.3",), "load_cell", 2.0 + 0.5),
+        ("load_cell", "slow", (), "load_cell", 2.0 + 0.5),
+    ],
+)
+def test_sensor_that_lies(tmp_path, report, device, fault, amount, cause, within):
+    """Promise 8: each is found within its declared time, by the truth log."""
+    with live_bench(tmp_path) as bench:
+        front = attach(bench.start(dwell=4.0))
+        front.until(turning(10.0))
+        bench.tell("fault", device, fault, *amount)
+        begun = next(line for line in reversed(bench.truth()) if line["event"] == "fault")
+        last = front.until(lambda s: s.state == "done")
+        assert last.outcome == "tripped"
+        assert cause in last.cause
+        zero = next(
+            line
+            for line in bench.truth()
+            if line["t_ns"] >= begun["t_ns"] and line["event"] == "command" and line["value"] == 0
+        )
+        latency = (zero["t_ns"] - begun["t_ns"]) * 1e-9
+        report(f"{device} {fault} to command 0", latency, "s")
+        assert latency < within
+        bench.controllers[0].wait(15)
+        front.peer.close()
+
+
+def test_kill_9_at_random_instants(tmp_path, report):
+    """Promise 1; twenty and more of them: benchmarks/kill_minus_9.py."""
+    chance, worst = random.Random(15), 0.0
+    with live_bench(tmp_path) as bench:
+        for _ in range(5):
+            killed = kill_once(bench, chance.uniform(0.0, 6.0))
+            worst = max(worst, killed.release)
+            assert killed.release <= WATCHDOG + TICK + SLACK
+            assert killed.rested
+            assert (killed.outcome, killed.complete) == ("aborted", True)
+    report("kill -9 at 5 random instants: worst time to release", worst, "s")
+
+
+def test_resume_after_kill_9_gives_what_an_uninterrupted_campaign_gives(tmp_path):
+    """Promise 22."""
+    with live_bench(tmp_path) as bench:
+        front = attach(bench.start(thrusters=("T1", "T3"), dwell=1.0))
+        front.until(lambda s: s.thruster == "T3" and s.state == "hold", timeout=60.0)
+        os.kill(bench.runs[0].pid, signal.SIGKILL)
+        front.peer.close()
+        bench.controllers[0].wait(15)
+        assert at_rest(bench)
+        folder = Path(bench.runs[0].folder)
+        words = [sys.executable, "-c", "from rig.cli import entry; entry()", "resume", str(folder), "--headless"]
+        resumed = subprocess.run(words, cwd=PROJECT, capture_output=True, text=True, timeout=80, check=False)
+        assert resumed.returncode == 0, resumed.stderr
+        assert "finished: T1; to do: T3" in resumed.stdout
+        ends = [fact for fact in read(folder) if fact["fact"] == "run_end"]
+        assert [(end["thruster"], end["outcome"]) for end in ends] == [("T1", "completed"), ("T3", "completed")]
+        first, second = (load(Path(end["recording"])) for end in ends)
+        assert [(s.index, s.phase) for s in first.steps] == [(s.index, s.phase) for s in second.steps]
+        assert Path(ends[1]["recording"]).name == "T3-2.h5"
+        assert any("attempt 2 of T3" in event.text for event in second.events)
+        assert load(folder / "T3.h5").outcome == "aborted", "the cut one is kept"
+        table = [line for line in resumed.stdout.splitlines() if line.startswith("│")]
+        assert [line.split()[1] for line in table] == ["T1", "T3"]
+        again = subprocess.run(words, cwd=PROJECT, capture_output=True, text=True, timeout=30, check=False)
+        assert again.returncode == 2
+        assert "nothing to resume" in again.stderr
+
+
+def test_recording_carries_what_came_before_it(tmp_path):
+    """Who the devices are, what the preflight found and how late the loop was are in the file, not only in the log."""
+    with live_bench(tmp_path) as bench:
+        front = attach(bench.start(dwell=0.6))
+        front.until(lambda s: s.state == "done")
+        bench.controllers[0].wait(15)
+        front.peer.close()
+        (path,) = Path(bench.runs[0].folder).glob("*.h5")
+        events = load(path).events
+        before = [event.text for event in events if event.time <= 0]
+        for wanted in ("motor: VESC", "preflight: watchdog", "preflight: load_cell rate", "T1 mounted", "scheduling"):
+            assert any(wanted in text for text in before), wanted
+        assert any("control loop: worst lateness" in event.text for event in events)
+
+
+def test_shutting_down_takes_no_longer_than_it_must(tmp_path, report):
+    with live_bench(tmp_path) as bench:
+        front = attach(bench.start())
+        front.until(lambda s: s.state == "tare")
+        front.peer.send(Request("stop", "a test"))
+        front.until(lambda s: s.state == "done")
+        front.peer.close()
+        done = time.monotonic()
+        assert bench.controllers[0].wait(15) == 0
+        report("done to the end of the controller", time.monotonic() - done, "s")
