@@ -69,14 +69,15 @@ class ConsoleApp(App[None], inherit_bindings=False):
                 yield ChecksPanel()
             with Container(id="live", classes="main"):
                 yield ProgressPanel(id="progress")
-                with Horizontal(id="upper"):
-                    with VerticalScroll(id="readings"):
-                        yield ReadingsPanel(markup=False)
+                with Horizontal():
+                    with Vertical(id="words"):
+                        with VerticalScroll(id="readings"):
+                            yield ReadingsPanel(markup=False)
+                        yield LogPanel(id="log", min_width=20, wrap=True)
                     with Vertical(id="plots"):
                         yield FitPlot()
                         yield ResidualPlot()
                         yield TimePlot()
-                yield LogPanel(id="log", min_width=20, wrap=True)
             with VerticalScroll(id="results"):
                 yield ResultsPanel()
         yield Panel(id="keys", markup=False)

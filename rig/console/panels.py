@@ -59,10 +59,11 @@ class Head(Vertical):
         name = view.snapshot.campaign if view.snapshot is not None else "rig console"
         doing = wording.activity(view.snapshot) if view.snapshot is not None else "no data yet"
         live = view.condition == "live"
-        if view.snapshot is not None and not live:
+        ended = view.snapshot is not None and view.snapshot.state == "done"
+        if view.snapshot is not None and not live and not ended:
             doing = f"last known: {doing}"
         lines.append(doing, "bold #ffffff").append(f"   {name}\n", "#b0b0b0")
-        lines.append(wording.link(view), "#7fd88f" if live else "bold #ff9090")
+        lines.append(wording.link(view), "#7fd88f" if live else "#b0b0b0" if ended else "bold #ff9090")
         lines.append(_attendance(view.snapshot) if live else "", "#b0b0b0")
         if view.snapshot is not None and view.snapshot.files:
             lines.append(

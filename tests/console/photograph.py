@@ -35,8 +35,14 @@ async def photograph(run: Run, folder: Path) -> None:
     app = ConsoleApp(SocketFeed(connect(Path(run.socket), "the controller")), time.monotonic)
 
     async def take(name: str, pilot: Pilot[None], wanted: Callable[[Snapshot], bool]) -> None:
-        await settle(pilot, lambda: app.state.snapshot is not None and wanted(app.state.snapshot))
+        def reached() -> bool:
+            return app.state.snapshot is not None and wanted(app.state.snapshot)
+
+        await settle(pilot, reached)
         await show(pilot, app)
+        while not reached():  # the bench went on while the screen was drawn
+            await settle(pilot, reached)
+            await show(pilot, app)
         picture = app.export_screenshot(title=ConsoleApp.TITLE)
         (folder / f"console-{name}.svg").write_text(picture, encoding="utf-8")
 
