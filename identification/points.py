@@ -18,6 +18,9 @@ MIN_SHARE = 0.5
 MATERIAL_DRIFT = 0.005
 """A drift counts against a point when, over its window, it moves the mean by this share of the run's largest thrust."""
 
+FALLBACK = ("command_voltage", "motor_voltage", "rotation_rate")
+"""What the thrust is explained by, in this order, when nothing is asked for."""
+
 
 @dataclass(frozen=True, slots=True)
 class Point:
@@ -64,18 +67,21 @@ class Points:
 
 
 def voltage_channel(recording: Recording, quantity: str = "command_voltage") -> Channel | None:
-    """The channel asked for; `command_voltage` falls back to `motor_voltage` when the command was not recorded."""
-    found = recording.first_of(quantity)
-    if (found is None or not np.any(np.isfinite(found.value))) and quantity == "command_voltage":
-        return recording.first_of("motor_voltage")
-    return found
+    """The channel asked for. `command_voltage` falls back to `motor_voltage`, then to `rotation_rate` (rev/s)."""
+    wanted = FALLBACK if quantity == FALLBACK[0] else (quantity,)
+    for name in wanted:
+        found = recording.first_of(name)
+        if found is not None and bool(np.any(np.isfinite(found.value))):
+            return found
+    return None
 
 
 def find_windows(recording: Recording, voltage: Channel, thrust: Channel) -> tuple[Window, ...]:
     """Windows of constant voltage worth a point each; empty when the run is a sine, a ramp or a plain level table.
 
     Steps are believed when they are there and name at least two levels. Without them, holds are runs of the command
-    (of the measured voltage only if there is no command) that are long enough and make up most of the run.
+    (of the measured voltage only if there is no command) that are long enough and make up most of the run. A rotation
+    rate alone makes no holds: it is a response, which lingers wherever the rotor is slow.
     """
     marked = without_waiting(from_steps(recording))
     if len({w.voltage for w in marked}) > 1 and overlap_free(marked):
@@ -83,6 +89,8 @@ def find_windows(recording: Recording, voltage: Channel, thrust: Channel) -> tup
     command = recording.first_of("command_voltage")
     usable = command is not None and bool(np.any(np.isfinite(command.value)))
     source = command if command is not None and usable else voltage
+    if source.quantity == "rotation_rate":
+        return ()
     good = thrust.time[np.isfinite(thrust.value)]
     runs = from_voltage(source, good, MIN_HOLD_SAMPLES)
     covered = sum(int(np.diff(np.searchsorted(good, (w.t_start, w.t_end)))[0]) for w in runs)

@@ -2,8 +2,8 @@
 
 Windows share the kind and the time constant of the slow (correlated) noise. They share its size too, in one of two
 ways: the same newtons in every window (the cell and its amplifier), or the same share of the window's own noise (the
-flow). Which of these, which kind and which size is a posterior over a grid; a window may depart from the common size, since a
-hold can have a disturbance of its own. What each window says is Whittle's likelihood of `identification.noise`.
+flow). Which of these, which kind and which size is a posterior over a grid; a window may depart from the common size,
+since a hold can have a disturbance of its own. Each window speaks by Whittle's likelihood of `identification.noise`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The thruster model tau = C V|V| (eq. 4.14), or C+ and C- for the two directions, with one tare per recording."""
+"""The thruster model tau = C V|V| (eq. 4.14) or tau = C_t n|n|, one coefficient or two, one tare per recording."""
 
 from __future__ import annotations
 
@@ -17,8 +17,25 @@ from identification.thrust_data import Run, Unusable, prepare
 from identification.verdicts import Significance, Whiteness, significance, whiteness
 
 Model = Literal["C V|V|", "C+/C-"]
-COEFFICIENTS: dict[str, tuple[str, ...]] = {"C V|V|": ("C",), "C+/C-": ("C_plus", "C_minus")}
-UNIT = "N/V^2"
+"""One coefficient, or one for each direction."""
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """How a model is called, its coefficients and their unit."""
+
+    name: str
+    coefficients: tuple[str, ...]
+    unit: str
+
+
+FORMS: dict[tuple[Model, bool], Form] = {
+    ("C V|V|", False): Form("C V|V|", ("C",), "N/V^2"),
+    ("C+/C-", False): Form("C+/C-", ("C_plus", "C_minus"), "N/V^2"),
+    ("C V|V|", True): Form("C_t n|n|", ("C_t",), "N.s^2"),
+    ("C+/C-", True): Form("C_t+/C_t-", ("C_t_plus", "C_t_minus"), "N.s^2"),
+}
+"""By model and whether it is explained by rotation rate n in rev/s (thesis section 4.2.2: tau = C_t n|n|)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +88,7 @@ class ThrustFit:
         return verdict.per_dof if verdict is not None and verdict.dof > 0 else None
 
 
-def rows_of(runs: Sequence[Run], model: str) -> tuple[Rows, Literal["points", "samples"]]:
+def rows_of(runs: Sequence[Run], form: Form) -> tuple[Rows, Literal["points", "samples"]]:
     """Stack the runs: V|V| per direction, one column of ones per recording; points if every run has holds."""
     points = [run.points for run in runs if run.points is not None]
     of_points = len(points) == len(runs)
@@ -80,11 +97,11 @@ def rows_of(runs: Sequence[Run], model: str) -> tuple[Rows, Literal["points", "s
     ends = np.cumsum([0, *[v.size for v in V]])
     blocks = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
     square = np.concatenate([v * np.abs(v) for v in V])
-    columns = [square] if model == "C V|V|" else [np.maximum(square, 0.0), np.minimum(square, 0.0)]
+    columns = [square] if len(form.coefficients) == 1 else [np.maximum(square, 0.0), np.minimum(square, 0.0)]
     tares = np.zeros((square.size, len(runs)))
     for k, block in enumerate(blocks):
         tares[block, k] = 1.0
-    names = (*COEFFICIENTS[model], *(f"tare[{run.recording_id}]" for run in runs))
+    names = (*form.coefficients, *(f"tare[{run.recording_id}]" for run in runs))
     H, thrust = np.column_stack([*columns, tares]), np.concatenate(y)
     if not of_points:
         return Rows(H, thrust, names, blocks, even=True), "samples"
@@ -111,29 +128,38 @@ def _parameter(found: Estimate, contrast: Floats, unit: str, gain: float) -> Par
 
 def fit_runs(runs: Sequence[Run], model: Model = "C V|V|", method: Method = "wls") -> ThrustFit | Unusable:
     """Fit prepared runs of one thruster jointly; see `fit_thrust`."""
-    rows, rmse_of = rows_of(runs, model)
+    by_rate = [run.voltage_quantity == "rotation_rate" for run in runs]
+    if any(by_rate) and not all(by_rate):
+        return Unusable(
+            f"recordings {', '.join(run.recording_id for run in runs)}: some have a voltage, some only a "
+            "rotation rate; "
+            "choose what all of them have (rotation_rate), or fit them apart"
+        )
+    form = FORMS[model, by_rate[0]]
+    rows, rmse_of = rows_of(runs, form)
     found = estimate(rows, method)
     lost = found.fit.deficiency
-    names = COEFFICIENTS[model]
+    names = form.coefficients
     if lost is not None and all(name in lost.names for name in names):
         levels = np.unique(np.concatenate([run.voltage for run in runs]).round(6))
         ids = ", ".join(run.recording_id for run in runs)
-        seen = f"{levels.size} level(s) from {levels[0]:g} to {levels[-1]:g} V"
-        return Unusable(f"recording {ids}: {lost.statement}; the voltage shows {seen}, at least two are needed")
+        what, suffix = ("rotation rate", "rev/s") if by_rate[0] else ("voltage", "V")
+        seen = f"{levels.size} level(s) from {levels[0]:g} to {levels[-1]:g} {suffix}"
+        return Unusable(f"recording {ids}: {lost.statement}; the {what} shows {seen}, at least two are needed")
     gain = max(run.gain_std for run in runs)
     unit = np.eye(len(rows.names))
-    parameters = {name: _parameter(found, unit[i], UNIT, gain) for i, name in enumerate(names)}
+    parameters = {name: _parameter(found, unit[i], form.unit, gain) for i, name in enumerate(names)}
     tare = {run.recording_id: _parameter(found, unit[len(names) + k], "N", run.gain_std) for k, run in enumerate(runs)}
     known = {name: significance(p.value, p.std_statistical, p.dof) for name, p in parameters.items()}
     residual = found.fit.residual
     return ThrustFit(
         runs[0].thruster,
-        model,
+        form.name,
         tuple(run.recording_id for run in runs),
         runs[0].voltage_quantity,
         parameters,
         tare,
-        _difference(found, unit) if model == "C+/C-" else None,
+        _difference(found, unit) if len(names) == 2 else None,
         found,
         float(np.sqrt(np.mean(residual**2))),
         rmse_of,
@@ -162,7 +188,7 @@ def fit_thrust(
 ) -> ThrustFit | Unusable:
     """Fit tau = C V|V| + tare (eq. 4.14) to all recordings of one thruster.
 
-    `voltage` is the quantity of the regressor; `command_voltage` falls back to `motor_voltage` where none was recorded.
+    `voltage` is the quantity of the regressor; `command_voltage` falls back to `motor_voltage`, then `rotation_rate`.
     Input that cannot be used comes back as `Unusable`, never as an exception.
 
     >>> t = np.arange(0.0, 60.0, 0.02)

@@ -6,8 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.points import Points, reduce_to_points, voltage_channel
+from identification.points import FALLBACK, Points, reduce_to_points, voltage_channel
 from identification.recording import Channel, Floats, Recording
+
+REST_SHARE = 0.05
+"""Slower than this share of the fastest rotation counts as rest."""
+SIGN_SHARE = 0.2
+"""Thrust above this share of the largest has a direction."""
+MIN_SIDE = 0.05
+"""Each direction must hold this share of the samples at speed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,7 +32,7 @@ class Run:
     thruster: str
     voltage_quantity: str
     voltage: Floats
-    """V at each thrust sample, (n,)."""
+    """V (rev/s when the quantity is `rotation_rate`) at each thrust sample, (n,)."""
     thrust: Floats
     """N, (n,), NaN-free."""
     skipped: int
@@ -34,6 +41,8 @@ class Run:
     gain_std: float
     """Relative standard uncertainty of the cell's calibration; 0 when not stated."""
     noise_std: float | None
+    unsigned: bool = False
+    """The rotation rate never turns negative while the thrust changes sign: the tachometer does not tell direction."""
 
 
 def gain_std(thrust: Channel) -> float:
@@ -63,6 +72,23 @@ def voltage_at(channel: Channel, times: Floats) -> Floats:
     return out
 
 
+def lacks_sign(rate: Floats, thrust: Floats) -> bool:
+    """Does thrust (n,) go both ways while the rotation rate (n,) keeps one sign? Zero thrust is that of slow turning.
+
+    >>> n = np.array([0.0, 5.0, 10.0, 0.0, 5.0, 10.0])
+    >>> force = np.array([3.0, 5.0, 11.0, 3.0, 1.0, -5.0])
+    >>> lacks_sign(n, force), lacks_sign(np.copysign(n, force - 3), force), lacks_sign(n, abs(force))
+    (True, False, False)
+    """
+    most = float(np.abs(rate).max())
+    if most == 0 or min(-float(rate.min()), float(rate.max())) > REST_SHARE * most:
+        return False
+    slow = np.abs(rate) < REST_SHARE * most
+    driven = thrust[np.abs(rate) > 0.5 * most] - (float(np.median(thrust[slow])) if slow.any() else 0.0)
+    large = SIGN_SHARE * float(np.abs(driven).max())
+    return bool(np.mean(driven > large) > MIN_SIDE and np.mean(driven < -large) > MIN_SIDE)
+
+
 def prepare(recording: Recording, voltage: str = "command_voltage") -> Run | Unusable:
     """Select channels, drop what is not a number, reduce holds to points."""
     who = f"recording {recording.source or recording.recording_id}"
@@ -73,7 +99,8 @@ def prepare(recording: Recording, voltage: str = "command_voltage") -> Run | Unu
         return Unusable(f"{who} has no channel of quantity thrust; without a measured force nothing can be fitted")
     source = voltage_channel(recording, voltage)
     if source is None:
-        return Unusable(f"{who} has no {voltage} channel; expected the voltage that the thrust is to be explained by")
+        wanted = " nor ".join(FALLBACK) if voltage == FALLBACK[0] else voltage
+        return Unusable(f"{who} has no {wanted} channel with numbers in it; the thrust is to be explained by one")
     at = voltage_at(source, thrust.time)
     good = np.isfinite(thrust.value) & np.isfinite(at)
     if not good.any():
@@ -89,4 +116,5 @@ def prepare(recording: Recording, voltage: str = "command_voltage") -> Run | Unu
         reduce_to_points(recording, source, thrust),
         gain_std(thrust),
         thrust.noise_std if thrust.noise_std is not None and thrust.noise_std > 0 else None,
+        quantity == "rotation_rate" and lacks_sign(at[good], thrust.value[good]),
     )

@@ -74,20 +74,27 @@ def sentence(fit: ThrustFit) -> str:
 
 def _difference(fit: ThrustFit) -> str:
     found = fit.difference
+    one = fit.model.partition("+")[0]
+    both = f"{one}+ and {one}-"
     if found is None:
-        return "C+ and C-: cannot be compared, only one direction was driven far enough"
-    plus, minus = fit.parameters["C_plus"].value, fit.parameters["C_minus"].value
+        return f"{both}: cannot be compared, only one direction was driven far enough"
+    plus, minus = (p.value for p in fit.parameters.values())
     share = abs(plus - minus) / max(abs(plus + minus) / 2, 1e-300)
     rarity = "p < 1e-12" if found.p_value < 1e-12 else f"p = {found.p_value:.2g}"
     if not found.significant:
-        return f"C+ and C- differ by {100 * share:.2g} %, which is not significant ({rarity}): one C is enough"
+        return f"{both} differ by {100 * share:.2g} %, which is not significant ({rarity}): one {one} is enough"
     if share < BOTH_MATTER:
-        return f"C+ and C- differ significantly ({rarity}) but by {100 * share:.2g} % only"
-    return f"C+ and C- differ by {100 * share:.3g} % ({rarity}): the directions are not alike, use --model C+/C-"
+        return f"{both} differ significantly ({rarity}) but by {100 * share:.2g} % only"
+    return f"{both} differ by {100 * share:.3g} % ({rarity}): the directions are not alike, use --model C+/C-"
 
 
 def verdicts(fit: ThrustFit, alternatives: Sequence[ThrustFit] = ()) -> Iterator[str]:
     """One sentence for each thing to know before the numbers are used."""
+    if any(run.unsigned for run in fit.runs):
+        yield (
+            "this fit means nothing: the rotation rate never changes sign while the thrust does (a tachometer that "
+            "does not tell the direction); give the rate its sign when importing, and fit again"
+        )
     judged = fit.estimate.underfit
     if judged is None:
         how = (
@@ -103,7 +110,7 @@ def verdicts(fit: ThrustFit, alternatives: Sequence[ThrustFit] = ()) -> Iterator
                 "of lack of fit or repeatability was added to each"
             )
     for split in (fit, *alternatives):
-        if split.model == "C+/C-":
+        if len(split.parameters) == 2:
             yield _difference(split)
             break
     if fit.whiteness is not None:
@@ -124,7 +131,9 @@ def _remarks(fit: ThrustFit) -> Iterator[str]:
         yield f"{fit.unsteady} of {total} holds were not steady ({why})"
     if fit.skipped:
         yield f"{fit.skipped} thrust samples were left out: not a number, or at no known voltage"
-    if fit.voltage_quantity != "command_voltage":
+    if fit.voltage_quantity == "rotation_rate":
+        yield "explained by rotation_rate (n in rev/s): no voltage was recorded, or it was asked for"
+    elif fit.voltage_quantity != "command_voltage":
         yield f"explained by {fit.voltage_quantity}, not by the command"
     if not any(run.gain_std for run in fit.runs):
         yield "calibration uncertainty of the load cell is not stated (gain_std): std is statistical only"

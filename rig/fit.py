@@ -21,8 +21,10 @@ from rig.errors import RecordingError, RigError
 from rig.hdf5 import load
 
 MODELS: tuple[Model, ...] = ("C V|V|", "C+/C-")
-NAMES: dict[str, Model] = {"C": "C V|V|", "C V|V|": "C V|V|", "C+/C-": "C+/C-"}
-"""What `--model` takes."""
+NAMES: dict[str, Model] = {"C": "C V|V|", "C V|V|": "C V|V|", "C_t n|n|": "C V|V|", "C+/C-": "C+/C-"}
+"""What `--model` takes: one coefficient or one for each direction; V or n follows from `--against`."""
+AGAINST = ("command_voltage", "motor_voltage", "rotation_rate")
+"""What `--against` takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +62,7 @@ def _answer(runs: Sequence[Run], model: Model, method: Method, notes: tuple[str,
     fit = fit_runs(runs, model, method)
     if isinstance(fit, Unusable):
         raise RecordingError(fit.reason)
-    others = (fit_runs(runs, other, method) for other in MODELS if other != model)
+    others = [fit_runs(runs, other, method) for other in MODELS if other != model]
     return Answer(fit, tuple(other for other in others if isinstance(other, ThrustFit)), notes)
 
 
@@ -180,17 +182,20 @@ def answer_text(answer: Answer) -> str:
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write the fit here; - is standard output.")
 @click.option("--model", type=click.Choice(list(NAMES)), default="C V|V|", show_default=True, help="Model to report.")
 @click.option(
-    "--voltage",
-    type=click.Choice(["command_voltage", "motor_voltage"]),
+    "--against",
+    type=click.Choice(AGAINST),
     default="command_voltage",
     show_default=True,
-    help="Voltage the thrust is explained by.",
+    help="What explains the thrust; the next one where it was not recorded.",
 )
+@click.option("--voltage", type=click.Choice(AGAINST), hidden=True, help="The former name of --against.")
 @click.option("--method", type=click.Choice(["wls", "ls"]), default="wls", show_default=True, help="Weighting.")
-def fit_command(files: tuple[Path, ...], json_path: Path | None, model: str, voltage: str, method: Method) -> None:
-    """Fit thrust = C V|V| + tare to one or more recordings, per thruster."""
+def fit_command(
+    files: tuple[Path, ...], json_path: Path | None, model: str, against: str, voltage: str | None, method: Method
+) -> None:
+    """Fit thrust = C V|V| + tare to one or more recordings, per thruster; C_t n|n| where only n was recorded."""
     try:
-        answers = fit_files(files, NAMES[model], voltage, method)
+        answers = fit_files(files, NAMES[model], voltage or against, method)
         text = json.dumps(answer_json(answers), indent=1, allow_nan=False)
         if json_path is not None and str(json_path) != "-":
             json_path.write_text(text + "\n", encoding="utf-8")
