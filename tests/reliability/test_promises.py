@@ -97,8 +97,12 @@ def test_kill_9_at_random_instants(tmp_path, report):
 
 
 def test_resume_after_kill_9_gives_what_an_uninterrupted_campaign_gives(tmp_path):
-    """Promise 22."""
-    with live_bench(tmp_path) as bench:
+    """Promise 22. Two campaigns long on a machine that does other things too: a late sample is not what is tried here."""
+
+    def patient(text: str) -> str:
+        return text.replace("min = -300.0 ", "max_age = 1.0\nmin = -300.0 ")
+
+    with live_bench(tmp_path, edit_bench=patient) as bench:
         front = attach(bench.start(thrusters=("T1", "T3"), dwell=1.0))
         front.until(lambda s: s.thruster == "T3" and s.state == "hold", timeout=60.0)
         os.kill(bench.runs[0].pid, signal.SIGKILL)
@@ -117,8 +121,8 @@ def test_resume_after_kill_9_gives_what_an_uninterrupted_campaign_gives(tmp_path
         assert Path(ends[1]["recording"]).name == "T3-2.h5"
         assert any("attempt 2 of T3" in event.text for event in second.events)
         assert load(folder / "T3.h5").outcome == "aborted", "the cut one is kept"
-        table = [line for line in resumed.stdout.splitlines() if line.startswith("│")]
-        assert [line.split()[1] for line in table] == ["T1", "T3"]
+        fits = (folder / "fits.json").read_text()
+        assert [name for name in ("T1", "T3") if f'"{name}"' in fits] == ["T1", "T3"], "one table over both parts"
         again = subprocess.run(words, cwd=PROJECT, capture_output=True, text=True, timeout=30, check=False)
         assert again.returncode == 2
         assert "nothing to resume" in again.stderr
