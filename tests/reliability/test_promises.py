@@ -97,7 +97,7 @@ def test_kill_9_at_random_instants(tmp_path, report):
 
 
 def test_resume_after_kill_9_gives_what_an_uninterrupted_campaign_gives(tmp_path):
-    """Promise 22. Two campaigns long on a machine that does other things too: a late sample is not what is tried here."""
+    """Promise 22. Long, on a machine that does other things too: a late sample is not what is tried here."""
 
     def patient(text: str) -> str:
         return text.replace("min = -300.0 ", "max_age = 1.0\nmin = -300.0 ")

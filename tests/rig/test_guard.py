@@ -108,3 +108,36 @@ def test_unknown_channel_is_named():
 def test_lateness_follows_the_loop_rate():
     assert allowances(50.0).lateness == 0.25
     assert allowances(10.0).lateness == 0.5
+
+
+FROZEN = Watch("load_cell.thrust", "N", 0.2, max_frozen=0.0)
+
+
+@pytest.mark.parametrize(
+    ("watch", "same", "longest", "driven", "trips"),
+    [
+        (FROZEN, 1.9, 0.02, 5.0, False),  # 2 s at least
+        (FROZEN, 2.1, 0.02, 5.0, True),
+        (FROZEN, 2.1, 0.3, 9.0, False),  # its digit has stood still for 0.3 s before: 6 s
+        (FROZEN, 6.1, 0.3, 9.0, True),
+        (FROZEN, 9.0, None, 20.0, False),  # it has never changed: 10 s
+        (FROZEN, 10.1, None, 20.0, True),
+        (FROZEN, 60.0, 0.02, 0.0, False),  # at rest a sensor may stand still
+        (FROZEN, 60.0, 0.02, 1.0, False),  # and what was at rest does not count
+        (Watch("load_cell.thrust", "N", 0.2, max_frozen=0.5), 0.6, 9.0, 5.0, True),
+        (Watch("load_cell.thrust", "N", 0.2, max_frozen=inf), 99.0, 0.02, 99.0, False),
+        (Watch("load_cell.thrust", "N", 0.2), 99.0, 0.02, 99.0, False),
+    ],
+)
+def test_frozen_value(watch, same, longest, driven, trips):
+    trip = check((watch,), {watch.channel: Latest(5.0, 10.0, same, longest)}, Vitals(10.0, 0.0, driven=driven), ALLOWED)
+    assert (trip is not None) == trips
+    assert trip is None or (trip.source, "without any change" in trip.cause) == ("frozen", True)
+
+
+def test_thrust_is_watched_for_being_frozen_unless_switched_off():
+    (thrust,) = watches([], (CELL,), ["load_cell.thrust"], "load_cell.thrust")
+    assert thrust.max_frozen == 0.0
+    (thrust,) = watches([LimitConfig("load_cell.thrust", max_frozen=inf)], (CELL,), (), "load_cell.thrust")
+    assert thrust.max_frozen == inf
+    assert watches([], (CELL,), ["load_cell.stable"], "load_cell.thrust")[0].max_frozen is None
