@@ -18,6 +18,8 @@ from identification.verdicts import Significance, Whiteness, significance, white
 
 Model = Literal["C V|V|", "C+/C-"]
 """One coefficient, or one for each direction."""
+HARDLY_DRIVEN = 0.05
+"""Share of the other direction's largest voltage or rate up to which a direction counts as not driven."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +90,13 @@ class ThrustFit:
         return verdict.per_dof if verdict is not None and verdict.dof > 0 else None
 
 
+def _directions(square: Floats) -> list[Floats]:
+    """V|V| of each direction; one that was hardly driven (noise about rest, an overshoot) tells nothing: zeros."""
+    sides = [np.maximum(square, 0.0), np.minimum(square, 0.0)]
+    most = max(float(np.abs(side).max()) for side in sides)
+    return [side if np.abs(side).max() > HARDLY_DRIVEN**2 * most else np.zeros_like(side) for side in sides]
+
+
 def rows_of(runs: Sequence[Run], form: Form) -> tuple[Rows, Literal["points", "samples"]]:
     """Stack the runs: V|V| per direction, one column of ones per recording; points if every run has holds."""
     points = [run.points for run in runs if run.points is not None]
@@ -97,7 +106,7 @@ def rows_of(runs: Sequence[Run], form: Form) -> tuple[Rows, Literal["points", "s
     ends = np.cumsum([0, *[v.size for v in V]])
     blocks = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
     square = np.concatenate([v * np.abs(v) for v in V])
-    columns = [square] if len(form.coefficients) == 1 else [np.maximum(square, 0.0), np.minimum(square, 0.0)]
+    columns = [square] if len(form.coefficients) == 1 else _directions(square)
     tares = np.zeros((square.size, len(runs)))
     for k, block in enumerate(blocks):
         tares[block, k] = 1.0

@@ -11,8 +11,10 @@ from rig.ticks import Settings
 
 EPSILON = 1e-9
 """s, slack for float arithmetic."""
-LOOK_PERIOD = 0.1
-"""s between two looks whether it is steady: looking in every tick would find more lucky moments and cost more."""
+LOOK_PERIOD = 0.2
+"""s between two looks whether it is steady: a look costs some milliseconds."""
+LOOKS = 2
+"""Looks in a row that must find it steady: one alone would sooner or later be lucky."""
 
 
 class Holding:
@@ -20,7 +22,8 @@ class Holding:
 
     def __init__(self, start: float, step: Step, settings: Settings) -> None:
         self._start, self._step, self._settings = start, step, settings
-        self._next_look = step.min_duration
+        self._next_look = step.min_duration - (LOOKS - 1) * LOOK_PERIOD
+        self._steady_looks = 0
         self._window = Window(start + step.settle, settings.estimator)
 
     def advance(self, time: float, rows: tuple[tuple[float, float], ...]) -> bool:
@@ -30,7 +33,10 @@ class Holding:
         if self._settings.max_std_error is None or elapsed < self._next_look:
             return elapsed >= self._step.max_duration
         self._next_look = elapsed + LOOK_PERIOD
-        return elapsed >= self._step.max_duration or self._steady()
+        self._steady_looks = self._steady_looks + 1 if self._steady() else 0
+        return elapsed >= self._step.max_duration or (
+            self._steady_looks >= LOOKS and elapsed >= self._step.min_duration
+        )
 
     def point(self, time: float, tare: float) -> Point | None:
         """The point of a hold that ends at `time` s, less `tare` N; None with too few samples for an error."""

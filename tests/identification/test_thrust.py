@@ -143,7 +143,7 @@ def test_what_cannot_be_used_says_why():
     late = Channel("u", "c", "command_voltage", "V", t + 1000, np.full(100, 3.0))
     cases = {
         "no channel of quantity thrust": Recording("r", "T", (V,)),
-        "no command_voltage channel": Recording("r", "T", (F,)),
+        "no command_voltage nor": Recording("r", "T", (F,)),
         "at least two are needed": Recording("r", "T", (F, V)),
         "vehicle trial": Recording("r", "T", (F, V), kind="vehicle"),
         "all of 100 are missing": Recording("r", "T", (F, late)),

@@ -139,3 +139,68 @@ def test_the_same_recording_twice_is_refused(tmp_path):
 def test_answer_that_cannot_be_written_ends_with_2(tmp_path):
     result = run(write(tmp_path / "a.h5"), "--json", tmp_path / "nowhere" / "fit.json")
     assert result.exit_code == 2
+
+
+def by_rate(path, *, signed=True, name="rotation_rate"):
+    """A sine by rotation rate, no voltage: C_t = 0.03 N.s^2."""
+    t = np.arange(2000) / 50.0
+    n = 20 * np.sin(2 * np.pi * t / 10)
+    F = 0.03 * n * np.abs(n) + 1.0 + np.random.default_rng(0).normal(0, 0.2, t.size)
+    with h5py.File(path, "w") as file:
+        file.attrs.update(format="thruster-rig-recording", format_version=1, recording_id=path.stem, thruster="T3")
+        file.attrs.update(created="2026-01-01T00:00:00Z", complete=True, outcome="completed")
+        for stream, channel, value, unit in (("cell", "thrust", F, "N"), ("motor", name, n, "rev/s")):
+            group = file.create_group(f"streams/{stream}")
+            group["time"] = t
+            group[channel] = value if signed or stream == "cell" else np.abs(value)
+            group[channel].attrs.update(quantity=channel, unit=unit)
+    return path
+
+
+def test_without_a_voltage_the_rotation_rate_explains_the_thrust(tmp_path):
+    path = by_rate(tmp_path / "n.h5")
+    found = json.loads(run(path, "--json", "-").output)["fits"][0]
+    assert found["model"] == "C_t n|n|"
+    assert found["parameters"]["C_t"]["value"] == pytest.approx(0.03, rel=0.02)
+    assert found["parameters"]["C_t"]["unit"] == "N.s^2"
+    assert set(found["alternatives"][0]["parameters"]) == {"C_t_plus", "C_t_minus"}
+    assert "explained by rotation_rate" in run(path).output
+    assert run(path, "--against", "rotation_rate").output == run(path, "--voltage", "rotation_rate").output
+
+
+def test_a_tachometer_without_direction_is_said_first(tmp_path):
+    said = run(by_rate(tmp_path / "n.h5", signed=False)).output
+    assert "this fit means nothing" in said
+    assert "means nothing" not in run(by_rate(tmp_path / "m.h5")).output
+
+
+def test_volts_and_rates_are_not_mixed(tmp_path):
+    result = run(by_rate(tmp_path / "n.h5"), write(tmp_path / "a.h5"))
+    assert result.exit_code == 2
+    assert "some have a voltage" in result.output
+
+
+def test_two_thrusters_are_fitted_apart(tmp_path):
+    files = [write(tmp_path / "a.h5"), write(tmp_path / "b.h5", thruster="T1", C=0.3)]
+    found = json.loads(run(*files, "--json", "-").output)["fits"]
+    assert [f["thruster"] for f in found] == ["T3", "T1"]
+    assert found[1]["parameters"]["C"]["value"] == pytest.approx(0.3, abs=0.003)
+
+
+def with_thrust(path, value):
+    write(path)
+    with h5py.File(path, "r+") as file:
+        cell = file["streams/load_cell"]
+        cell["thrust"][:] = value(cell["thrust"][:])
+    return path
+
+
+def test_nothing_but_nan_is_refused_and_few_samples_say_that_nothing_is_known(tmp_path):
+    result = run(with_thrust(tmp_path / "a.h5", lambda F: F * np.nan))
+    assert result.exit_code == 2
+    assert "are missing" in result.output
+    assert len(result.output.strip().splitlines()) == 1
+    few = with_thrust(tmp_path / "b.h5", lambda F: np.where(np.isin(np.arange(F.size), (50, 150, 250)), F, np.nan))
+    result = run(few)
+    assert result.exit_code == 0, result.output
+    assert "3 points" in result.output or "3 samples" in result.output
