@@ -117,14 +117,9 @@ def optimal_levels(
     >>> plan.levels.tolist(), plan.dwells.round(3).tolist()
     ([-20.0, 20.0], [30.0, 30.0])
     """
+    _checked(candidates, total_time, max_mean_heat)
     rows, heat = candidates.rows, candidates.heat
     n, p = rows.shape
-    if candidates.levels.shape != (n,) or len(candidates.names) != p or (heat is not None and heat.shape != (n,)):
-        raise ValueError(f"optimal_levels: levels {candidates.levels.shape}, H {rows.shape}, names or heat do not fit")
-    if not (np.isfinite(total_time) and total_time > 0):
-        raise ValueError(f"optimal_levels: total_time must be finite and above 0 s, got {total_time}")
-    if heat is None and np.isfinite(max_mean_heat):
-        raise ValueError("optimal_levels: max_mean_heat needs the heat of each candidate")
     corners = _corners(n, heat, max_mean_heat)
     if not corners.size:
         return Impossible(f"every level heats more than the limit of {max_mean_heat:g}")
@@ -150,6 +145,20 @@ def optimal_levels(
         _excess(information, M, target),
         None if heat is None else float(kept @ heat),
     )
+
+
+def _checked(candidates: Candidates, total_time: float, max_mean_heat: float) -> None:
+    n, p = candidates.H.shape
+    heat = candidates.heat
+    if candidates.levels.shape != (n,) or len(candidates.names) != p or (heat is not None and heat.shape != (n,)):
+        raise ValueError(
+            f"optimal_levels: levels {candidates.levels.shape}, H {(n, p)}, {len(candidates.names)} names and the heat "
+            "do not fit together"
+        )
+    if not (np.isfinite(total_time) and total_time > 0):
+        raise ValueError(f"optimal_levels: total_time must be finite and above 0 s, got {total_time}")
+    if heat is None and np.isfinite(max_mean_heat):
+        raise ValueError("optimal_levels: max_mean_heat needs the heat of each candidate")
 
 
 def _corners(n: int, heat: Floats | None, limit: float) -> Floats:
