@@ -27,6 +27,9 @@ from rig.stopping import Stop, turning
 RECORDER_WAIT = 20.0
 """s for the recorder to open or close a file."""
 
+PASSING = ("stale", "late", "rate")
+"""Trips that end nothing while nothing is driven: a pause of the machine during a mount. The run's own ticks judge anew."""
+
 
 class Stopped(Exception):
     """The campaign is over before its plan is: an operator, a signal or the guard said so."""
@@ -67,7 +70,7 @@ class Session:
         stop = next((request for request in inputs.requests if request.kind == "stop"), None)
         if stop is not None:
             raise Stopped("aborted", f"stopped by {stop.text or 'the operator'}")
-        if inputs.trip is not None:
+        if inputs.trip is not None and inputs.trip.source not in PASSING:
             raise Stopped("tripped", inputs.trip.cause)
         return inputs.requests
 

@@ -14,6 +14,7 @@ from rig.ledger import read
 from rig.link import connect
 from rig.messages import Request
 from tests.reliability.live import (
+    PATIENCE,
     SLACK,
     TICK,
     WATCHDOG,
@@ -176,7 +177,9 @@ def test_frozen_controller_is_stopped_by_the_device_and_does_not_go_on(tmp_path,
         front.peer.close()
 
 
-@pytest.mark.parametrize(("device", "allowed"), [("load_cell", 0.3), ("motor", WATCHDOG + TICK + SLACK)])
+@pytest.mark.parametrize(
+    ("device", "allowed"), [("load_cell", PATIENCE + TICK + SLACK), ("motor", WATCHDOG + TICK + SLACK)]
+)
 def test_device_falls_silent(tmp_path, report, device, allowed):
     with live_bench(tmp_path) as bench:
         front, _ = under_way(bench)
