@@ -31,8 +31,8 @@ class Bench:
         motor = self.instruments[self.config.motor]
         if not isinstance(motor, MotorController):
             raise ConfigError(
-                f"{self.config.path}: bench.motor names {self.config.motor!r}, which measures but can't turn a propeller; "
-                "name a motor controller"
+                f"{self.config.path}: bench.motor is {self.config.motor!r}, which measures but can't turn a propeller:"
+                " name a motor controller"
             )
         return motor
 

@@ -124,12 +124,12 @@ class Snapshot:
     cause: str = ""
     """Why it stopped, one sentence; empty while running or completed."""
     stop_confirmed: bool | None = None
-    """After a stop: True = measured rotation at rest, False = STOP NOT CONFIRMED, None = not stopped or still waiting."""
+    """After a stop: True = measured rest, False = STOP NOT CONFIRMED, None = not stopped or still waiting."""
     attended: bool = True
     """False: the campaign may go on with no front end connected (`unattended = true`)."""
     clients: int = 0
     mounted_by_hand: bool = False
-    """True: in the state `mount` an operator puts the thruster on the bench and sends `mounted`; False: a command does."""
+    """True: in the state `mount` an operator puts the thruster on the bench, then sends `mounted`. False: a command."""
 
 
 RequestKind = Literal[

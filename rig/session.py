@@ -28,7 +28,7 @@ RECORDER_WAIT = 20.0
 """s for the recorder to open or close a file."""
 
 PASSING = ("stale", "late", "rate")
-"""Trips that end nothing while nothing is driven: a pause of the machine during a mount. The run's own ticks judge anew."""
+"""Trips that end nothing while nothing is driven: the machine paused during a mount. A run's own ticks judge anew."""
 
 
 class Stopped(Exception):

@@ -200,8 +200,9 @@ def _check_calibration(channel: str, calibration: str) -> None:
 
 
 def _attributes(target: h5py.Group | h5py.Dataset, attributes: Mapping[str, Attribute | None]) -> None:
-    """Those that say something. Text is variable-length, which h5py and MATLAB read as text; it is on the disk before the
-    first row and, but for `outcome` at the very end, never touched again, so a kill can't hurt it as it does in tables."""
+    """Those that say something. Text is variable-length, which h5py and MATLAB read as text; it is on the disk before
+    the first row and, but for `outcome` at the very end, never touched again: a kill can't hurt it as it can tables.
+    """
     for name, value in attributes.items():
         if value is not None and value != "":
             target.attrs.create(name, value)

@@ -124,7 +124,7 @@ def unchanged(text: str) -> str:
 
 
 def patient(text: str) -> str:
-    """A bench file whose load cell may be `PATIENCE` late: what is tried here is not the machine that the tests run on."""
+    """A bench file whose load cell may be `PATIENCE` late: the machine that the tests run on is not tried here."""
     return text.replace("min = -300.0 ", f"max_age = {PATIENCE}\nmin = -300.0 ")
 
 
