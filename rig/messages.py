@@ -128,6 +128,8 @@ class Snapshot:
     attended: bool = True
     """False: the campaign may go on with no front end connected (`unattended = true`)."""
     clients: int = 0
+    since_begin: float = 0.0
+    """s since the controller began, the clock of `log`."""
     mounted_by_hand: bool = False
     """True: in the state `mount` an operator puts the thruster on the bench, then sends `mounted`. False: a command."""
 

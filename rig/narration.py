@@ -99,7 +99,7 @@ def event_line(line: LogLine) -> str:
 
 def step_line(done: Snapshot, progress: Progress, points: tuple[Point, ...]) -> str:
     """The step under way in `done`, and the hold it became, if it is one of `points`."""
-    text = f"{done.time:8.2f} s  step {progress.step + 1}/{progress.steps}  {done.thruster} {done.state}"
+    text = f"{done.since_begin:8.2f} s  step {progress.step + 1}/{progress.steps}  {done.thruster} {done.state}"
     text += f" {done.command:+.2f} V"
     for point in points:
         if (point.thruster or done.thruster, point.step) == (done.thruster, progress.step):

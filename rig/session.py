@@ -180,7 +180,9 @@ def begin(
     bench, recorder, ledger, log, clients, clock = parts
     status = Status(campaign, thrusters or campaign.thrusters)
     readings = Readings({stream.name: stream for _, stream in bench.streams()}, campaign.bench.limits)
-    chronicle = Chronicle(status, recorder, log, clock.now_ns())
+    begun_ns = clock.now_ns()
+    status.begun = begun_ns * 1e-9
+    chronicle = Chronicle(status, recorder, log, begun_ns)
 
     def publish(now: float) -> None:
         since = loop.recording_since_ns

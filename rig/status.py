@@ -34,6 +34,8 @@ class Status:
     """s, when the operator started the campaign."""
     output: Output | None = None
     """Of the running sequencer."""
+    begun: float = 0.0
+    """s, when the controller began."""
     sequence: int = 0
     run_expected: float = field(init=False)
     """s of one run by plan; reckoned once, a long plan has thousands of steps."""
@@ -71,6 +73,7 @@ class Status:
             cause=self.cause,
             stop_confirmed=self.stop_confirmed,
             attended=not self.campaign.unattended,
+            since_begin=now - self.begun,
             mounted_by_hand=not self.campaign.bench.mount.command,
         )
 
