@@ -1,0 +1,254 @@
+"""Vehicle recordings made ready: constant-velocity runs with an honest velocity, and trials to simulate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.efficiency import AXES, Force, Installation, force_on
+from identification.noise import MIN_SAMPLES, leverage
+from identification.pooling import moderate
+from identification.recording import Channel, Floats, Recording
+from identification.shared_noise import fit_noise_jointly
+from identification.thrust_data import Unusable
+from identification.verdicts import significance
+
+LEAST_SAMPLES = 12
+"""Position samples that a constant-velocity run needs."""
+CURVED = 0.01
+"""Level at which the position of a run counts as curved: the vehicle was still gathering way."""
+CUT = 0.1
+"""Share of a curved run left out at its start, again and again, until it is straight."""
+MOST_CUT = 0.6
+
+
+@dataclass(frozen=True, eq=False)
+class SteadyRun:
+    """One run at constant command and constant velocity."""
+
+    recording_id: str
+    axis: str
+    velocity: float
+    """m/s (yaw: rad/s), slope of the straight line through the position (section 4.2.3)."""
+    std: float
+    """Honest under autocorrelated position noise, all runs lending each other degrees of freedom."""
+    heading: float
+    """rad, mean; NaN when it was not recorded."""
+    force: Force
+    """One instant."""
+    straight: bool
+    """False: curved even after the most that may be cut."""
+    t_start: float
+    t_end: float
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """One recording on one axis, to be simulated: n measurements, force on a grid of g even steps."""
+
+    recording_id: str
+    axis: str
+    quantity: str
+    """`position` (also depth and heading) or `speed`."""
+    time: Floats
+    """(n,) s of the measurements."""
+    response: Floats
+    """(n,) m, rad, m/s or rad/s."""
+    heading: float
+    start: float
+    """s, start of the grid."""
+    step: float
+    """s of the grid."""
+    force: Force
+    """Mean over each step of the grid, (T, g)."""
+
+
+def thruster_volts(recording: Recording, installation: Installation, time: Floats) -> dict[str, Floats] | Unusable:
+    """Voltage (n,) of every thruster at `time`; a thruster without a command stays at 0. A command is held."""
+    found: dict[str, Channel] = {}
+    for channel in recording.all_of("command_voltage"):
+        if channel.thruster is not None:
+            found[channel.thruster] = channel
+    shared = [c for c in recording.all_of("command_voltage") if c.thruster is None]
+    volts = {}
+    for thruster in installation.thrusters:
+        channel = found.get(thruster.name, next((c for c in shared if c.axis in thruster.arms), None))
+        volts[thruster.name] = np.zeros(time.size) if channel is None else np.nan_to_num(channel.held_at(time))
+    if not any(t.name in found for t in installation.thrusters) and not shared:
+        names = ", ".join(thruster.name for thruster in installation.thrusters)
+        return Unusable(f"{_who(recording)} has no command_voltage of any of the thrusters {names}")
+    return volts
+
+
+def response_of(recording: Recording, axis: str) -> Channel | None:
+    """What was measured on an axis: position (depth for heave, heading for yaw) before speed."""
+    if axis == "yaw":
+        wanted = [recording.all_of("heading"), [c for c in recording.all_of("speed") if c.axis == "yaw"]]
+    else:
+        wanted = [
+            [c for c in recording.all_of(q) if c.axis == axis or (q == "depth" and axis == "heave" and c.axis is None)]
+            for q in ("depth", "position", "speed")
+        ]
+    return next((channel for group in wanted for channel in group), None)
+
+
+def dominant_axis(recording: Recording, installation: Installation) -> str | None:
+    """The axis on which the commands push hardest, as a share of what its thrusters give at the largest voltage.
+
+    None when nothing was commanded. Used where a campaign does not say what each trial was for.
+    """
+    times = np.unique(np.concatenate([c.time for c in recording.all_of("command_voltage")] or [np.zeros(0)]))
+    volts = thruster_volts(recording, installation, times) if times.size else Unusable("")
+    if isinstance(volts, Unusable):
+        return None
+    top = max(float(np.abs(V).max()) for V in volts.values())
+    best, share = None, 0.0
+    for axis in AXES:
+        most = sum(
+            float(np.abs(t.coefficients @ t.basis(np.array([top]))).max()) * abs(t.arms.get(axis, 0.0))
+            for t in installation.thrusters
+        )
+        pushed = float(np.sqrt(np.mean(force_on(installation, axis, volts).nominal() ** 2))) if most else 0.0
+        if most and pushed / most > share + 1e-9:
+            best, share = axis, pushed / most
+    return best
+
+
+def _who(recording: Recording) -> str:
+    return f"recording {recording.source or recording.recording_id}"
+
+
+def _finite(channel: Channel, t_start: float, t_end: float) -> tuple[Floats, Floats]:
+    time, value = channel.window(t_start, t_end)
+    good = np.isfinite(value)
+    return time[good], value[good]
+
+
+def _heading(recording: Recording, t_start: float, t_end: float) -> float:
+    channel = recording.first_of("heading")
+    _, value = _finite(channel, t_start, t_end) if channel is not None else (None, np.zeros(0))
+    return float(value.mean()) if value.size else float("nan")
+
+
+def _holds(recording: Recording) -> list[tuple[float, float]]:
+    """Steps of phase `hold`; without a table, spans without a change of any command."""
+    marked = [(s.t_start, s.t_end) for s in recording.steps if s.phase == "hold" and s.t_end > s.t_start]
+    if marked or recording.steps:
+        return marked
+    edges = [0.0, recording.duration]
+    for channel in recording.all_of("command_voltage"):
+        moved = np.flatnonzero(np.diff(channel.value) != 0) + 1
+        edges += [*channel.time[:1].tolist(), *channel.time[moved].tolist()]
+    ordered = np.unique(edges)
+    return list(zip(ordered[:-1].tolist(), ordered[1:].tolist(), strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class _Line:
+    time: Floats
+    slope: float
+    residual: Floats
+    spread: float
+    """Square root of the sum of squared times from their mean: std of the slope x this = noise of one sample."""
+    straight: bool
+
+
+def _line(time: Floats, position: Floats) -> _Line:
+    """Straight line through the longest late part of the run that is not curved."""
+    cut, straight = 0.0, False
+    while True:
+        keep = time >= time[0] + cut * (time[-1] - time[0])
+        t, x = time[keep], position[keep]
+        u = t - t.mean()
+        basis = np.vander(u / np.abs(u).max(), 3, increasing=True)
+        theta, *_ = np.linalg.lstsq(basis, x, rcond=None)
+        left = x - basis @ theta
+        dof = t.size - 3
+        std = float(np.sqrt(left @ left / dof * np.linalg.inv(basis.T @ basis)[2, 2])) if dof > 0 else np.inf
+        straight = not significance(float(theta[2]), std, dof, CURVED).significant
+        if straight or cut + CUT > MOST_CUT or keep.sum() * (1 - CUT) < LEAST_SAMPLES:
+            break
+        cut += CUT
+    power = float(u @ u)
+    slope = float(u @ x) / power
+    return _Line(t, slope, x - x.mean() - slope * u, float(np.sqrt(power)), straight)
+
+
+def _sample_noise(line: _Line, noise_std: float | None, model_std: tuple[float, float] | None) -> tuple[float, float]:
+    """Noise of one sample that would give the slope its standard error, and its degrees of freedom."""
+    if model_std is None:
+        known = noise_std or float(np.std(line.residual))
+        return known, float(max(line.residual.size - 2, 1))
+    return model_std[0] * line.spread, model_std[1]
+
+
+def steady_runs(recordings: Sequence[Recording], installation: Installation, axis: str) -> tuple[SteadyRun, ...]:
+    """Every constant-velocity run of these recordings on one axis; recordings that do not have the axis give none."""
+    spans, lines, sensors = [], [], []
+    for recording in recordings:
+        channel = response_of(recording, axis)
+        if channel is None or channel.quantity == "speed":
+            continue
+        for t_start, t_end in _holds(recording):
+            time, value = _finite(channel, t_start, t_end)
+            if time.size >= LEAST_SAMPLES and time[-1] > time[0]:
+                spans.append((recording, t_start, t_end))
+                lines.append(_line(time, value))
+                sensors.append(channel.noise_std)
+    columns = [np.column_stack([np.ones(x.time.size), x.time - x.time.mean()]) for x in lines]
+    lost = [leverage(column / np.linalg.norm(column, axis=0)) for column in columns]
+    models = fit_noise_jointly([line.residual for line in lines], lost) if lines else ()
+    weights = [column[:, 1] / float(column[:, 1] @ column[:, 1]) for column in columns]
+    found = [
+        _sample_noise(line, sensor, model.combination_std(w) if line.residual.size >= MIN_SAMPLES else None)
+        for line, sensor, model, w in zip(lines, sensors, models, weights, strict=True)
+    ]
+    shared = moderate(np.array([s for s, _ in found]), np.array([d for _, d in found]), np.zeros(len(found)))
+    runs = []
+    for (recording, t_start, t_end), line, noise in zip(spans, lines, shared.std_error, strict=True):
+        middle = np.array([0.5 * (t_start + t_end)])
+        volts = thruster_volts(recording, installation, middle)
+        if isinstance(volts, Unusable) or not noise > 0:
+            continue
+        force, heading = force_on(installation, axis, volts), _heading(recording, t_start, t_end)
+        runs.append(
+            SteadyRun(
+                recording.recording_id, axis, line.slope, float(noise) / line.spread, heading, force, line.straight,
+                t_start, t_end,
+            )
+        )  # fmt: skip
+    return tuple(runs)
+
+
+def trial(
+    recording: Recording, installation: Installation, axis: str, step: float = 0.1, sub: int = 10
+) -> Trial | Unusable:
+    """One recording on one axis, its force averaged over steps of `step` s (`sub` looks at the command in each)."""
+    channel = response_of(recording, axis)
+    if channel is None:
+        return Unusable(f"{_who(recording)} has no position, depth, heading or speed of axis {axis}")
+    time, value = _finite(channel, -np.inf, np.inf)
+    if time.size < LEAST_SAMPLES:
+        return Unusable(f"{_who(recording)} has {time.size} measurements of axis {axis}; {LEAST_SAMPLES} are needed")
+    steps = int(np.ceil((time[-1] - time[0]) / step - 1e-9))
+    fine = time[0] + (np.arange(steps * sub) + 0.5) * step / sub
+    volts = thruster_volts(recording, installation, fine)
+    if isinstance(volts, Unusable):
+        return volts
+    found = force_on(installation, axis, volts)
+    mean = found.signal.reshape(len(found.coefficients), steps, sub).mean(axis=2)
+    force = Force(found.coefficients, found.etas, mean, found.values)
+    quantity = "speed" if channel.quantity == "speed" else "position"
+    heading = _heading(recording, time[0], np.inf)
+    return Trial(recording.recording_id, axis, quantity, time, value, heading, float(time[0]), step, force)
+
+
+def ballast_of(recording_ids: Sequence[str], experiments: Mapping[str, str]) -> dict[str, str]:
+    """Name of the buoyancy parameter of each recording: recordings of one ballast share one.
+
+    >>> ballast_of(["a", "b", "c"], {"a": "light", "b": "light"})
+    {'a': 'buoyancy[light]', 'b': 'buoyancy[light]', 'c': 'buoyancy[c]'}
+    """
+    return {name: f"buoyancy[{experiments.get(name, name)}]" for name in recording_ids}
