@@ -79,7 +79,7 @@ class Maximum:
     misfit: Floats
     """(n,) whitened: measurements less prediction."""
     gain: Floats
-    """(p, n): how the estimate answers to each whitened measurement."""
+    """(p, n + q): how the estimate answers to each whitened measurement and to each of q pieces of earlier knowledge."""
     prior_misfit: Floats
     """Whitened distance of the estimate from what was known beforehand."""
     deficiency: Deficiency | None
@@ -99,9 +99,14 @@ class Maximum:
 
         `noise` (n, n) is their covariance.
         """
-        own = self.gain @ self.gain.T
-        out: Floats = self.estimate.cov - own + self.gain @ noise @ self.gain.T
+        measured, known = self.gain[:, : self.misfit.size], self.gain[:, self.misfit.size :]
+        out: Floats = measured @ noise @ measured.T + known @ known.T
+        out[np.isnan(self.estimate.cov)] = np.nan
         return out
+
+    def spread(self, gradient: Floats) -> float:
+        """Standard deviation of gradient (p,) @ theta along what the data do see; for ratios of unseen parameters."""
+        return float(np.linalg.norm(gradient @ self.gain))
 
 
 Misfit = Callable[[Floats], Floats]
@@ -151,7 +156,7 @@ def maximise(
     n = found.fun.size - len(at)
     cov, gain, deficiency = _covariance(np.asarray(found.jac), scale, names)
     estimate = Gaussian(names, found.x * scale, cov)
-    return Maximum(estimate, found.fun[:n], -gain[:, :n], found.fun[n:], deficiency, bool(found.status > 0))
+    return Maximum(estimate, found.fun[:n], -gain, found.fun[n:], deficiency, bool(found.status > 0))
 
 
 def _root(known: Gaussian) -> Floats:

@@ -28,7 +28,7 @@ class Motion:
 
 
 def drag_slope(xi: Floats, push: Floats, k: Floats, k2: Floats, m: Floats) -> Floats:
-    """xi' of eq. 4.13."""
+    """The acceleration of eq. 4.13."""
     out: Floats = (push - (k + k2 * np.abs(xi)) * xi) / m
     return out
 

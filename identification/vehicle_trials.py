@@ -67,14 +67,12 @@ class Trial:
 
 def thruster_volts(recording: Recording, installation: Installation, time: Floats) -> dict[str, Floats] | Unusable:
     """Voltage (n,) of every thruster at `time`; a thruster without a command stays at 0. A command is held."""
-    found: dict[str, Channel] = {}
-    for channel in recording.all_of("command_voltage"):
-        if channel.thruster is not None:
-            found[channel.thruster] = channel
+    found = {c.thruster: c for c in recording.all_of("command_voltage") if c.thruster is not None}
     shared = [c for c in recording.all_of("command_voltage") if c.thruster is None]
     volts = {}
     for thruster in installation.thrusters:
-        channel = found.get(thruster.name, next((c for c in shared if c.axis in thruster.arms), None))
+        others = (c for c in shared if c.axis in thruster.arms)
+        channel: Channel | None = found.get(thruster.name) or next(others, None)
         volts[thruster.name] = np.zeros(time.size) if channel is None else np.nan_to_num(channel.held_at(time))
     if not any(t.name in found for t in installation.thrusters) and not shared:
         names = ", ".join(thruster.name for thruster in installation.thrusters)
