@@ -84,11 +84,17 @@ def limit_checks(readings: Iterable[Reading]) -> list[Check]:
         if r.low is None and r.high is None:
             continue
         value = "nothing came" if r.value is None else f"{r.value:.4g} {r.unit}"
-        low = "-inf" if r.low is None else f"{r.low:g}"
-        high = "inf" if r.high is None else f"{r.high:g}"
         verdict: Verdict = "passed" if r.state == "ok" else "failed"
-        checks.append(Check(r.channel, verdict, f"{value} within [{low}, {high}], {r.state}"))
+        checks.append(Check(r.channel, verdict, f"{value}, {_allowed(r)}: {r.state}"))
     return checks
+
+
+def _allowed(r: Reading) -> str:
+    if r.low is None:
+        return f"at most {r.high:g} {r.unit} allowed"
+    if r.high is None:
+        return f"at least {r.low:g} {r.unit} allowed"
+    return f"{r.low:g} to {r.high:g} {r.unit} allowed"
 
 
 def all_checks(config: BenchConfig, readings: Readings, watchdog: Watchdog, now: float) -> list[Check]:

@@ -66,8 +66,8 @@ def test_limits():
     ]
     checks = limit_checks(readings)
     assert [check.verdict for check in checks] == ["passed", "failed", "failed"]
-    assert checks[1].text == "9 1 within [-inf, 5], limit"
-    assert checks[2].text == "nothing came within [1, inf], none"
+    assert checks[1].text == "9 1, at most 5 1 allowed: limit"
+    assert checks[2].text == "nothing came, at least 1 1 allowed: none"
 
 
 def test_readings_are_judged_as_the_guard_does():
