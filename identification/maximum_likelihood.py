@@ -79,7 +79,7 @@ class Maximum:
     misfit: Floats
     """(n,) whitened: measurements less prediction."""
     gain: Floats
-    """(p, n + q): how the estimate answers to each whitened measurement and to each of q pieces of earlier knowledge."""
+    """(p, n + q): how the estimate answers to each whitened measurement and to each of q pieces of prior knowledge."""
     prior_misfit: Floats
     """Whitened distance of the estimate from what was known beforehand."""
     deficiency: Deficiency | None
