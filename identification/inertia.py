@@ -1,0 +1,274 @@
+"""Step two of the vehicle's identification (section 4.2): inertia from sine-force trials, with step one carried in.
+
+`output_error` is the best estimate: the simulated vehicle is fitted to the position itself; drag, efficiencies,
+current and thruster coefficients are parameters too, known beforehand as step one left them. `by_derivative` is the
+thesis's way: Savitzky and Golay's derivatives and a straight line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from scipy.fft import dct
+
+from identification.maximum_likelihood import NOTHING, Gaussian, Maximum, maximise
+from identification.noise import fit_noise
+from identification.recording import Floats
+from identification.thrust_data import Unusable
+from identification.vehicle import entanglement, unit_of
+from identification.vehicle_simulation import Validation, column, current_along, simulate, validate
+from identification.vehicle_trials import Trial
+from identification.velocity import Window, derivative
+from identification.verdicts import Whiteness, significance, whiteness
+
+SMOOTHING = Window(10, 10)
+"""The thesis's n_l = n_r = 10 (section 4.2.3)."""
+ORDER = 4
+"""Its order."""
+ROUNDS = 3
+"""Most times the noise is found anew from the residual of the fit it weighs."""
+SAME_NOISE = 0.03
+"""Relative change of the noise below which it is not worth another round."""
+
+
+@dataclass(frozen=True, eq=False)
+class InertiaFit:
+    """Inertia of one axis, by any method."""
+
+    axis: str
+    method: str
+    estimate: Gaussian
+    """m and everything that was known or fitted with it, jointly. Starts of trials are left out."""
+    noise_std: tuple[float, ...]
+    """Of one measurement of each trial."""
+    validation: tuple[Validation, ...]
+    """Of the trials it was fitted to."""
+    whiteness: tuple[Whiteness | None, ...] = ()
+    maximum: Maximum | None = field(default=None, repr=False)
+
+    @property
+    def statements(self) -> tuple[str, ...]:
+        out = []
+        for name in self.estimate.names:
+            if name.startswith(("C[", "C+", "C-", "thrust[", "current")) or (name != "m" and not self._fitted(name)):
+                continue
+            value, std = self.estimate[name], self.estimate.std_of(name)
+            unit = unit_of(name, self.axis)
+            known = significance(value, std).significant
+            text = f"{value:.4g} ± {std:.2g} {unit}" if np.isfinite(std) else "not determined"
+            weak = "" if known or not np.isfinite(std) else ", not significant (eq. 4.11)"
+            out.append(f"{self.axis}: {name} = {text}{weak} ({self.method})")
+        if self.maximum is not None:
+            out.extend(entanglement(self.axis, self.maximum, self.estimate.names))
+        out.extend(f"{self.axis}: {v.statement}" for v in self.validation)
+        out.extend(f"{self.axis}: {w.statement}" for w in self.whiteness if w is not None and not w.white)
+        return tuple(out)
+
+    def _fitted(self, name: str) -> bool:
+        return self.maximum is not None and name in self.maximum.estimate.names
+
+
+def starts_of(trials: Sequence[Trial]) -> dict[str, float]:
+    """First position and velocity of each trial, by a polynomial through its first samples: `x0[0]`, `v0[0]` ..."""
+    out = {}
+    for i, one in enumerate(trials):
+        if one.quantity == "speed":
+            out[f"v0[{i}]"] = float(one.response[: SMOOTHING.n_r].mean())
+            continue
+        found = derivative(one.time, one.response, SMOOTHING, 2)
+        out[f"x0[{i}]"], out[f"v0[{i}]"] = float(found.position[0]), float(found.velocity[0])
+    return out
+
+
+def responses(
+    trials: Sequence[Trial], names: Sequence[str], theta: Floats, buoyancy: Mapping[str, str]
+) -> list[Floats]:
+    """Simulated measurement (k, n_i) of each trial."""
+    out = []
+    for i, one in enumerate(trials):
+        moved = simulate(one, names, theta, buoyancy.get(one.recording_id, ""), (f"x0[{i}]", f"v0[{i}]"))
+        out.append(moved.position if one.quantity == "position" else moved.velocity)
+    return out
+
+
+def sensor_noise(one: Trial) -> float:
+    """Noise of one measurement as its own neighbours tell it, whatever the vehicle does."""
+    found = derivative(one.time, one.response, SMOOTHING, ORDER).position_noise
+    return max(found, 1e-9 * float(np.ptp(one.response)), 1e-12)
+
+
+def output_error(
+    trials: Sequence[Trial],
+    known: Gaussian = NOTHING,
+    free: Mapping[str, float] | None = None,
+    buoyancy: Mapping[str, str] | None = None,
+) -> InertiaFit | Unusable:
+    """Fit the simulated vehicle to trials of one axis.
+
+    `known`: parameters with their covariance from step one or from elsewhere (a weighed mass). `free`: further
+    parameters and where to start; default: m alone, started by `start_inertia`. Noise may be autocorrelated: the
+    covariance allows for it.
+    """
+    if not trials:
+        return Unusable("no trial was given; expected at least one with a measured motion")
+    axis, floats = trials[0].axis, dict(buoyancy or {})
+    chosen = dict(free) if free is not None else {"m": start_inertia(trials, known, floats)}
+    starts = starts_of(trials)
+    names = (*chosen, *(n for n in known.names if n not in chosen), *starts)
+    start = np.array([*chosen.values(), *(known[n] for n in known.names if n not in chosen), *starts.values()])
+    scale = _scales(names, start, known)
+    measured = [one.response for one in trials]
+    sigma = [sensor_noise(one) for one in trials]
+    for _ in range(ROUNDS):
+
+        def misfit(theta: Floats, sigma: Sequence[float] = tuple(sigma)) -> Floats:
+            found = responses(trials, names, theta, floats)
+            return np.hstack([(y - f) / s for y, f, s in zip(measured, found, sigma, strict=True)])
+
+        best = maximise(names, start, scale, misfit, known)
+        start, used = best.estimate.mean, sigma
+        left = _residuals(best, trials, used)
+        sigma = [max(float(np.sqrt(r @ r / max(r.size - _share(best, trials), 1.0))), 1e-12) for r in left]
+        if max(abs(new / old - 1) for new, old in zip(sigma, used, strict=True)) < SAME_NOISE:
+            break
+    left = _residuals(best, trials, [1.0] * len(trials))
+    cov = best.with_noise(_noise_matrix(left))
+    wanted = [name for name in names if name not in starts]
+    estimate = Gaussian(names, best.estimate.mean, cov).select(wanted)
+    checked = _validation(trials, left, used)
+    return InertiaFit(
+        axis, "output error", estimate, tuple(sigma), checked, tuple(whiteness(r) for r in left), best
+    )  # fmt: skip
+
+
+def _scales(names: Sequence[str], start: Floats, known: Gaussian) -> Floats:
+    known_std = dict(zip(known.names, np.sqrt(np.diag(known.cov)), strict=True))
+    sizes = [max(float(known_std.get(n, 0.0)), 1e-3 * abs(v)) for n, v in zip(names, start, strict=True)]
+    floor = [0.1 if n.startswith(("x0", "v0")) else 1.0 for n in names]
+    return np.array(
+        [max(abs(v), f) if n not in known_std else s for n, v, s, f in zip(names, start, sizes, floor, strict=True)]
+    )
+
+
+def _share(best: Maximum, trials: Sequence[Trial]) -> float:
+    return len(best.estimate.names) / len(trials)
+
+
+def _residuals(best: Maximum, trials: Sequence[Trial], sigma: Sequence[float]) -> list[Floats]:
+    parts = np.split(best.misfit, np.cumsum([one.time.size for one in trials])[:-1])
+    return [part * s for part, s in zip(parts, sigma, strict=True)]
+
+
+def _noise_matrix(residuals: Sequence[Floats]) -> Floats:
+    """Covariance (n, n), block by trial, of autocorrelated noise like these residuals (cosine domain)."""
+    total = sum(r.size for r in residuals)
+    out, at = np.zeros((total, total)), 0
+    for r in residuals:
+        model, n = fit_noise(r), r.size
+        cosines = dct(np.eye(n), axis=0, norm="ortho")
+        power = np.concatenate([[n * model.mean_variance()], model.spectrum(np.arange(1, n) / (2 * n))])
+        out[at : at + n, at : at + n] = cosines.T @ (power[:, None] * cosines)
+        at += n
+    return out
+
+
+def _validation(trials: Sequence[Trial], left: Sequence[Floats], sigma: Sequence[float]) -> tuple[Validation, ...]:
+    out = []
+    for one, r, s in zip(trials, left, sigma, strict=True):
+        power = float(np.linalg.norm(one.response - one.response.mean()))
+        fit = 100 * (1 - float(np.linalg.norm(r * s)) / power) if power > 0 else float("nan")
+        out.append(Validation(one.recording_id, one.quantity, float(np.sqrt(np.mean((r * s) ** 2))), fit))
+    return tuple(out)
+
+
+def start_inertia(trials: Sequence[Trial], known: Gaussian, buoyancy: Mapping[str, str]) -> float:
+    """Inertia to start a search from: the thesis's way on every trial, the mean of what comes out positive."""
+    found = [_inverse_inertia(one, known.names, known.mean, buoyancy)[0] for one in trials]
+    good = [1 / q for q in found if np.isfinite(q) and q > 0]
+    return float(np.mean(good)) if good else 1.0
+
+
+def _inverse_inertia(
+    one: Trial, names: Sequence[str], theta: Floats, buoyancy: Mapping[str, str]
+) -> tuple[float, float]:
+    """1/m and its standard deviation from one trial: slope of the acceleration on the net force.
+
+    Both go through the same filters (the force as its double integral), so that what the filters flatten in one they
+    flatten in the other. The noise of the measurement is taken as white, and followed through them.
+    """
+    sets = theta[None]
+    if one.quantity == "position":
+        v = derivative(one.time, one.response, SMOOTHING, ORDER).velocity
+    else:
+        v = derivative(one.time, one.response, SMOOTHING, ORDER).position
+    xi = v - current_along(names, sets, one.axis, one.heading)[0]
+    middle = one.start + (np.arange(one.force.signal.shape[1]) + 0.5) * one.step
+    push = np.interp(one.time, middle, (one.force.weights(names, sets) @ one.force.signal)[0])
+    push = push + column(names, sets, buoyancy.get(one.recording_id, ""), 0.0)[0]
+    k, k2 = column(names, sets, "k", 0.0)[0], column(names, sets, "k2", 0.0)[0]
+    net = push - k * xi - k2 * np.abs(xi) * xi
+    moved = running_integral(net, one.time)
+    if one.quantity == "position":
+        moved = running_integral(moved, one.time)
+    y, h = _acceleration(one, one.response), _acceleration(one, moved)
+    inside = slice(2 * SMOOTHING.n_l, -2 * SMOOTHING.n_r)
+    y, h = y[inside], h[inside]
+    power = float(h @ h)
+    if y.size < 2 * ORDER or power == 0:
+        return float("nan"), float("nan")
+    q = float(h @ y) / power
+    impulse = np.zeros(one.time.size)
+    impulse[one.time.size // 2] = 1.0
+    passed = np.convolve(h / power, _acceleration(one, impulse))
+    return q, sensor_noise(one) * float(np.linalg.norm(passed))
+
+
+def running_integral(y: Floats, time: Floats) -> Floats:
+    """Trapezium rule from the first time on, (n,).
+
+    >>> running_integral(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 2.0])).tolist()
+    [0.0, 0.5, 2.0]
+    """
+    return np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(time))])
+
+
+def _acceleration(one: Trial, signal: Floats) -> Floats:
+    """Savitzky and Golay's derivative, twice for a position."""
+    first = derivative(one.time, signal, SMOOTHING, ORDER).velocity
+    return first if one.quantity == "speed" else derivative(one.time, first, SMOOTHING, ORDER).velocity
+
+
+def by_derivative(
+    trials: Sequence[Trial], known: Gaussian, buoyancy: Mapping[str, str] | None = None
+) -> InertiaFit | Unusable:
+    """The thesis's way: derivatives by Savitzky and Golay, then least squares for 1/m; step one's errors carried in.
+
+    Trials are averaged by their own variances; what is known beforehand moves all of them together.
+    """
+    floats = dict(buoyancy or {})
+    if not trials or min(one.time.size for one in trials) < 4 * (SMOOTHING.size + ORDER) // 2:
+        return Unusable("by_derivative: each trial needs at least two windows of Savitzky and Golay's filter")
+    single = [_inverse_inertia(one, known.names, known.mean, floats) for one in trials]
+    weight = np.array([1 / std**2 for _, std in single])
+    weight = weight / weight.sum()
+
+    def inertia(theta: Floats) -> float:
+        return 1 / float(weight @ [_inverse_inertia(one, known.names, theta, floats)[0] for one in trials])
+
+    m = inertia(known.mean)
+    own = m**2 * float(np.sqrt(np.sum((weight * [std for _, std in single]) ** 2)))
+    step = 1e-2 * np.sqrt(np.diag(known.cov)) + 1e-9
+    slope = np.array(
+        [
+            (inertia(known.mean + d) - inertia(known.mean - d)) / (2 * s)
+            for d, s in zip(np.diag(step), step, strict=True)
+        ]
+    ).reshape(-1)
+    cross = known.cov @ slope
+    cov = np.block([[np.array([[own**2 + float(slope @ cross)]]), cross[None]], [cross[:, None], known.cov]])
+    estimate = Gaussian(("m", *known.names), np.append(m, known.mean), cov)
+    noise = tuple(sensor_noise(one) for one in trials)
+    checked = validate(trials, estimate, floats)
+    return InertiaFit(trials[0].axis, "Savitzky-Golay and least squares", estimate, noise, checked)
