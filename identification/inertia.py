@@ -13,20 +13,17 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.fft import dct
 
+from identification.inertia_by_derivative import LEAST, SMOOTHING, inverse_inertia, sensor_noise, smoothed
 from identification.maximum_likelihood import NOTHING, Gaussian, Maximum, maximise
 from identification.noise import fit_noise
 from identification.recording import Floats
 from identification.thrust_data import Unusable
 from identification.vehicle import entanglement, unit_of
-from identification.vehicle_simulation import Validation, column, current_along, simulate, validate
+from identification.vehicle_simulation import Validation, simulate, validate
 from identification.vehicle_trials import Trial
-from identification.velocity import Window, derivative
+from identification.velocity import derivative
 from identification.verdicts import Whiteness, significance, whiteness
 
-SMOOTHING = Window(10, 10)
-"""The thesis's n_l = n_r = 10 (section 4.2.3)."""
-ORDER = 4
-"""Its order."""
 ROUNDS = 3
 """Most times the noise is found anew from the residual of the fit it weighs."""
 SAME_NOISE = 0.03
@@ -91,12 +88,6 @@ def responses(
         moved = simulate(one, names, theta, buoyancy.get(one.recording_id, ""), (f"x0[{i}]", f"v0[{i}]"))
         out.append(moved.position if one.quantity == "position" else moved.velocity)
     return out
-
-
-def sensor_noise(one: Trial) -> float:
-    """Noise of one measurement as its own neighbours tell it, whatever the vehicle does."""
-    found = derivative(one.time, one.response, SMOOTHING, ORDER).position_noise
-    return max(found, 1e-9 * float(np.ptp(one.response)), 1e-12)
 
 
 def output_error(
@@ -185,59 +176,10 @@ def _validation(trials: Sequence[Trial], left: Sequence[Floats], sigma: Sequence
 
 def start_inertia(trials: Sequence[Trial], known: Gaussian, buoyancy: Mapping[str, str]) -> float:
     """Inertia to start a search from: the thesis's way on every trial, the mean of what comes out positive."""
-    found = [_inverse_inertia(one, known.names, known.mean, buoyancy)[0] for one in trials]
-    good = [1 / q for q in found if np.isfinite(q) and q > 0]
+    ready = [found for one in trials if (found := smoothed(one)) is not None]
+    inverse = [inverse_inertia(one, known.names, known.mean, buoyancy)[0] for one in ready]
+    good = [1 / q for q in inverse if np.isfinite(q) and q > 0]
     return float(np.mean(good)) if good else 1.0
-
-
-def _inverse_inertia(
-    one: Trial, names: Sequence[str], theta: Floats, buoyancy: Mapping[str, str]
-) -> tuple[float, float]:
-    """1/m and its standard deviation from one trial: slope of the acceleration on the net force.
-
-    Both go through the same filters (the force as its double integral), so that what the filters flatten in one they
-    flatten in the other. The noise of the measurement is taken as white, and followed through them.
-    """
-    sets = theta[None]
-    if one.quantity == "position":
-        v = derivative(one.time, one.response, SMOOTHING, ORDER).velocity
-    else:
-        v = derivative(one.time, one.response, SMOOTHING, ORDER).position
-    xi = v - current_along(names, sets, one.axis, one.heading)[0]
-    middle = one.start + (np.arange(one.force.signal.shape[1]) + 0.5) * one.step
-    push = np.interp(one.time, middle, (one.force.weights(names, sets) @ one.force.signal)[0])
-    push = push + column(names, sets, buoyancy.get(one.recording_id, ""), 0.0)[0]
-    k, k2 = column(names, sets, "k", 0.0)[0], column(names, sets, "k2", 0.0)[0]
-    net = push - k * xi - k2 * np.abs(xi) * xi
-    moved = running_integral(net, one.time)
-    if one.quantity == "position":
-        moved = running_integral(moved, one.time)
-    y, h = _acceleration(one, one.response), _acceleration(one, moved)
-    inside = slice(2 * SMOOTHING.n_l, -2 * SMOOTHING.n_r)
-    y, h = y[inside], h[inside]
-    power = float(h @ h)
-    if y.size < 2 * ORDER or power == 0:
-        return float("nan"), float("nan")
-    q = float(h @ y) / power
-    impulse = np.zeros(one.time.size)
-    impulse[one.time.size // 2] = 1.0
-    passed = np.convolve(h / power, _acceleration(one, impulse))
-    return q, sensor_noise(one) * float(np.linalg.norm(passed))
-
-
-def running_integral(y: Floats, time: Floats) -> Floats:
-    """Trapezium rule from the first time on, (n,).
-
-    >>> running_integral(np.array([0.0, 1.0, 2.0]), np.array([0.0, 1.0, 2.0])).tolist()
-    [0.0, 0.5, 2.0]
-    """
-    return np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(time))])
-
-
-def _acceleration(one: Trial, signal: Floats) -> Floats:
-    """Savitzky and Golay's derivative, twice for a position."""
-    first = derivative(one.time, signal, SMOOTHING, ORDER).velocity
-    return first if one.quantity == "speed" else derivative(one.time, first, SMOOTHING, ORDER).velocity
 
 
 def by_derivative(
@@ -248,14 +190,17 @@ def by_derivative(
     Trials are averaged by their own variances; what is known beforehand moves all of them together.
     """
     floats = dict(buoyancy or {})
-    if not trials or min(one.time.size for one in trials) < 4 * (SMOOTHING.size + ORDER) // 2:
-        return Unusable("by_derivative: each trial needs at least two windows of Savitzky and Golay's filter")
-    single = [_inverse_inertia(one, known.names, known.mean, floats) for one in trials]
+    ready = [found for one in trials if (found := smoothed(one)) is not None]
+    if not trials or len(ready) < len(trials):
+        return Unusable(f"by_derivative: each trial needs at least {LEAST} measurements, two windows of the filter")
+    single = [inverse_inertia(one, known.names, known.mean, floats) for one in ready]
+    if not all(q > 0 for q, _ in single):
+        return Unusable("by_derivative: acceleration does not follow the force; signs or drag are not as stated")
     weight = np.array([1 / std**2 for _, std in single])
     weight = weight / weight.sum()
 
     def inertia(theta: Floats) -> float:
-        return 1 / float(weight @ [_inverse_inertia(one, known.names, theta, floats)[0] for one in trials])
+        return 1 / float(weight @ [inverse_inertia(one, known.names, theta, floats)[0] for one in ready])
 
     m = inertia(known.mean)
     own = m**2 * float(np.sqrt(np.sum((weight * [std for _, std in single]) ** 2)))

@@ -6,12 +6,12 @@ constant force. Runge and Kutta's fourth-order rule; the force is constant in ea
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from identification.maximum_likelihood import Gaussian
+from identification.maximum_likelihood import Gaussian, maximise
 from identification.recording import Floats
 from identification.vehicle_trials import Trial
 
@@ -143,28 +143,40 @@ def fit_percent(measured: Floats, simulated: Floats) -> float:
 
 
 def validate(
-    trials: Sequence[Trial], estimate: Gaussian, buoyancy: Mapping[str, str] | None = None, first: int = 1
+    trials: Sequence[Trial], estimate: Gaussian, buoyancy: Mapping[str, str] | None = None, *, fit_start: bool = True
 ) -> tuple[Validation, ...]:
-    """Simulate each trial from its own start and compare; the model sees no measurement after the first few.
+    """Simulate each trial and compare; the model sees the commands and how the trial began, nothing else.
 
-    `first`: measurements whose mean starts a speed trial. A position trial starts from the straight line through its
-    first 5 or more of them. `buoyancy`: recording id -> parameter.
+    `fit_start`: position and velocity at the start are those that suit the whole trial best; else a speed trial
+    starts from its first measurement and a position trial from the straight line through its first five, noise and
+    all. `buoyancy`: recording id -> parameter.
     """
     out = []
     names = (*estimate.names, "x0", "v0")
     for one in trials:
-        x0, v0 = _start(one, first)
-        theta = np.append(estimate.mean, [x0, v0])[None]
-        moved = simulate(one, names, theta, (buoyancy or {}).get(one.recording_id, ""))
-        y = (moved.position if one.quantity == "position" else moved.velocity)[0]
+        start = _start(one)
+
+        def response(starts: Floats, one: Trial = one) -> Floats:
+            theta = np.column_stack([np.tile(estimate.mean, (len(starts), 1)), starts])
+            moved = simulate(one, names, theta, (buoyancy or {}).get(one.recording_id, ""))
+            return moved.position if one.quantity == "position" else moved.velocity
+
+        if fit_start:
+            size = np.maximum(np.abs(start), 0.01 * max(float(np.ptp(one.response)), 1e-6))
+
+            def misfit(starts: Floats, one: Trial = one, response: Callable[[Floats], Floats] = response) -> Floats:
+                return one.response - response(starts)
+
+            start = maximise(("x0", "v0"), start, size, misfit).estimate.mean
+        y = response(start[None])[0]
         rmse = float(np.sqrt(np.mean((one.response - y) ** 2)))
         out.append(Validation(one.recording_id, one.quantity, rmse, fit_percent(one.response, y)))
     return tuple(out)
 
 
-def _start(one: Trial, first: int) -> tuple[float, float]:
+def _start(one: Trial) -> Floats:
+    """Position and velocity at the start of a trial as its first measurements have them."""
     if one.quantity == "speed":
-        return 0.0, float(one.response[:first].mean())
-    few = max(first, 5)
-    slope, level = np.polyfit(one.time[:few] - one.time[0], one.response[:few], 1)
-    return float(level), float(slope)
+        return np.array([0.0, one.response[0]])
+    slope, level = np.polyfit(one.time[:5] - one.time[0], one.response[:5], 1)
+    return np.array([level, slope])
