@@ -57,8 +57,14 @@ class InertiaFit:
             text = f"{value:.4g} ± {std:.2g} {unit}" if np.isfinite(std) else "not determined"
             weak = "" if known or not np.isfinite(std) else ", not significant (eq. 4.11)"
             out.append(f"{self.axis}: {name} = {text}{weak} ({self.method})")
+        out.extend(
+            f"{self.axis}: {name} is negative, which no body has: the model lacks something, or the data do not show it"
+            for name in ("m", "k", "k2")
+            if name in self.estimate.names and self.estimate[name] < 0
+        )
         if self.maximum is not None:
-            out.extend(entanglement(self.axis, self.maximum, self.estimate.names))
+            physical = [n for n in self.estimate.names if n in ("m", "k", "k2") or n.startswith("eta")]
+            out.extend(entanglement(self.axis, self.maximum, physical))
         out.extend(f"{self.axis}: {v.statement}" for v in self.validation)
         out.extend(f"{self.axis}: {w.statement}" for w in self.whiteness if w is not None and not w.white)
         return tuple(out)

@@ -17,6 +17,8 @@ from identification.vehicle_trials import Trial
 
 HEAVY = 1e-9
 """kg: inertia below which a trial step of an optimiser is no vehicle."""
+RUNAWAY = 1e6
+"""m or m/s: farther and faster no vehicle goes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,9 +61,14 @@ def integrate(
             x[i + 1] = x[i] + step / 6 * (v + 2 * v2 + 2 * v3 + v4)
             v = v + step / 6 * (a + 2 * b + 2 * c + drag_slope(v4, p, k, k2, m))
             xi[i + 1] = v
-    return np.nan_to_num(xi.T, nan=1e9, posinf=1e9, neginf=-1e9), np.nan_to_num(
-        (x + drift * step * np.arange(steps + 1)[:, None]).T, nan=1e9, posinf=1e9, neginf=-1e9
-    )
+    far = x + drift * step * np.arange(steps + 1)[:, None]
+    return _bounded(xi.T), _bounded(far.T)
+
+
+def _bounded(y: Floats) -> Floats:
+    """What ran away in a trial step of an optimiser stays a number that can be squared."""
+    out: Floats = np.clip(np.nan_to_num(y, nan=RUNAWAY), -RUNAWAY, RUNAWAY)
+    return out
 
 
 def column(names: Sequence[str], theta: Floats, name: str, default: float) -> Floats:

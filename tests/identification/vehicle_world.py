@@ -1,14 +1,17 @@
-"""The simulated vehicle's records as recordings, vehicles drawn at random, and what the tunnel said of their thrusters."""
+"""Recordings of the simulated vehicle, vehicles drawn at random, what the tunnel said of their thrusters."""
 
 from dataclasses import dataclass, field, replace
 from math import cos, radians, sin
+from time import process_time
 
 import numpy as np
 
+from identification.comparators import by_annealing, by_kalman
 from identification.efficiency import Installation, Interaction, Thruster
 from identification.inertia import by_derivative, output_error
 from identification.recording import Channel, Recording, Step
-from identification.vehicle import identify_drag, passed_on
+from identification.vehicle import identify_drag
+from identification.vehicle_campaign import identify_vehicle
 from identification.vehicle_trials import trial
 from sim_devices.vehicle import romeo, run_trials
 from sim_devices.vehicle.body import Body
@@ -17,6 +20,7 @@ from sim_devices.vehicle.romeo import BODIES
 
 GAIN_STD = 0.005
 OWN_STD = 0.004
+DRAWN = 10
 AXES = ("surge", "sway", "heave", "yaw")
 TRIALS = {"surge": surge_steady, "sway": sway_steady, "heave": heave_steady, "yaw": yaw_steady}
 
@@ -77,32 +81,43 @@ class Identified:
     hull: object
     drag: dict = field(default_factory=dict)
     inertia: dict = field(default_factory=dict)
-    derivative: dict = field(default_factory=dict)
-    held_out: dict = field(default_factory=dict)
+
+    def own(self, axis):
+        """What this axis alone has a say in."""
+        keep = ("m", "k", "k2", "buoyancy[heave-3]") + (("eta_hull", "eta_pair") if axis == "surge" else ())
+        estimate = self.inertia[axis].estimate
+        return estimate.select([n for n in estimate.names if n in keep])
 
 
-def step_two_known(fit):
-    """All of step one but the buoyancies of other ballasts."""
-    seen = fit.estimate.determined()
-    return seen
-
-
-def identify(hull, vehicle, rng, axes=AXES, derivative=False) -> Identified:
+def identify(hull, vehicle, rng, axes=AXES) -> Identified:
     """Both steps on each axis; surge first: it tells the others what the efficiencies are."""
-    out, known = Identified(hull), None
-    for axis in axes:
-        steady = recordings_of(hull, TRIALS[axis](), rng)
-        arguments = (known,) if known is not None and axis != "heave" else ()
-        fit = identify_drag(steady, vehicle, axis, *arguments)
-        out.drag[axis] = fit
-        if axis == "surge":
-            known = passed_on(fit)
-        moving = [trial(r, vehicle, axis) for r in recordings_of(hull, sines(axis), rng)]
-        buoyancy = {r.recording_id: "buoyancy[heave-3]" for r in moving} if axis == "heave" else {}
-        out.inertia[axis] = output_error(moving, step_two_known(fit), None, buoyancy)
-        if derivative:
-            out.derivative[axis] = by_derivative(moving, step_two_known(fit), buoyancy)
+    steady = {axis: recordings_of(hull, TRIALS[axis](), rng) for axis in axes}
+    moving = {axis: recordings_of(hull, sines(axis), rng) for axis in axes}
+    everything = [r for group in (*steady.values(), *moving.values()) for r in group]
+    experiments = {"heave-sine-1": "heave-3", "heave-sine-2": "heave-3"}
+    found = identify_vehicle(everything, vehicle, experiments)
+    out = Identified(hull)
+    for axis, result in found.axes.items():
+        out.drag[axis], out.inertia[axis] = result.drag, result.inertia
     return out
+
+
+def compared(rng):
+    """Every way to the inertia of surge of one vehicle: name, fit, truth, CPU seconds."""
+    hull, vehicle = drawn(rng, 1)
+    fit = identify_drag(recordings_of(hull, TRIALS["surge"](), rng), vehicle, "surge")
+    known = fit.estimate
+    moving = [trial(r, vehicle, "surge") for r in recordings_of(hull, sines("surge"), rng)]
+    ways = (
+        lambda: output_error(moving, known),
+        lambda: by_derivative(moving, known),
+        lambda: by_kalman(moving, known),
+        lambda: by_annealing(moving, known, {"m": (100.0, 5000.0)}, rng),
+    )
+    for way in ways:
+        begin = process_time()
+        found = way()
+        yield found.method, found, hull.axes["surge"].inertia, process_time() - begin
 
 
 def truth_of(hull, axis, names):
