@@ -7,21 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.constant_velocity import LEAST_SAMPLES, Line, straight_line, velocities
 from identification.efficiency import AXES, Force, Installation, force_on
-from identification.noise import MIN_SAMPLES, leverage
-from identification.pooling import moderate
 from identification.recording import Channel, Floats, Recording
-from identification.shared_noise import fit_noise_jointly
 from identification.thrust_data import Unusable
-from identification.verdicts import significance
-
-LEAST_SAMPLES = 12
-"""Position samples that a constant-velocity run needs."""
-CURVED = 0.01
-"""Level at which the position of a run counts as curved: the vehicle was still gathering way."""
-CUT = 0.1
-"""Share of a curved run left out at its start, again and again, until it is straight."""
-MOST_CUT = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,79 +133,41 @@ def _holds(recording: Recording) -> list[tuple[float, float]]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Line:
-    time: Floats
-    slope: float
-    residual: Floats
-    spread: float
-    """Square root of the sum of squared times from their mean: std of the slope x this = noise of one sample."""
-    straight: bool
+class _Span:
+    """One hold of one recording."""
+
+    recording: Recording
+    sensor: float | None
+    force: Force
+    line: Line
 
 
-def _line(time: Floats, position: Floats) -> _Line:
-    """Straight line through the longest late part of the run that is not curved."""
-    cut, straight = 0.0, False
-    while True:
-        keep = time >= time[0] + cut * (time[-1] - time[0])
-        t, x = time[keep], position[keep]
-        u = t - t.mean()
-        basis = np.vander(u / np.abs(u).max(), 3, increasing=True)
-        theta, *_ = np.linalg.lstsq(basis, x, rcond=None)
-        left = x - basis @ theta
-        dof = t.size - 3
-        std = float(np.sqrt(left @ left / dof * np.linalg.inv(basis.T @ basis)[2, 2])) if dof > 0 else np.inf
-        straight = not significance(float(theta[2]), std, dof, CURVED).significant
-        if straight or cut + CUT > MOST_CUT or keep.sum() * (1 - CUT) < LEAST_SAMPLES:
-            break
-        cut += CUT
-    power = float(u @ u)
-    slope = float(u @ x) / power
-    return _Line(t, slope, x - x.mean() - slope * u, float(np.sqrt(power)), straight)
-
-
-def _sample_noise(line: _Line, noise_std: float | None, model_std: tuple[float, float] | None) -> tuple[float, float]:
-    """Noise of one sample that would give the slope its standard error, and its degrees of freedom."""
-    if model_std is None:
-        known = noise_std or float(np.std(line.residual))
-        return known, float(max(line.residual.size - 2, 1))
-    return model_std[0] * line.spread, model_std[1]
-
-
-def steady_runs(recordings: Sequence[Recording], installation: Installation, axis: str) -> tuple[SteadyRun, ...]:
-    """Every constant-velocity run of these recordings on one axis; recordings that do not have the axis give none."""
-    spans, lines, sensors = [], [], []
+def _spans(recordings: Sequence[Recording], installation: Installation, axis: str) -> list[_Span]:
+    out = []
     for recording in recordings:
         channel = response_of(recording, axis)
         if channel is None or channel.quantity == "speed":
             continue
         for t_start, t_end in _holds(recording):
             time, value = _finite(channel, t_start, t_end)
-            if time.size >= LEAST_SAMPLES and time[-1] > time[0]:
-                spans.append((recording, t_start, t_end))
-                lines.append(_line(time, value))
-                sensors.append(channel.noise_std)
-    columns = [np.column_stack([np.ones(x.time.size), x.time - x.time.mean()]) for x in lines]
-    lost = [leverage(column / np.linalg.norm(column, axis=0)) for column in columns]
-    models = fit_noise_jointly([line.residual for line in lines], lost) if lines else ()
-    weights = [column[:, 1] / float(column[:, 1] @ column[:, 1]) for column in columns]
-    found = [
-        _sample_noise(line, sensor, model.combination_std(w) if line.residual.size >= MIN_SAMPLES else None)
-        for line, sensor, model, w in zip(lines, sensors, models, weights, strict=True)
-    ]
-    shared = moderate(np.array([s for s, _ in found]), np.array([d for _, d in found]), np.zeros(len(found)))
+            volts = thruster_volts(recording, installation, np.array([0.5 * (t_start + t_end)]))
+            if time.size >= LEAST_SAMPLES and time[-1] > time[0] and not isinstance(volts, Unusable):
+                force = force_on(installation, axis, volts)
+                out.append(_Span(recording, channel.noise_std, force, straight_line(time, value)))
+    return out
+
+
+def steady_runs(recordings: Sequence[Recording], installation: Installation, axis: str) -> tuple[SteadyRun, ...]:
+    """Every constant-velocity run of these recordings on one axis; recordings that do not have the axis give none."""
+    spans = _spans(recordings, installation, axis)
+    forces = np.array([float(span.force.nominal()[0]) for span in spans])
+    found = velocities([span.line for span in spans], forces, [span.sensor for span in spans])
     runs = []
-    for (recording, t_start, t_end), line, noise in zip(spans, lines, shared.std_error, strict=True):
-        middle = np.array([0.5 * (t_start + t_end)])
-        volts = thruster_volts(recording, installation, middle)
-        if isinstance(volts, Unusable) or not noise > 0:
-            continue
-        force, heading = force_on(installation, axis, volts), _heading(recording, t_start, t_end)
-        runs.append(
-            SteadyRun(
-                recording.recording_id, axis, line.slope, float(noise) / line.spread, heading, force, line.straight,
-                t_start, t_end,
-            )
-        )  # fmt: skip
+    for span, (velocity, std) in zip(spans, found, strict=True):
+        start, end = float(span.line.time[0]), float(span.line.time[-1])
+        heading, name = _heading(span.recording, start, end), span.recording.recording_id
+        if std > 0:
+            runs.append(SteadyRun(name, axis, velocity, std, heading, span.force, span.line.straight, start, end))
     return tuple(runs)
 
 
