@@ -1,7 +1,8 @@
 """The uncoupled vehicle m xi' = -k xi - k2 |xi| xi + tau (eq. 4.13) simulated for many parameter sets at once.
 
 xi is the velocity through the water; a uniform current adds to the velocity over ground. Buoyancy (heave) is a
-constant force. Runge and Kutta's fourth-order rule; the force is constant in each step, as trials give it.
+constant force. Runge and Kutta's fourth-order rule; in each step the force is a straight line with the mean that the
+trial gives and the slope of its neighbours (a constant one puts the vehicle off by (change of force / m) h^2/12).
 """
 
 from __future__ import annotations
@@ -46,20 +47,21 @@ def integrate(
     (True, True)
     """
     count, steps = push.shape
+    half = 0.5 * np.gradient(push, axis=1) if steps > 1 else np.zeros(push.shape)
     xi, x = np.empty((steps + 1, count)), np.zeros((steps + 1, count))
     xi[0] = v = np.asarray(xi0, dtype=np.float64)
     m = np.maximum(m, HEAVY)
     with np.errstate(over="ignore", invalid="ignore"):
         for i in range(steps):
-            p = push[:, i]
-            a = drag_slope(v, p, k, k2, m)
+            p, q = push[:, i], half[:, i]
+            a = drag_slope(v, p - q, k, k2, m)
             v2 = v + 0.5 * step * a
             b = drag_slope(v2, p, k, k2, m)
             v3 = v + 0.5 * step * b
             c = drag_slope(v3, p, k, k2, m)
             v4 = v + step * c
             x[i + 1] = x[i] + step / 6 * (v + 2 * v2 + 2 * v3 + v4)
-            v = v + step / 6 * (a + 2 * b + 2 * c + drag_slope(v4, p, k, k2, m))
+            v = v + step / 6 * (a + 2 * b + 2 * c + drag_slope(v4, p + q, k, k2, m))
             xi[i + 1] = v
     far = x + drift * step * np.arange(steps + 1)[:, None]
     return _bounded(xi.T), _bounded(far.T)

@@ -172,7 +172,7 @@ def steady_runs(recordings: Sequence[Recording], installation: Installation, axi
 
 
 def trial(
-    recording: Recording, installation: Installation, axis: str, step: float = 0.25, sub: int = 10
+    recording: Recording, installation: Installation, axis: str, step: float = 0.2, sub: int = 8
 ) -> Trial | Unusable:
     """One recording on one axis, its force averaged over steps of `step` s (`sub` looks at the command in each)."""
     channel = response_of(recording, axis)

@@ -152,7 +152,7 @@ def test_current_seen_in_runs_both_ways_only_spoils_nothing():
     fit = identify_drag(steady(hull, line), vehicle, "surge")
     assert fit.estimate["current_north"] == pytest.approx(0.15, abs=5 * fit.estimate.std_of("current_north"))
     assert fit.estimate.std_of("current_north") < 0.001
-    assert fit.estimate.std_of("current_east") == pytest.approx(1.0, rel=0.01)  # never driven along it
+    assert fit.estimate.std_of("current_east") > 0.3  # never driven along it
     without = identify_drag(steady(hull, line), vehicle, "surge", current=False)
     assert without.underfit.underfitted
     assert without.excess_std > 0.05
