@@ -26,6 +26,8 @@ from identification.verdicts import Whiteness, significance, whiteness
 
 ROUNDS = 3
 """Most times the noise is found anew from the residual of the fit it weighs."""
+SETTLING = 0.1
+"""Share of a trial, see `start_inertia`."""
 SAME_NOISE = 0.03
 """Relative change of the noise below which it is not worth another round."""
 
@@ -181,11 +183,19 @@ def _validation(trials: Sequence[Trial], left: Sequence[Floats], sigma: Sequence
 
 
 def start_inertia(trials: Sequence[Trial], known: Gaussian, buoyancy: Mapping[str, str]) -> float:
-    """Inertia to start a search from: the thesis's way on every trial, the mean of what comes out positive."""
+    """Inertia to start a search from: the thesis's way on every trial, the mean of what comes out positive.
+
+    If none does: what would make the vehicle settle in a tenth of the trial.
+    """
     ready = [found for one in trials if (found := smoothed(one)) is not None]
     inverse = [inverse_inertia(one, known.names, known.mean, buoyancy)[0] for one in ready]
     good = [1 / q for q in inverse if np.isfinite(q) and q > 0]
-    return float(np.mean(good)) if good else 1.0
+    if good:
+        return float(np.mean(good))
+    k, k2 = (known[name] if name in known.names else 0.0 for name in ("k", "k2"))
+    slopes = [abs(k) + 2 * abs(k2) * float(np.abs(found.velocity).max()) for found in ready]
+    settling = [slope * SETTLING * float(np.ptp(found.trial.time)) for slope, found in zip(slopes, ready, strict=True)]
+    return max([*settling, 1.0])
 
 
 def by_derivative(
