@@ -17,6 +17,7 @@ from rig.errors import ConfigError, PlanError
 from rig.loading import load_campaign
 from rig.plan import Duration, FixedDwell, Step
 from rig.sequencer import settings_for
+from rig.shapes import Levels
 from rig.steady import LEAST_SAMPLES
 
 
@@ -134,10 +135,12 @@ def _require_samples(campaign: CampaignConfig, force: Instrument) -> None:
     """The shortest hold and the tare must give enough samples to know the error of their mean."""
     rate = _thrust_channel(force)[2]
     windows = [("tare.duration", campaign.tare.duration)]
-    if any(step.phase == "hold" for step in campaign.plan):
-        dwell = campaign.plan.dwell
-        key = "duration" if isinstance(dwell, FixedDwell) else "min"
-        windows.append((f"plan.dwell.{key} less settle", dwell.bounds[0] - dwell.settle))
+    holds = [step.min_duration - step.settle for step in campaign.plan if step.phase == "hold"]
+    if holds:
+        dwell, shape = campaign.plan.dwell, campaign.plan.shape
+        own = isinstance(shape, Levels) and shape.durations
+        key = "durations" if own else "dwell.duration" if isinstance(dwell, FixedDwell) else "dwell.min"
+        windows.append((f"plan.{key} less settle", min(holds)))
     for key, seconds in windows:
         if seconds * rate < LEAST_SAMPLES:
             raise PlanError(
@@ -163,6 +166,8 @@ def print_report(report: CheckReport, console: Console) -> None:
         table.add_row(str(step.index), step.phase, f"{start:.2f}", to, *times)
     console.print(table)
     console.print(f"thrusters      {', '.join(campaign.thrusters)}", markup=False)
+    if campaign.flow_speed is not None:
+        console.print(f"flow speed     {campaign.flow_speed:g} m/s, to be set by hand before the run")
     console.print(f"one run        {_clock(report.run.expected)} expected, {_clock(report.run.worst)} at worst")
     console.print(f"campaign       {_clock(report.total.expected)} expected, {_clock(report.total.worst)} at worst")
     console.print(f"peak voltage   {report.peak_voltage:g} V")

@@ -105,3 +105,5 @@ class CampaignConfig:
     expected_C: float | None = None
     """N/V^2, for the expected peak thrust of `rig check`; None: peak thrust is not checked and rig check says so."""
     prove_watchdog: bool = True
+    flow_speed: float | None = None
+    """m/s that the campaign is meant for; the operator sets it. None: whatever it is."""

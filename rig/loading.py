@@ -64,6 +64,8 @@ def load_campaign(path: Path) -> CampaignConfig:
         raise ConfigError(f"{path}: campaign.thrusters must name at least one thruster, and none twice")
     if campaign.expected_C is not None:
         _require_above_zero(path, "campaign.expected_C", campaign.expected_C, "N/V^2")
+    if campaign.flow_speed is not None and not math.isfinite(campaign.flow_speed):
+        raise ConfigError(f"{path}: campaign.flow_speed must be a finite number of m/s, but is {campaign.flow_speed:g}")
     return replace(campaign, output=(path.parent / campaign.output).resolve())
 
 

@@ -167,6 +167,12 @@ class Plan:
                 f"{_said(move)} needs {steepest(move):.3g} V/s, but the plan's slew is {self.slew:g} V/s: "
                 "lower it or raise slew",
             )
+            if isinstance(move, Hold) and move.duration is not None:
+                require(
+                    self.dwell.settle < move.duration,
+                    f"dwell.settle ({self.dwell.settle:g} s) must be shorter than each of durations, but one is "
+                    f"{move.duration:g} s",
+                )
 
     def __iter__(self) -> Iterator[Step]:
         return (replace(step, index=index) for index, step in enumerate(self._sequence()))
@@ -192,8 +198,9 @@ class Plan:
 
     def _measure(self, move: Move) -> Step:
         match move:
-            case Hold(voltage):
-                return Step(0, "hold", voltage, *self.dwell.bounds, settle=self.dwell.settle)
+            case Hold(voltage, seconds):
+                bounds = self.dwell.bounds if seconds is None else (seconds, seconds)
+                return Step(0, "hold", voltage, *bounds, settle=self.dwell.settle)
             case Sweep(start, end, rate):
                 seconds = abs(end - start) / rate
                 return Step(0, "ramp", end, seconds, seconds, from_voltage=start, swept=True)

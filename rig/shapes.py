@@ -28,9 +28,10 @@ def require_not_negative(key: str, value: float, unit: str) -> None:
 
 
 class Hold(NamedTuple):
-    """A constant voltage (V) for one dwell."""
+    """A constant voltage (V) for `duration` s, or for one dwell of the plan."""
 
     voltage: float
+    duration: float | None = None
 
 
 class Sweep(NamedTuple):
@@ -132,17 +133,27 @@ class RandomOrder:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """The voltages as written, in that order; 0 V is a level like another."""
+    """The voltages as written, in that order; 0 V is a level like another. `durations` (s, one each) replace the dwell."""
 
     voltages: tuple[float, ...]
+    durations: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         require(len(self.voltages) > 0, "voltages must hold at least one level: a plan without levels measures nothing")
         for v in self.voltages:
             require(isfinite(v), f"voltages must be finite numbers in V, but one is {v:g}")
+        require(
+            len(self.durations) in {0, len(self.voltages)},
+            f"durations must hold one number for each of the {len(self.voltages)} voltages, but holds "
+            f"{len(self.durations)}",
+        )
+        for seconds in self.durations:
+            require_above_zero("durations", seconds, "s")
 
     def units(self, repeats: int) -> Iterator[Unit]:
-        return _holds(self.voltages * repeats)
+        if not self.durations:
+            return _holds(self.voltages * repeats)
+        return iter(tuple((Hold(v, s),) for v, s in zip(self.voltages, self.durations, strict=True)) * repeats)
 
 
 @dataclass(frozen=True, slots=True)
@@ -187,7 +198,7 @@ class Sine:
 def ends(move: Move) -> tuple[float, float]:
     """Command in V at the start and at the end of a move."""
     match move:
-        case Hold(voltage):
+        case Hold(voltage, _):
             return voltage, voltage
         case Sweep(start, end, _):
             return start, end

@@ -45,6 +45,12 @@ def test_steps_in_full():
     ]  # fmt: skip
 
 
+def test_levels_may_have_their_own_durations():
+    plan = Plan(Levels((5.0, -5.0), (3.0, 4.0)), FixedDwell(2.0, settle=1.0), 10.0, repeats=2)
+    found = [(s.voltage, s.min_duration, s.max_duration, s.settle) for s in plan if s.phase == "hold"]
+    assert found == [(5.0, 3.0, 3.0, 1.0), (-5.0, 4.0, 4.0, 1.0)] * 2
+
+
 def test_duration_and_peak():
     plan = Plan(Levels((5.0,)), SteadyDwell(1.0, 3.0, 0.1, 0.1), 10.0, rest=1.0, tare=TareConfig(2.0, attempts=2))
     # tare 2, ramp 0.5, hold 1 to 3, ramp 0.5, rest 1 to 4, tare 2; a tare may need its two attempts
@@ -100,6 +106,9 @@ def test_every_plan_is_continuous_and_ends_at_zero(voltages, zero_every, repeats
         (lambda: TareConfig(attempts=0), "attempts must be at least 1"),
         (lambda: Levels(()), "voltages must hold at least one level"),
         (lambda: Levels((1.0, nan)), "voltages must be finite numbers in V, but one is nan"),
+        (lambda: Levels((1.0, 2.0), (1.0,)), "durations must hold one number for each of the 2 voltages, but holds 1"),
+        (lambda: Levels((1.0,), (nan,)), "durations must be a number above 0 s, but is nan"),
+        (lambda: Plan(Levels((1.0,), (0.5,)), DWELL, 1.0), r"dwell.settle \(0.5 s\) must be shorter than each of dur"),
         (lambda: Staircase(5.0, 0), "levels must be at least 1, but is 0"),
         (lambda: Staircase(-5.0, 2), "max must be a number above 0 V"),
         (lambda: Interleaved(5.0, 2, min=6.0), r"min \(6 V\) must not exceed max \(5 V\)"),
