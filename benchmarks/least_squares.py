@@ -62,9 +62,14 @@ def write_ill(path: Path, n: int) -> None:
 
 
 def blocks(file: h5py.File) -> Iterator[Block]:
+    """Always in the same two arrays: memory that is asked for anew costs more than the reading."""
     H, y = file["H"], file["y"]
+    H_block, y_block = np.empty((BLOCK, H.shape[1])), np.empty(BLOCK)
     for start in range(0, len(y), BLOCK):
-        yield H[start : start + BLOCK], y[start : start + BLOCK]
+        k = min(BLOCK, len(y) - start)
+        H.read_direct(H_block, np.s_[start : start + k], np.s_[:k])
+        y.read_direct(y_block, np.s_[start : start + k], np.s_[:k])
+        yield H_block[:k], y_block[:k]
 
 
 def spread_sample(file: h5py.File) -> Block:

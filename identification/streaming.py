@@ -1,10 +1,12 @@
 """Least squares on more rows than memory holds: blocks in, one pass, constant memory, the accuracy of QR.
 
-The Gram matrix H'H squares the condition of H, which is why normal equations fail. So a sample of the rows [H, y] is
-decomposed first: divided by the triangle of that QR, all rows have a condition near 1, and their Gram matrix loses
-nothing. Where the sample turns out not to stand for the rest (a block becomes large), the pass goes on with the slower
-sequence of QR decompositions (TSQR: Demmel and others, SIAM J. Sci. Comput. 34, 2012), from the triangle that the
-Gram matrix holds at that moment. Nothing is read twice.
+The Gram matrix H'H squares the condition of H, which is why normal equations fail. So a sample of the rows is solved
+first: its QR gives a triangle R0 and a solution x0. The pass gathers the Gram matrix of [H R0^-1, y - H x0], whose
+condition is near 1, so that nothing is lost. A sample whose columns are far from dependent needs no division: the Gram
+matrix of [H, y - H x0] is gathered as it is, straight from the caller's blocks. Where the sample turns out not to stand
+for the rest (a block becomes large), the pass goes on with the slower sequence of QR decompositions (TSQR: Demmel and
+others, SIAM J. Sci. Comput. 34, 2012), from the triangle that the Gram matrix holds at that moment. Nothing is read
+twice. `condense` gives that triangle, which stands for all rows, to whoever wants to put several of them together.
 """
 
 from __future__ import annotations
@@ -15,25 +17,37 @@ from itertools import chain
 from typing import Literal
 
 import numpy as np
-from scipy.linalg.blas import dsyrk, dtrsm
+from scipy.linalg import solve_triangular
+from scipy.linalg.blas import dgemv, dsyrk, dtrsm
 
 from identification.recording import Floats
 from identification.regression import LinearFit, least_squares
 
 Block = tuple[Floats, Floats]
-"""Rows of H (k, p) and y (k,)."""
-Method = Literal["preconditioned Gram", "TSQR", "preconditioned Gram, then TSQR"]
+"""Rows of H (k, p) and y (k,). Fastest when H is float64 with each row in one piece (C order): then it is not copied.
+The arrays are read before the next block is asked for, so a reader may use the same ones for every block."""
+Method = Literal["Gram", "preconditioned Gram", "TSQR", "Gram, then TSQR"]
 
 SAMPLE = 8192
 """Rows of the sample at most; when none is given the first blocks that have so many together stand for the rest."""
-ROWS = 1024
-"""Rows worked on at a time: for a dozen columns they stay in a core's own cache."""
+WORK = 2**18
+"""Bytes of H worked on at a time: they stay in a core's own cache (measured: flat from 2^17 to 2^19)."""
+PLAIN_CONDITION = 100.0
+"""Condition of the sample's column-scaled H up to which rows are not divided: its square costs 4 of 16 digits."""
 GROWTH = 1e4
 """Mean square of a column in a block, 1 in the sample, above which the sample does not stand for the rest."""
 SAMPLE_CONDITION = 1e13
 """Condition of the sample's column-scaled H beyond which rows are not divided by its triangle."""
-EXACT = 1e-12
-"""A residual of the sample below this share of y counts as this share: data without noise."""
+
+
+@dataclass(frozen=True, eq=False)
+class Condensed:
+    """All rows [H, y] as one triangle: least squares on its p + 1 rows is least squares on them."""
+
+    triangle: Floats
+    """(k, p + 1) upper, k <= p + 1."""
+    rows: int
+    method: Method
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,15 +77,25 @@ def stream_least_squares(
     >>> (found.fit.theta.round(6) + 0.0).tolist(), found.fit.dof, found.rows
     ([2.0, 0.0], 1, 3)
     """
+    _known(sigma)
+    found = condense(blocks, len(names), sample)
+    if found.rows == 0:
+        raise ValueError("stream_least_squares: there are no rows")
+    return Streamed(solve(found, names, sigma), found.rows, found.method)
+
+
+def _known(sigma: float | None) -> None:
     if sigma is not None and not (np.isfinite(sigma) and sigma > 0):
         raise ValueError(f"stream_least_squares: sigma must be finite and above zero, got {sigma}")
-    checked = _checked(blocks, len(names))
-    start = _start(checked) if sample is None else [*_checked([sample], len(names))]
+
+
+def condense(blocks: Iterable[Block], p: int, sample: Block | None = None) -> Condensed:
+    """The triangle of all rows of p columns; zeros for no rows. Arguments and errors as
+    `stream_least_squares`."""
+    checked = _checked(blocks, p)
+    start = _start(checked) if sample is None else [*_checked([sample], p)]
     guess = _preconditioner(start) if start else None
-    triangle, rows, method = _pass(chain(start, checked) if sample is None else checked, guess, len(names))
-    if rows == 0:
-        raise ValueError("stream_least_squares: there are no rows")
-    return Streamed(_fit(triangle, rows, names, sigma), rows, method)
+    return _pass(chain(start, checked) if sample is None else checked, guess, p)
 
 
 def _checked(blocks: Iterable[Block], p: int) -> Iterator[Block]:
@@ -84,17 +108,26 @@ def _checked(blocks: Iterable[Block], p: int) -> Iterator[Block]:
 
 
 def _start(blocks: Iterator[Block]) -> list[Block]:
-    """As many blocks as make a sample."""
+    """As many blocks as make a sample, copied: the reader may use its arrays again."""
     out: list[Block] = []
     while sum(len(y) for _, y in out) < SAMPLE and (block := next(blocks, None)) is not None:
-        out.append(block)
+        out.append((block[0].copy(), block[1].copy()))
     return out
 
 
 @dataclass(frozen=True, eq=False)
 class _Preconditioner:
-    triangle: Floats
-    """(p + 1, p + 1) upper, Fortran order: [H, y] of the sample divided by it has columns of mean square 1."""
+    """Of the sample: with W = H R0^-1, or W = H when plain, [H, y] = [W, y - H x0] @ back."""
+
+    divisor: Floats
+    """R0 (p, p) upper, Fortran order: the sample's H divided by it has columns of mean square 1."""
+    solution: Floats
+    """x0 (p,)"""
+    back: Floats
+    """(p + 1, p + 1) upper"""
+    largest: Floats
+    """(p,) Mean square of a column of W beyond which a block is not what the sample has led to expect."""
+    plain: bool
     rows: int
 
 
@@ -107,88 +140,122 @@ def _preconditioner(sample: list[Block]) -> _Preconditioner | None:
     if n <= p + 1:
         return None
     triangle = _triangle(rows) / np.sqrt(n)
-    length = np.linalg.norm(triangle, axis=0)
-    if np.any(length == 0) or np.linalg.cond(triangle[:p, :p] / length[:p]) > SAMPLE_CONDITION:
+    R0, length = triangle[:p, :p], np.linalg.norm(triangle[:p, :p], axis=0)
+    condition = np.linalg.cond(R0 / length) if np.all(length > 0) else np.inf
+    if condition > SAMPLE_CONDITION:
         return None
-    if abs(triangle[p, p]) < EXACT * length[p]:
-        triangle[p, p] = EXACT * length[p]
-    return _Preconditioner(np.asfortranarray(triangle), n)
+    x0 = np.asarray(solve_triangular(R0, triangle[:p, p]), dtype=np.float64)
+    back, plain = np.eye(p + 1), bool(condition <= PLAIN_CONDITION)
+    back[:p, p] = x0 if plain else triangle[:p, p]
+    if not plain:
+        back[:p, :p] = R0
+    largest = GROWTH * np.square(length / condition) if plain else np.full(p, GROWTH)
+    return _Preconditioner(np.asfortranarray(R0), x0, back, largest, plain, n)
 
 
-def _finite(rows: Floats) -> None:
-    if not np.all(np.isfinite(rows)):
+def _finite(*arrays: Floats) -> None:
+    if not all(np.all(np.isfinite(array)) for array in arrays):
         raise ValueError("stream_least_squares: H and y must be finite; leave out missing samples first")
 
 
-def _pass(blocks: Iterable[Block], guess: _Preconditioner | None, p: int) -> tuple[Floats, int, Method]:
-    """Triangle (p + 1, p + 1) of all rows [H, y], their number, and how it was found."""
-    gram = np.zeros((p + 1, p + 1), order="F")
+def _pass(blocks: Iterable[Block], guess: _Preconditioner | None, p: int) -> Condensed:
+    gram = _Gram(np.zeros((p, p), order="F"), np.zeros(p), 0.0)
     triangle: Floats | None = np.zeros((0, p + 1)) if guess is None else None
-    buffer, work, count = np.empty((ROWS, p + 1)), np.empty((ROWS, p + 1)), 0
-    for rows in _rows(blocks, buffer):
-        count += len(rows)
+    k = max(WORK // (8 * p), 64)
+    work, count = np.empty((k, p)), 0
+    for H, y in _pieces(blocks, k):
+        count += len(y)
         if guess is not None and triangle is None:
-            more = _gram(rows, guess, work)
+            more = _gram(H, y, guess, work)
             if more is not None:
-                gram += more
+                gram = gram.plus(more)
                 continue
-            triangle = _root(gram) @ guess.triangle
+            triangle = gram.root() @ guess.back
         assert triangle is not None
-        _finite(rows)
-        triangle = _triangle(np.vstack([triangle, rows]))
+        _finite(H, y)
+        triangle = _triangle(np.vstack([triangle, np.column_stack([H, y])]))
     if guess is None:
         assert triangle is not None
-        return triangle, count, "TSQR"
+        return Condensed(triangle, count, "TSQR")
     if triangle is not None:
-        return triangle, count, "preconditioned Gram, then TSQR"
-    if np.linalg.eigvalsh(gram[:p, :p], UPLO="U")[0] < 0.5 * guess.rows:
+        return Condensed(triangle, count, "Gram, then TSQR")
+    if count:
+        _not_less_than(gram, guess)
+    return Condensed(gram.root() @ guess.back, count, "Gram" if guess.plain else "preconditioned Gram")
+
+
+def _pieces(blocks: Iterable[Block], k: int) -> Iterator[Block]:
+    """Views of at most k rows."""
+    for H, y in blocks:
+        for start in range(0, len(y), k):
+            yield H[start : start + k], y[start : start + k]
+
+
+@dataclass(frozen=True, eq=False)
+class _Gram:
+    """Gram matrix of [W, r]: W'W (upper half), W'r and r'r."""
+
+    WW: Floats
+    Wr: Floats
+    rr: float
+
+    def plus(self, other: _Gram) -> _Gram:
+        return _Gram(self.WW + other.WW, self.Wr + other.Wr, self.rr + other.rr)
+
+    def root(self) -> Floats:
+        """Upper triangle whose square is the matrix, also where that is singular so far."""
+        p = len(self.Wr)
+        full = np.zeros((p + 1, p + 1))
+        full[:p, :p], full[:p, p], full[p, p] = self.WW, self.Wr, self.rr
+        length = np.sqrt(np.diagonal(full))
+        length = np.where(length > 0, length, 1.0)
+        value, vector = np.linalg.eigh(full / np.outer(length, length), UPLO="U")
+        return _triangle(np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T) * length
+
+
+def _gram(H: Floats, y: Floats, guess: _Preconditioner, work: Floats) -> _Gram | None:
+    """Of a few rows; None when they are too large for the sample, or not finite."""
+    columns = H.T
+    left = dgemv(-1.0, columns, guess.solution, 1.0, y, trans=1)
+    if not guess.plain:
+        divided = work[: len(y)].T
+        divided[:] = columns
+        columns = dtrsm(1.0, guess.divisor, divided, side=0, lower=0, trans_a=1, overwrite_b=1)
+    WW: Floats = dsyrk(1.0, columns)
+    Wr: Floats = columns @ left
+    rr = float(left @ left)
+    fits = np.all(np.diagonal(WW) <= guess.largest * len(y)) and np.isfinite(rr)
+    return _Gram(WW, Wr, rr) if fits else None
+
+
+def _not_less_than(gram: _Gram, guess: _Preconditioner) -> None:
+    """The blocks hold the sample's rows, so that in no direction they can have less than it has."""
+    WW = np.triu(gram.WW) + np.triu(gram.WW, 1).T
+    if guess.plain:
+        inverse = solve_triangular(guess.divisor, np.eye(len(WW)))
+        WW = inverse.T @ WW @ inverse
+    if np.linalg.eigvalsh(WW)[0] < 0.5 * guess.rows:
         raise ValueError(
             "stream_least_squares: the sample must be rows of the blocks themselves, but the blocks excite "
             "some combination of columns less than the sample alone does"
         )
-    return _root(gram) @ guess.triangle, count, "preconditioned Gram"
-
-
-def _rows(blocks: Iterable[Block], buffer: Floats) -> Iterator[Floats]:
-    """[H, y], at most as many rows at a time as `buffer` (k, p + 1) has, in `buffer`."""
-    for H, y in blocks:
-        for start in range(0, len(y), len(buffer)):
-            rows = buffer[: min(len(buffer), len(y) - start)]
-            rows[:, :-1] = H[start : start + len(rows)]
-            rows[:, -1] = y[start : start + len(rows)]
-            yield rows
-
-
-def _gram(rows: Floats, guess: _Preconditioner, work: Floats) -> Floats | None:
-    """Upper half of the Gram matrix of the rows divided by the triangle; None when they are too large for it."""
-    divided = work[: len(rows)].T
-    divided[:] = rows.T
-    divided = dtrsm(1.0, guess.triangle, divided, side=0, lower=0, trans_a=1, overwrite_b=1)
-    out: Floats = dsyrk(1.0, divided)
-    size = np.diagonal(out).max()
-    return out if size <= GROWTH * len(rows) else None
-
-
-def _root(gram: Floats) -> Floats:
-    """Upper triangle whose square is the Gram matrix (upper half given), also where that is singular so far."""
-    value, vector = np.linalg.eigh(gram, UPLO="U")
-    return _triangle(np.sqrt(np.maximum(value, 0.0))[:, None] * vector.T)
 
 
 def _triangle(rows: Floats) -> Floats:
     return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
 
 
-def _fit(triangle: Floats, rows: int, names: tuple[str, ...], sigma: float | None) -> LinearFit:
-    """The same normal equations have the triangle as their regressor: p rows stand for all."""
+def solve(found: Condensed, names: tuple[str, ...], sigma: float | None = None) -> LinearFit:
+    """Least squares of the rows that the triangle stands for; `sigma` as in `stream_least_squares`."""
+    _known(sigma)
     p = len(names)
     square = np.zeros((p + 1, p + 1))
-    square[: len(triangle)] = triangle
+    square[: len(found.triangle)] = found.triangle
     unit = 1.0 if sigma is None else sigma
     fit = least_squares(square[:p, :p], square[:p, p], names, unit)
     assert fit.chi2 is not None
     chi2 = fit.chi2 + float(square[p, p] / unit) ** 2
-    dof = rows - p + (0 if fit.deficiency is None else len(fit.deficiency.combinations))
+    dof = found.rows - p + (0 if fit.deficiency is None else len(fit.deficiency.combinations))
     fit = replace(fit, residual=np.empty(0), solver=np.empty((p, 0)), dof=dof, chi2=chi2)
     if sigma is not None:
         return fit
