@@ -1,0 +1,284 @@
+"""The report of `rig fit`: per thruster the sentence, the table, the figures that judge the fit, the points."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from scipy.stats import t as student
+
+from identification.recording import Floats
+from identification.thrust import Parameter, ThrustFit
+from identification.thrust_report import digits, sentence, table, verdicts
+from rig.report import figures, provenance
+from rig.report.figures import Curve, Group, Interval
+from rig.report.look import prose, unit_text
+from rig.report.normal import normal_order
+from rig.report.page import Page, Picture, Remark, Section, Table, Tone, columns, sentences, write
+
+GRID = 121
+MOST = 1500
+"""Samples drawn of one recording; of more, every k-th."""
+QUANTITY = {
+    "command_voltage": "command voltage / V",
+    "motor_voltage": "motor voltage / V",
+    "rotation_rate": "rotation rate / (rev/s)",
+}
+ALARMS: tuple[tuple[str, Tone], ...] = (
+    ("this fit means nothing", "bad"),
+    ("the data cannot tell", "bad"),
+    ("underfitted", "doubt"),
+    ("points scatter", "doubt"),
+    ("residual not white", "doubt"),
+    ("poorly excited", "doubt"),
+    ("fit not judged", "doubt"),
+    ("calibration uncertainty", "doubt"),
+    ("not underfitted", "good"),
+    ("residual white", "good"),
+)
+"""How a verdict begins, and the sign it gets."""
+
+
+class Answer(Protocol):
+    """What `rig fit` says of one thruster."""
+
+    @property
+    def fit(self) -> ThrustFit: ...
+    @property
+    def alternatives(self) -> tuple[ThrustFit, ...]: ...
+    @property
+    def notes(self) -> tuple[str, ...]: ...
+
+
+def write_report(answers: Sequence[Answer], path: Path, files: Sequence[Path] = ()) -> None:
+    """One page for all thrusters. `files`: the recordings, to be hashed. Raises RecordingError, OSError."""
+    write(fit_page(answers, provenance.sources(files)), path)
+
+
+def fit_page(answers: Sequence[Answer], found: Sequence[provenance.Source] = ()) -> Page:
+    """The page of one or more answers."""
+    names = [answer.fit.thruster or "thruster" for answer in answers]
+    ids = [name for answer in answers for name in answer.fit.recordings]
+    parts = [comparison(answers)] if len(answers) > 1 else []
+    parts += [thruster_section(answer) for answer in answers]
+    many = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
+    lead = prose(sentence(answers[0].fit)) if len(answers) == 1 else _spread(answers)
+    return Page(f"Thrust fit of {many}", lead, (*parts, provenance.section(found, ids)), contents=len(answers) > 1)
+
+
+def _spread(answers: Sequence[Answer]) -> str:
+    """Of the first coefficient over thrusters."""
+    first = [next(iter(answer.fit.parameters.values())) for answer in answers]
+    name = next(iter(answers[0].fit.parameters))
+    values = [p.value for p in first if np.isfinite(p.value)]
+    if not values:
+        return f"{len(answers)} thrusters were fitted with {answers[0].fit.model}; {name} was determined for none."
+    unit = unit_text(first[0].unit)
+    widest = 100 * (max(values) - min(values)) / abs(float(np.mean(values)))
+    return (
+        f"{len(answers)} thrusters were fitted with thrust = {answers[0].fit.model}: {name} lies between "
+        f"{min(values):.4g} and {max(values):.4g} {unit}, {widest:.2g} % apart."
+    )
+
+
+def comparison(answers: Sequence[Answer]) -> Section:
+    """All thrusters side by side."""
+    head = ("thruster", "coefficient", "value ± std", "95 % interval", "unit", "points", "RMSE / N", "χ²/dof")
+    rows, intervals = [], []
+    for answer in answers:
+        fit = answer.fit
+        judged = "" if fit.chi2_per_dof is None else f"{fit.chi2_per_dof:.2f}"
+        for name, p in fit.parameters.items():
+            end = (unit_text(p.unit), str(fit.estimate.rows.y.size), f"{fit.rmse:.3g}", judged)
+            thruster = fit.thruster or "?"
+            rows.append((thruster, prose(name), *value_and_interval(p.value, p.std, p.low, p.high), *end))
+            label = thruster if len(fit.parameters) == 1 else f"{thruster} {prose(name)}"
+            intervals.append(Interval(label, p.value, p.low, p.high))
+    first = next(iter(answers[0].fit.parameters.values()))
+    plot = figures.forest(intervals, f"coefficient of {answers[0].fit.model} / ({unit_text(first.unit)})")
+    caption = "Bars are 95 % intervals, the load cell's calibration included: that part is common to all thrusters."
+    told = Table("Coefficients of all thrusters", head, tuple(rows), columns(head, "thruster", "coefficient", "unit"))
+    return Section("All thrusters", (told, Picture("Thrusters side by side", plot, caption)))
+
+
+def value_and_interval(value: float, std: float, low: float, high: float) -> tuple[str, str]:
+    """Two cells of a table; what is not known is a dash.
+
+    >>> value_and_interval(0.40123, 0.0012, 0.39883, 0.40363), value_and_interval(1.0, np.nan, np.nan, np.nan)
+    (('0.4012 ± 0.0012', '0.3988 to 0.4036'), ('1', '–'))
+    """
+    if not np.isfinite(value):
+        return "–", "–"
+    if not np.isfinite(std):
+        return digits(value, std), "–"
+    return f"{digits(value, std)} ± {digits(std, std)}", f"{digits(low, std)} to {digits(high, std)}"
+
+
+def thruster_section(answer: Answer) -> Section:
+    """Everything about one thruster."""
+    fit = answer.fit
+    said = (*verdicts(fit, answer.alternatives), *answer.notes)
+    judgement = Section(
+        "What to know before the numbers are used", sentences(Remark(prose(text), tone(text)) for text in said)
+    )
+    return Section(
+        fit.thruster or "Thruster",
+        (parameter_table(answer), judgement, *pictures(fit), *points_table(fit)),
+        prose(sentence(fit)),
+    )
+
+
+def tone(verdict: str) -> Tone:
+    """The sign of a verdict, by how it begins.
+
+    >>> tone("not underfitted (chi2/dof 0.9)"), tone("underfitted: residuals exceed"), tone("explained by rate")
+    ('good', 'doubt', '')
+    """
+    return next((sign for start, sign in ALARMS if verdict.startswith(start)), "")
+
+
+def parameter_table(answer: Answer) -> Table:
+    """The model asked for first, the others below it."""
+    head = ("parameter", "model", "value ± std", "95 % interval", "unit", "relative error", "verdict", "RMSE / N")
+    rows = []
+    for fit in (answer.fit, *answer.alternatives):
+        for row in table(fit):
+            found = value_and_interval(row.value, row.std, row.low, row.high)
+            error = f"{row.percent:.2g} %" if np.isfinite(row.percent) else "–"
+            rmse = f"{fit.rmse:.4g}" if row.name in fit.parameters else ""
+            rows.append((prose(row.name), fit.model, *found, unit_text(row.unit), error, row.verdict, rmse))
+    words = columns(head, "parameter", "model", "unit", "verdict")
+    return Table("Parameters; std holds scatter and calibration", head, tuple(rows), words)
+
+
+def points_table(fit: ThrustFit) -> tuple[Table, ...]:
+    """One row per hold, folded; nothing for a fit on samples."""
+    if fit.rmse_of != "points":
+        return ()
+    explained = QUANTITY[fit.voltage_quantity]
+    head = (
+        *("recording", "start / s", "end / s", explained, "thrust / N", "std error / N"),
+        *("n", "n effective", "residual / N", "steady"),
+    )
+    rows = []
+    left = iter(fit.estimate.fit.residual)
+    for k, run in enumerate(fit.runs):
+        for point in run.points.points if run.points is not None else ():
+            e = point.thrust
+            window = (str(k + 1), f"{e.t_start:.2f}", f"{e.t_end:.2f}", f"{point.voltage:.3f}")
+            found = (digits(e.mean, e.std_error), digits(e.std_error, e.std_error), str(e.n), f"{e.n_effective:.0f}")
+            rows.append((*window, *found, f"{next(left):+.3f}", "yes" if point.steady else "no"))
+    return (Table(f"All {len(rows)} points", head, tuple(rows), columns(head, "steady"), folded=True),)
+
+
+def pictures(fit: ThrustFit) -> tuple[Picture, ...]:
+    """Fit, residuals over voltage and over time, normal plot, singular values."""
+    x = QUANTITY[fit.voltage_quantity]
+    model = _curve(fit)
+    band = _scatter_band(fit, model.x)
+    thin = _thinning(fit)
+    kept = f" Every {thin}th sample is drawn." if thin > 1 else ""
+    bars = " Bars are 95 % intervals of each point." if fit.estimate.rows.std_error is not None else ""
+    order = normal_order(fit.estimate)
+    solved = fit.estimate.fit
+    out = [
+        Picture(
+            "Measured and fitted thrust",
+            figures.fit_band(_measured(fit), model, x, "thrust less tare / N"),
+            f"The band holds scatter and calibration; where it is not seen it is narrower than the line.{bars}{kept}",
+        ),
+        Picture(
+            "Residuals over what explains the thrust",
+            figures.residuals(_residuals(fit), x, "residual / N", band),
+            "A shape here is physics that the model leaves out. The band is what scatter alone leaves open.",
+        ),
+        Picture(
+            "Residuals in the order of measurement",
+            figures.residuals(_residuals(fit, over_time=True), _time_label(fit), "residual / N", wide=True),
+            "A trend or a wave here is drift, warming up or slow noise.",
+        ),
+        Picture(
+            "Singular values of the regressor",
+            figures.singular_values(solved.singular_values, solved.condition),
+            "What the sweep excites: a value far below the others is a combination it hardly shows. The condition "
+            "number is that of the scaled columns; above 100 is poor.",
+        ),
+    ]
+    if order is not None:
+        text = "On the line and inside the band: the errors are normal. Residuals are divided by their standard errors."
+        out.insert(3, Picture("Normal plot", figures.normal_plot(order), text))
+    return tuple(out)
+
+
+def _of(fit: ThrustFit, x: Floats) -> list[Parameter]:
+    """The coefficient that counts at each voltage."""
+    found = list(fit.parameters.values())
+    return [found[0] if V >= 0 or len(found) == 1 else found[1] for V in x]
+
+
+def _curve(fit: ThrustFit) -> Curve:
+    """At each voltage one coefficient counts; its interval, calibration included, is the band."""
+    V = np.concatenate([_explaining(fit, k) for k in range(len(fit.runs))])
+    x = np.linspace(min(float(V.min()), 0.0), max(float(V.max()), 0.0), GRID)
+    square = x * np.abs(x)
+    value = np.array([p.value for p in _of(fit, x)]) * square
+    half = np.array([(p.high - p.low) / 2 for p in _of(fit, x)]) * np.abs(square)
+    return Curve(fit.model, x, value, value - half, value + half)
+
+
+def _scatter_band(fit: ThrustFit, x: Floats) -> Curve:
+    """About zero, from the scatter alone: an error of the cell's gain moves points and curve together."""
+    half = np.array([(p.high - p.low) / 2 * _share(p) for p in _of(fit, x)]) * x**2
+    return Curve("95 % band of the fit", x, 0 * x, -half, half)
+
+
+def _share(p: Parameter) -> float:
+    return p.std_statistical / p.std if p.std > 0 else 0.0
+
+
+def _explaining(fit: ThrustFit, k: int) -> Floats:
+    run = fit.runs[k]
+    return run.points.voltage if run.points is not None and fit.rmse_of == "points" else run.voltage
+
+
+def _thinning(fit: ThrustFit) -> int:
+    longest = max(int(block.stop - block.start) for block in fit.estimate.rows.blocks)
+    return max(1, math.ceil(longest / MOST))
+
+
+def _groups(fit: ThrustFit, x: Sequence[Floats], y: Sequence[Floats]) -> list[Group]:
+    rows = fit.estimate.rows
+    step, out = _thinning(fit), []
+    half = None
+    if rows.std_error is not None:
+        wide = student.ppf(0.975, rows.dof) if rows.dof is not None else 1.96
+        half = wide * rows.std_error
+    for k, block in enumerate(rows.blocks):
+        label = "measured" if len(rows.blocks) == 1 else f"recording {k + 1}"
+        out.append(Group(label, x[k][::step], y[k][::step], None if half is None else half[block][::step]))
+    return out
+
+
+def _measured(fit: ThrustFit) -> list[Group]:
+    tare = [p.value for p in fit.tare.values()]
+    y = [fit.estimate.rows.y[block] - tare[k] for k, block in enumerate(fit.estimate.rows.blocks)]
+    return _groups(fit, [_explaining(fit, k) for k in range(len(fit.runs))], y)
+
+
+def _time_label(fit: ThrustFit) -> str:
+    return "time since the recording began / s" if fit.rmse_of == "points" else "number of the sample, in order"
+
+
+def _residuals(fit: ThrustFit, *, over_time: bool = False) -> list[Group]:
+    blocks = fit.estimate.rows.blocks
+    y = [fit.estimate.fit.residual[block] for block in blocks]
+    x = [_explaining(fit, k) for k in range(len(blocks))]
+    if over_time:
+        x = [np.arange(block.stop - block.start, dtype=np.float64) for block in blocks]
+        for k, run in enumerate(fit.runs):
+            if fit.rmse_of == "points" and run.points is not None:
+                x[k] = np.array([0.5 * (p.thrust.t_start + p.thrust.t_end) for p in run.points.points])
+    return _groups(fit, x, y)
