@@ -1,10 +1,10 @@
-"""The thruster model tau = C V|V| (eq. 4.14) or tau = C_t n|n|, one coefficient or two, one tare per recording."""
+"""Fit of a thruster model (`identification.thrust_forms`) to all recordings of one thruster, one tare per recording."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import combinations, pairwise
 from typing import Literal
 
 import numpy as np
@@ -14,30 +14,8 @@ from identification.estimation import Estimate, Method, Rows, estimate
 from identification.pooling import moderate
 from identification.recording import Floats, Recording
 from identification.thrust_data import Run, Unusable, prepare
+from identification.thrust_forms import FORMS, Form, Model, columns
 from identification.verdicts import Significance, Whiteness, significance, whiteness
-
-Model = Literal["C V|V|", "C+/C-"]
-"""One coefficient, or one for each direction."""
-HARDLY_DRIVEN = 0.05
-"""Share of the other direction's largest voltage or rate up to which a direction counts as not driven."""
-
-
-@dataclass(frozen=True, slots=True)
-class Form:
-    """How a model is called, its coefficients and their unit."""
-
-    name: str
-    coefficients: tuple[str, ...]
-    unit: str
-
-
-FORMS: dict[tuple[Model, bool], Form] = {
-    ("C V|V|", False): Form("C V|V|", ("C",), "N/V^2"),
-    ("C+/C-", False): Form("C+/C-", ("C_plus", "C_minus"), "N/V^2"),
-    ("C V|V|", True): Form("C_t n|n|", ("C_t",), "N.s^2"),
-    ("C+/C-", True): Form("C_t+/C_t-", ("C_t_plus", "C_t_minus"), "N.s^2"),
-}
-"""By model and whether it is explained by rotation rate n in rev/s (thesis section 4.2.2: tau = C_t n|n|)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,6 +35,13 @@ class Parameter:
     dof: float
     low: float
     high: float
+    std_uncorrected: float = float("nan")
+    """What samples taken as uncorrelated would have given."""
+
+    @property
+    def dof_statistical(self) -> float:
+        """Degrees of freedom of `std_statistical`: Welch-Satterthwaite undone."""
+        return self.dof * (self.std_statistical / self.std) ** 4 if self.std > 0 else self.dof
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +68,27 @@ class ThrustFit:
     skipped: int
     unsteady: int
     runs: tuple[Run, ...] = field(repr=False)
+    form: Form
+    cov_statistical: Floats = field(repr=False)
+    """(p, p) of `names`, scatter only; NaN where not determined."""
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Coefficients, then `tare[recording]`: the order of the covariance."""
+        return self.estimate.rows.names
+
+    @property
+    def values(self) -> Floats:
+        """(p,) of `names`."""
+        return np.array([p.value for p in (*self.parameters.values(), *self.tare.values())])
+
+    @property
+    def cov(self) -> Floats:
+        """(p, p) of `names`: scatter, and the gain of the cell that multiplies all of them alike."""
+        gain = np.array([p.std_calibration for p in (*self.parameters.values(), *self.tare.values())])
+        shared = gain * np.sign(self.values)
+        out: Floats = self.cov_statistical + np.outer(shared, shared)
+        return out
 
     @property
     def chi2_per_dof(self) -> float | None:
@@ -90,28 +96,26 @@ class ThrustFit:
         return verdict.per_dof if verdict is not None and verdict.dof > 0 else None
 
 
-def _directions(square: Floats) -> list[Floats]:
-    """V|V| of each direction; one that was hardly driven (noise about rest, an overshoot) tells nothing: zeros."""
-    sides = [np.maximum(square, 0.0), np.minimum(square, 0.0)]
-    most = max(float(np.abs(side).max()) for side in sides)
-    return [side if np.abs(side).max() > HARDLY_DRIVEN**2 * most else np.zeros_like(side) for side in sides]
+def _flow(runs: Sequence[Run], of_points: bool) -> Floats | None:
+    found = [run.flow.points if of_points else run.flow.samples for run in runs if run.flow is not None]
+    known = [flow for flow in found if flow is not None]
+    return np.concatenate(known) if len(known) == len(runs) else None
 
 
 def rows_of(runs: Sequence[Run], form: Form) -> tuple[Rows, Literal["points", "samples"]]:
-    """Stack the runs: V|V| per direction, one column of ones per recording; points if every run has holds."""
+    """Stack the runs: signals of the form, one column of ones per recording; points if every run has holds."""
     points = [run.points for run in runs if run.points is not None]
     of_points = len(points) == len(runs)
     V = [p.voltage for p in points] if of_points else [run.voltage for run in runs]
     y = [p.thrust for p in points] if of_points else [run.thrust for run in runs]
     ends = np.cumsum([0, *[v.size for v in V]])
     blocks = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-    square = np.concatenate([v * np.abs(v) for v in V])
-    columns = [square] if len(form.coefficients) == 1 else _directions(square)
-    tares = np.zeros((square.size, len(runs)))
+    signals = columns(form, np.concatenate(V), _flow(runs, of_points))
+    tares = np.zeros((signals[0].size, len(runs)))
     for k, block in enumerate(blocks):
         tares[block, k] = 1.0
     names = (*form.coefficients, *(f"tare[{run.recording_id}]" for run in runs))
-    H, thrust = np.column_stack([*columns, tares]), np.concatenate(y)
+    H, thrust = np.column_stack([*signals, tares]), np.concatenate(y)
     if not of_points:
         return Rows(H, thrust, names, blocks, even=True), "samples"
     error = np.concatenate([p.std_error for p in points])
@@ -122,7 +126,17 @@ def rows_of(runs: Sequence[Run], form: Form) -> tuple[Rows, Literal["points", "s
     return Rows(H, thrust, names, blocks, shared.std_error, shared.dof, float(dof.max())), "points"
 
 
-def _parameter(found: Estimate, contrast: Floats, unit: str, gain: float) -> Parameter:
+def _uncorrected(found: Estimate, runs: Sequence[Run], contrast: Floats) -> float:
+    """Standard deviation of contrast @ theta with every sample taken as independent of its neighbours."""
+    rows = found.rows
+    if rows.std_error is None or found.internal is None:
+        return found.spread(contrast).internal
+    points = [point.thrust for run in runs if run.points is not None for point in run.points.points]
+    white = np.array([p.std_error * np.sqrt(min(p.n_effective / p.n, 1.0)) for p in points])
+    return float(np.linalg.norm((contrast @ found.fit.solver) * white))
+
+
+def _parameter(found: Estimate, runs: Sequence[Run], contrast: Floats, unit: str, gain: float) -> Parameter:
     value, spread = float(contrast @ found.fit.theta), found.spread(contrast)
     calibration = abs(value) * gain
     std = float(np.hypot(spread.std, calibration))
@@ -130,13 +144,58 @@ def _parameter(found: Estimate, contrast: Floats, unit: str, gain: float) -> Par
     if std > 0 and spread.std > 0 and np.isfinite(dof):
         dof = spread.dof * (std / spread.std) ** 4  # Welch-Satterthwaite: the type B part has infinite dof
     half = float(student.ppf(0.975, dof)) * std if dof > 0 else float("nan")
-    if not np.isfinite(spread.std):
-        value = float("nan") if spread.dof == 0 and found.fit.dof > 0 else value
-    return Parameter(value, std, unit, spread.std, calibration, spread.internal, dof, value - half, value + half)
+    white = float("nan")
+    if np.isfinite(spread.std):
+        white = _uncorrected(found, runs, contrast)
+    elif spread.dof == 0 and found.fit.dof > 0:
+        value = float("nan")
+    low, high = value - half, value + half
+    return Parameter(value, std, unit, spread.std, calibration, spread.internal, dof, low, high, white)
 
 
-def fit_runs(runs: Sequence[Run], model: Model = "C V|V|", method: Method = "wls") -> ThrustFit | Unusable:
-    """Fit prepared runs of one thruster jointly; see `fit_thrust`."""
+def _covariance(found: Estimate, stds: Floats, coefficients: int) -> Floats:
+    """Statistical covariance (p, p) with these standard deviations (p,) on its diagonal.
+
+    Correlations are those of the fit; with correlated samples those of the coefficients follow from the spread of
+    their sums (var(a + b) - var(a - b) = 4 cov).
+    """
+    plain = np.sqrt(np.diag(found.fit.cov))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        rho = np.nan_to_num(found.fit.cov / np.outer(plain, plain))
+    unit = np.eye(stds.size)
+    for i, j in combinations(range(coefficients if found.noise else 0), 2):
+        a, b = unit[i] / stds[i], unit[j] / stds[j]
+        if np.all(np.isfinite(a)) and np.all(np.isfinite(b)):
+            both = (found.spread(a + b).std ** 2 - found.spread(a - b).std ** 2) / 4
+            rho[i, j] = rho[j, i] = float(np.clip(both, -1.0, 1.0))
+    np.fill_diagonal(rho, 1.0)
+    values, vectors = np.linalg.eigh(rho)
+    rho = (vectors * np.maximum(values, 0.0)) @ vectors.T
+    scale = stds / np.sqrt(np.diag(rho))
+    out: Floats = rho * np.outer(scale, scale)
+    return out
+
+
+def _not_told(runs: Sequence[Run], found: Estimate, form: Form) -> Unusable | None:
+    """Why none of the coefficients can be had, when that is so."""
+    lost, count = found.fit.deficiency, found.rows.y.size
+    if lost is None or not all(name in lost.names for name in form.coefficients):
+        return None
+    ids = ", ".join(run.recording_id for run in runs)
+    if count < len(found.rows.names):
+        wanted = ", ".join(found.rows.names)
+        return Unusable(
+            f"recording {ids}: {count} {'hold' if count == 1 else 'holds or samples'} for "
+            f"{len(found.rows.names)} parameters ({wanted}); measure at least one more level than parameters"
+        )
+    levels = np.unique(np.concatenate([run.voltage for run in runs]).round(6))
+    what, unit = ("rotation rate", "rev/s") if runs[0].voltage_quantity == "rotation_rate" else ("voltage", "V")
+    seen = f"{levels.size} level(s) from {levels[0]:g} to {levels[-1]:g} {unit}"
+    return Unusable(f"recording {ids}: {lost.statement}; the {what} shows {seen}, at least two are needed")
+
+
+def _unfit(runs: Sequence[Run], model: Model) -> Unusable | None:
+    """Why these runs cannot be fitted together with this model."""
     by_rate = [run.voltage_quantity == "rotation_rate" for run in runs]
     if any(by_rate) and not all(by_rate):
         return Unusable(
@@ -145,21 +204,30 @@ def fit_runs(runs: Sequence[Run], model: Model = "C V|V|", method: Method = "wls
             "choose what all of them have (rotation_rate), or fit them apart"
         )
     form = FORMS[model, by_rate[0]]
+    still = [run.recording_id for run in runs if run.flow is None]
+    if form.with_flow and still:
+        return Unusable(f"recording {', '.join(still)}: no flow_speed was recorded; {form.name} needs the flow U")
+    return None
+
+
+def fit_runs(runs: Sequence[Run], model: Model = "C V|V|", method: Method = "wls") -> ThrustFit | Unusable:
+    """Fit prepared runs of one thruster jointly; see `fit_thrust`."""
+    refused = _unfit(runs, model)
+    if refused is not None:
+        return refused
+    form = FORMS[model, runs[0].voltage_quantity == "rotation_rate"]
     rows, rmse_of = rows_of(runs, form)
     found = estimate(rows, method)
-    lost = found.fit.deficiency
-    names = form.coefficients
-    if lost is not None and all(name in lost.names for name in names):
-        levels = np.unique(np.concatenate([run.voltage for run in runs]).round(6))
-        ids = ", ".join(run.recording_id for run in runs)
-        what, suffix = ("rotation rate", "rev/s") if by_rate[0] else ("voltage", "V")
-        seen = f"{levels.size} level(s) from {levels[0]:g} to {levels[-1]:g} {suffix}"
-        return Unusable(f"recording {ids}: {lost.statement}; the {what} shows {seen}, at least two are needed")
+    refused = _not_told(runs, found, form)
+    if refused is not None:
+        return refused
+    names, unit = form.coefficients, np.eye(len(rows.names))
     gain = max(run.gain_std for run in runs)
-    unit = np.eye(len(rows.names))
-    parameters = {name: _parameter(found, unit[i], form.unit, gain) for i, name in enumerate(names)}
-    tare = {run.recording_id: _parameter(found, unit[len(names) + k], "N", run.gain_std) for k, run in enumerate(runs)}
-    known = {name: significance(p.value, p.std_statistical, p.dof) for name, p in parameters.items()}
+    parameters = {name: _parameter(found, runs, unit[i], form.units[i], gain) for i, name in enumerate(names)}
+    tare = {
+        run.recording_id: _parameter(found, runs, unit[len(names) + k], "N", run.gain_std) for k, run in enumerate(runs)
+    }
+    stds = np.array([p.std_statistical for p in (*parameters.values(), *tare.values())])
     residual = found.fit.residual
     return ThrustFit(
         runs[0].thruster,
@@ -168,16 +236,18 @@ def fit_runs(runs: Sequence[Run], model: Model = "C V|V|", method: Method = "wls
         runs[0].voltage_quantity,
         parameters,
         tare,
-        _difference(found, unit) if len(names) == 2 else None,
+        _difference(found, unit) if form.split else None,
         found,
         float(np.sqrt(np.mean(residual**2))),
         rmse_of,
         None if found.fit.sigma2 is None else float(np.sqrt(found.fit.sigma2)),
         whiteness(residual),
-        known,
+        {name: significance(p.value, p.std_statistical, p.dof_statistical) for name, p in parameters.items()},
         sum(run.skipped for run in runs),
         sum(run.points.unsteady for run in runs if run.points is not None),
         tuple(runs),
+        form,
+        _covariance(found, stds, len(names)),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,8 @@ SIGN_SHARE = 0.2
 """Thrust above this share of the largest has a direction."""
 MIN_SIDE = 0.05
 """Each direction must hold this share of the samples at speed."""
+MOVING = 2.0
+"""A flow counts as one when it is this many times the noise of its sensor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,6 +25,16 @@ class Unusable:
     """A sentence for the operator: which recording, what was expected, what came."""
 
     reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Flow:
+    """Velocity of advance, m/s: at each thrust sample (n,) and, as a mean over it, at each point (k,)."""
+
+    samples: Floats
+    points: Floats | None
+    moves: bool
+    """It is more than its sensor's noise about zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +56,9 @@ class Run:
     noise_std: float | None
     unsigned: bool = False
     """The rotation rate never turns negative while the thrust changes sign: the tachometer does not tell direction."""
+    flow: Flow | None = None
+    calibration: str = ""
+    """Which cell under which calibration: recordings that agree in it share the error of its gain."""
 
 
 def gain_std(thrust: Channel) -> float:
@@ -89,11 +105,67 @@ def lacks_sign(rate: Floats, thrust: Floats) -> bool:
     return bool(np.mean(driven > large) > MIN_SIDE and np.mean(driven < -large) > MIN_SIDE)
 
 
+def calibration_of(thrust: Channel) -> str:
+    """The cell and the facts of its calibration as one text; its role in the recording is no part of it.
+
+    >>> none, facts = np.zeros(1), {"gain_std": 0.1, "role": "primary"}
+    >>> calibration_of(Channel("thrust", "cell", "thrust", "N", none, none, calibration=facts))
+    'cell/thrust {"gain_std": 0.1}'
+    """
+    facts = {key: value for key, value in thrust.calibration.items() if key != "role"}
+    return f"{thrust.stream}/{thrust.name} {json.dumps(facts, sort_keys=True, default=str)}"
+
+
+def flow_of(recording: Recording, times: Floats, points: Points | None) -> Flow | None:
+    """Flow at `times` (n,) and over the windows of `points`; None when none was recorded. Ends are held.
+
+    Noise of the sensor: from differences of neighbouring rows, which a slow flow does not touch.
+    """
+    channel = recording.first_of("flow_speed")
+    good = np.isfinite(channel.value) if channel is not None else np.zeros(0, dtype=np.bool_)
+    if channel is None or not good.any():
+        return None
+    t, u = channel.time[good], channel.value[good]
+    samples = np.interp(times, t, u)
+    noise = float(np.sqrt(np.mean(np.diff(u) ** 2) / 2)) if u.size > 1 else 0.0
+    power = float(np.sqrt(np.mean(samples**2)))
+    means = None
+    if points is not None:
+        windows = [(point.thrust.t_start, point.thrust.t_end) for point in points.points]
+        means = np.array([_mean_flow(t, u, *window) for window in windows])
+    return Flow(samples, means, power > MOVING * noise and power > 0)
+
+
+def _mean_flow(t: Floats, u: Floats, t_start: float, t_end: float) -> float:
+    inside = u[(t >= t_start) & (t <= t_end)]
+    return float(inside.mean()) if inside.size else float(np.interp((t_start + t_end) / 2, t, u))
+
+
+def _refusal(recording: Recording, who: str) -> Unusable | None:
+    """What no fit can be made of, before any number is looked at."""
+    if recording.kind == "vehicle":
+        return Unusable(f"{who} is a vehicle trial; `rig fit` takes tunnel or bollard runs of one thruster")
+    of = sorted({channel.thruster for channel in recording.all_of("thrust") if channel.thruster})
+    if len(of) > 1:
+        return Unusable(f"{who} holds the thrust of {' and '.join(of)}; expected one thruster in one recording")
+    return None
+
+
+def _stuck(thrust: Floats, who: str) -> Unusable | None:
+    if thrust.size > 1 and float(np.ptp(thrust)) == 0.0:
+        return Unusable(
+            f"{who}: the thrust is {thrust[0]:g} N in all of {thrust.size} samples, it has no variance; "
+            "ask whether the load cell was alive"
+        )
+    return None
+
+
 def prepare(recording: Recording, voltage: str = "command_voltage") -> Run | Unusable:
     """Select channels, drop what is not a number, reduce holds to points."""
     who = f"recording {recording.source or recording.recording_id}"
-    if recording.kind == "vehicle":
-        return Unusable(f"{who} is a vehicle trial; `rig fit` takes tunnel or bollard runs of one thruster")
+    refused = _refusal(recording, who)
+    if refused is not None:
+        return refused
     thrust = recording.first_of("thrust")
     if thrust is None:
         return Unusable(f"{who} has no channel of quantity thrust; without a measured force nothing can be fitted")
@@ -105,7 +177,11 @@ def prepare(recording: Recording, voltage: str = "command_voltage") -> Run | Unu
     good = np.isfinite(thrust.value) & np.isfinite(at)
     if not good.any():
         return Unusable(f"{who} has no thrust sample at a known {source.quantity}: all of {good.size} are missing")
+    stuck = _stuck(thrust.value[good], who)
+    if stuck is not None:
+        return stuck
     quantity = source.quantity or voltage
+    points = reduce_to_points(recording, source, thrust)
     return Run(
         recording.recording_id,
         recording.thruster,
@@ -113,8 +189,10 @@ def prepare(recording: Recording, voltage: str = "command_voltage") -> Run | Unu
         at[good],
         thrust.value[good],
         int(good.size - good.sum()),
-        reduce_to_points(recording, source, thrust),
+        points,
         gain_std(thrust),
         thrust.noise_std if thrust.noise_std is not None and thrust.noise_std > 0 else None,
         quantity == "rotation_rate" and lacks_sign(at[good], thrust.value[good]),
+        flow_of(recording, thrust.time[good], points),
+        calibration_of(thrust),
     )

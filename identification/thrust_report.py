@@ -78,7 +78,7 @@ def _difference(fit: ThrustFit) -> str:
     both = f"{one}+ and {one}-"
     if found is None:
         return f"{both}: cannot be compared, only one direction was driven far enough"
-    plus, minus = (p.value for p in fit.parameters.values())
+    plus, minus, *_ = (p.value for p in fit.parameters.values())
     share = abs(plus - minus) / max(abs(plus + minus) / 2, 1e-300)
     rarity = "p < 1e-12" if found.p_value < 1e-12 else f"p = {found.p_value:.2g}"
     if not found.significant:
@@ -110,7 +110,7 @@ def verdicts(fit: ThrustFit, alternatives: Sequence[ThrustFit] = ()) -> Iterator
                 "of lack of fit or repeatability was added to each"
             )
     for split in (fit, *alternatives):
-        if len(split.parameters) == 2:
+        if split.form.split and not split.form.with_flow:
             yield _difference(split)
             break
     if fit.whiteness is not None:

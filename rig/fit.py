@@ -14,8 +14,9 @@ import numpy as np
 
 from identification.estimation import Method
 from identification.recording import Recording
-from identification.thrust import Model, Parameter, ThrustFit, fit_runs
+from identification.thrust import Parameter, ThrustFit, fit_runs
 from identification.thrust_data import Run, Unusable, prepare
+from identification.thrust_forms import Model
 from identification.thrust_report import digits, sentence, table, verdicts
 from rig.errors import RecordingError, RigError
 from rig.hdf5 import load

@@ -162,7 +162,7 @@ def test_without_a_voltage_the_rotation_rate_explains_the_thrust(tmp_path):
     found = json.loads(run(path, "--json", "-").output)["fits"][0]
     assert found["model"] == "C_t n|n|"
     assert found["parameters"]["C_t"]["value"] == pytest.approx(0.03, rel=0.02)
-    assert found["parameters"]["C_t"]["unit"] == "N.s^2"
+    assert found["parameters"]["C_t"]["unit"] == "N.s^2/rev^2"
     assert set(found["alternatives"][0]["parameters"]) == {"C_t_plus", "C_t_minus"}
     assert "explained by rotation_rate" in run(path).output
     assert run(path, "--against", "rotation_rate").output == run(path, "--voltage", "rotation_rate").output
