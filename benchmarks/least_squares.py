@@ -26,7 +26,7 @@ import numpy as np
 from identification.streaming import Block, stream_least_squares
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-BLOCK = 16_384
+BLOCK = 32_768
 SAMPLE_BLOCKS = 64
 SEED = 4
 

@@ -11,7 +11,7 @@ twice. `condense` gives that triangle, which stands for all rows, to whoever wan
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 from typing import Literal
@@ -243,6 +243,18 @@ def _not_less_than(gram: _Gram, guess: _Preconditioner) -> None:
 
 def _triangle(rows: Floats) -> Floats:
     return np.asarray(np.linalg.qr(rows, mode="r"), dtype=np.float64)
+
+
+def join(parts: Sequence[tuple[Condensed, Sequence[int]]], p: int) -> Condensed:
+    """Several sets of rows as one; with each, which of the p columns its own columns are (the others are zero)."""
+    stacked = [np.zeros((0, p + 1))]
+    for part, columns in parts:
+        wide = np.zeros((len(part.triangle), p + 1))
+        wide[:, [*columns, p]] = part.triangle
+        stacked.append(wide)
+    triangle = _triangle(np.vstack([*stacked, np.zeros((p + 1, p + 1))]))
+    methods = {part.method for part, _ in parts}
+    return Condensed(triangle, sum(part.rows for part, _ in parts), methods.pop() if len(methods) == 1 else "TSQR")
 
 
 def solve(found: Condensed, names: tuple[str, ...], sigma: float | None = None) -> LinearFit:

@@ -28,8 +28,8 @@ class Findings:
     texts: list[str] = field(default_factory=list)
 
 
-def load(path: str | Path) -> Recording:
-    """A recording as read-only arrays. Raises RecordingError.
+def load(path: str | Path, rows: int | None = None) -> Recording:
+    """A recording as read-only arrays; of every stream only the first `rows`, if given. Raises RecordingError.
 
     `attributes` has the root attributes that have no field of their own, `opened_as` (`plain`, or `swmr`: it was not
     closed in order, or is still being written) and `streams` (source, device and note of each). What was not as it
@@ -38,7 +38,7 @@ def load(path: str | Path) -> Recording:
     path = Path(path)
     file, opened_as = open_for_reading(path)
     with file:
-        return _recording(file, path, opened_as)
+        return _recording(file, path, opened_as, rows)
 
 
 def open_for_reading(path: Path) -> tuple[h5py.File, str]:
@@ -76,14 +76,14 @@ def _check_format(file: h5py.File, path: Path) -> None:
         raise RecordingError(f"{path} says it is a recording, but has no group /streams")
 
 
-def _recording(file: h5py.File, path: Path, opened_as: str) -> Recording:
+def _recording(file: h5py.File, path: Path, opened_as: str, rows: int | None) -> Recording:
     findings = Findings()
     if opened_as == "swmr":
         findings.texts.append(
             "not closed in order (or still being written): opened in SWMR mode; `rig recover` copies it"
         )
     streams = {name: group for name, group in file["streams"].items() if isinstance(group, h5py.Group)}
-    channels = tuple(channel for name, group in streams.items() for channel in _channels(name, group, findings))
+    channels = tuple(channel for name, group in streams.items() for channel in _channels(name, group, rows, findings))
     if not channels:
         raise RecordingError(f"{path} says it is a recording, but no stream in it has a time and a channel")
     steps = _steps(file, findings)
@@ -135,7 +135,7 @@ def numeric_columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
     return {name: item for name, item in columns.items() if item.ndim == 1 and item.dtype.kind in "iufb"}
 
 
-def _channels(stream: str, group: h5py.Group, findings: Findings) -> list[Channel]:
+def _channels(stream: str, group: h5py.Group, rows: int | None, findings: Findings) -> list[Channel]:
     columns = numeric_columns(group)
     if "time" not in columns:
         findings.texts.append(f"stream {stream} has no numeric `time`: left out")
@@ -148,6 +148,7 @@ def _channels(stream: str, group: h5py.Group, findings: Findings) -> list[Channe
     if max(lengths.values()) > n:
         longest = max(lengths.values())
         findings.texts.append(f"stream {stream}: cut to its shortest dataset, {n} rows; {longest - n} were unfinished")
+    n = n if rows is None else min(n, rows)
     time = columns.pop("time")[:n].astype(np.float64)
     good = _rising(time)
     if not good.all():
