@@ -181,6 +181,9 @@ def answer_text(answer: Answer) -> str:
 @click.command("fit")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write the fit here; - is standard output.")
+@click.option(
+    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
+)
 @click.option("--model", type=click.Choice(list(NAMES)), default="C V|V|", show_default=True, help="Model to report.")
 @click.option(
     "--against",
@@ -192,7 +195,13 @@ def answer_text(answer: Answer) -> str:
 @click.option("--voltage", type=click.Choice(AGAINST), hidden=True, help="The former name of --against.")
 @click.option("--method", type=click.Choice(["wls", "ls"]), default="wls", show_default=True, help="Weighting.")
 def fit_command(
-    files: tuple[Path, ...], json_path: Path | None, model: str, against: str, voltage: str | None, method: Method
+    files: tuple[Path, ...],
+    json_path: Path | None,
+    report: Path | None,
+    model: str,
+    against: str,
+    voltage: str | None,
+    method: Method,
 ) -> None:
     """Fit thrust = C V|V| + tare to one or more recordings, per thruster; C_t n|n| where only n was recorded."""
     try:
@@ -200,6 +209,10 @@ def fit_command(
         text = json.dumps(answer_json(answers), indent=1, allow_nan=False)
         if json_path is not None and str(json_path) != "-":
             json_path.write_text(text + "\n", encoding="utf-8")
+        if report is not None:
+            from rig.report.fit import write_report  # matplotlib takes a second to come up: only where it is used
+
+            write_report(answers, report, files)
     except (RigError, OSError) as error:
         click.echo(f"rig fit: {error}", err=True)
         raise SystemExit(2) from error

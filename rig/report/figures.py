@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from identification.recording import Floats
-from rig.report.look import BAND, DATA, INK, MODEL, MUTED, NARROW, PAPER, SERIES, Plot, labels, legend_above
+from rig.report.look import BAND, DATA, INK, MODEL, MUTED, NARROW, PAPER, SERIES, Plot, dots, labels, legend_above
 
 MANY = 200
 """More points than this are dots without error bars."""
@@ -56,7 +56,7 @@ def draw_groups(axes: Axes, groups: Sequence[Group]) -> None:
         colour, marker = SERIES[min(i, len(SERIES) - 1)]
         name = group.label if i < len(SERIES) else "_"
         if group.x.size > MANY:
-            axes.plot(group.x, group.y, marker, color=colour, markersize=1.6, label=name, markeredgewidth=0)
+            dots(axes, group.x, group.y, colour, 1.8, name)
         elif group.half is None or not np.any(np.isfinite(group.half)):
             axes.plot(group.x, group.y, marker, color=colour, label=name)
         else:
@@ -186,5 +186,4 @@ def forest(rows: Sequence[Interval], x: str, reference: float | None = None) -> 
         axes.set_ylim(len(rows) - 0.4, -0.6)
         axes.grid(visible=False, axis="y")
 
-    height = 0.85 + 0.3 * len(rows)
-    return Plot(draw, alt, (NARROW[0], height), (9.0, height))
+    return Plot(draw, alt, (NARROW[0], 0.85 + 0.3 * len(rows)))

@@ -13,7 +13,7 @@ from matplotlib.patches import Rectangle
 
 from identification.recording import Floats
 from rig.report.figures import Curve, Group, draw_curve, draw_groups
-from rig.report.look import DATA, INK, MODEL, MUTED, NARROW, PAPER, STEPS, Plot, labels, legend_above
+from rig.report.look import DATA, INK, MODEL, MUTED, NARROW, PAPER, STEPS, Plot, drawable, labels, legend_above
 
 CELLS = (24, 14)
 """Most columns (time) and rows (voltage) of a map: each cell must be seen on a phone."""
@@ -83,14 +83,15 @@ def residual_map(
         _signs(axes, grid, bounds)
         if region is not None:
             _outline(axes, grid, region)
-        labels(axes, x, y)
+        labels(axes, x if region is None else f"{x}\noutlined: {region.label}", y)
         axes.grid(visible=False)
         axes.set_xlim(grid.time[0], grid.time[-1])
         axes.set_ylim(grid.voltage[0], grid.voltage[-1])
         scale = figure.colorbar(drawn, ax=axes, orientation="horizontal", location="top", aspect=40, pad=0.02)
-        scale.set_ticks([bounds[0], bounds[2], 0.0, bounds[-3], bounds[-1]])
-        scale.ax.set_xticklabels([f"{tick:.2g}" for tick in (bounds[0], bounds[2], 0.0, bounds[-3], bounds[-1])])
-        scale.set_label(f"{value}; + and − mark the darkest half")
+        ticks = [bounds[0], bounds[2], 0.0, bounds[-3], bounds[-1]]
+        scale.set_ticks(ticks)
+        scale.ax.set_xticklabels([f"{tick:.2g}".replace("-", "−") for tick in ticks])
+        scale.set_label(f"{value}; + and − in the two strongest; blank: not measured")
 
     return Plot(draw, alt, (NARROW[0], 4.2), (9.0, 4.4))
 
@@ -151,11 +152,13 @@ def before_after(panel: Panel, y: str, x: str = "time / s") -> Plot:
 
     def draw(figure: Figure) -> None:
         above, below = figure.subplots(2, 1, sharex=True, height_ratios=[3, 2])
-        above.plot(panel.time, panel.measured, color=DATA, linewidth=2.4, label="measured")
+        above.plot(*drawable(panel.time, panel.measured), color=DATA, linewidth=2.4, label="measured")
         for i, (name, predicted, colour, dash) in enumerate(lines):
-            above.plot(panel.time, predicted, dash, color=colour, linewidth=1.2, label=name)
+            above.plot(*drawable(panel.time, predicted), dash, color=colour, linewidth=1.2, label=name)
             left = panel.measured - predicted
-            below.plot(panel.time, left, dash, color=colour, linewidth=1.0, label=f"{name}: RMSE {rms[i]:.3g}")
+            below.plot(
+                *drawable(panel.time, left), dash, color=colour, linewidth=1.0, label=f"{name}: RMSE {rms[i]:.3g}"
+            )
         labels(above, "", y)
         labels(below, x, "residual")
         legend_above(above)

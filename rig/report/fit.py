@@ -187,7 +187,7 @@ def pictures(fit: ThrustFit) -> tuple[Picture, ...]:
     out = [
         Picture(
             "Measured and fitted thrust",
-            figures.fit_band(_measured(fit), model, x, "thrust less tare / N"),
+            figures.fit_band(_measured(fit), model, x, _less(fit)),
             f"The band holds scatter and calibration; where it is not seen it is narrower than the line.{bars}{kept}",
         ),
         Picture(
@@ -213,9 +213,14 @@ def pictures(fit: ThrustFit) -> tuple[Picture, ...]:
     return tuple(out)
 
 
+def _main(fit: ThrustFit) -> int:
+    """How many coefficients multiply the square of what explains: one, or one for each direction; flow comes after."""
+    return sum(name.endswith(("_plus", "_minus")) for name in fit.parameters) or 1
+
+
 def _of(fit: ThrustFit, x: Floats) -> list[Parameter]:
     """The coefficient that counts at each voltage."""
-    found = list(fit.parameters.values())
+    found = list(fit.parameters.values())[: _main(fit)]
     return [found[0] if V >= 0 or len(found) == 1 else found[1] for V in x]
 
 
@@ -262,10 +267,16 @@ def _groups(fit: ThrustFit, x: Sequence[Floats], y: Sequence[Floats]) -> list[Gr
     return out
 
 
+def _less(fit: ThrustFit) -> str:
+    return "thrust less tare and flow / N" if len(fit.parameters) > _main(fit) else "thrust less tare / N"
+
+
 def _measured(fit: ThrustFit) -> list[Group]:
-    tare = [p.value for p in fit.tare.values()]
-    y = [fit.estimate.rows.y[block] - tare[k] for k, block in enumerate(fit.estimate.rows.blocks)]
-    return _groups(fit, [_explaining(fit, k) for k in range(len(fit.runs))], y)
+    """Thrust without what the curve does not show: tares, and the term of the flow where there is one."""
+    rows, solved = fit.estimate.rows, fit.estimate.fit
+    others = slice(_main(fit), None)
+    shown = rows.y - rows.H[:, others] @ solved.theta[others]
+    return _groups(fit, [_explaining(fit, k) for k in range(len(fit.runs))], [shown[block] for block in rows.blocks])
 
 
 def _time_label(fit: ThrustFit) -> str:

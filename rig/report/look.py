@@ -12,12 +12,16 @@ import re
 from collections.abc import Callable
 from dataclasses import dataclass
 from io import StringIO
+from itertools import pairwise
 from typing import Any, Final, NamedTuple
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.style import context
 from matplotlib.ticker import FuncFormatter, MaxNLocator, NullFormatter
+
+from identification.recording import Floats
 
 
 class Colour(NamedTuple):
@@ -37,7 +41,7 @@ MODEL: Final = "#c2500a"
 BAND: Final = "#f7dcc6"
 OTHER: Final = "#00795d"
 THIRD: Final = "#83408f"
-STEPS: Final = ("#0b4a87", "#3b7ab3", "#86b0d5", "#cfdfed", "#f1f2f3", "#f6dcc4", "#eaac76", "#cd742a", "#8d4209")
+STEPS: Final = ("#0b4a87", "#3b7ab3", "#86b0d5", "#cfdfed", "#e4e7ea", "#f6dcc4", "#eaac76", "#cd742a", "#8d4209")
 """Diverging: most negative first, nothing in the middle."""
 PALETTE: Final = (
     Colour("ink", INK, "#e6e9ed"),
@@ -54,7 +58,7 @@ PALETTE: Final = (
         for i, (light, dark) in enumerate(
             zip(
                 STEPS,
-                ("#9fd0ff", "#5fa3dd", "#3b719f", "#29485f", "#22282f", "#584029", "#96602f", "#d9873c", "#ffc48f"),
+                ("#9fd0ff", "#5fa3dd", "#3b719f", "#29485f", "#2c333b", "#584029", "#96602f", "#d9873c", "#ffc48f"),
                 strict=True,
             )
         )
@@ -106,7 +110,7 @@ STYLE: Final[dict[str, Any]] = {
     "lines.linewidth": 1.6,
     "lines.markersize": 5.0,
     "errorbar.capsize": 2.5,
-    "path.simplify": True,
+    "path.simplify": False,
     "figure.facecolor": "none",
     "savefig.facecolor": "none",
     "legend.labelcolor": INK,
@@ -165,6 +169,29 @@ def _opening(found: re.Match[str]) -> str:
     box = re.search(r'viewBox="[^"]*"', found[0])
     assert box is not None
     return f"<svg {box[0]}>"
+
+
+def dots(axes: Axes, x: Floats, y: Floats, colour: str, size: float, label: str | None = None) -> None:
+    """Many small round points as one path of strokes without length: a tenth of the bytes of as many markers."""
+    gaps = np.full(x.size, np.nan)
+    across, up = (np.column_stack([z, z, gaps]).ravel() for z in (x, y))
+    axes.plot(across, up, color=colour, linewidth=size, solid_capstyle="round")
+    axes.plot([], [], "o", color=colour, markersize=max(size, 3.0), label=label)
+
+
+def drawable(x: Floats, y: Floats, most: int = 1200) -> tuple[Floats, Floats]:
+    """A long line (n,) as at most about `most` points that keep its lowest and highest in each stretch.
+
+    >>> x, y = drawable(np.arange(6.0), np.array([0.0, 9.0, 1.0, 2.0, -5.0, 3.0]), 4)
+    >>> x.tolist(), y.tolist()
+    ([0.0, 1.0, 4.0, 5.0], [0.0, 9.0, -5.0, 3.0])
+    """
+    if x.size <= most:
+        return x, y
+    edges = np.linspace(0, x.size, max(most // 2, 1) + 1).astype(np.intp)
+    kept = [a + part for a, b in pairwise(edges) if b > a for part in (y[a:b].argmin(), y[a:b].argmax())]
+    at = np.unique(kept)
+    return x[at], y[at]
 
 
 def unit_text(unit: str) -> str:
