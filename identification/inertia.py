@@ -18,7 +18,8 @@ from identification.maximum_likelihood import NOTHING, Gaussian, Maximum, maximi
 from identification.noise import fit_noise
 from identification.recording import Floats
 from identification.thrust_data import Unusable
-from identification.vehicle import entanglement, unit_of
+from identification.vehicle import unit_of
+from identification.vehicle_entangled import entanglement
 from identification.vehicle_simulation import Validation, simulate, validate
 from identification.vehicle_trials import Trial
 from identification.velocity import derivative
@@ -59,6 +60,13 @@ class InertiaFit:
             text = f"{value:.4g} ± {std:.2g} {unit}" if np.isfinite(std) else "not determined"
             weak = "" if known or not np.isfinite(std) else ", not significant (eq. 4.11)"
             out.append(f"{self.axis}: {name} = {text}{weak} ({self.method})")
+        out.extend(f"{self.axis}: {v.statement}" for v in self.validation)
+        return (*out, *self.verdicts)
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        """What to know before the numbers are used."""
+        out: list[str] = []
         out.extend(
             f"{self.axis}: {name} is negative, which no body has: the model lacks something, or the data do not show it"
             for name in ("m", "k", "k2")
@@ -67,7 +75,6 @@ class InertiaFit:
         if self.maximum is not None:
             physical = [n for n in self.estimate.names if n in ("m", "k", "k2") or n.startswith("eta")]
             out.extend(entanglement(self.axis, self.maximum, physical))
-        out.extend(f"{self.axis}: {v.statement}" for v in self.validation)
         out.extend(f"{self.axis}: {w.statement}" for w in self.whiteness if w is not None and not w.white)
         return tuple(out)
 

@@ -18,14 +18,14 @@ from identification.efficiency import Installation, efficiency_sentence
 from identification.maximum_likelihood import NOTHING, Gaussian, Maximum, independent, maximise
 from identification.recording import Floats, Recording
 from identification.thrust_data import Unusable
+from identification.vehicle_entangled import entanglement
 from identification.vehicle_simulation import column, current_along
 from identification.vehicle_trials import SteadyRun, ballast_of, steady_runs
 from identification.verdicts import Underfit, significance, underfit
 
 CURRENT_STD = 1.0
 """m/s: known of any current before it is measured. It settles the direction that no run was driven along."""
-ENTANGLED = 0.98
-"""Correlation above which two parameters are called hardly told apart."""
+CURRENT = ("current_north", "current_east")
 UNITS = {
     "m": ("kg", "kg.m^2"),
     "k": ("N/(m/s)", "N.m/(rad/s)"),
@@ -70,7 +70,11 @@ class DragFit:
     @property
     def statements(self) -> tuple[str, ...]:
         """Parameters, then verdicts, a sentence each."""
-        return (*_parameters(self), *_verdicts(self))
+        return (*_parameters(self), *self.verdicts)
+
+    @property
+    def verdicts(self) -> tuple[str, ...]:
+        return _verdicts(self)
 
 
 def steady_velocity(push: Floats, k: Floats, k2: Floats) -> Floats:
@@ -145,18 +149,18 @@ def fit_runs(
 
 
 def _prior(in_force: Sequence[str], installation: Installation, axis: str, known: Gaussian, current: bool) -> Gaussian:
-    """Earlier knowledge of what enters the force on this axis, and of the current."""
-    told = known.select([name for name in in_force if name in known.names])
+    """Earlier knowledge of drag, of what enters the force on this axis, and of the current."""
+    relevant = ("k", "k2", *in_force)
+    flowing = current and axis in ("surge", "sway")
+    told = known.select([n for n in known.names if n in relevant or (flowing and n in CURRENT)])
     rest = installation.known(name for name in in_force if name not in told.names)
-    pieces = [told, rest]
-    flow = ("current_north", "current_east")
-    if current and axis in ("surge", "sway"):
-        pieces.append(
-            known.select(flow)
-            if set(flow) <= set(known.names)
-            else Gaussian(flow, np.zeros(2), CURRENT_STD**2 * np.eye(2))
-        )
-    return independent(*pieces)
+    return independent(told, rest, current_prior(told) if flowing else NOTHING)
+
+
+def current_prior(told: Gaussian) -> Gaussian:
+    """What is known of a current that nothing told yet speaks of."""
+    names = tuple(name for name in CURRENT if name not in told.names)
+    return Gaussian(names, np.zeros(len(names)), CURRENT_STD**2 * np.eye(len(names)))
 
 
 def _start(runs: Sequence[SteadyRun], names: tuple[str, ...], prior: Gaussian) -> tuple[Floats, Floats]:
@@ -244,45 +248,3 @@ def _verdicts(fit: DragFit) -> tuple[str, ...]:
         out.append(f"{fit.axis}: {bent} of {len(fit.runs)} runs had not reached a constant velocity")
     out.extend(entanglement(fit.axis, fit.maximum, ("k", "k2", *fit.etas)))
     return tuple(out)
-
-
-def entanglement(axis: str, found: Maximum, physical: Sequence[str]) -> tuple[str, ...]:
-    """What cannot be told apart, by name: combinations never seen with the ratios that are, then close correlations."""
-    lost = found.deficiency
-    estimate = found.estimate
-    out = []
-    if lost is not None:
-        out.append(f"{axis}: {lost.statement}")
-        etas = [name for name in lost.names if name.startswith("eta")]
-        drags = [name for name in ("m", "k", "k2") if name in lost.names]
-        for eta in etas if drags else []:
-            shares = [_ratio(found, drag, eta) for drag in drags]
-            told = ", ".join(text for text in shares if text)
-            if told:
-                out.append(f"{axis}: drag and {eta} only scale together; determined are {told}")
-        if etas and drags:
-            names = ", ".join(etas)
-            out.append(f"{axis}: add runs whose thrusters are free of {names}, or state one of them")
-    std = np.sqrt(np.diag(estimate.cov))
-    for i, a in enumerate(estimate.names):
-        for j, b in enumerate(estimate.names[:i]):
-            if a in physical and b in physical and np.isfinite(std[i] * std[j]):
-                r = float(estimate.cov[i, j] / (std[i] * std[j]))
-                if abs(r) > ENTANGLED:
-                    out.append(f"{axis}: {b} and {a} are hardly told apart (correlation {r:.3f})")
-    return tuple(out)
-
-
-def _ratio(found: Maximum, over: str, under: str) -> str:
-    """`k/eta = 120 ± 3`, or nothing when the unseen combination changes the ratio."""
-    estimate, lost = found.estimate, found.deficiency
-    a, b = estimate[over], estimate[under]
-    if a == 0 or b == 0 or lost is None:
-        return ""
-    moves = [dict(c).get(over, 0.0) / a - dict(c).get(under, 0.0) / b for c in lost.combinations]
-    size = max(abs(dict(c).get(under, 0.0) / b) for c in lost.combinations)
-    if size == 0 or max(abs(move) for move in moves) > 0.02 * size:
-        return ""
-    gradient = np.zeros(len(estimate.names))
-    gradient[estimate.names.index(over)], gradient[estimate.names.index(under)] = 1 / b, -a / b**2
-    return f"{over}/{under} = {a / b:.4g} ± {found.spread(gradient):.2g}"

@@ -7,7 +7,7 @@ trial gives and the slope of its neighbours (a constant one puts the vehicle off
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -151,36 +151,51 @@ def fit_percent(measured: Floats, simulated: Floats) -> float:
     return 100 * (1 - float(np.linalg.norm(measured - simulated)) / power) if power > 0 else float("nan")
 
 
-def validate(
-    trials: Sequence[Trial], estimate: Gaussian, buoyancy: Mapping[str, str] | None = None, *, fit_start: bool = True
-) -> tuple[Validation, ...]:
-    """Simulate each trial and compare; the model sees the commands and how the trial began, nothing else.
+@dataclass(frozen=True, eq=False)
+class Replay:
+    """One trial as measured and as the identified vehicle does it, (n,)."""
+
+    recording_id: str
+    quantity: str
+    time: Floats
+    measured: Floats
+    simulated: Floats
+
+    @property
+    def validation(self) -> Validation:
+        rmse = float(np.sqrt(np.mean((self.measured - self.simulated) ** 2)))
+        return Validation(self.recording_id, self.quantity, rmse, fit_percent(self.measured, self.simulated))
+
+
+def replay(one: Trial, estimate: Gaussian, buoyancy: str = "", *, fit_start: bool = True) -> Replay:
+    """Simulate a trial; the model sees the commands and how the trial began, nothing else.
 
     `fit_start`: position and velocity at the start are those that suit the whole trial best; else a speed trial
     starts from its first measurement and a position trial from the straight line through its first five, noise and
-    all. `buoyancy`: recording id -> parameter.
+    all. `buoyancy`: the parameter of this trial's ballast.
     """
-    out = []
     names = (*estimate.names, "x0", "v0")
-    for one in trials:
-        start = _start(one)
+    start = _start(one)
 
-        def response(starts: Floats, one: Trial = one) -> Floats:
-            theta = np.column_stack([np.tile(estimate.mean, (len(starts), 1)), starts])
-            moved = simulate(one, names, theta, (buoyancy or {}).get(one.recording_id, ""))
-            return moved.position if one.quantity == "position" else moved.velocity
+    def response(starts: Floats) -> Floats:
+        theta = np.column_stack([np.tile(estimate.mean, (len(starts), 1)), starts])
+        moved = simulate(one, names, theta, buoyancy)
+        return moved.position if one.quantity == "position" else moved.velocity
 
-        if fit_start:
-            size = np.maximum(np.abs(start), 0.01 * max(float(np.ptp(one.response)), 1e-6))
+    if fit_start:
+        size = np.maximum(np.abs(start), 0.01 * max(float(np.ptp(one.response)), 1e-6))
+        start = maximise(("x0", "v0"), start, size, lambda starts: one.response - response(starts)).estimate.mean
+    return Replay(one.recording_id, one.quantity, one.time, one.response, response(start[None])[0])
 
-            def misfit(starts: Floats, one: Trial = one, response: Callable[[Floats], Floats] = response) -> Floats:
-                return one.response - response(starts)
 
-            start = maximise(("x0", "v0"), start, size, misfit).estimate.mean
-        y = response(start[None])[0]
-        rmse = float(np.sqrt(np.mean((one.response - y) ** 2)))
-        out.append(Validation(one.recording_id, one.quantity, rmse, fit_percent(one.response, y)))
-    return tuple(out)
+def validate(
+    trials: Sequence[Trial], estimate: Gaussian, buoyancy: Mapping[str, str] | None = None, *, fit_start: bool = True
+) -> tuple[Validation, ...]:
+    """`replay` of each trial in numbers. `buoyancy`: recording id -> parameter."""
+    floats = buoyancy or {}
+    return tuple(
+        replay(one, estimate, floats.get(one.recording_id, ""), fit_start=fit_start).validation for one in trials
+    )
 
 
 def _start(one: Trial) -> Floats:

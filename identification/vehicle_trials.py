@@ -81,26 +81,36 @@ def response_of(recording: Recording, axis: str) -> Channel | None:
     return next((channel for group in wanted for channel in group), None)
 
 
+AS_GOOD = 0.5
+"""Share of the hardest push that an axis needs to be what a trial was for, because its motion alone was measured."""
+
+
 def dominant_axis(recording: Recording, installation: Installation) -> str | None:
     """The axis on which the commands push hardest, as a share of what its thrusters give at the largest voltage.
 
-    None when nothing was commanded. Used where a campaign does not say what each trial was for.
+    Thrusters at an angle push along several axes: one whose motion was measured comes before one whose was not. None
+    when nothing was commanded. Used where a campaign does not say what each trial was for.
     """
     times = np.unique(np.concatenate([c.time for c in recording.all_of("command_voltage")] or [np.zeros(0)]))
     volts = thruster_volts(recording, installation, times) if times.size else Unusable("")
     if isinstance(volts, Unusable):
         return None
+    shares = {axis: _pushed(installation, axis, volts) for axis in AXES}
+    most = max(shares.values())
+    if most == 0:
+        return None
+    seen = [axis for axis in AXES if shares[axis] >= AS_GOOD * most and response_of(recording, axis) is not None]
+    return max(seen or AXES, key=lambda axis: round(shares[axis], 9))
+
+
+def _pushed(installation: Installation, axis: str, volts: Mapping[str, Floats]) -> float:
+    """Root mean square force as a share of all that the thrusters give on the axis at the largest voltage."""
     top = max(float(np.abs(V).max()) for V in volts.values())
-    best, share = None, 0.0
-    for axis in AXES:
-        most = sum(
-            float(np.abs(t.coefficients @ t.basis(np.array([top]))).max()) * abs(t.arms.get(axis, 0.0))
-            for t in installation.thrusters
-        )
-        pushed = float(np.sqrt(np.mean(force_on(installation, axis, volts).nominal() ** 2))) if most else 0.0
-        if most and pushed / most > share + 1e-9:
-            best, share = axis, pushed / most
-    return best
+    most = sum(
+        float(np.abs(t.coefficients @ t.basis(np.array([top]))).max()) * abs(t.arms.get(axis, 0.0))
+        for t in installation.thrusters
+    )
+    return float(np.sqrt(np.mean(force_on(installation, axis, volts).nominal() ** 2))) / most if most else 0.0
 
 
 def _who(recording: Recording) -> str:
@@ -119,7 +129,7 @@ def _heading(recording: Recording, t_start: float, t_end: float) -> float:
     return float(value.mean()) if value.size else float("nan")
 
 
-def _holds(recording: Recording) -> list[tuple[float, float]]:
+def holds(recording: Recording) -> list[tuple[float, float]]:
     """Steps of phase `hold`; without a table, spans without a change of any command."""
     marked = [(s.t_start, s.t_end) for s in recording.steps if s.phase == "hold" and s.t_end > s.t_start]
     if marked or recording.steps:
@@ -148,7 +158,7 @@ def _spans(recordings: Sequence[Recording], installation: Installation, axis: st
         channel = response_of(recording, axis)
         if channel is None or channel.quantity == "speed":
             continue
-        for t_start, t_end in _holds(recording):
+        for t_start, t_end in holds(recording):
             time, value = _finite(channel, t_start, t_end)
             volts = thruster_volts(recording, installation, np.array([0.5 * (t_start + t_end)]))
             if time.size >= LEAST_SAMPLES and time[-1] > time[0] and not isinstance(volts, Unusable):

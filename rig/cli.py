@@ -31,7 +31,11 @@ COMMANDS: Final = {
     ),
     "console": Entry("rig.run:console_command", "Attach to a run that is going on."),
     "stop": Entry("rig.run:stop_command", "Stop a run that is going on: zero volts now, close the recording."),
+    "design": Entry("rig.design:design_command", "Best levels, order and dwells for the time in the tunnel."),
     "fit": Entry("rig.fit:fit_command", "Fit tau = C V|V| to recordings."),
+    "vehicle": Entry(
+        "rig.vehicle:vehicle_command", "Identify drag, efficiency and inertia of a vehicle from its trials."
+    ),
     "import": Entry("rig.importer:import_command", "Make a recording of another program's table or log."),
     "recover": Entry("rig.recover:recover_command", "Copy a recording that was not closed in order into a plain file."),
 }

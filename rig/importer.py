@@ -16,6 +16,7 @@ import numpy as np
 from rig.errors import ConfigError, RecordingError, RigError
 from rig.importing.convert import Imported, convert
 from rig.importing.mapping import ImportMap, read_map, shipped
+from rig.importing.plain import read_plain
 from rig.recorder_messages import Attribute, EventRow, Rows
 
 
@@ -50,6 +51,32 @@ def import_file(
     _write(part, _attributes(source, data, plan, imported, notes), imported)
     part.rename(out)
     return Summary(out, imported.rows, imported.bad, (*imported.notes, *imported.warnings))
+
+
+def import_plain(source: Path, out: Path, notes: str = "") -> Summary:
+    """Write `out`, a new file, from JSON in the words of the recording format (`rig.importing.plain`)."""
+    if out.exists():
+        raise RecordingError(f"{out} exists; a recording is never overwritten: give another name")
+    try:
+        data = source.read_bytes()
+        plain = read_plain(data)
+    except OSError as error:
+        raise RecordingError(f"{source} can't be read: {error.strerror}") from error
+    except RecordingError as error:
+        raise RecordingError(f"{source.name}: {error}") from error
+    digest = hashlib.sha256(data).hexdigest()
+    attributes: dict[str, Attribute] = {
+        "recording_id": str(uuid.uuid5(uuid.NAMESPACE_OID, digest)),
+        "thruster": source.stem,
+        "software": f"thruster-rig {_version()}, rig import",
+        "imported_from": source.name,
+        "imported_sha256": digest,
+    }
+    part = out.with_name(out.name + ".part")
+    part.unlink(missing_ok=True)
+    _write(part, attributes | plain.attributes | ({"notes": notes} if notes else {}), plain.imported)
+    part.rename(out)
+    return Summary(out, plain.imported.rows, 0, plain.imported.notes)
 
 
 def _write(path: Path, attributes: Mapping[str, Attribute], imported: Imported) -> None:
@@ -120,7 +147,11 @@ def _list_maps(context: click.Context, _parameter: click.Parameter, wanted: bool
 
 @click.command("import", help="Make a recording of another program's table or log, as MAP says what its columns are.")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("--map", "map_name", required=True, help="name of a shipped map (see --list) or path of a MAP.toml")
+@click.option(
+    "--map",
+    "map_name",
+    help="name of a shipped map (see --list) or path of a MAP.toml; none for JSON in the words of the recording format",
+)
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="the recording; default: FILE with .h5")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=NUMBER", help="override a parameter of the map")
 @click.option("--thruster", help="id of the thruster; default: the map's, else the file's name")
@@ -130,7 +161,7 @@ def _list_maps(context: click.Context, _parameter: click.Parameter, wanted: bool
 def import_command(
     *,
     file: Path,
-    map_name: str,
+    map_name: str | None,
     output: Path | None,
     assignments: tuple[str, ...],
     thruster: str | None,
@@ -138,6 +169,10 @@ def import_command(
     notes: str,
 ) -> None:
     """Exit status 0; RigError is for the caller (rig.cli) to print."""
+    if map_name is None:
+        summary = import_plain(file, output or file.with_suffix(".h5"), notes)
+        click.echo(f"{summary.path}: {summary.rows} rows")
+        return
     plan = read_map(map_name)
     plan = replace(plan, thruster=thruster or plan.thruster, kind=kind or plan.kind)
     summary = import_file(file, plan, output or file.with_suffix(".h5"), _assignments(assignments), notes)

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import json
 import signal
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from types import FrameType
 from typing import NoReturn
 
 import click
+import numpy as np
 
 from sim_devices.bench import Bench, start
 from sim_devices.ports import ask
@@ -17,6 +20,10 @@ from sim_devices.process import running
 from sim_devices.settings import load
 from sim_devices.tables import WorldError
 from sim_devices.truth_table import SUSPICIOUS, compare, table
+from sim_devices.vehicle.documents import held_out, recorded, trials, truth, tunnel
+from sim_devices.vehicle.settings import load as load_vehicle
+from sim_devices.vehicle.truth_table import compare as compare_answer
+from sim_devices.vehicle.truth_table import table as vehicle_table
 
 FILE = click.Path(path_type=Path)
 FITS = "fits.json"
@@ -77,6 +84,50 @@ def calibrate(world: Path, links: Path | None, seed: int | None, campaign: Path,
     rows = [row for fits in sorted(set(output.glob(f"*/{FITS}")) - before) for row in compare(fits, constants)]
     click.echo(table(rows))
     return status or int(not rows or any(abs(row.z) > SUSPICIOUS for row in rows))
+
+
+@main.command()
+@click.argument("settings", type=FILE)
+@click.argument("out", type=FILE)
+@click.option("--seed", type=click.IntRange(min=0), help="Seed of all noise (default: from the file).")
+def vehicle(settings: Path, out: Path, seed: int | None) -> None:
+    """Simulate the vehicle of SETTINGS (TOML): recordings of tunnel, trials and trials to check on, into folder OUT."""
+    from rig.cli import main as rig
+
+    try:
+        described = load_vehicle(settings)
+    except WorldError as error:
+        fail(str(error))
+    if out.exists():
+        fail(f"{out} exists; recordings are never overwritten: give a new folder")
+    hull, scalars = described.hull, described.scalars
+    rng = np.random.default_rng(scalars.seed if seed is None else seed)
+    groups = {
+        "tunnel": tunnel(hull, scalars, rng),
+        "trials": recorded(hull, trials(), rng),
+        "check": recorded(hull, held_out(), rng),
+    }
+    status = 0
+    with TemporaryDirectory() as temporary:
+        for group, documents in groups.items():
+            (out / group).mkdir(parents=True)
+            for name, document in documents.items():
+                log = Path(temporary) / f"{name}.json"
+                log.write_text(json.dumps(document), encoding="utf-8")
+                status = status or rig(["import", str(log), "--output", str(out / group / f"{name}.h5")])
+    (out / "truth.json").write_text(json.dumps(truth(hull), indent=1) + "\n", encoding="utf-8")
+    raise SystemExit(status)
+
+
+@main.command("compare")
+@click.argument("true", type=FILE)
+@click.argument("answer", type=FILE)
+def compare_vehicle(true: Path, answer: Path) -> None:
+    """The vehicle in TRUE (truth.json) beside ANSWER, what `rig vehicle --json` wrote of its recordings."""
+    try:
+        click.echo(vehicle_table(compare_answer(true, answer)))
+    except WorldError as error:
+        fail(str(error))
 
 
 def stop_requests() -> Callable[[], bool]:

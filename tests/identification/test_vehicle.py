@@ -20,7 +20,7 @@ from identification.inertia import by_derivative, output_error
 from identification.maximum_likelihood import Gaussian
 from identification.thrust_data import Unusable
 from identification.vehicle import fit_runs, identify_drag, passed_on
-from identification.vehicle_campaign import AxisTrials, identify_axis, identify_vehicle, sort_trials
+from identification.vehicle_campaign import AxisTrials, CampaignFacts, identify_axis, identify_vehicle, sort_trials
 from identification.vehicle_simulation import validate
 from identification.vehicle_trials import Trial, steady_runs, trial
 from sim_devices.vehicle import romeo, run_trials
@@ -128,7 +128,6 @@ def test_one_group_alone_with_its_interaction_gives_the_ratio():
     assert ratio == pytest.approx(60 / 0.6, rel=0.05)
     result = identify_axis(
         AxisTrials(tuple(steady(hull, ahead)), tuple(steady(hull, sines("surge")))), vehicle, "surge",
-        Gaussian((), np.zeros(0), np.zeros((0, 0))), {},
     )  # fmt: skip
     assert isinstance(result.inertia, Unusable)
 
@@ -174,7 +173,9 @@ def test_heave_with_five_weights_and_a_sixth_in_step_two():
     hull, vehicle = romeo(), installation(EXACT)
     moving = recordings_of(hull, [sine("heave", DIVE, v, f"new-{v:g}", ballast=12.0) for v in (12.0, -12.0)], rng)
     found = identify_vehicle(
-        [*recordings_of(hull, heave_steady(), rng), *moving], vehicle, {"new-12": "sixth", "new--12": "sixth"}
+        [*recordings_of(hull, heave_steady(), rng), *moving],
+        vehicle,
+        CampaignFacts(ballast={"new-12": "sixth", "new--12": "sixth"}),
     )
     estimate = found.axes["heave"].inertia.estimate
     assert estimate["buoyancy[sixth]"] == pytest.approx(12.0, abs=4 * estimate.std_of("buoyancy[sixth]"))
@@ -199,14 +200,13 @@ def test_refusals_are_sentences():
     one = steady(romeo(), [there_and_back("f", "surge", FRONT, (10.0,))])
     assert "at least two" in identify_drag([], vehicle, "surge").reason
     assert isinstance(output_error([]), Unusable)
-    alone = identify_axis(AxisTrials(tuple(one)), vehicle, "surge", Gaussian((), np.zeros(0), np.zeros((0, 0))), {})
+    alone = identify_axis(AxisTrials(tuple(one)), vehicle, "surge")
     assert "no sine-force trial was given" in alone.inertia.reason
-    none = identify_axis(AxisTrials(), vehicle, "surge", Gaussian((), np.zeros(0), np.zeros((0, 0))), {})
+    none = identify_axis(AxisTrials(), vehicle, "surge")
     assert "without drag" in none.inertia.reason
     assert len(none.statements) == 2
     heave = identify_axis(
         AxisTrials(tuple(one), tuple(steady(romeo(), [sine("heave", DIVE, 10.0)]))), vehicle, "surge",
-        Gaussian((), np.zeros(0), np.zeros((0, 0))), {},
     )  # fmt: skip
     assert "no position, depth, heading or speed" in heave.inertia.reason
 

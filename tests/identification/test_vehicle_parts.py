@@ -23,7 +23,8 @@ from identification.maximum_likelihood import Gaussian, independent, maximise
 from identification.recording import Channel, Recording
 from identification.thrust import fit_thrust
 from identification.thrust_data import Unusable
-from identification.vehicle import entanglement, identify_drag, steady_velocity, unit_of
+from identification.vehicle import identify_drag, steady_velocity, unit_of
+from identification.vehicle_entangled import entanglement
 from identification.vehicle_simulation import fit_percent, integrate
 from identification.vehicle_trials import Trial, dominant_axis, response_of, steady_runs, trial
 from sim_devices.vehicle import romeo

@@ -11,7 +11,7 @@ from identification.efficiency import Installation, Interaction, Thruster
 from identification.inertia import by_derivative, output_error
 from identification.recording import Channel, Recording, Step
 from identification.vehicle import identify_drag
-from identification.vehicle_campaign import identify_vehicle
+from identification.vehicle_campaign import CampaignFacts, identify_vehicle
 from identification.vehicle_trials import trial
 from sim_devices.vehicle import romeo, run_trials
 from sim_devices.vehicle.body import Body
@@ -95,7 +95,7 @@ def identify(hull, vehicle, rng, axes=AXES) -> Identified:
     moving = {axis: recordings_of(hull, sines(axis), rng) for axis in axes}
     everything = [r for group in (*steady.values(), *moving.values()) for r in group]
     experiments = {"heave-sine-1": "heave-3", "heave-sine-2": "heave-3"}
-    found = identify_vehicle(everything, vehicle, experiments)
+    found = identify_vehicle(everything, vehicle, CampaignFacts(ballast=experiments))
     out = Identified(hull)
     for axis, result in found.axes.items():
         out.drag[axis], out.inertia[axis] = result.drag, result.inertia
