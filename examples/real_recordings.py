@@ -17,8 +17,8 @@ import numpy as np
 from identification.estimation import Method
 from identification.points import voltage_channel
 from identification.recording import Recording
-from identification.thrust_forms import Model
 from identification.thrust_data import voltage_at
+from identification.thrust_forms import Model
 from rig.errors import RecordingError
 from rig.fit import answer_text, fit_recordings
 from rig.hdf5 import load

@@ -52,7 +52,7 @@ def repeatability(thrusters: Sequence[Sequence[Group]]) -> Repeatability | None:
     >>> groups = [Group("a", ("C",), np.array([c]), np.array([[1e-8]]), 20.0) for c in (0.40, 0.404, 0.398, 0.401)]
     >>> found = repeatability([groups])
     >>> round(found.std, 4), found.dof, found.p_value < 0.001
-    (0.0063, 3.0, True)
+    (0.0062, 3.0, True)
     """
     several = [groups for groups in thrusters if len(groups) > 1]
     if not several:

@@ -4,7 +4,7 @@
         + k V                                        with a linear term
     V|V| -> sgn(V) max(|V| - d, 0)^2                 with a dead band d; linearised about its expected value
 
-A hold of T seconds after settling gives its mean thrust with the variance (white^2 + (proportional tau)^2) / T + floor^2.
+A hold of T s after settling gives its mean thrust with the variance (white^2 + (proportional tau)^2) / T + floor^2.
 """
 
 from __future__ import annotations

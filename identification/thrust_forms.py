@@ -78,3 +78,8 @@ def columns(form: Form, level: Floats, flow: Floats | None) -> list[Floats]:
             raise ValueError(f"columns: {form.name} needs the flow")
         found.append(-np.abs(level) * flow)
     return found
+
+
+def model_of(form: Form) -> Model:
+    """The model a form belongs to."""
+    return next(model for (model, _), other in FORMS.items() if other == form)

@@ -24,7 +24,10 @@ class Row:
     high: float
     unit: str
     percent: float
+    """Relative error of eq. 4.11, corrected for correlated samples."""
     verdict: str
+    percent_uncorrected: float = float("nan")
+    """The same as if samples were independent."""
 
 
 def digits(value: float, std: float) -> str:
@@ -49,17 +52,22 @@ def parameter_text(p: Parameter) -> str:
     return f"{digits(p.value, p.std)} ± {digits(p.std, p.std)} {p.unit} (95 %: {low} to {high})"
 
 
+def _percent(std: float, value: float) -> float:
+    return 100 * std / abs(value) if value else float("inf")
+
+
 def table(fit: ThrustFit) -> tuple[Row, ...]:
     """Coefficients, then one tare per recording."""
     rows = []
     for name, p in fit.parameters.items():
         verdict = fit.significance[name]
         word = "significant" if verdict.significant else "not significant"
-        rows.append(Row(name, p.value, p.std, p.low, p.high, p.unit, verdict.percent, word))
+        plain = _percent(p.std_uncorrected, p.value)
+        rows.append(Row(name, p.value, p.std, p.low, p.high, p.unit, verdict.percent, word, plain))
     for k, p in enumerate(fit.tare.values()):
-        percent = 100 * p.std / abs(p.value) if p.value else float("inf")
         name = "tare" if len(fit.tare) == 1 else f"tare {k + 1}"
-        rows.append(Row(name, p.value, p.std, p.low, p.high, p.unit, percent, ""))
+        percent, plain = _percent(p.std, p.value), _percent(p.std_uncorrected, p.value)
+        rows.append(Row(name, p.value, p.std, p.low, p.high, p.unit, percent, "", plain))
     return tuple(rows)
 
 

@@ -1,0 +1,142 @@
+"""What `rig fit` finds: per thruster the model asked for, the others beside it, and what each residual says."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import chain
+from pathlib import Path
+
+from identification.estimation import Method
+from identification.recording import Recording
+from identification.thrust import ThrustFit, fit_runs
+from identification.thrust_choice import Candidate, Remainder, side_by_side, without
+from identification.thrust_data import Run, Unusable, prepare
+from identification.thrust_forms import FORMS, MODELS, Model
+from identification.thruster_dynamics import DynamicsFit, fit_dynamics
+from rig.errors import RecordingError
+from rig.hdf5 import load
+
+FIT_FORMAT = "thruster-rig-fit"
+FIT_VERSION = 1
+OTHER_AXIS = {"command_voltage": "rotation_rate", "motor_voltage": "rotation_rate", "rotation_rate": "command_voltage"}
+"""What the thrust is explained by in the models beside the chosen one, where it was recorded too."""
+
+
+@dataclass(frozen=True, eq=False)
+class Answer:
+    """Of one thruster: the fit asked for and the other models beside it, where the data allow them."""
+
+    fit: ThrustFit
+    alternatives: tuple[ThrustFit, ...]
+    notes: tuple[str, ...] = ()
+    candidates: tuple[Candidate, ...] = ()
+    """The fit and its alternatives, in their order, with what each residual says."""
+    remainders: tuple[Remainder, ...] = ()
+    """The fit without each of its coefficients in turn."""
+    dynamics: DynamicsFit | Unusable | None = None
+    """Of the rotor; the sentence why there is none; None when it was not asked for."""
+
+
+@dataclass(frozen=True, slots=True)
+class Wanted:
+    """What is to be fitted. `dynamics`: the rotor too."""
+
+    model: Model = "C V|V|"
+    voltage: str = "command_voltage"
+    method: Method = "wls"
+    dynamics: bool = False
+
+
+def fit_recordings(
+    recordings: Sequence[Recording],
+    model: Model = "C V|V|",
+    voltage: str = "command_voltage",
+    method: Method = "wls",
+    *,
+    dynamics: bool = False,
+) -> tuple[Answer, ...]:
+    """One answer per thruster, in order of first appearance. Raises RecordingError for input that cannot be used."""
+    wanted = Wanted(model, voltage, method, dynamics)
+    seen: dict[str, str] = {}
+    groups: dict[str, list[Recording]] = {}
+    for recording in recordings:
+        name = recording.source or recording.recording_id
+        if recording.recording_id in seen:
+            other = seen[recording.recording_id]
+            raise RecordingError(f"{name} is the same recording as {other} ({recording.recording_id}); give it once")
+        seen[recording.recording_id] = name
+        groups.setdefault(recording.thruster, []).append(recording)
+    prepared = {thruster: _prepared(group, voltage) for thruster, group in groups.items()}
+    return tuple(_answer(groups[thruster], runs, wanted) for thruster, runs in prepared.items())
+
+
+def _prepared(recordings: Sequence[Recording], voltage: str) -> list[Run]:
+    runs = []
+    for recording in recordings:
+        run = prepare(recording, voltage)
+        if isinstance(run, Unusable):
+            raise RecordingError(run.reason)
+        runs.append(run)
+    return runs
+
+
+def _answer(recordings: Sequence[Recording], runs: Sequence[Run], wanted: Wanted) -> Answer:
+    fit = fit_runs(runs, wanted.model, wanted.method)
+    if isinstance(fit, Unusable):
+        raise RecordingError(fit.reason)
+    notes = tuple(
+        f"{recording.source or recording.recording_id} was {recording.outcome}: what it holds was used"
+        for recording in recordings
+        if recording.outcome in {"aborted", "tripped"}
+    )
+    others = tuple(_beside(recordings, runs, wanted))
+    dynamics = fit_dynamics(recordings) if wanted.dynamics else None
+    remainders = tuple(without(fit, name) for name in fit.parameters)
+    return Answer(fit, others, notes, side_by_side((fit, *others)), remainders, dynamics)
+
+
+def _models(runs: Sequence[Run], but: Model | None = None) -> list[Model]:
+    """The sensible ones: with the flow term only where a flow was recorded and moves."""
+    flows = all(run.flow is not None and run.flow.moves for run in runs)
+    by_rate = runs[0].voltage_quantity == "rotation_rate"
+    return [model for model in MODELS if model != but and (flows or not FORMS[model, by_rate].with_flow)]
+
+
+def _beside(recordings: Sequence[Recording], runs: Sequence[Run], wanted: Wanted) -> Iterable[ThrustFit]:
+    """Other models of the same signal, then those of the other signal where all recordings have it."""
+    found = [fit_runs(runs, model, wanted.method) for model in _models(runs, wanted.model)]
+    other = OTHER_AXIS[runs[0].voltage_quantity]
+    turned = [prepare(recording, other) for recording in recordings]
+    good = [run for run in turned if isinstance(run, Run) and not run.unsigned]
+    if len(good) == len(turned) and all((run.voltage_quantity == "rotation_rate") == _by_rate(other) for run in good):
+        found += [fit_runs(good, model, wanted.method) for model in _models(good)]
+    return (fit for fit in found if isinstance(fit, ThrustFit))
+
+
+def _by_rate(quantity: str) -> bool:
+    return quantity == "rotation_rate"
+
+
+def fit_files(
+    paths: Iterable[Path],
+    model: Model = "C V|V|",
+    voltage: str = "command_voltage",
+    method: Method = "wls",
+    *,
+    dynamics: bool = False,
+) -> tuple[Answer, ...]:
+    """Load and fit; a folder stands for every `*.h5` in it. Raises RecordingError with one sentence."""
+    files = list(chain.from_iterable(_expand(Path(path)) for path in paths))
+    if not files:
+        raise RecordingError("rig fit: no recording was given; expected one or more *.h5 files")
+    return fit_recordings([load(path) for path in files], model, voltage, method, dynamics=dynamics)
+
+
+def _expand(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    found = sorted(path.glob("*.h5"))
+    if not found:
+        raise RecordingError(f"{path} is a folder without recordings; expected *.h5 files in it")
+    return found
