@@ -106,11 +106,13 @@ def optimal_levels(
     criterion: Criterion = "D",
     max_mean_heat: float = float("inf"),
     size: Floats | None = None,
+    prior: Floats | None = None,
 ) -> Design | Deficiency | Impossible:
     """Shares of `total_time` (s) over the candidates; a Deficiency when no choice of levels tells the parameters apart.
 
-    `size` (p,): expected magnitude of each parameter, for criterion A (default 1 each). `max_mean_heat` limits the
-    mean of candidates.heat over the time. Raises ValueError for arrays that do not fit.
+    `size` (p,): expected magnitude of each parameter, for criterion A (default 1 each, inf: it does not count).
+    `max_mean_heat` limits the mean of candidates.heat over the time. `prior` (p, p): information there is anyhow, from
+    tares or an earlier run. Raises ValueError for arrays that do not fit.
 
     >>> V = np.linspace(-20, 20, 41)
     >>> plan = optimal_levels(Candidates(V, np.column_stack([V * abs(V), np.ones(41)]), ("C", "tare")), 60.0)
@@ -123,16 +125,17 @@ def optimal_levels(
     corners = _corners(n, heat, max_mean_heat)
     if not corners.size:
         return Impossible(f"every level heats more than the limit of {max_mean_heat:g}")
+    given = np.zeros((p, p)) if prior is None else np.asarray(prior, dtype=np.float64) / total_time
     used = np.flatnonzero(corners.any(axis=0))
-    seen = excitation(rows[used], candidates.names)
+    seen = excitation(np.vstack([rows[used], root_of(given)]), candidates.names)
     if seen.deficiency is not None:
         return seen.deficiency
     scale = np.ones(p) if size is None else np.asarray(size, dtype=np.float64)
     target = np.diag(1 / scale**2) if criterion == "A" else None
-    information = np.einsum("vi,ij,ik->vjk", corners, rows, rows)
+    information = np.einsum("vi,ij,ik->vjk", corners, rows, rows) + given
     weights = _exchange(information, target) @ corners
-    kept: Floats = _pruned(weights, rows, information, target)
-    M = rows.T @ (kept[:, None] * rows)
+    kept: Floats = _pruned(weights, rows, information, target, given)
+    M = rows.T @ (kept[:, None] * rows) + given
     on = np.flatnonzero(kept)
     cov: Floats = np.asarray(np.linalg.inv(M) / total_time, dtype=np.float64)
     return Design(
@@ -145,6 +148,18 @@ def optimal_levels(
         _excess(information, M, target),
         None if heat is None else float(kept @ heat),
     )
+
+
+def root_of(information: Floats) -> Floats:
+    """R (p, p) with R'R = information, which may be singular.
+
+    >>> R = root_of(np.array([[4.0, 2.0], [2.0, 1.0]]))
+    >>> (R.T @ R).round(9).tolist()
+    [[4.0, 2.0], [2.0, 1.0]]
+    """
+    values, vectors = np.linalg.eigh(information)
+    out: Floats = np.sqrt(np.maximum(values, 0.0))[:, None] * vectors.T
+    return out
 
 
 def _checked(candidates: Candidates, total_time: float, max_mean_heat: float) -> None:
@@ -211,7 +226,7 @@ def _start(information: Floats, target: Floats | None) -> Floats:
     weights = np.full(len(information), 1 / len(information))
     for _ in range(60):
         gain = _gradient(information, np.einsum("v,vij->ij", weights, information), target)
-        weights *= gain if target is None else np.sqrt(gain)
+        weights *= gain if target is None else np.sqrt(np.maximum(gain, 0.0))  # a gain of 0 may round below
         weights /= weights.sum()
     kept: Floats = np.where(weights >= 0.05 * weights.max(), weights, 0.0)
     few = np.linalg.cond(np.einsum("v,vij->ij", kept, information))
@@ -247,9 +262,9 @@ def _line_search(M: Floats, change: Floats, target: Floats | None, most: float) 
     return float(brentq(slope, 0.0, most, rtol=1e-12)) if slope(0.0) > 0 > slope(most) else 0.0
 
 
-def _pruned(weights: Floats, rows: Floats, information: Floats, target: Floats | None) -> Floats:
+def _pruned(weights: Floats, rows: Floats, information: Floats, target: Floats | None, given: Floats) -> Floats:
     """Without the traces that the exchange leaves behind, unless they matter."""
     kept = np.where(weights >= LEAST_WEIGHT, weights, 0.0)
     kept /= kept.sum()
-    M = rows.T @ (kept[:, None] * rows)
+    M = rows.T @ (kept[:, None] * rows) + given
     return kept if np.linalg.cond(M) < 1e15 and _excess(information, M, target) <= GAP_AFTER else weights

@@ -51,13 +51,15 @@ class Limits:
     sigma: float
     """m, standard deviation of the position noise."""
     max_force: float
-    """N, of |f0 + a sin|."""
+    """N, of |f0 + a sin|, or of its square law."""
     max_travel: float = float("inf")
     """m, highest less lowest position."""
     max_speed: float = float("inf")
     """m/s"""
     omega: tuple[float, float] = (0.02, 5.0)
     """rad/s, lowest and highest frequency."""
+    of_voltage: bool = False
+    """The voltage is the sine, so the force is a |sin| sin (eq. 4.14): what a plan of kind `sine` commands."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,14 +104,21 @@ def predict(amplitude: Floats, omega: Floats, vehicle: Vehicle, limits: Limits) 
         np.maximum(far, np.abs(state[1]), out=far)
         np.minimum(low, state[0], out=low)
         np.maximum(high, state[0], out=high)
-        state = _step(state, i * h, h, amplitude, omega, vehicle)
+        force = [_force(i * h + part * h, amplitude, omega, vehicle.f0, limits.of_voltage) for part in (0, 0.5, 1)]
+        state = _step(state, h, force, vehicle)
     return Predicted(_m_std(M, vehicle), high - low, far)
 
 
-def _rates(s: Floats, t: float, amplitude: Floats, omega: Floats, vehicle: Vehicle) -> Floats:
+def _force(t: float, amplitude: Floats, omega: Floats, f0: float, of_voltage: bool) -> Floats:
+    wave = np.sin(omega * t)
+    out: Floats = f0 + amplitude * (wave * np.abs(wave) if of_voltage else wave)
+    return out
+
+
+def _rates(s: Floats, force: Floats, vehicle: Vehicle) -> Floats:
     """State (10, c): x, v, dx/d(m, k, k_q, v0), dv/d(v0, m, k, k_q)."""
     v, out = s[1], np.empty_like(s)
-    pull = vehicle.f0 + amplitude * np.sin(omega * t) - vehicle.k * v - vehicle.k_q * np.abs(v) * v
+    pull = force - vehicle.k * v - vehicle.k_q * np.abs(v) * v
     slope = -(vehicle.k + 2 * vehicle.k_q * np.abs(v)) / vehicle.m
     out[0], out[1] = v, pull / vehicle.m
     out[2:5], out[5] = s[7:10], s[6]
@@ -120,11 +129,12 @@ def _rates(s: Floats, t: float, amplitude: Floats, omega: Floats, vehicle: Vehic
     return out
 
 
-def _step(s: Floats, t: float, h: float, amplitude: Floats, omega: Floats, vehicle: Vehicle) -> Floats:
-    a = _rates(s, t, amplitude, omega, vehicle)
-    b = _rates(s + h / 2 * a, t + h / 2, amplitude, omega, vehicle)
-    c = _rates(s + h / 2 * b, t + h / 2, amplitude, omega, vehicle)
-    d = _rates(s + h * c, t + h, amplitude, omega, vehicle)
+def _step(s: Floats, h: float, force: list[Floats], vehicle: Vehicle) -> Floats:
+    """One step of h s; `force` at its start, middle and end."""
+    a = _rates(s, force[0], vehicle)
+    b = _rates(s + h / 2 * a, force[1], vehicle)
+    c = _rates(s + h / 2 * b, force[1], vehicle)
+    d = _rates(s + h * c, force[2], vehicle)
     out: Floats = s + h / 6 * (a + 2 * b + 2 * c + d)
     return out
 

@@ -133,7 +133,7 @@ class RandomOrder:
 
 @dataclass(frozen=True, slots=True)
 class Levels:
-    """The voltages as written, in that order; 0 V is a level like another. `durations` (s, one each) replace the dwell."""
+    """The voltages as written, in that order; 0 V is a level like another. `durations` (s each) replace the dwell."""
 
     voltages: tuple[float, ...]
     durations: tuple[float, ...] = ()
