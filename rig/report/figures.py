@@ -55,8 +55,10 @@ def draw_groups(axes: Axes, groups: Sequence[Group]) -> None:
     for i, group in enumerate(groups):
         colour, marker = SERIES[min(i, len(SERIES) - 1)]
         name = group.label if i < len(SERIES) else "_"
-        if group.x.size > MANY:
+        if group.x.size > MANY and len(groups) == 1:
             dots(axes, group.x, group.y, colour, 1.8, name)
+        elif group.x.size > MANY:
+            axes.plot(group.x, group.y, marker, color=colour, label=name, markersize=3, fillstyle="none", mew=0.7)
         elif group.half is None or not np.any(np.isfinite(group.half)):
             axes.plot(group.x, group.y, marker, color=colour, label=name)
         else:
@@ -133,7 +135,7 @@ def normal_plot(order: NormalOrder) -> Plot:
         axes.plot(order.quantile, order.middle, color=MODEL, linewidth=1.2)
         axes.plot(order.quantile, order.ordered, "o", color=DATA, label="residuals", markersize=4 if n < 100 else 2.5)
         labels(axes, "normal quantile", "standardised residual")
-        legend_above(axes, 2)
+        legend_above(axes)
 
     return Plot(draw, alt)
 

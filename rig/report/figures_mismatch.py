@@ -98,11 +98,10 @@ def residual_map(
 
 def _signs(axes: Axes, grid: Grid, bounds: Floats) -> None:
     """`+` or a minus in every cell of the two outer colours on each side, so that colour is not needed."""
-    strong = float(bounds[-3])
-    for row, column in np.argwhere(np.abs(np.nan_to_num(grid.value)) > strong):
-        x, y = grid.time[column : column + 2].mean(), grid.voltage[row : row + 2].mean()
-        sign = "+" if grid.value[row, column] > 0 else "−"
-        axes.text(x, y, sign, color=PAPER, ha="center", va="center", clip_on=True)
+    x, y = (0.5 * (edges[1:] + edges[:-1]) for edges in (grid.time, grid.voltage))
+    for sign, marker in ((1, "+"), (-1, "_")):
+        row, column = np.nonzero(sign * np.nan_to_num(grid.value) > bounds[-3])
+        axes.plot(x[column], y[row], marker, color=PAPER, markersize=6, markeredgewidth=1.4, zorder=2.6)
 
 
 def _outline(axes: Axes, grid: Grid, region: Region) -> None:

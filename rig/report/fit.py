@@ -20,26 +20,30 @@ from rig.report.normal import normal_order
 from rig.report.page import Page, Picture, Remark, Section, Table, Tone, columns, sentences, write
 
 GRID = 121
-MOST = 1500
-"""Samples drawn of one recording; of more, every k-th."""
+MOST, MOST_EACH = 1500, 300
+"""Samples drawn of a single recording, and of each of several; of more, every k-th."""
 QUANTITY = {
     "command_voltage": "command voltage / V",
     "motor_voltage": "motor voltage / V",
     "rotation_rate": "rotation rate / (rev/s)",
 }
-ALARMS: tuple[tuple[str, Tone], ...] = (
+SIGNS: tuple[tuple[str, Tone], ...] = (
+    ("not underfitted", "good"),
+    ("residual white", "good"),
     ("this fit means nothing", "bad"),
     ("the data cannot tell", "bad"),
     ("underfitted", "doubt"),
     ("points scatter", "doubt"),
-    ("residual not white", "doubt"),
+    ("not white", "doubt"),
     ("poorly excited", "doubt"),
     ("fit not judged", "doubt"),
     ("calibration uncertainty", "doubt"),
-    ("not underfitted", "good"),
-    ("residual white", "good"),
+    ("were not steady", "doubt"),
+    ("the directions are not alike", "doubt"),
+    ("had not reached a constant velocity", "doubt"),
+    ("hardly told apart", "doubt"),
 )
-"""How a verdict begins, and the sign it gets."""
+"""What a verdict says, and the sign it gets; the first that is found counts."""
 
 
 class Answer(Protocol):
@@ -63,7 +67,7 @@ def fit_page(answers: Sequence[Answer], found: Sequence[provenance.Source] = ())
     names = [answer.fit.thruster or "thruster" for answer in answers]
     ids = [name for answer in answers for name in answer.fit.recordings]
     parts = [comparison(answers)] if len(answers) > 1 else []
-    parts += [thruster_section(answer) for answer in answers]
+    parts += [thruster_section(answer, alone=len(answers) == 1) for answer in answers]
     many = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
     lead = prose(sentence(answers[0].fit)) if len(answers) == 1 else _spread(answers)
     return Page(f"Thrust fit of {many}", lead, (*parts, provenance.section(found, ids)), contents=len(answers) > 1)
@@ -117,27 +121,27 @@ def value_and_interval(value: float, std: float, low: float, high: float) -> tup
     return f"{digits(value, std)} ± {digits(std, std)}", f"{digits(low, std)} to {digits(high, std)}"
 
 
-def thruster_section(answer: Answer) -> Section:
-    """Everything about one thruster."""
+def thruster_section(answer: Answer, *, alone: bool = False) -> Section:
+    """Everything about one thruster; `alone` on a page whose head already says it."""
     fit = answer.fit
     said = (*verdicts(fit, answer.alternatives), *answer.notes)
     judgement = Section(
         "What to know before the numbers are used", sentences(Remark(prose(text), tone(text)) for text in said)
     )
     return Section(
-        fit.thruster or "Thruster",
+        "The fit" if alone else fit.thruster or "Thruster",
         (parameter_table(answer), judgement, *pictures(fit), *points_table(fit)),
-        prose(sentence(fit)),
+        "" if alone else prose(sentence(fit)),
     )
 
 
 def tone(verdict: str) -> Tone:
-    """The sign of a verdict, by how it begins.
+    """The sign of a verdict, by what it says.
 
     >>> tone("not underfitted (chi2/dof 0.9)"), tone("underfitted: residuals exceed"), tone("explained by rate")
     ('good', 'doubt', '')
     """
-    return next((sign for start, sign in ALARMS if verdict.startswith(start)), "")
+    return next((sign for words, sign in SIGNS if words in verdict), "")
 
 
 def parameter_table(answer: Answer) -> Table:
@@ -181,7 +185,8 @@ def pictures(fit: ThrustFit) -> tuple[Picture, ...]:
     band = _scatter_band(fit, model.x)
     thin = _thinning(fit)
     kept = f" Every {thin}th sample is drawn." if thin > 1 else ""
-    bars = " Bars are 95 % intervals of each point." if fit.estimate.rows.std_error is not None else ""
+    few = fit.estimate.rows.std_error is not None and fit.estimate.rows.y.size <= figures.MANY
+    bars = " Bars are 95 % intervals of each point." if few else ""
     order = normal_order(fit.estimate)
     solved = fit.estimate.fit
     out = [
@@ -208,9 +213,14 @@ def pictures(fit: ThrustFit) -> tuple[Picture, ...]:
         ),
     ]
     if order is not None:
-        text = "On the line and inside the band: the errors are normal. Residuals are divided by their standard errors."
-        out.insert(3, Picture("Normal plot", figures.normal_plot(order), text))
+        out.insert(3, Picture("Normal plot", figures.normal_plot(order), _normal_caption(fit, order.ordered.size)))
     return tuple(out)
+
+
+def _normal_caption(fit: ThrustFit, drawn: int) -> str:
+    n = fit.estimate.rows.y.size
+    worth = f" {drawn} of {n} residuals, spread evenly: no more than are worth independent ones." if drawn < n else ""
+    return f"On the line and inside the band the errors are normal; each is over its standard error.{worth}"
 
 
 def _main(fit: ThrustFit) -> int:
@@ -250,8 +260,9 @@ def _explaining(fit: ThrustFit, k: int) -> Floats:
 
 
 def _thinning(fit: ThrustFit) -> int:
-    longest = max(int(block.stop - block.start) for block in fit.estimate.rows.blocks)
-    return max(1, math.ceil(longest / MOST))
+    blocks = fit.estimate.rows.blocks
+    longest = max(int(block.stop - block.start) for block in blocks)
+    return max(1, math.ceil(longest / (MOST if len(blocks) == 1 else MOST_EACH)))
 
 
 def _groups(fit: ThrustFit, x: Sequence[Floats], y: Sequence[Floats]) -> list[Group]:

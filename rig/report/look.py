@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from io import StringIO
 from itertools import pairwise
@@ -73,6 +73,8 @@ WIDE: Final = (9.0, 3.6)
 """inches, across both columns of a desk page."""
 TEXT: Final = 10.2
 """pt, every letter in every figure."""
+LETTERS: Final = 12.5
+"""of that size to an inch."""
 
 STYLE: Final[dict[str, Any]] = {
     "svg.fonttype": "none",
@@ -134,6 +136,9 @@ def svg(plot: Plot, size: tuple[float, float] | None = None) -> str:
     with context(STYLE):
         figure = Figure(figsize=size or plot.size, layout="constrained")
         plot.draw(figure)
+        for axes in figure.axes:
+            for artist in (*axes.lines, *axes.collections, *axes.patches):
+                artist.set_in_layout(False)  # inside the axes anyway: no need to measure it
         sink = StringIO()
         metadata = {"Date": None, "Creator": None, "Format": None, "Type": None}
         figure.savefig(sink, format="svg", metadata=metadata)
@@ -234,8 +239,17 @@ def labels(axes: Axes, x: str, y: str) -> None:
             axis.set_minor_formatter(NullFormatter())
 
 
-def legend_above(axes: Axes, columns: int = 3) -> None:
-    """Outside the axes, where it hides no point; nothing for fewer than two series."""
+def legend_above(axes: Axes) -> None:
+    """Outside the axes, where it hides no point, in as many columns as fit; nothing for fewer than two series."""
     handles, names = axes.get_legend_handles_labels()
-    if len(handles) > 1:
-        axes.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, columnspacing=1.0)
+    if len(handles) < 2:
+        return
+    room = LETTERS * axes.get_window_extent().width / axes.figure.dpi
+    columns = next((n for n in range(len(names), 1, -1) if _width(names, n) <= room), 1)
+    axes.legend(handles, names, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, columnspacing=1.0)
+
+
+def _width(names: Sequence[str], columns: int) -> int:
+    """Letters that a legend in so many columns, filled from the top, takes; a marker is worth 4."""
+    rows = -(-len(names) // columns)
+    return sum(4 + max(map(len, names[i : i + rows])) for i in range(0, len(names), rows))
