@@ -12,7 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.stats import chi2
+from scipy.stats import chi2, norm
+from scipy.stats import t as student
 
 from identification.noise import fit_noise, leverage
 from identification.pooling import moderate
@@ -63,14 +64,21 @@ def straight_line(time: Floats, position: Floats) -> Line:
         t, x = time[keep], position[keep]
         u = t - t.mean()
         basis = np.vander(u / np.abs(u).max(), 3, increasing=True)
-        theta, *_ = np.linalg.lstsq(basis, x, rcond=None)
-        left = x - basis @ theta
-        dof = t.size - 3
-        std = float(np.sqrt(left @ left / dof * np.linalg.inv(basis.T @ basis)[2, 2]))
-        straight = not significance(float(theta[2]), std, dof, CURVED).significant
+        straight = not significance(*_last_coefficient(basis, x), CURVED).significant
         if straight or cut + CUT > MOST_CUT or keep.sum() * (1 - CUT) < LEAST_SAMPLES:
             return Line(t, x, straight)
         cut += CUT
+
+
+def _last_coefficient(H: Floats, y: Floats) -> tuple[float, float, float]:
+    """Least-squares coefficient of the last column, its standard deviation under autocorrelated noise, its dof.
+
+    White noise taken for granted, slow noise is curved: runs were cut to less than half and lost that much information.
+    """
+    Q, R = np.linalg.qr(H)
+    weights = Q[:, -1] / R[-1, -1]
+    std, dof = fit_noise(y - Q @ (Q.T @ y), leverage(Q)).combination_std(weights)
+    return float(weights @ y), std, dof
 
 
 def _columns(line: Line, approach: float) -> Floats:
@@ -113,8 +121,18 @@ def approaches(lines: Sequence[Line], forces: Floats) -> Floats:
         gain = float(np.sum((before - after) / power))
         if gain > gained:
             best, gained = T, gain
-    seen = chi2.sf(gained, np.sum(best > 0) + 1) * APPROACHES.size < CURVED
-    return best if seen else none
+    return best if np.any(best > 0) and _seen(lines, best) else none
+
+
+def _seen(lines: Sequence[Line], T: Floats) -> bool:
+    """Do all runs together show an approach, slow noise allowed for? A t deviate counts as the normal one as rare."""
+    power, runs = 0.0, 0
+    for line, constant in zip(lines, T, strict=True):
+        if constant > 0:
+            value, std, dof = _last_coefficient(_columns(line, constant), line.position)
+            rare = student.sf(abs(value) / std, dof) if std > 0 else 0.5
+            power, runs = power + float(norm.isf(max(float(rare), 1e-300))) ** 2, runs + 1
+    return bool(chi2.sf(power, runs + 1) * APPROACHES.size < CURVED)
 
 
 def velocities(
