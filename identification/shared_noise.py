@@ -11,7 +11,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.special import logsumexp
 
 from identification.noise import SHARES, Likelihood, NoiseModel, fit_noise, likelihood, posterior, time_constants
 from identification.recording import Floats
@@ -51,12 +50,23 @@ def fit_noise_jointly(
     found = [likelihood(r, constants, gone) for r, gone in zip(residuals, losses, strict=True)]
     priors = [_share_priors(f, sizes) for f, sizes in zip(found, _sizes(found), strict=True)]
     logs = [prior + f.log.reshape(1, len(SHARES), -1) for prior, f in zip(priors, found, strict=True)]
-    by_size = [logsumexp(log, axis=1) for log in logs]
+    by_size = [_log_sum(log, axis=1) for log in logs]
     together = np.sum(by_size, axis=0) + _size_prior(len(by_size[0]))[:, None] + _shape_prior(constants)
     return tuple(
-        posterior(f, logsumexp(log + (together - own)[:, None, :], axis=0).ravel())
+        posterior(f, _log_sum(log + (together - own)[:, None, :], axis=0).ravel())
         for f, log, own in zip(found, logs, by_size, strict=True)
     )
+
+
+def _log_sum(log: Floats, axis: int = 0) -> Floats:
+    """log(sum(exp(log))) along an axis, finite numbers only: scipy's logsumexp, made for more, was half of a fit.
+
+    >>> _log_sum(np.log([[1.0, 2.0], [3.0, 2.0]])).round(6).tolist() == np.log([4.0, 4.0]).round(6).tolist()
+    True
+    """
+    most = log.max(axis=axis, keepdims=True)
+    out: Floats = np.log(np.exp(log - most).sum(axis=axis)) + most.squeeze(axis)
+    return out
 
 
 def _sizes(found: Sequence[Likelihood]) -> list[Floats]:
@@ -78,7 +88,8 @@ def _size_prior(count: int) -> Floats:
 def _shape_prior(constants: int) -> Floats:
     """Log prior (K,) of first-order and flicker noise by time constant."""
     each = SLOW_POWER * np.log(np.tile(np.arange(constants) + 1.0, 2))
-    return np.asarray(each - logsumexp(each), dtype=np.float64)
+    out: Floats = each - _log_sum(each)
+    return out
 
 
 def _share_priors(found: Likelihood, sizes: Floats) -> Floats:
@@ -86,7 +97,7 @@ def _share_priors(found: Likelihood, sizes: Floats) -> Floats:
     share = np.array(SHARES)[:, None]
     slow = np.log(np.maximum(share[1:] * found.variance.reshape(len(SHARES), -1)[1:], 1e-300))
     away = -0.5 * np.square((slow - np.log(sizes)[:, None, None]) / SIZE_SPREAD)
-    near = np.exp(away - logsumexp(away, axis=1, keepdims=True))
+    near = np.exp(away - _log_sum(away, axis=1)[:, None])
     anyhow = np.full((len(SHARES), slow.shape[1]), OWN_WAY / len(SHARES))
     white = anyhow.copy()
     white[0] += 1 - OWN_WAY

@@ -43,6 +43,12 @@ class Desk:
     async def draw(self) -> None:
         await show(self.pilot, self.app)
 
+    async def glance(self) -> None:
+        """Draw once: enough where what is drawn is not looked at."""
+        self.app.show_text()
+        self.app.show_plots()
+        await self.pilot.pause()
+
     async def wait(self, seconds: float) -> None:
         """Let that much of the console's time pass with nothing coming."""
         self.clock.now += seconds

@@ -226,7 +226,7 @@ async def test_survives_every_size(scene):
             await desk.pilot.resize_terminal(*size)
             for key in "12345":
                 await desk.press(key)
-                await desk.draw()
+                await desk.glance()
         assert desk.app.is_running
 
 

@@ -11,6 +11,13 @@ import pytest
 RESULTS = Path(__file__).parents[2] / "build" / "reliability.json"
 
 
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """They measure how late things happen: nothing else may run beside them."""
+    for item in items:
+        if Path(__file__).parent in item.path.parents:
+            item.add_marker(pytest.mark.alone)
+
+
 @pytest.fixture(scope="session")
 def measured() -> Iterator[dict[str, dict[str, float | str]]]:
     numbers: dict[str, dict[str, float | str]] = {}
