@@ -222,6 +222,9 @@ def _comparators(fit: VehicleFit) -> dict[str, tuple[InertiaFit | Unusable, ...]
     "--json", "json_path", type=click.Path(path_type=Path), help="Write the answer here; - is standard output."
 )
 @click.option(
+    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
+)
+@click.option(
     "--holdout", multiple=True, type=click.Path(path_type=Path), help="Recordings to simulate that are not fitted."
 )
 @click.option(
@@ -232,6 +235,7 @@ def vehicle_command(
     thrusters: tuple[Path, ...],
     installation: Path | None,
     json_path: Path | None,
+    report: Path | None,
     holdout: tuple[Path, ...],
     comparators: bool,
 ) -> None:
@@ -246,6 +250,10 @@ def vehicle_command(
         text = json.dumps(answer_json(answer), indent=1, allow_nan=False)
         if json_path is not None and str(json_path) != "-":
             json_path.write_text(text + "\n", encoding="utf-8")
+        if report is not None:
+            from rig.report.vehicle import write_report  # matplotlib takes a second to come up: only where it is used
+
+            write_report(answer, report)
     except (RigError, OSError) as error:
         click.echo(f"rig vehicle: {error}", err=True)
         raise SystemExit(2) from error

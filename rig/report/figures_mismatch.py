@@ -83,7 +83,7 @@ def residual_map(
         _signs(axes, grid, bounds)
         if region is not None:
             _outline(axes, grid, region)
-        labels(axes, x if region is None else f"{x}\noutlined: {region.label}", y)
+        labels(axes, f"{x} (blank: not measured)" + (f"\noutlined: {region.label}" if region else ""), y)
         axes.grid(visible=False)
         axes.set_xlim(grid.time[0], grid.time[-1])
         axes.set_ylim(grid.voltage[0], grid.voltage[-1])
@@ -91,7 +91,7 @@ def residual_map(
         ticks = [bounds[0], bounds[2], 0.0, bounds[-3], bounds[-1]]
         scale.set_ticks(ticks)
         scale.ax.set_xticklabels([f"{tick:.2g}".replace("-", "−") for tick in ticks])
-        scale.set_label(f"{value}; + and − in the two strongest; blank: not measured")
+        scale.set_label(f"{value}; + and − mark the strongest")
 
     return Plot(draw, alt, (NARROW[0], 4.2), (9.0, 4.4))
 

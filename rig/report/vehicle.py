@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,9 +18,12 @@ from identification.vehicle_report import COVER_95, Row, rows
 from identification.vehicle_simulation import current_along
 from rig.report import figures, figures_vehicle, provenance
 from rig.report.figures import Curve, Group, Interval
+from rig.report.figures_mismatch import Panel, before_after
 from rig.report.fit import tone, value_and_interval
 from rig.report.look import prose, unit_text
 from rig.report.page import Page, Picture, Remark, Section, Table, columns, sentences, write
+from rig.vehicle import HeldOut, VehicleAnswer
+from rig.vehicle_text import rms_of, unit_of_response
 
 GRID = 121
 MOST_TRIALS = 2
@@ -30,26 +33,22 @@ FORCE = {"yaw": "torque / (N·m)"}
 PLACE = {"yaw": "heading / rad", "heave": "depth / m"}
 
 
-def write_report(fit: VehicleFit, path: Path, files: Sequence[Path] = (), name: str = "") -> None:
-    """One page of all axes. `files`: the recordings, to be hashed. Raises RecordingError, OSError."""
-    write(vehicle_page(fit, provenance.sources(files), name), path)
+def write_report(answer: VehicleAnswer, path: Path) -> None:
+    """One page of all axes; the recordings are hashed. Raises RecordingError, OSError."""
+    files = [one.path for one in answer.recordings]
+    write(vehicle_page(answer, provenance.sources(files)), path)
 
 
-def vehicle_page(fit: VehicleFit, found: Sequence[provenance.Source] = (), name: str = "") -> Page:
+def vehicle_page(answer: VehicleAnswer, found: Sequence[provenance.Source] = ()) -> Page:
     """The page of an identified vehicle."""
-    parts = [axis_section(result) for result in fit.axes.values()]
-    unused = tuple(f"recording {one} was not used: no thruster of the lay-out is commanded in it" for one in fit.unused)
-    if unused:
-        parts.append(Section("Not used", sentences(unused)))
-    ids = list(dict.fromkeys(one for result in fit.axes.values() for one in _recordings(result)))
-    parts.append(provenance.section(found, ids))
-    return Page(f"Identification of {name or 'the vehicle'}", _lead(fit), tuple(parts), contents=len(parts) > 2)
-
-
-def _recordings(result: AxisResult) -> Iterator[str]:
-    if not isinstance(result.drag, Unusable):
-        yield from (run.recording_id for run in result.drag.runs)
-    yield from (one.recording_id for one in result.moving)
+    fit = answer.fit
+    parts = [axis_section(result, answer) for result in fit.axes.values()]
+    parts += held_out_section(answer.held_out)
+    unused = [f"Recording {one} was not used: no thruster of the lay-out is commanded in it." for one in fit.unused]
+    if unused or answer.notes:
+        parts.append(Section("Notes", sentences((*answer.notes, *unused))))
+    parts.append(provenance.section(found, [one.uuid for one in answer.recordings]))
+    return Page(f"Identification of {answer.vehicle or 'the vehicle'}", _lead(fit), tuple(parts), contents=True)
 
 
 def _lead(fit: VehicleFit) -> str:
@@ -75,7 +74,7 @@ def _rows(result: AxisResult, *, calibration: bool = False) -> tuple[Row, ...]:
     return () if result.estimate is None else rows(result.estimate, result.axis, calibration)
 
 
-def axis_section(result: AxisResult) -> Section:
+def axis_section(result: AxisResult, answer: VehicleAnswer) -> Section:
     """Both steps of one axis."""
     refused = [Remark(found.reason, "bad") for found in (result.drag, result.inertia) if isinstance(found, Unusable)]
     fits = [found for found in (result.drag, result.inertia) if not isinstance(found, Unusable)]
@@ -90,7 +89,10 @@ def axis_section(result: AxisResult) -> Section:
     if etas:
         plot = figures.forest(etas, "efficiency, 1 is the thrust in the tunnel", 1.0)
         drawn.append(Picture("Efficiencies", plot, "Share of the tunnel's thrust that reaches the vehicle."))
-    return Section(result.axis.capitalize(), (*_tables(result), *((judged,) if refused or said else ()), *drawn))
+    return Section(
+        result.axis.capitalize(),
+        (*_tables(result), *simulations(result, answer), *((judged,) if refused or said else ()), *drawn),
+    )
 
 
 def _remark(text: str, axis: str) -> Remark:
@@ -161,7 +163,7 @@ def inertia_pictures(result: AxisResult, fit: InertiaFit) -> list[Picture]:
     simulated = [y[0] for y in found]
     out = []
     for one, y in list(zip(result.moving, simulated, strict=True))[:MOST_TRIALS]:
-        place = SPEED.get(fit.axis, "speed / (m/s)") if one.quantity == "speed" else PLACE.get(fit.axis, "position / m")
+        place = response_label(fit.axis, one.quantity)
         trial = figures_vehicle.Simulated(one.recording_id, one.time, one.response, y)
         fitted = "The simulation sees the commands and how the trial began, nothing else."
         title = f"Trial {one.recording_id}, simulated"
@@ -191,3 +193,70 @@ def _inertia_line(result: AxisResult, fit: InertiaFit, simulated: Sequence[Float
     up = "acceleration / (rad/s²)" if yaw else "acceleration / (m/s²)"
     caption = "The slope is one over the inertia; the fit itself is to the trials above, not to these derivatives."
     return [Picture(f"Inertia in {fit.axis}", figures_vehicle.inertia_line(points, curve, across, up), caption)]
+
+
+def simulations(result: AxisResult, answer: VehicleAnswer) -> tuple[Table, ...]:
+    """How well each trial is simulated, and the inertia by other ways, folded; nothing where nothing was asked for."""
+    out = []
+    replays = answer.replays.get(result.axis, ())
+    if replays:
+        head = ("trial", "off by, rms", "unit", "fit / %")
+        checks = [(one, one.validation) for one in replays]
+        cells = tuple(
+            (one.recording_id, f"{check.rmse:.3g}", unit_of_response(result.axis, one.quantity), f"{check.fit:.2f}")
+            for one, check in checks
+        )
+        out.append(Table(f"Trials of {result.axis}, simulated", head, cells, columns(head, "trial", "unit"), True))
+    rivals = answer.comparators.get(result.axis, ())
+    if rivals:
+        head = ("method", "m ± std", "95 % interval", "off by, rms")
+        cells = tuple(_rival(one) for one in (result.inertia, *rivals))
+        out.append(Table(f"Inertia of {result.axis} by other ways", head, cells))
+    return tuple(out)
+
+
+def _rival(one: InertiaFit | Unusable) -> tuple[str, str, str, str]:
+    if isinstance(one, Unusable):
+        return one.reason, "–", "–", "–"
+    m, std = one.estimate["m"], one.estimate.std_of("m")
+    return one.method, *value_and_interval(m, std, m - COVER_95 * std, m + COVER_95 * std), f"{rms_of(one):.3g}"
+
+
+def held_out_section(found: Sequence[HeldOut]) -> tuple[Section, ...]:
+    """Recordings that were not fitted; nothing where there are none."""
+    if not found:
+        return ()
+    head = ("recording", "axis", "off by, rms", "without efficiencies", "unit", "fit / %")
+    cells, drawn = [], []
+    for one in found:
+        check = one.replay.validation
+        without = "" if one.without is None else f"{one.without.validation.rmse:.3g}"
+        unit = unit_of_response(one.axis, one.replay.quantity)
+        cells.append((one.name, one.axis, f"{check.rmse:.3g}", without, unit, f"{check.fit:.2f}"))
+        drawn.append(_held_out_picture(one))
+    told = Table("Simulated, not fitted", head, tuple(cells), columns(head, "recording", "axis", "unit"))
+    lead = "The simulation sees the commands and how the recording began; nothing of these was used in the fit."
+    return (Section("Held out", (told, *drawn[:MOST_TRIALS]), lead),)
+
+
+def _held_out_picture(one: HeldOut) -> Picture:
+    seen, y = one.replay, response_label(one.axis, one.replay.quantity)
+    if one.without is None:
+        plot = figures_vehicle.simulated_trial(
+            figures_vehicle.Simulated(one.name, seen.time, seen.measured, seen.simulated), y
+        )
+        return Picture(f"{one.name}, {one.axis}", plot)
+    panel = Panel(one.name, seen.time, seen.measured, one.without.simulated, seen.simulated)
+    caption = "Before: identified as if every thruster gave what it gave in the tunnel. After: with the efficiencies."
+    return Picture(f"{one.name}, {one.axis}", before_after(panel, y), caption)
+
+
+def response_label(axis: str, quantity: str) -> str:
+    """Axis label of what was measured.
+
+    >>> response_label("yaw", "position"), response_label("surge", "speed"), response_label("sway", "position")
+    ('heading / rad', 'speed / (m/s)', 'position / m')
+    """
+    if quantity == "speed":
+        return SPEED.get(axis, "speed / (m/s)")
+    return PLACE.get(axis, "position / m")

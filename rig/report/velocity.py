@@ -80,6 +80,8 @@ def draw_velocity(found: Derivative, true: Floats | None, sigma: float | None = 
     `sigma`: standard deviation of the position noise; None: the one estimated from the residuals.
     """
     band = 1.96 * found.std(sigma)
+    steady = float(np.nanmedian(band))
+    """The band away from the ends, where the window is not whole and the band wide."""
 
     def draw(figure: Figure) -> None:
         rows = 1 if true is None else 2
@@ -93,6 +95,8 @@ def draw_velocity(found: Derivative, true: Floats | None, sigma: float | None = 
             axes[1].fill_between(found.time, -band, band, color=BAND, linewidth=0)
             axes[1].plot(found.time, found.velocity - true, color=DATA, linewidth=0.8)
             labels(axes[1], "", "error / (m/s)")
+            axes[1].set_ylim(-4 * steady, 4 * steady)
+        axes[0].set_ylim(np.nanmin(found.velocity) - 4 * steady, np.nanmax(found.velocity) + 4 * steady)
         axes[-1].set_xlabel("time / s")
         legend_above(axes[0])
         for one in axes:
