@@ -1,0 +1,175 @@
+"""Fit of a model to whitened rows: Levenberg-Marquardt within the physical bounds (eq. 4.8 with full Sigma)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict
+from identification.physics.filters import delayed
+from identification.recording import Floats
+
+MOST_STEPS = 25
+CLOSE = 1e-4
+"""Fall of chi-square at which a fit has ended; a difference of 1 is one sigma."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model at its best values, on whitened rows."""
+
+    model: Model
+    theta: Theta
+    residual: Floats
+    """(n,) whitened."""
+    jacobian: Floats
+    """(n, p) whitened, all parameters that were free."""
+    free: NDArray[np.bool_]
+    """(q,) of the whole vector of theta: what was free, and not at a bound."""
+    log_det: float = 0.0
+
+    @property
+    def chi2(self) -> float:
+        return float(self.residual @ self.residual)
+
+    @property
+    def deviance(self) -> float:
+        """-2 log likelihood, up to a constant; noise included, for fits with different noise."""
+        return self.chi2 + self.log_det
+
+    @property
+    def cov(self) -> Floats:
+        """(q, q) of the whole vector, NaN where not free."""
+        q = self.free.size
+        out = np.full((q, q), np.nan)
+        J = self.jacobian
+        size = np.linalg.norm(J, axis=0)
+        size = np.where(size > 0, size, 1.0)
+        inverse = np.linalg.pinv((J / size).T @ (J / size), hermitian=True, rcond=1e-12) / np.outer(size, size)
+        out[np.ix_(self.free, self.free)] = inverse
+        return out
+
+    @property
+    def std(self) -> Floats:
+        return np.sqrt(np.diag(self.cov))
+
+
+def bounds_of(model: Model, data: Data, theta: Theta) -> tuple[Floats, Floats, Floats]:
+    """(low, high, step) of the whole vector."""
+    scale = data.scale
+    known = [p for group in parameters(model, scale) for p in group]
+    R = len(theta.tares)
+    most = 0.0 if any(term.id == "time_skew" for term in model.terms) else data.most_shift
+    low = np.array([-np.inf, *(p.low for p in known), *([-np.inf] * R), -most, -np.inf])
+    high = np.array([np.inf, *(p.high for p in known), *([np.inf] * R), most, np.inf])
+    C = scale.thrust / scale.driver**2
+    steps = [1e-4 * C]
+    for p, value in zip(known, theta.vector[1 : 1 + len(known)], strict=True):
+        span = p.high - p.low
+        steps.append(min(1e-3 * span, 1e-3 * max(abs(value), 0.02 * span)))
+    steps += [1e-3 * scale.thrust] * R + [1e-4, 1e-4 * (abs(theta.k) or 1.0)]
+    return low, high, np.array(steps)
+
+
+def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[list[Floats], list[Floats]]:
+    """Predictions at the rows: thrust with tare, and rate; run by run."""
+    thrust, rate = [], []
+    for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
+        F, x = predict(model, theta, history, data.scale)
+        if theta.shift:
+            F = delayed(F, history.edges, theta.shift)
+        thrust.append(F[rows] + theta.tares[i])
+        if with_rate:
+            rate.append(theta.k * x[history.rate_rows])
+    return thrust, rate
+
+
+def residual_of(model: Model, theta: Theta, data: Data, weights: Weights) -> Floats:
+    thrust, rate = raw(model, theta, data, with_rate=bool(weights.rate))
+    left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
+    left_rate = [h.rate[h.rate_rows] - f for h, f in zip(data.histories, rate, strict=False)] if weights.rate else []
+    return weights.whiten(left, left_rate)
+
+
+def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: NDArray[np.bool_]) -> Floats:
+    """(n, p) whitened slopes of the prediction over the parameters in `which`."""
+    low, high, step = bounds_of(model, data, theta)
+    del low
+    base_thrust, base_rate = raw(model, theta, data, with_rate=bool(weights.rate))
+    vector = theta.vector
+    R, q = len(theta.tares), vector.size
+    thrust: list[list[Floats]] = [[] for _ in data.histories]
+    rate: list[list[Floats]] = [[] for _ in data.histories]
+    for j in np.flatnonzero(which):
+        run = j - (q - 2 - R)
+        if 0 <= run < R:  # a tare moves its own run by one
+            for i in range(R):
+                thrust[i].append(np.full(base_thrust[i].size, float(i == run)))
+                if weights.rate:
+                    rate[i].append(np.zeros(base_rate[i].size))
+            continue
+        h = step[j] if vector[j] + step[j] <= high[j] else -step[j]
+        moved = vector.copy()
+        moved[j] += h
+        new_thrust, new_rate = raw(model, theta.with_vector(moved), data, with_rate=bool(weights.rate))
+        for i in range(R):
+            thrust[i].append((new_thrust[i] - base_thrust[i]) / h)
+            if weights.rate:
+                rate[i].append((new_rate[i] - base_rate[i]) / h)
+    stacked = [np.column_stack(c) if c else np.empty((y.size, 0)) for c, y in zip(thrust, base_thrust, strict=True)]
+    stacked_rate = [np.column_stack(c) for c in rate] if weights.rate and which.any() else []
+    return weights.whiten(stacked, stacked_rate)
+
+
+def fit(model: Model, start: Theta, data: Data, weights: Weights, most_steps: int = MOST_STEPS) -> Fit:
+    """Least squares of the whitened residual within the bounds."""
+    low, high, _ = bounds_of(model, data, start)
+    theta = start.with_vector(np.clip(start.vector, low, high))
+    may = np.ones(theta.vector.size, dtype=bool)
+    may[-1] = bool(weights.rate)
+    may[-2] = high[-2] > low[-2]
+    residual = residual_of(model, theta, data, weights)
+    damping = 1e-3
+    J = columns_of(model, theta, data, weights, may)
+    for _ in range(most_steps):
+        vector = theta.vector
+        slope = J.T @ residual
+        stuck = ((vector[may] <= low[may]) & (slope < 0)) | ((vector[may] >= high[may]) & (slope > 0))
+        size = np.linalg.norm(J, axis=0)
+        go = ~stuck & (size > 0)
+        A = J[:, go] / size[go]
+        gram, right = A.T @ A, A.T @ residual
+        improved = False
+        chi2 = float(residual @ residual)
+        for _ in range(8):
+            step = np.linalg.solve(gram + damping * np.eye(gram.shape[0]), right) / size[go]
+            moved = vector.copy()
+            moved[np.flatnonzero(may)[go]] += step
+            trial = theta.with_vector(np.clip(moved, low, high))
+            new = residual_of(model, trial, data, weights)
+            fall = chi2 - float(new @ new)
+            if np.isfinite(fall) and fall > 0:
+                improved = True
+                break
+            damping = max(damping, 1e-6) * 8
+        if not improved:
+            break
+        theta, residual = trial, new
+        damping = max(damping / 10, 1e-9)
+        J = columns_of(model, theta, data, weights, may)
+        if fall < CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1)):
+            break
+    vector = theta.vector
+    at_bound = (vector <= low) | (vector >= high)
+    free = may & ~at_bound
+    J = J[:, free[may]]
+    log_det = sum(w.log_det for w in (*weights.thrust, *weights.rate))
+    return Fit(model, theta, residual, J, free, log_det)
+
+
+def extended(theta: Theta, model: Model, term: object, values: tuple[float, ...], bigger: Model) -> Theta:
+    """Theta of `bigger` = model + term, started at `values` for the new one."""
+    known = dict(zip(model.terms, theta.terms, strict=True))
+    return replace(theta, terms=tuple(values if t == term else known[t] for t in bigger.terms))

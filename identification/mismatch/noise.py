@@ -1,0 +1,271 @@
+"""Noise of a response: white, proportional to the force, slow on many time scales, and in bands; and its whitening.
+
+The covariance of rows at uneven times is K = diag((white^2 + (proportional |F|)^2)/count) + sum_j v_j exp(-|dt|/T_j)
++ sum_b v_b cos-like kernels of damped oscillators: a celerite matrix (Foreman-Mackey, Agol, Ambikasaran and Angus,
+AJ 154, 220, 2017), which is factored in time proportional to the number of rows. Exponentials on time scales a factor 8
+apart make any noise between white and 1/f^2. All variances enter linearly; they are found by restricted maximum
+likelihood (Patterson and Thompson, Biometrika 1971) with the exact gradient, so that columns fitted to the same data do
+not make the noise look smaller than it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from celerite2 import backprop, driver
+from scipy.optimize import minimize
+
+from identification.recording import Floats
+
+SCALE_STEP = 8.0
+"""Ratio of neighbouring time scales."""
+MOST_SCALES = 4
+"""celerite2 0.3.3 gives wrong slopes for more than four columns (its tests stop there)."""
+FEW_ROWS = 100
+"""With fewer rows the noise is taken as white."""
+OUTLIER = 4.0
+"""Whitened residuals beyond this get a variance of their own size."""
+LEAST_SHARE = 1e-12
+"""Variances are kept above this share of the residual's."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """Where one run's response was measured."""
+
+    time: Floats
+    """(n,) s, ascending."""
+    count: Floats
+    """(n,) samples in each row."""
+    extra: Floats
+    """(n,) variance factor of the white part, above 1 for outliers."""
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Variances in the square of the response's unit, times in s."""
+
+    white: float
+    """Of one sample."""
+    proportional: float
+    """Of one sample, relative to |F| squared."""
+    scales: tuple[float, ...] = ()
+    slow: tuple[float, ...] = ()
+    bands: tuple[tuple[float, float], ...] = ()
+    """(frequency in Hz, quality) of each damped oscillator."""
+    band: tuple[float, ...] = ()
+
+    @property
+    def variances(self) -> Floats:
+        return np.array([self.white, self.proportional, *self.slow, *self.band])
+
+    def with_variances(self, values: Floats) -> Noise:
+        J = len(self.scales)
+        return replace(
+            self,
+            white=float(values[0]),
+            proportional=float(values[1]),
+            slow=tuple(map(float, values[2 : 2 + J])),
+            band=tuple(map(float, values[2 + J :])),
+        )
+
+    def correlated(self, rows: Rows, size: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """c, a, U, V of celerite's matrices for rows at which the force is `size` (n,)."""
+        diag = (self.white + self.proportional * size**2) * rows.extra / rows.count
+        ac, bc, cc, dc = self._oscillators()
+        ar, cr = np.array(self.slow), 1 / np.array(self.scales) if self.scales else np.empty(0)
+        n, J = rows.time.size, ar.size + 2 * ac.size
+        c = np.concatenate([cr, np.repeat(cc, 2)])
+        a, U, V = driver.get_celerite_matrices(
+            ar, ac, bc, dc, rows.time, diag, np.empty(n), np.empty((n, J)), np.empty((n, J))
+        )
+        return c, a, U, V
+
+    def _oscillators(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Underdamped harmonic oscillators with unit-height kernels times their variance."""
+        f = np.array([b[0] for b in self.bands])
+        Q = np.array([b[1] for b in self.bands])
+        a = np.array(self.band)
+        w = 2 * np.pi * f
+        root = np.sqrt(np.maximum(4 * Q**2 - 1, 1e-9))
+        return a, a / root, 0.5 * w / Q if Q.size else Q, 0.5 * w * root / Q if Q.size else Q
+
+
+class Whitener:
+    """The factored covariance of one run's rows."""
+
+    def __init__(self, noise: Noise, rows: Rows, size: Floats) -> None:
+        self.noise, self.rows = noise, rows
+        self._c, a, self._U, V = noise.correlated(rows, size)
+        n, J = self._U.shape
+        if J == 0:
+            self._d, self._W = a, V
+        else:
+            self._d, self._W = driver.factor(rows.time, self._c, a, self._U, V, np.empty(n), np.empty((n, J)))
+        self._root = np.sqrt(self._d)
+
+    @property
+    def log_det(self) -> float:
+        return float(np.sum(np.log(self._d)))
+
+    def whiten(self, columns: Floats) -> Floats:
+        """L^-1 columns for K = L L'; (n,) or (n, p)."""
+        flat = columns.ndim == 1
+        Y = np.ascontiguousarray(columns[:, None] if flat else columns)
+        if self._U.shape[1]:
+            Y = driver.solve_lower(self.rows.time, self._c, self._U, self._W, Y, np.empty_like(Y))
+        Z: Floats = Y / self._root[:, None]
+        return Z[:, 0] if flat else Z
+
+
+def time_scales(times: Sequence[Floats]) -> tuple[float, ...]:
+    """From a few intervals to a quarter of the longest run."""
+    longest = max(float(t[-1] - t[0]) for t in times)
+    spacing = float(np.median(np.concatenate([np.diff(t) for t in times])))
+    low, high = 2 * spacing, 0.25 * longest
+    if high <= low:
+        return ()
+    number = min(int(np.floor(np.log(high / low) / np.log(SCALE_STEP))) + 1, MOST_SCALES)
+    return tuple(float(high / SCALE_STEP**k) for k in range(number))[::-1]
+
+
+def fit_noise(
+    runs: Sequence[Rows],
+    residuals: Sequence[Floats],
+    columns: Sequence[Floats],
+    sizes: Sequence[Floats],
+    bands: tuple[tuple[float, float], ...] = (),
+    start: Noise | None = None,
+) -> Noise:
+    """Restricted maximum likelihood of all variances, common to all runs.
+
+    `residuals` (n,) and `columns` (n, p) of what was fitted to them, `sizes` (n,) |F|, one of each per run.
+    """
+    total = np.concatenate(residuals)
+    variance = float(np.mean(total**2)) or 1.0
+    weight = np.concatenate([r.count for r in runs])
+    if total.size < FEW_ROWS:
+        used = max(total.size - columns[0].shape[1], 1)
+        return Noise(float(np.sum(total**2 * weight) / used) or 1e-300, 0.0)
+    scales = time_scales([r.time for r in runs])
+    F2 = float(np.mean(np.concatenate(sizes) ** 2)) or 1.0
+    if start is None or start.bands != bands:
+        quick = _differences(runs, residuals)
+        start = Noise(
+            quick,
+            0.02 * quick / F2,
+            scales,
+            tuple([0.05 * variance / max(len(scales), 1)] * len(scales)),
+            bands,
+            tuple([0.05 * variance] * len(bands)),
+        )
+    floor = LEAST_SHARE * np.array([variance, variance / F2] + [variance] * (len(scales) + len(bands)))
+    begin = np.log(np.maximum(start.variances, 1e3 * floor))
+
+    def cost(log_values: Floats) -> tuple[float, Floats]:
+        values = np.exp(log_values)
+        try:
+            value, slope = _cost(start.with_variances(values), runs, residuals, columns, sizes)
+        except driver.LinAlgError:
+            return 1e30, np.zeros_like(log_values)
+        return value, slope * values
+
+    bounds = [(np.log(low), np.log(1e3 * variance * low / (LEAST_SHARE * variance))) for low in floor]
+    found = minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": 40, "ftol": 1e-7})
+    return start.with_variances(np.exp(found.x))
+
+
+def _differences(runs: Sequence[Rows], residuals: Sequence[Floats]) -> float:
+    """Variance of one sample from differences of neighbouring rows, robust against steps."""
+    found = []
+    for rows, r in zip(runs, residuals, strict=True):
+        scale = np.sqrt(1 / rows.count[1:] + 1 / rows.count[:-1])
+        found.append(np.abs(np.diff(r)) / scale)
+    out = float(np.median(np.concatenate(found)) / 0.6745) ** 2
+    return out if out > 0 else 1e-6 * float(np.mean(np.concatenate(residuals) ** 2)) or 1e-300
+
+
+def _cost(
+    noise: Noise, runs: Sequence[Rows], residuals: Sequence[Floats], columns: Sequence[Floats], sizes: Sequence[Floats]
+) -> tuple[float, Floats]:
+    """Half the restricted deviance, and its slope over each variance."""
+    factored = []
+    p = columns[0].shape[1]
+    gram, moment = np.zeros((p, p)), np.zeros(p)
+    for rows, r, X, size in zip(runs, residuals, columns, sizes, strict=True):
+        c, a, U, V = noise.correlated(rows, size)
+        n, J = U.shape
+        d, W, S = backprop.factor_fwd(rows.time, c, a, U, V, np.empty(n), np.empty((n, J)), np.empty((n, J, J)))
+        Y = np.ascontiguousarray(np.column_stack([X, r]))
+        Z = driver.solve_lower(rows.time, c, U, W, Y, np.empty_like(Y))
+        weighted = Z[:, :p] / d[:, None]
+        gram += Z[:, :p].T @ weighted
+        moment += weighted.T @ Z[:, p]
+        factored.append((c, a, U, V, d, W, S))
+    value, slope = 0.0, np.zeros(2 + len(noise.slow) + len(noise.band))
+    if p:
+        lower = np.linalg.cholesky(gram + 1e-12 * np.diag(np.diag(gram) + 1e-300))
+        beta = np.linalg.solve(lower.T, np.linalg.solve(lower, moment))
+        value += float(np.sum(np.log(np.diag(lower))))
+    for (c, a, U, V, d, W, S), rows, r, X, size in zip(factored, runs, residuals, columns, sizes, strict=True):
+        left = r - X @ beta if p else r
+        Y = np.ascontiguousarray(np.column_stack([left, np.linalg.solve(lower, X.T).T]) if p else left[:, None])
+        n, J = U.shape
+        k = Y.shape[1]
+        Z, F = backprop.solve_lower_fwd(rows.time, c, U, W, Y, np.empty_like(Y), np.empty((n, J, k)))
+        value += 0.5 * float(np.sum(np.log(d))) + 0.5 * float(np.sum(Z[:, 0] ** 2 / d))
+        bZ = np.ascontiguousarray(Z / d[:, None])
+        _, _, bU1, bW, _ = backprop.solve_lower_rev(
+            rows.time,
+            c,
+            U,
+            W,
+            Y,
+            Z,
+            F,
+            bZ,
+            np.zeros(n),
+            np.zeros(J),
+            np.zeros((n, J)),
+            np.zeros((n, J)),
+            np.zeros((n, k)),
+        )
+        bd = 0.5 / d - 0.5 * np.sum(Z**2, axis=1) / d**2
+        _, _, ba, bU2, _ = backprop.factor_rev(
+            rows.time,
+            c,
+            a,
+            U,
+            V,
+            d,
+            W,
+            S,
+            bd,
+            np.ascontiguousarray(bW),
+            np.zeros(n),
+            np.zeros(J),
+            np.zeros(n),
+            np.zeros((n, J)),
+            np.zeros((n, J)),
+        )
+        bU = bU1 + bU2
+        per_count = rows.extra / rows.count
+        slope[0] += float(ba @ per_count)
+        slope[1] += float(ba @ (per_count * size**2))
+        Jr = len(noise.slow)
+        for j in range(Jr):
+            slope[2 + j] += float(ba.sum() + bU[:, j].sum())
+        for b, value_b in enumerate(noise.band):
+            at = Jr + 2 * b
+            moved = float(np.sum(bU[:, at] * U[:, at]) + np.sum(bU[:, at + 1] * U[:, at + 1])) / max(value_b, 1e-300)
+            slope[2 + Jr + b] += float(ba.sum()) + moved
+    return value, slope
+
+
+def with_outliers(rows: Rows, whitened: Floats) -> Rows:
+    """Rows whose whitened residual is beyond OUTLIER get the variance that makes it OUTLIER/2."""
+    far = np.abs(whitened) > OUTLIER
+    extra = np.where(far, np.maximum((whitened / (0.5 * OUTLIER)) ** 2, 1.0), 1.0)
+    return replace(rows, extra=extra)

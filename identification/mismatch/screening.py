@@ -1,0 +1,200 @@
+"""Which term would help: change of the whitened prediction by a little of each, against the whitened residual.
+
+A little of every term in every form, at a few inner settings, gives a direction (tangent space of the present model).
+What the present model's own parameters can follow is projected out (Frisch and Waugh). The largest correlation of all
+is judged against the largest of its own null distribution: directions are correlated, so that is drawn from the data,
+by changing the sign of whole blocks of the residual at random (symmetric noise of any colour within a block).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.mismatch.fitting import Fit, extended, raw
+from identification.mismatch.model import Data, Model, Weights
+from identification.physics.term import Term
+from identification.recording import Floats
+
+SURROGATES = 1000
+BLOCKS = 120
+"""Blocks whose signs are drawn, at most."""
+PLAIN = 4.0
+"""Sigmas at which a direction is taken out before surrogates are made, and before noise is estimated."""
+MOST_PLAIN = 10
+LEAST_DIRECTION = 1e-6
+"""Share of a direction that must remain when the present model is projected out."""
+
+
+@dataclass(frozen=True, eq=False)
+class Directions:
+    """Unit columns, orthogonal to the present model, one per trial."""
+
+    terms: tuple[Term, ...]
+    values: tuple[tuple[float, ...], ...]
+    one_sided: tuple[bool, ...]
+    columns: Floats
+    """(n, q)."""
+    sizes: Floats
+    """(q,) sigma that the trial amount itself is worth."""
+
+
+@dataclass(frozen=True, eq=False)
+class Screening:
+    directions: Directions
+    z: Floats
+    """(q,) sigmas; one-sided ones are 0 where physics has the other sign."""
+    p_value: float
+    """Family-wise, of the largest."""
+    threshold: float
+    """z that the largest exceeds with the false-alarm rate asked for."""
+
+    @property
+    def largest(self) -> float:
+        return float(self.z.max(initial=0.0))
+
+    def best(self, most: int, share: float = 0.5) -> list[tuple[Term, tuple[float, ...], float]]:
+        """Terms in descending order of z, each form once with its best trial, those within `share` of the best."""
+        out: list[tuple[Term, tuple[float, ...], float]] = []
+        seen: set[Term] = set()
+        for j in np.argsort(-self.z):
+            term = self.directions.terms[j]
+            if self.z[j] < share * self.largest or len(out) >= most:
+                break
+            if term not in seen:
+                seen.add(term)
+                out.append((term, self.directions.values[j], float(self.z[j])))
+        return out
+
+
+def orthogonal_basis(columns: Floats) -> Floats:
+    """(n, r) orthonormal basis of what columns span."""
+    if columns.shape[1] == 0:
+        return columns
+    size = np.linalg.norm(columns, axis=0)
+    scaled = columns[:, size > 0] / size[size > 0]
+    u, s, _ = np.linalg.svd(scaled, full_matrices=False)
+    out: Floats = u[:, s > 1e-9 * s[0]] if s.size else scaled
+    return out
+
+
+def directions(fit: Fit, data: Data, weights: Weights, terms: Sequence[Term]) -> Directions:
+    """Of all trials of all terms whose channels were recorded."""
+    with_rate = bool(weights.rate)
+    base_thrust, base_rate = raw(fit.model, fit.theta, data, with_rate=with_rate)
+    used: list[Term] = []
+    values: list[tuple[float, ...]] = []
+    sided: list[bool] = []
+    thrust: list[list[Floats]] = [[] for _ in data.histories]
+    rate: list[list[Floats]] = [[] for _ in data.histories]
+    for term in terms:
+        first = term.parameters(data.scale)[0]
+        bigger = fit.model.plus(term)
+        for trial in term.trials(data.scale):
+            theta = extended(fit.theta, fit.model, term, trial, bigger)
+            new_thrust, new_rate = raw(bigger, theta, data, with_rate=with_rate)
+            for i, (new, base) in enumerate(zip(new_thrust, base_thrust, strict=True)):
+                thrust[i].append(new - base)
+            for i, (new, base) in enumerate(zip(new_rate, base_rate, strict=True)):
+                rate[i].append(new - base)
+            used.append(term)
+            values.append(trial)
+            sided.append(first.neutral in (first.low, first.high))
+    if not used:
+        return Directions((), (), (), np.empty((fit.residual.size, 0)), np.empty(0))
+    columns = weights.whiten([np.column_stack(c) for c in thrust], [np.column_stack(c) for c in rate if c])
+    basis = orthogonal_basis(fit.jacobian)
+    before = np.linalg.norm(columns, axis=0)
+    columns = columns - basis @ (basis.T @ columns)
+    size = np.linalg.norm(columns, axis=0)
+    good = (size > LEAST_DIRECTION * before) & (size > 0) & np.isfinite(size)
+    keep = np.flatnonzero(good)
+    return Directions(
+        tuple(used[j] for j in keep),
+        tuple(values[j] for j in keep),
+        tuple(sided[j] for j in keep),
+        columns[:, keep] / size[keep],
+        size[keep],
+    )
+
+
+def screen(fit: Fit, found: Directions, rng: np.random.Generator, alarm: float = 0.01) -> Screening:
+    """Sigmas of each direction and the family-wise judgement of the largest."""
+    score = found.columns.T @ fit.residual
+    sided = np.array(found.one_sided, dtype=bool)
+    z = np.where(sided, np.maximum(score, 0.0), np.abs(score))
+    if not score.size:
+        return Screening(found, z, 1.0, float("inf"))
+    null = surrogate_scores(found.columns, quiet(fit.residual, found.columns), rng)
+    null = np.where(sided, np.maximum(null, 0.0), np.abs(null)).max(axis=1)
+    normal = _normal_scores(found.columns, rng)
+    normal = np.where(sided, np.maximum(normal, 0.0), np.abs(normal)).max(axis=1)
+    threshold = float(max(np.quantile(null, 1 - alarm), np.quantile(normal, 1 - alarm)))
+    return Screening(found, z, _p_value(float(z.max()), null, normal), threshold)
+
+
+def matching_pursuit(columns: Floats, residual: Floats, least: float, most: int) -> tuple[list[int], Floats]:
+    """Indices of unit columns (n, q) that take more than `least` sigma, one after the other, and what is left (n,)."""
+    chosen: list[int] = []
+    taken = np.empty((residual.size, 0))
+    left = residual
+    score = columns.T @ left
+    size = np.ones(columns.shape[1])
+    for _ in range(most):
+        sigma = float(np.sqrt(np.mean(left**2)))
+        z = np.where(size > 1e-2, np.abs(score) / np.maximum(size, 1e-12), 0.0)
+        j = int(np.argmax(z)) if z.size else 0
+        if not z.size or z[j] < least * sigma:
+            break
+        chosen.append(j)
+        q = columns[:, j] - taken @ (taken.T @ columns[:, j])
+        q /= np.linalg.norm(q)
+        taken = np.column_stack([taken, q])
+        left = left - q * (q @ left)
+        overlap = columns.T @ q
+        size = np.sqrt(np.maximum(size**2 - overlap**2, 0.0))
+        score = columns.T @ left
+    return chosen, left
+
+
+def quiet(residual: Floats, columns: Floats) -> Floats:
+    """The residual without what is plainly no noise in the span of unit columns: what surrogates are made from."""
+    return matching_pursuit(columns, residual, PLAIN, MOST_PLAIN)[1]
+
+
+def surrogate_scores(columns: Floats, residual: Floats, rng: np.random.Generator) -> Floats:
+    """(SURROGATES, q) scores after the signs of blocks of the residual were drawn anew."""
+    blocks = min(BLOCKS, max(residual.size // 4, 1))
+    edges = np.linspace(0, residual.size, blocks + 1).astype(int)[:-1]
+    parts = np.add.reduceat(columns * residual[:, None], edges, axis=0)
+    signs = rng.choice((-1.0, 1.0), size=(SURROGATES, blocks))
+    out: Floats = signs @ parts
+    return out
+
+
+def _normal_scores(columns: Floats, rng: np.random.Generator) -> Floats:
+    """(4 SURROGATES, q) scores of white normal residuals."""
+    gram = columns.T @ columns
+    values, vectors = np.linalg.eigh(gram)
+    root = vectors * np.sqrt(np.maximum(values, 0.0))
+    out: Floats = rng.standard_normal((4 * SURROGATES, values.size)) @ root.T
+    return out
+
+
+def _p_value(largest: float, null: Floats, normal: Floats) -> float:
+    """The larger of both; beyond the draws a Gumbel tail fitted to them."""
+    found = []
+    for draws in (null, normal):
+        share = (1 + np.count_nonzero(draws >= largest)) / (1 + draws.size)
+        if share > 20 / draws.size:
+            found.append(float(share))
+            continue
+        # tail of the normal maximum: as of one normal deviate, times the number of independent ones it acts like
+        from scipy.stats import norm
+
+        at = max(float(np.quantile(draws, 0.95)), 1e-6)
+        many = 0.05 / max(norm.sf(at), 1e-300)
+        found.append(float(min(many * norm.sf(largest), share)))
+    return max(found)

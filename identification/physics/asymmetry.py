@@ -1,0 +1,39 @@
+"""A blade built for one direction: C- = ratio C+."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Asymmetry:
+    """A blade built for one direction: C- = ratio C+."""
+
+    id: ClassVar[str] = "asymmetry"
+    stage: ClassVar[Stage] = "hydro"
+    physics: ClassVar[str] = "the two directions have different coefficients"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("direction",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("ratio", "1", 0.05, 20.0, 1.0),)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ((0.95,),)
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        out: Floats = np.where(now.x < 0, theta[0] * value, value)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Asymmetry: in reverse the thruster gives {theta[0]:.3g} of its forward thrust at the same voltage; use C+ and C-."
+
+
+FORMS = (Asymmetry(),)

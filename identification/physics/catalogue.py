@@ -1,0 +1,65 @@
+"""All terms that may be added to `tau = C V|V|`, form by form."""
+
+from __future__ import annotations
+
+from itertools import chain
+
+from identification.physics import (
+    asymmetry,
+    cavitation,
+    command_saturation,
+    dead_band,
+    exponent,
+    heating,
+    hysteresis,
+    inflow_dynamics,
+    linear_term,
+    load_cell_creep,
+    load_cell_nonlinearity,
+    load_cell_saturation,
+    motor_lag,
+    recirculation,
+    reversal_loss,
+    rotation_coupling,
+    speed_of_advance,
+    stand_resonance,
+    strut_drag,
+    supply_sag,
+    thruster_interaction,
+    time_skew,
+    torque_crosstalk,
+    winding_resistance,
+    zero_drift,
+)
+from identification.physics.term import Term
+
+CATALOGUE: tuple[Term, ...] = tuple(
+    chain(
+        command_saturation.FORMS,
+        supply_sag.FORMS,
+        dead_band.FORMS,
+        winding_resistance.FORMS,
+        motor_lag.FORMS,
+        rotation_coupling.FORMS,
+        exponent.FORMS,
+        asymmetry.FORMS,
+        inflow_dynamics.FORMS,
+        cavitation.FORMS,
+        heating.FORMS,
+        reversal_loss.FORMS,
+        linear_term.FORMS,
+        speed_of_advance.FORMS,
+        recirculation.FORMS,
+        thruster_interaction.FORMS,
+        strut_drag.FORMS,
+        torque_crosstalk.FORMS,
+        stand_resonance.FORMS,
+        hysteresis.FORMS,
+        time_skew.FORMS,
+        load_cell_creep.FORMS,
+        load_cell_nonlinearity.FORMS,
+        zero_drift.FORMS,
+        load_cell_saturation.FORMS,
+    )
+)
+"""In the order in which they act within their stage."""

@@ -1,0 +1,42 @@
+"""Thrust breaks down above a rate: T (1 - k max(|x| - onset, 0))."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Cavitation:
+    """Thrust breaks down above a rate: T (1 - k max(|x| - onset, 0))."""
+
+    id: ClassVar[str] = "cavitation"
+    stage: ClassVar[Stage] = "hydro"
+    physics: ClassVar[str] = "thrust breaks down above a rate"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (
+            Parameter("slope", f"1/{scale.driver_unit}", 0.0, 8.0 / scale.driver, 0.0),
+            Parameter("onset", scale.driver_unit, 0.2 * scale.driver, 0.98 * scale.driver),
+        )
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((0.3 / scale.driver, share * scale.driver) for share in (0.4, 0.6, 0.75, 0.88))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        out: Floats = value * np.maximum(1 - theta[0] * np.maximum(np.abs(now.x) - theta[1], 0.0), 0.0)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Cavitation: above {theta[1]:.3g} {scale.driver_unit} thrust breaks down, by {100 * theta[0]:.2g} % per {scale.driver_unit}."
+
+
+FORMS = (Cavitation(),)

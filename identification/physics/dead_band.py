@@ -1,0 +1,49 @@
+"""Static friction or the neutral zone of a drive: nothing happens below a voltage."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class DeadBand:
+    """Static friction or the neutral zone of a drive: nothing happens below a voltage."""
+
+    id: ClassVar[str] = "dead_band"
+    stage: ClassVar[Stage] = "command"
+    physics: ClassVar[str] = "below a voltage the rotor does not turn"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    form: Literal["shrink", "jump"] = "shrink"
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("half_width", scale.driver_unit, 0.0, 0.6 * scale.driver, 0.0),)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((share * scale.driver,) for share in (0.01, 0.03, 0.07, 0.15, 0.3))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        size = np.abs(value)
+        if self.form == "jump":
+            # a ramp this narrow keeps the prediction continuous in the parameter
+            edge = 2e-3 * now.scale.driver
+            out: Floats = value * np.clip((size - theta[0]) / edge + 0.5, 0.0, 1.0) if theta[0] > 0 else value
+            return out
+        shrunk: Floats = np.sign(value) * np.maximum(size - theta[0], 0.0)
+        return shrunk
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        what = "thrust begins with a jump" if self.form == "jump" else "only the voltage beyond it acts"
+        return f"Dead band: within +-{theta[0]:.3g} {scale.driver_unit} the rotor does not turn, and {what}."
+
+
+FORMS = (
+    DeadBand("shrink"),
+    DeadBand("jump"),
+)

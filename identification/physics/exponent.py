@@ -1,0 +1,40 @@
+"""Thrust grows as |V|^p, not as its square (Reynolds number, open-water curve)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Exponent:
+    """Thrust grows as |V|^p, not as its square (Reynolds number, open-water curve)."""
+
+    id: ClassVar[str] = "exponent"
+    stage: ClassVar[Stage] = "hydro"
+    physics: ClassVar[str] = "thrust does not grow with the square"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("exponent", "1", 0.8, 3.5, 2.0),)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ((1.95,), (1.7,), (2.3,))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        size = np.abs(now.x) / now.scale.driver
+        out: Floats = value * np.maximum(size, 1e-9) ** (theta[0] - 2)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Exponent: thrust grows as |V|^{theta[0]:.2f}, not as V^2."
+
+
+FORMS = (Exponent(),)

@@ -1,0 +1,140 @@
+"""Memory on intervals of uneven length: each in a few vectorised operations, stable at any length of interval."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dtbtrs, ztbtrs
+
+from identification.recording import Floats
+
+LAG_ITERATIONS = 8
+LAG_CLOSE = 1e-7
+"""Relative change of the rate at which the quadratic lag has converged."""
+
+
+def recursion(keep: Floats, push: Floats, start: float) -> Floats:
+    """y_k = keep_k y_{k-1} + push_k, y_{-1} = start; (M,), by one banded triangular solve."""
+    push = push.copy()
+    push[0] += keep[0] * start
+    banded = np.ones((2, keep.size))
+    banded[1, :-1] = -keep[1:]
+    solved, info = dtbtrs(banded, push[:, None], uplo="L")
+    if info != 0:
+        raise ValueError(f"recursion: banded solve failed with {info}")
+    out: Floats = solved[:, 0]
+    return out
+
+
+def lowpass(u: Floats, dt: Floats, tau: float, start: float = 0.0) -> tuple[Floats, Floats]:
+    """First-order low-pass y' = (u - y)/tau for u constant in each interval: exact y at the ends, and exact means.
+
+    >>> end, mean = lowpass(np.array([1.0, 1.0]), np.array([1.0, 1.0]), 1.0)
+    >>> end.round(4).tolist(), mean.round(4).tolist()
+    ([0.6321, 0.8647], [0.3679, 0.7675])
+    """
+    share = dt / tau
+    keep = np.exp(-share)
+    end = recursion(keep, (1 - keep) * u, start)
+    before = np.concatenate([[start], end[:-1]])
+    mean = u + (before - u) * -np.expm1(-share) / share
+    return end, mean
+
+
+def lag(w: Floats, dt: Floats, quadratic: float, linear: float, start: float = 0.0) -> Floats:
+    """Mean rate of n' = quadratic (w|w| - n|n|) + linear (w - n) in each interval (thesis, rotor equation).
+
+    The right side is lambda(n) (w - n) with lambda > 0; the linear recursion is solved again and again with the lambda
+    of the last answer.
+    """
+    size = float(np.max(np.abs(w), initial=0.0)) or 1.0
+    end = w.copy()
+    decay = np.zeros_like(w)
+    for _ in range(LAG_ITERATIONS):
+        before = np.concatenate([[start], end[:-1]])
+        n = 0.5 * (before + end)
+        gap = w - n
+        safe = np.where(np.abs(gap) > 1e-9 * size, gap, 1.0)
+        slope = np.where(np.abs(gap) > 1e-9 * size, (w * np.abs(w) - n * np.abs(n)) / safe, 2 * np.abs(w))
+        decay = (quadratic * slope + linear) * dt
+        keep = np.exp(-decay)
+        new = recursion(keep, (1 - keep) * w, start)
+        moved = float(np.max(np.abs(new - end)))
+        end = new
+        if moved < LAG_CLOSE * size:
+            break
+    before = np.concatenate([[start], end[:-1]])
+    decay = np.maximum(decay, 1e-12)
+    out: Floats = w + (before - w) * -np.expm1(-decay) / decay
+    return out
+
+
+def integral(value: Floats, edges: Floats, at: Floats) -> Floats:
+    """Integral of an interval-wise constant from the first edge to `at`; held constant outside."""
+    total = np.concatenate([[0.0], np.cumsum(value * np.diff(edges))])
+    out: Floats = np.interp(at, edges, total)
+    out += np.where(at < edges[0], (at - edges[0]) * value[0], 0.0)
+    out += np.where(at > edges[-1], (at - edges[-1]) * value[-1], 0.0)
+    return out
+
+
+def delayed(value: Floats, edges: Floats, delay: float) -> Floats:
+    """Means over each interval of value(t - delay)."""
+    out: Floats = np.diff(integral(value, edges, edges - delay)) / np.diff(edges)
+    return out
+
+
+def resonant(value: Floats, dt: Floats, frequency: float, damping: float) -> Floats:
+    """Mass on a spring y'' + 2 damping w y' + w^2 y = w^2 value, w = 2 pi frequency: exact means over each interval.
+
+    y is the imaginary part of (w^2/wd) z with z' = p z + value, p = -damping w + i wd: one complex first-order filter.
+    """
+    w = 2 * np.pi * frequency
+    wd = w * np.sqrt(max(1 - damping**2, 1e-9))
+    p = complex(-damping * w, wd)
+    keep = np.exp(p * dt)
+    end = _complex_recursion(keep, value * (keep - 1) / p)
+    before = np.concatenate([[0.0], end[:-1]])
+    mean = ((end - before) / dt - value) / p
+    out: Floats = (w**2 / wd) * mean.imag
+    return out
+
+
+def _complex_recursion(keep: NDArray[np.complex128], push: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    banded = np.ones((2, keep.size), dtype=np.complex128)
+    banded[1, :-1] = -keep[1:]
+    solved, info = ztbtrs(banded, push[:, None], uplo="L")
+    if info != 0:
+        raise ValueError(f"recursion: banded solve failed with {info}")
+    out: NDArray[np.complex128] = solved[:, 0]
+    return out
+
+
+def play(value: Floats, width: float) -> Floats:
+    """Play operator y = min(max(y, value - width), value + width), from y = 0."""
+    y, out = 0.0, []
+    for low, high in zip((value - width).tolist(), (value + width).tolist(), strict=True):
+        y = low if y < low else min(y, high)
+        out.append(y)
+    return np.array(out, dtype=np.float64)
+
+
+def since_opposite(x: Floats, dt: Floats, turning: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:
+    """S since it last turned the other way, s since it began to turn this way, and where either is known; (M,)."""
+    sign = np.where(x > turning, 1, np.where(x < -turning, -1, 0))
+    end = np.cumsum(dt)
+    middle = end - 0.5 * dt
+    index = np.arange(x.size)
+    last = {s: np.maximum.accumulate(np.where(sign == s, index, -1)) for s in (1, -1)}
+    now = np.where(last[1] > last[-1], 1, -1)  # the way it turns, or turned last
+    other = np.where(now == 1, last[-1], last[1])
+    known = (other >= 0) & (np.maximum(last[1], last[-1]) >= 0)
+    ended = end[np.maximum(other, 0)]
+    began = np.empty_like(middle)
+    # first interval of this direction after `other`
+    turns = np.flatnonzero((sign != 0) & known & (np.concatenate([[-2], other[:-1]]) != other))
+    start = np.full(x.size, -1)
+    start[turns] = turns
+    start = np.maximum.accumulate(start)
+    began = np.where(start >= 0, end[np.maximum(start, 0)] - dt[np.maximum(start, 0)], 0.0)
+    return middle - ended, middle - began, known

@@ -1,0 +1,44 @@
+"""Winding and magnet warm up: T (1 - h Theta), Theta' = (power - Theta)/tau, power of the copper as V^4."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.filters import lowpass
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Heating:
+    """Winding and magnet warm up: T (1 - h Theta), Theta' = (power - Theta)/tau, power of the copper as V^4."""
+
+    id: ClassVar[str] = "heating"
+    stage: ClassVar[Stage] = "hydro"
+    physics: ClassVar[str] = "winding and magnets warm up under load"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("time",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("loss", "1", 0.0, 0.95, 0.0), Parameter("time_constant", "s", 5.0, 1200.0))
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((0.05, tau) for tau in (15.0, 40.0, 100.0, 300.0))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        history = now.history
+        current = history.others.get("current")
+        load = (now.x / now.scale.driver) ** 4 if current is None else (current / np.nanmax(np.abs(current))) ** 2
+        warm = lowpass(load, history.dt, theta[1])[1]
+        out: Floats = value * np.maximum(1 - theta[0] * warm, 0.0)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Heating: at full load for long thrust falls by {100 * theta[0]:.2g} %, with a time constant of {theta[1]:.3g} s; rest between loads, or record the motor temperature."
+
+
+FORMS = (Heating(),)

@@ -1,0 +1,108 @@
+"""What one run did, on intervals of time: what drove it, what was measured in each, and what else was recorded.
+
+Intervals are short after a change of the driver and grow with the time since then, so that ten minutes at 100 Hz need
+some thousand of them and a motor lag is still seen. Values are means over the interval.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.recording import Floats
+
+TURNING = 0.02
+"""Share of the largest driver above which it counts as driving."""
+CHANGED = 0.01
+"""Share of the largest driver: a smaller difference between neighbouring intervals is no step."""
+
+
+@dataclass(frozen=True, eq=False)
+class History:
+    """One run on M intervals. All arrays are read-only by agreement; SI."""
+
+    recording_id: str
+    driver_quantity: str
+    """command_voltage, motor_voltage or rotation_rate."""
+    edges: Floats
+    """(M+1,) s."""
+    driver: Floats
+    """(M,) mean of the driver."""
+    thrust: Floats
+    """(M,) N, mean of the samples in the interval, NaN where there are none."""
+    count: NDArray[np.int64]
+    """(M,) thrust samples in the interval."""
+    sampled: Floats
+    """(M,) s, mean time of those samples; the middle of the interval where there are none."""
+    rate: Floats | None = None
+    """(M,) rev/s, mean of the rotation rate measured in the interval, NaN where none."""
+    rate_count: NDArray[np.int64] | None = None
+    others: Mapping[str, Floats] = None  # type: ignore[assignment]  # replaced in __post_init__
+    """quantity -> (M,) interpolated: bus_voltage, flow_speed, current, torque, motor_temperature, water_temperature,
+    rotation_rate, neighbour_thrust."""
+    rate_per_driver: float = 1.0
+    """rev/s per unit of the driver, where both are steady; of no use without a rate."""
+    static: bool = False
+    """Levels without a course of time: nothing that moves can be seen."""
+
+    def __post_init__(self) -> None:
+        if self.others is None:
+            object.__setattr__(self, "others", {})
+
+    @cached_property
+    def dt(self) -> Floats:
+        out: Floats = np.diff(self.edges)
+        return out
+
+    @cached_property
+    def middle(self) -> Floats:
+        out: Floats = 0.5 * (self.edges[1:] + self.edges[:-1])
+        return out
+
+    @cached_property
+    def rows(self) -> NDArray[np.intp]:
+        """Intervals with thrust."""
+        return np.flatnonzero(self.count > 0)
+
+    @cached_property
+    def rate_rows(self) -> NDArray[np.intp]:
+        """Intervals with a measured rotation rate."""
+        return np.flatnonzero(np.isfinite(self.rate)) if self.rate is not None else np.empty(0, dtype=np.intp)
+
+    @cached_property
+    def size(self) -> float:
+        """Largest |driver|."""
+        return float(np.max(np.abs(self.driver), initial=0.0))
+
+    @cached_property
+    def level_start(self) -> NDArray[np.intp]:
+        """(M,) index of the interval in which the present level began."""
+        new = np.abs(np.diff(self.driver, prepend=np.nan)) > CHANGED * self.size
+        new[0] = True
+        return np.maximum.accumulate(np.where(new, np.arange(new.size), 0))
+
+    @cached_property
+    def since_step(self) -> Floats:
+        """(M,) s since the driver changed, at the middle of the interval."""
+        out: Floats = self.middle - self.edges[self.level_start]
+        return out
+
+    @cached_property
+    def previous(self) -> Floats:
+        """(M,) driver of the level before this one that was held for some time; 0 before the first."""
+        starts = np.unique(self.level_start)
+        ends = np.append(starts[1:], self.driver.size)
+        held = self.edges[ends] - self.edges[starts] > max(0.3, 2 * float(np.median(self.dt)))
+        before = np.zeros(starts.size)
+        last = 0.0
+        for i in range(starts.size):
+            before[i] = last
+            if held[i]:
+                last = float(self.driver[starts[i]])
+        which = np.searchsorted(starts, self.level_start)
+        out: Floats = before[which]
+        return out

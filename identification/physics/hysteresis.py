@@ -1,0 +1,37 @@
+"""Friction or play in the load path: play operator of half width w."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from identification.physics.filters import play
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Hysteresis:
+    """Friction or play in the load path: play operator of half width w."""
+
+    id: ClassVar[str] = "hysteresis"
+    stage: ClassVar[Stage] = "stand"
+    physics: ClassVar[str] = "friction or play in the load path"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("previous_voltage", "direction_of_change")
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("half_width", "N", 0.0, 0.3 * scale.thrust, 0.0),)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((share * scale.thrust,) for share in (0.003, 0.01, 0.04))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        return play(value, theta[0])
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Hysteresis: up- and down-sweep differ by {2 * theta[0]:.3g} N; friction or play in the load path."
+
+
+FORMS = (Hysteresis(),)

@@ -1,0 +1,41 @@
+"""Water in the duct must be accelerated: T + C|x| share (x - u), u' = (x - u)/tau."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.filters import lowpass
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class InflowDynamics:
+    """Water in the duct must be accelerated: T + C|x| share (x - u), u' = (x - u)/tau."""
+
+    id: ClassVar[str] = "inflow_dynamics"
+    stage: ClassVar[Stage] = "hydro"
+    physics: ClassVar[str] = "the water in the duct must be accelerated first, so thrust overshoots"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("share", "1", 0.0, 3.0, 0.0), Parameter("time_constant", "s", 0.05, 5.0))
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((0.1, tau) for tau in (0.1, 0.3, 1.0, 3.0))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        u = lowpass(now.x, now.history.dt, theta[1])[1]
+        out: Floats = value + now.C * np.abs(now.x) * theta[0] * (now.x - u)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Inflow dynamics: after a step thrust overshoots by {100 * theta[0]:.0f} %, until the water has followed (time constant {theta[1]:.2g} s)."
+
+
+FORMS = (InflowDynamics(),)

@@ -1,0 +1,54 @@
+"""The cell is not straight: F + e F|F|, or F + e F^3."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class LoadCellNonlinearity:
+    """The cell is not straight: F + e F|F|, or F + e F^3."""
+
+    id: ClassVar[str] = "load_cell_nonlinearity"
+    stage: ClassVar[Stage] = "cell"
+    physics: ClassVar[str] = "the load cell is not straight"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("thrust",)
+    form: Literal["quadratic", "cubic"] = "quadratic"
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        power = 2 if self.form == "cubic" else 1
+        return (
+            Parameter(
+                "coefficient",
+                "1/N" if power == 1 else "1/N^2",
+                -0.4 / scale.thrust**power,
+                2.0 / scale.thrust**power,
+                0.0,
+            ),
+        )
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        power = 2 if self.form == "cubic" else 1
+        return ((0.02 / scale.thrust**power,),)
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        bend = value**2 if self.form == "cubic" else np.abs(value)
+        out: Floats = value * (1 + theta[0] * bend)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        power = 2 if self.form == "cubic" else 1
+        return f"Load-cell non-linearity: at {scale.thrust:.3g} N the cell shows {100 * theta[0] * scale.thrust**power:+.2g} %; check it with dead weights."
+
+
+FORMS = (
+    LoadCellNonlinearity("quadratic"),
+    LoadCellNonlinearity("cubic"),
+)

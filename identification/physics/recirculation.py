@@ -1,0 +1,44 @@
+"""The jet comes round the tunnel: T - k |x| u, u' = (x - u)/tau over tens of seconds."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.filters import lowpass
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Recirculation:
+    """The jet comes round the tunnel: T - k |x| u, u' = (x - u)/tau over tens of seconds."""
+
+    id: ClassVar[str] = "recirculation"
+    stage: ClassVar[Stage] = "hydro"
+    physics: ClassVar[str] = "the jet of the thruster comes round the tunnel"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step", "time")
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (
+            Parameter("coefficient", f"N/{scale.driver_unit}^2", 0.0, 0.9 * scale.thrust / scale.driver**2, 0.0),
+            Parameter("time_constant", "s", 3.0, 300.0),
+        )
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((0.05 * scale.thrust / scale.driver**2, tau) for tau in (5.0, 12.0, 30.0, 80.0))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        u = lowpass(now.x, now.history.dt, theta[1])[1]
+        out: Floats = value - theta[0] * np.abs(now.x) * u
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Recirculation: the jet comes round and takes up to {100 * theta[0] * scale.driver**2 / scale.thrust:.0f} % of the thrust within {theta[1]:.3g} s of one direction."
+
+
+FORMS = (Recirculation(),)

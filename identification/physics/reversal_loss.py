@@ -1,0 +1,47 @@
+"""The wake met at a sign change: T (1 - r e^(-t/tau)); t since the reversal, or since it last turned the other way."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from identification.physics.filters import since_opposite
+from identification.physics.history import TURNING
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class ReversalLoss:
+    """The wake met at a sign change: T (1 - r e^(-t/tau)); t since the reversal, or since it last turned the other way."""
+
+    id: ClassVar[str] = "reversal_loss"
+    stage: ClassVar[Stage] = "hydro"
+    physics: ClassVar[str] = "after a reversal the propeller works in its own wake"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("time_since_reversal", "time_since_step")
+    form: Literal["wake", "step"] = "wake"
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("loss", "1", 0.0, 1.0, 0.0), Parameter("time_constant", "s", 0.1, 60.0))
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((0.1, tau) for tau in (0.3, 1.0, 3.0, 10.0))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        since_other, since_began, known = since_opposite(now.x, now.history.dt, TURNING * now.scale.driver)
+        age = since_other if self.form == "wake" else since_began
+        wake = np.where(known, np.exp(-np.maximum(age, 0.0) / theta[1]), 0.0)
+        out: Floats = value * (1 - theta[0] * wake)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Reversal loss: after a change of direction {100 * theta[0]:.0f} % of the thrust is missing, for some {theta[1]:.2g} s."
+
+
+FORMS = (
+    ReversalLoss("wake"),
+    ReversalLoss("step"),
+)

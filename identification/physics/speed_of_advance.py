@@ -1,0 +1,42 @@
+"""Tunnel flow through the disc: T - C_s |x| U (Fossen, bilinear thrust)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class SpeedOfAdvance:
+    """Tunnel flow through the disc: T - C_s |x| U (Fossen, bilinear thrust)."""
+
+    id: ClassVar[str] = "speed_of_advance"
+    stage: ClassVar[Stage] = "hydro"
+    physics: ClassVar[str] = "the flow through the disc takes thrust"
+    needs: ClassVar[tuple[str, ...]] = ("flow_speed",)
+    coordinates: ClassVar[tuple[str, ...]] = ("flow_speed",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        u = max(scale.flow, 1e-6)
+        return (
+            Parameter("coefficient", f"N/({scale.driver_unit} m/s)", 0.0, 3 * scale.thrust / scale.driver / u, 0.0),
+        )
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ((0.05 * scale.thrust / scale.driver / max(scale.flow, 1e-6),),)
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        out: Floats = value - theta[0] * np.abs(now.x) * now.history.others["flow_speed"]
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Speed of advance: flow through the disc takes {theta[0]:.3g} N per {scale.driver_unit} and m/s."
+
+
+FORMS = (SpeedOfAdvance(),)

@@ -1,0 +1,45 @@
+"""Mass on a spring: the reading rings, y'' + 2 z w y' + w^2 y = w^2 F."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.filters import resonant
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class StandResonance:
+    """Mass on a spring: the reading rings, y'' + 2 z w y' + w^2 y = w^2 F."""
+
+    id: ClassVar[str] = "stand_resonance"
+    stage: ClassVar[Stage] = "stand"
+    physics: ClassVar[str] = "the stand rings after a step"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (
+            Parameter("compliance", "1", 0.0, 1.0, 0.0),
+            Parameter("frequency", "Hz", 0.1, 0.45 / scale.interval),
+            Parameter("damping", "1", 0.005, 0.95),
+        )
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((1.0, f, 0.15) for f in np.geomspace(0.5, max(0.25 / scale.interval, 0.6), 7))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        rung = resonant(value, now.history.dt, theta[1], theta[2])
+        out: Floats = value + theta[0] * (rung - value)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Stand resonance: the stand rings at {theta[1]:.3g} Hz with {100 * theta[2]:.2g} % of critical damping."
+
+
+FORMS = (StandResonance(),)

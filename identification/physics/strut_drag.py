@@ -1,0 +1,43 @@
+"""Flow on the mounting: + s U|U|."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class StrutDrag:
+    """Flow on the mounting: + s U|U|."""
+
+    id: ClassVar[str] = "strut_drag"
+    stage: ClassVar[Stage] = "stand"
+    physics: ClassVar[str] = "the flow pushes on the mounting"
+    needs: ClassVar[tuple[str, ...]] = ("flow_speed",)
+    coordinates: ClassVar[tuple[str, ...]] = ("flow_speed",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        u = max(scale.flow, 1e-6)
+        return (Parameter("coefficient", "N/(m/s)^2", -scale.thrust / u**2, scale.thrust / u**2, 0.0),)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ((-0.02 * scale.thrust / max(scale.flow, 1e-6) ** 2,),)
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        flow = now.history.others["flow_speed"]
+        out: Floats = value + theta[0] * flow * np.abs(flow)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return (
+            f"Strut drag: the flow pushes on the mounting with {theta[0]:.3g} N/(m/s)^2, also at rest of the propeller."
+        )
+
+
+FORMS = (StrutDrag(),)

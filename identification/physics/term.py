@@ -1,0 +1,95 @@
+"""What a piece of physics is: a named change of a prediction, with bounded parameters.
+
+A prediction passes stages in the order of the bench: `command` (V that the rotor answers to), `rotor` (V to the rate
+it reaches, in volts of the steady state), `hydro` (thrust of the propeller), `stand` (force that reaches the cell),
+`cell` (its reading). Terms of a model act in that order, so models are closed under `+`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from identification.physics.history import History
+from identification.recording import Floats
+
+Stage = Literal["command", "rotor", "hydro", "stand", "cell"]
+STAGES: tuple[Stage, ...] = ("command", "rotor", "hydro", "stand", "cell")
+
+
+@dataclass(frozen=True, slots=True)
+class Scale:
+    """Sizes that bounds and trial values are made of: nothing depends on one bench's volts and newtons."""
+
+    driver: float
+    """Largest |driver|, in `driver_unit`."""
+    driver_unit: str
+    thrust: float
+    """N: C driver^2."""
+    duration: float
+    """s of the longest run."""
+    interval: float
+    """s, the shortest interval of the grid."""
+    flow: float = 0.0
+    """m/s, the largest |flow_speed|."""
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One number of a term. `neutral`: where the term is absent, None for an inner parameter (a time constant)."""
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    neutral: float | None = None
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Moment:
+    """What a term may look at beside the value that it changes. Arrays (M,) on the intervals of the history."""
+
+    history: History
+    scale: Scale
+    C: float
+    x: Floats
+    """Rate of the rotor in units of the driver: thrust is C x|x| without any term. In stage command: the driver."""
+
+
+class Term(Protocol):
+    """One effect in one textbook form."""
+
+    @property
+    def id(self) -> str:
+        """Effect id of the catalogue."""
+
+    @property
+    def form(self) -> str:
+        """Which textbook form; empty where there is one."""
+
+    @property
+    def stage(self) -> Stage: ...
+
+    @property
+    def physics(self) -> str:
+        """One clause: what it says is left out."""
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Quantities that must be recorded."""
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """Covariates over which its shape can be tested against a free form."""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        """In the order of theta; the first one is the amount."""
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        """Small but finite amounts at several inner settings, to look for it with."""
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        """The value of its stage (M,) with this effect in it."""
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        """One sentence a person can act on."""

@@ -1,0 +1,37 @@
+"""Channels not on one clock, or a transport delay: F(t - d)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+from identification.physics.filters import delayed
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class TimeSkew:
+    """Channels not on one clock, or a transport delay: F(t - d)."""
+
+    id: ClassVar[str] = "time_skew"
+    stage: ClassVar[Stage] = "stand"
+    physics: ClassVar[str] = "force and command are not on one clock"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("delay", "s", -2.0, 2.0, 0.0),)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((d,) for d in (0.004, 0.02, 0.1, 0.4))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        return delayed(value, now.history.edges, theta[0])
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Time skew: the force arrives {1000 * abs(theta[0]):.3g} ms {'after' if theta[0] > 0 else 'before'} the command that causes it."
+
+
+FORMS = (TimeSkew(),)

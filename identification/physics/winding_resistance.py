@@ -1,0 +1,43 @@
+"""Voltage lost in the winding: |V| = e + loss e^2, e the back-EMF (motor balance, current as e^2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class WindingResistance:
+    """Voltage lost in the winding: |V| = e + loss e^2, e the back-EMF (motor balance, current as e^2)."""
+
+    id: ClassVar[str] = "winding_resistance"
+    stage: ClassVar[Stage] = "command"
+    physics: ClassVar[str] = "voltage is lost in the winding as the current grows"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("loss", f"1/{scale.driver_unit}", 0.0, 5.0 / scale.driver, 0.0),)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((share / scale.driver,) for share in (0.02, 0.2, 0.8))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        loss = theta[0]
+        if loss <= 0:
+            return value
+        out: Floats = np.sign(value) * 2 * np.abs(value) / (1 + np.sqrt(1 + 4 * loss * np.abs(value)))
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        e = 2 / (1 + (1 + 4 * theta[0] * scale.driver) ** 0.5)
+        return f"Winding resistance: of {scale.driver:.3g} {scale.driver_unit} only {100 * e:.0f} % turns the motor; the rest is lost in the winding, as the current grows."
+
+
+FORMS = (WindingResistance(),)
