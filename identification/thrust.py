@@ -4,17 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, pairwise
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
 from scipy.stats import t as student
 
-from identification.estimation import Estimate, Method, Rows, estimate
-from identification.pooling import moderate
+from identification.estimation import Estimate, Method, estimate
 from identification.recording import Floats, Recording
 from identification.thrust_data import Run, Unusable, prepare
-from identification.thrust_forms import FORMS, Form, Model, columns
+from identification.thrust_forms import FORMS, Form, Model
+from identification.thrust_rows import rows_of
 from identification.verdicts import Significance, Whiteness, significance, whiteness
 
 
@@ -94,36 +94,6 @@ class ThrustFit:
     def chi2_per_dof(self) -> float | None:
         verdict = self.estimate.underfit
         return verdict.per_dof if verdict is not None and verdict.dof > 0 else None
-
-
-def _flow(runs: Sequence[Run], of_points: bool) -> Floats | None:
-    found = [run.flow.points if of_points else run.flow.samples for run in runs if run.flow is not None]
-    known = [flow for flow in found if flow is not None]
-    return np.concatenate(known) if len(known) == len(runs) else None
-
-
-def rows_of(runs: Sequence[Run], form: Form) -> tuple[Rows, Literal["points", "samples"]]:
-    """Stack the runs: signals of the form, one column of ones per recording; points if every run has holds."""
-    points = [run.points for run in runs if run.points is not None]
-    of_points = len(points) == len(runs)
-    V = [p.voltage for p in points] if of_points else [run.voltage for run in runs]
-    y = [p.thrust for p in points] if of_points else [run.thrust for run in runs]
-    ends = np.cumsum([0, *[v.size for v in V]])
-    blocks = tuple(slice(int(a), int(b)) for a, b in pairwise(ends))
-    signals = columns(form, np.concatenate(V), _flow(runs, of_points))
-    tares = np.zeros((signals[0].size, len(runs)))
-    for k, block in enumerate(blocks):
-        tares[block, k] = 1.0
-    names = (*form.coefficients, *(f"tare[{run.recording_id}]" for run in runs))
-    H, thrust = np.column_stack([*signals, tares]), np.concatenate(y)
-    if not of_points:
-        return Rows(H, thrust, names, blocks, even=True), "samples"
-    error = np.concatenate([p.std_error for p in points])
-    if not np.all(np.isfinite(error) & (error > 0)):
-        return Rows(H, thrust, names, blocks, even=True), "points"
-    dof = np.concatenate([p.dof for p in points])
-    shared = moderate(error, dof, np.abs(thrust))
-    return Rows(H, thrust, names, blocks, shared.std_error, shared.dof, float(dof.max())), "points"
 
 
 def _uncorrected(found: Estimate, runs: Sequence[Run], contrast: Floats) -> float:

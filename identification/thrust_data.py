@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.points import FALLBACK, Points, reduce_to_points, voltage_channel
+from identification.noise import MIN_SAMPLES
+from identification.points import FALLBACK, Points, find_windows, reduce_to_points, voltage_channel
 from identification.recording import Channel, Floats, Recording
+from identification.steady import settled_estimates
 
 REST_SHARE = 0.05
 """Slower than this share of the fastest rotation counts as rest."""
@@ -57,6 +59,8 @@ class Run:
     unsigned: bool = False
     """The rotation rate never turns negative while the thrust changes sign: the tachometer does not tell direction."""
     flow: Flow | None = None
+    level_std: Floats | None = None
+    """Standard error of each point's voltage or rate (k,) when it was measured; None for a command."""
     calibration: str = ""
     """Which cell under which calibration: recordings that agree in it share the error of its gain."""
 
@@ -141,6 +145,30 @@ def _mean_flow(t: Floats, u: Floats, t_start: float, t_end: float) -> float:
     return float(inside.mean()) if inside.size else float(np.interp((t_start + t_end) / 2, t, u))
 
 
+def measured_levels(recording: Recording, source: Channel, points: Points) -> tuple[Points, Floats]:
+    """Points at the level that a measured voltage or rate settles to in their holds, and its standard error (k,).
+
+    A thrust that is still settling is extrapolated to where it goes; the rate beside it must be too.
+    """
+    kept: list[tuple[int, tuple[Floats, Floats]]] = []
+    thrust = recording.first_of("thrust")
+    windows = find_windows(recording, source, thrust) if thrust is not None else ()
+    for at, point in enumerate(points.points):
+        e = point.thrust
+        span = next(((w.t_start, w.t_end) for w in windows if w.t_start <= e.t_start and e.t_end <= w.t_end), None)
+        low, high = span or (e.t_start, float(np.nextafter(e.t_end, np.inf)))
+        time, value = source.window(low, high)
+        good = np.isfinite(value)
+        if good.sum() >= MIN_SAMPLES:
+            kept.append((at, (time[good], value[good])))
+    levels, std = points.voltage, np.zeros(len(points.points))
+    for (at, _), found in zip(kept, settled_estimates([samples for _, samples in kept]), strict=True):
+        if np.isfinite(found.mean) and np.isfinite(found.std_error):
+            levels[at], std[at] = found.mean, found.std_error
+    moved = tuple(replace(point, voltage=float(v)) for point, v in zip(points.points, levels, strict=True))
+    return replace(points, points=moved), std
+
+
 def _refusal(recording: Recording, who: str) -> Unusable | None:
     """What no fit can be made of, before any number is looked at."""
     if recording.kind == "vehicle":
@@ -181,7 +209,9 @@ def prepare(recording: Recording, voltage: str = "command_voltage") -> Run | Unu
     if stuck is not None:
         return stuck
     quantity = source.quantity or voltage
-    points = reduce_to_points(recording, source, thrust)
+    points, level_std = reduce_to_points(recording, source, thrust), None
+    if points is not None and quantity != "command_voltage":
+        points, level_std = measured_levels(recording, source, points)
     return Run(
         recording.recording_id,
         recording.thruster,
@@ -194,5 +224,6 @@ def prepare(recording: Recording, voltage: str = "command_voltage") -> Run | Unu
         thrust.noise_std if thrust.noise_std is not None and thrust.noise_std > 0 else None,
         quantity == "rotation_rate" and lacks_sign(at[good], thrust.value[good]),
         flow_of(recording, thrust.time[good], points),
+        level_std,
         calibration_of(thrust),
     )
