@@ -8,6 +8,7 @@ from typing import Any
 
 from sim_devices.tables import WorldError, build, check_known
 from sim_devices.world.effects import EFFECTS, Effect
+from sim_devices.world.effects.uncatalogued import UNCATALOGUED
 from sim_devices.world.noise import CHANNELS, Noise
 
 
@@ -35,8 +36,13 @@ class Thruster:
     """K/A^2: winding temperature rise per squared current: 40 K at 20 A."""
     heating_time: float = 120.0
     """s."""
+    rotor: str = "servo"
+    """"servo": the equation above. "instant": n = k V at once while driven, so tau = C V|V| at every instant;
+    `drag` and `torque_acceleration` then only say the current, drag n|n| / torque_acceleration."""
 
     def __post_init__(self) -> None:
+        if self.rotor not in ("servo", "instant"):
+            raise ValueError(f"rotor must be one of servo, instant, got {self.rotor!r}")
         if not (self.rate_per_volt > 0 and self.drag > 0 and self.torque_acceleration > 0 and self.heating_time > 0):
             raise ValueError("rate_per_volt, drag, torque_acceleration and heating_time must be positive")
 
@@ -48,7 +54,9 @@ class Tunnel:
     flow_speed: float = 0.0
     """m/s, positive when the water comes at the thruster from ahead."""
     water_temperature: float = 18.0
-    """degC."""
+    """degC, at the start."""
+    temperature_drift: float = 0.0
+    """K/s, of the water."""
     pressure: float = 1.04e5
     """Pa, absolute, at the transmitter."""
 
@@ -113,6 +121,7 @@ def read_world(tables: Mapping[str, Any]) -> WorldSettings:
 
 def make_effects(tables: Mapping[str, Mapping[str, Any]]) -> list[Effect]:
     """Fresh effects, in the order of the catalogue, from `[effects.<id>]` tables."""
+    known = {**EFFECTS, **UNCATALOGUED}
     for name in tables:
-        check_known(name, EFFECTS, "effects")
-    return [build(cls, tables[name], f"effects.{name}") for name, cls in EFFECTS.items() if name in tables]
+        check_known(name, known, "effects")
+    return [build(cls, tables[name], f"effects.{name}") for name, cls in known.items() if name in tables]

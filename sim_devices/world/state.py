@@ -19,6 +19,8 @@ class State:
     """False: the windings carry a set current (0 = coasting) instead of a voltage."""
     n: float = 0.0
     """rev/s, signed."""
+    acceleration: float = 0.0
+    """rev/s^2, of a concealed rotor inertia; a rotor of the thruster table keeps its own account."""
     thrust: float = 0.0
     """N, of the propeller, positive forward."""
     force: float = 0.0
@@ -35,6 +37,8 @@ class State:
     """V."""
     flow: float = 0.0
     """m/s of the tunnel."""
+    water_temperature: float = 18.0
+    """degC."""
     motor_rise: float = 0.0
     """K, winding over water."""
     # constants of the mounted thruster and the supply, here so that effects need no second argument

@@ -22,13 +22,17 @@ class World:
         self.settings = settings
         self.state = State(bus_voltage=settings.supply.voltage, nominal_bus=settings.supply.voltage)
         self.state.flow = settings.tunnel.flow_speed
+        self.state.water_temperature = settings.tunnel.water_temperature
         self._noise = {c: NoiseSource(settings.noise.get(c, Noise()), rng) for c in CHANNELS}
         self._effects = make_effects(settings.effects)
         self._command = self._of_stage("command")
+        self._rotor = self._of_stage("rotor")
         self._hydro = self._of_stage("hydro")
         self._stand = self._of_stage("stand")
         self._cell = self._of_stage("cell")
         self._outputs = {c: tuple(e for e in self._of_stage("output") if _concerns(e, c)) for c in CHANNELS}
+        self._spin = 0.0
+        """rev/s of the rotor before the effects of the rotor stage."""
         self.mounted = settings.mounted
         self._install()
 
@@ -41,7 +45,7 @@ class World:
                 "stop the motor first"
             )
         self.mounted = name
-        self.state.n = self.state.motor_rise = 0.0
+        self.state.n = self.state.motor_rise = self._spin = 0.0
         self._install()
 
     def _install(self) -> None:
@@ -59,7 +63,8 @@ class World:
         """Advance by dt (s) with `volts` at the motor; None: the windings carry `amps` instead (0 = coasting)."""
         s, th = self.state, self._thruster
         s.t += dt
-        n = s.n
+        s.water_temperature = self.settings.tunnel.water_temperature + self.settings.tunnel.temperature_drift * s.t
+        n = self._spin
         k, alpha = th.rate_per_volt, th.drag
         if volts is None:
             s.driven, s.command, s.volts = False, 0.0, n / k
@@ -74,8 +79,17 @@ class World:
         # Heun's rule for n' = push - pull n - alpha n|n|: second order, exact at the rest point
         slope = push - (pull + alpha * abs(n)) * n
         guess = n + dt * slope
-        s.n = n = n + 0.5 * dt * (slope + push - (pull + alpha * abs(guess)) * guess)
+        n = n + 0.5 * dt * (slope + push - (pull + alpha * abs(guess)) * guess)
+        instant = th.rotor == "instant" and volts is not None
+        if instant:
+            n = k * s.volts
+        self._spin = n
         s.current = amps if volts is None else (push - pull * n) / th.torque_acceleration
+        for e in self._rotor:
+            n = e.apply(n, s, dt)
+        s.n = n
+        if instant:
+            s.current = (alpha * n * abs(n) + s.acceleration) / th.torque_acceleration
         s.input_current = s.current * s.volts / s.bus_voltage if s.bus_voltage > 1.0 else 0.0
         s.motor_rise += (th.heating * s.current * s.current - s.motor_rise) * dt / th.heating_time
         self._forces(dt)
@@ -125,11 +139,11 @@ class World:
             case "pressure":
                 return self.settings.tunnel.pressure
             case "water_temperature":
-                return self.settings.tunnel.water_temperature
+                return s.water_temperature
             case "motor_temperature":
-                return self.settings.tunnel.water_temperature + s.motor_rise
+                return s.water_temperature + s.motor_rise
             case "fet_temperature":
-                return self.settings.tunnel.water_temperature + 5.0 + 0.5 * s.motor_rise
+                return s.water_temperature + 5.0 + 0.5 * s.motor_rise
             case _:
                 raise ValueError(f"sample: expected one of {', '.join(CHANNELS)}, got {channel!r}")
 

@@ -41,6 +41,9 @@ SHOWN = {
     "periodic_disturbance": {"amplitude": 0.5, "frequency": 17.0},
     "zero_drift": {"rate": 0.05},
     "load_cell_saturation": {"limit": 50.0},
+    "motor_lag": {"time_constant": 0.2},
+    "rotation_coupling": {"amplitude": 0.02},
+    "zero_offset": {"offset": 1.0, "start": 5.0},
     "channel_fault": {"channel": "thrust", "kind": "rescaled", "factor": 1.1},
 }
 TIMES, VOLTS = (0.0, 2.0, 6.0, 8.0, 12.0, 14.0), (0.0, 18.0, 4.0, -18.0, 0.5, 0.0)

@@ -1,7 +1,7 @@
 """The effects a world can conceal, one small class each, by their catalogue id.
 
-An effect has a `stage` and changes one number there: `command` (V that the rotor answers to), `hydro` (propeller
-thrust), `stand` (force that reaches the cell), `cell` (reading), `output` (after noise and offset).
+An effect has a `stage` and changes one number there: `command` (V that the rotor answers to), `rotor` (rotation rate),
+`hydro` (propeller thrust), `stand` (force that reaches the cell), `cell` (reading), `output` (after noise and offset).
 An effect that is not named in the world file is not there at all: its stage holds no object for it.
 """
 
@@ -12,10 +12,12 @@ from sim_devices.world.effects.cell import (
     LoadCellSaturation,
     PeriodicDisturbance,
     ZeroDrift,
+    ZeroOffset,
 )
 from sim_devices.world.effects.channel import ChannelFault
 from sim_devices.world.effects.electrical import CommandSaturation, DeadBand, SupplySag, WindingResistance
 from sim_devices.world.effects.flow import InflowDynamics, Recirculation, SpeedOfAdvance, ThrusterInteraction
+from sim_devices.world.effects.rotor import MotorLag, RotationCoupling
 from sim_devices.world.effects.stage import Effect
 from sim_devices.world.effects.stand import Hysteresis, StandResonance, StrutDrag, TimeSkew, TorqueCrosstalk
 
@@ -25,6 +27,8 @@ EFFECTS: dict[str, type[Effect]] = {
     "supply_sag": SupplySag,
     "dead_band": DeadBand,
     "winding_resistance": WindingResistance,
+    "motor_lag": MotorLag,
+    "rotation_coupling": RotationCoupling,
     "exponent": Exponent,
     "asymmetry": Asymmetry,
     "inflow_dynamics": InflowDynamics,
@@ -44,6 +48,7 @@ EFFECTS: dict[str, type[Effect]] = {
     "load_cell_nonlinearity": LoadCellNonlinearity,
     "periodic_disturbance": PeriodicDisturbance,
     "zero_drift": ZeroDrift,
+    "zero_offset": ZeroOffset,
     "load_cell_saturation": LoadCellSaturation,
     "channel_fault": ChannelFault,
 }

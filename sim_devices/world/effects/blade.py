@@ -6,8 +6,15 @@ from dataclasses import dataclass, field
 from math import exp
 from typing import ClassVar
 
-from sim_devices.world.effects.stage import Stage, require_positive
+import numpy as np
+
+from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
+from sim_devices.world.filters import low_pass
+from sim_devices.world.history import History
 from sim_devices.world.state import State
+
+TURNING = 0.5
+"""rev/s: slower than this the rotor neither makes nor meets a wake."""
 
 
 @dataclass(slots=True)
@@ -26,6 +33,12 @@ class Exponent:
         ratio = abs(s.n) / (s.rate_per_volt * self.reference_voltage)
         return float(value * ratio ** (self.exponent - 2.0)) if ratio > 0.0 else 0.0
 
+    def over(self, value: Floats, h: History) -> Floats:
+        ratio = np.abs(h.n) / (h.rate_per_volt * self.reference_voltage)
+        turning = ratio > 0.0
+        gain = np.power(ratio, self.exponent - 2.0, where=turning, out=np.zeros_like(ratio))
+        return np.asarray(value * gain)
+
 
 @dataclass(slots=True)
 class Asymmetry:
@@ -36,6 +49,9 @@ class Asymmetry:
 
     def apply(self, value: float, s: State, _dt: float) -> float:
         return value * self.ratio if s.n < 0.0 else value
+
+    def over(self, value: Floats, h: History) -> Floats:
+        return np.where(h.n < 0.0, value * self.ratio, value)
 
 
 @dataclass(slots=True)
@@ -49,32 +65,65 @@ class LinearTerm:
     def apply(self, value: float, s: State, _dt: float) -> float:
         return value + self.coefficient * s.n / s.rate_per_volt
 
+    def over(self, value: Floats, h: History) -> Floats:
+        return np.asarray(value + self.coefficient * h.n / h.rate_per_volt)
+
 
 @dataclass(slots=True)
 class Cavitation:
-    """Thrust breaks down above a rate: T (1 - slope max(|n| - onset, 0)), never below zero."""
+    """Thrust breaks down above a rate, never below zero; e = max(|n| - onset, 0).
+
+    form "linear": T (1 - slope e). form "square": T (1 - (slope e)^2), which sets in gently.
+    """
 
     stage: ClassVar[Stage] = "hydro"
     onset: float
     """rev/s."""
     slope: float
     """1/(rev/s)."""
+    form: str = "linear"
+
+    def __post_init__(self) -> None:
+        require_choice("form", self.form, ("linear", "square"))
 
     def apply(self, value: float, s: State, _dt: float) -> float:
-        excess = abs(s.n) - self.onset
-        return value * max(1.0 - self.slope * excess, 0.0) if excess > 0.0 else value
+        lost = self.slope * max(abs(s.n) - self.onset, 0.0)
+        return value * max(1.0 - (lost if self.form == "linear" else lost * lost), 0.0)
+
+    def over(self, value: Floats, h: History) -> Floats:
+        lost = self.slope * np.maximum(np.abs(h.n) - self.onset, 0.0)
+        return np.asarray(value * np.maximum(1.0 - (lost if self.form == "linear" else lost * lost), 0.0))
 
 
 @dataclass(slots=True)
 class Heating:
-    """Winding and magnet warm up: T (1 - loss_per_kelvin * rise); the rise is the motor's own (thruster table)."""
+    """Winding and magnet warm up: T (1 - loss_per_kelvin * rise).
+
+    form "winding": the rise is the motor's own, the one its thermometer sees. form "magnet": the magnets follow it
+    with a lag of their own, `time_constant`.
+    """
 
     stage: ClassVar[Stage] = "hydro"
     loss_per_kelvin: float
     """1/K."""
+    form: str = "winding"
+    time_constant: float = 60.0
+    """s; only for "magnet"."""
+    rise: float = field(init=False, default=0.0)
+    """K, of the magnets."""
 
-    def apply(self, value: float, s: State, _dt: float) -> float:
-        return value * (1.0 - self.loss_per_kelvin * s.motor_rise)
+    def __post_init__(self) -> None:
+        require_choice("form", self.form, ("winding", "magnet"))
+        require_positive(time_constant=self.time_constant)
+
+    def apply(self, value: float, s: State, dt: float) -> float:
+        self.rise += (s.motor_rise - self.rise) * min(dt / self.time_constant, 1.0)
+        rise = s.motor_rise if self.form == "winding" else self.rise
+        return value * (1.0 - self.loss_per_kelvin * rise)
+
+    def over(self, value: Floats, h: History) -> Floats:
+        rise = h.motor_rise if self.form == "winding" else low_pass(h.motor_rise, self.time_constant, h.dt)
+        return np.asarray(value * (1.0 - self.loss_per_kelvin * rise))
 
 
 @dataclass(slots=True)
@@ -99,7 +148,7 @@ class ReversalLoss:
 
     def apply(self, value: float, s: State, dt: float) -> float:
         self.wake *= exp(-dt / self.time_constant)
-        if abs(s.n) < 0.5:  # rev/s: too slow to make or meet a wake
+        if abs(s.n) < TURNING:
             self.rest += dt
             return value * (1.0 - self.loss * self.wake)
         turning = 1.0 if s.n > 0.0 else -1.0
@@ -109,3 +158,14 @@ class ReversalLoss:
             self.direction = turning
         self.rest = 0.0
         return value * (1.0 - self.loss * self.wake)
+
+    def over(self, value: Floats, h: History) -> Floats:
+        turning = np.flatnonzero(np.abs(h.n) >= TURNING)
+        wake = np.zeros_like(value)
+        turned = np.flatnonzero(np.diff(np.sign(h.n[turning]))) + 1  # positions in `turning` of a new direction
+        ends = [*turning[turned[1:]].tolist(), value.size]
+        for position, end in zip(turned.tolist(), ends[: turned.size], strict=True):
+            at = turning[position]
+            met = exp(-(at - turning[position - 1] - 1) * h.dt / self.time_constant)
+            wake[at:end] = met * np.exp(-(h.t[at:end] - h.t[at]) / self.time_constant)
+        return np.asarray(value * (1.0 - self.loss * wake))

@@ -6,27 +6,43 @@ from dataclasses import dataclass, field
 from math import exp, pi, sin
 from typing import ClassVar
 
-from sim_devices.world.effects.stage import Stage, require_positive
+import numpy as np
+
+from sim_devices.world.effects.stage import Floats, Stage, require_positive
+from sim_devices.world.filters import low_pass
+from sim_devices.world.history import History
 from sim_devices.world.state import State
 
 
 @dataclass(slots=True)
 class LoadCellCreep:
-    """Viscoelastic cell: F + share * c, c' = (F - c)/time_constant."""
+    """Viscoelastic cell: F + share * c, c' = (F - c)/time_constant; with share_2 a second, slower term beside it."""
 
     stage: ClassVar[Stage] = "cell"
     share: float
     time_constant: float
     """s."""
+    share_2: float = 0.0
+    time_constant_2: float = 300.0
+    """s."""
     crept: float = field(init=False, default=0.0)
+    """N."""
+    crept_2: float = field(init=False, default=0.0)
     """N."""
 
     def __post_init__(self) -> None:
-        require_positive(time_constant=self.time_constant)
+        require_positive(time_constant=self.time_constant, time_constant_2=self.time_constant_2)
 
     def apply(self, value: float, _s: State, dt: float) -> float:
         self.crept += (value - self.crept) * min(dt / self.time_constant, 1.0)
-        return value + self.share * self.crept
+        self.crept_2 += (value - self.crept_2) * min(dt / self.time_constant_2, 1.0)
+        return value + self.share * self.crept + self.share_2 * self.crept_2
+
+    def over(self, value: Floats, h: History) -> Floats:
+        crept = self.share * low_pass(value, self.time_constant, h.dt)
+        if self.share_2:
+            crept += self.share_2 * low_pass(value, self.time_constant_2, h.dt)
+        return np.asarray(value + crept)
 
 
 @dataclass(slots=True)
@@ -41,6 +57,9 @@ class LoadCellNonlinearity:
 
     def apply(self, value: float, _s: State, _dt: float) -> float:
         return value + self.quadratic * value * abs(value) + self.cubic * value**3
+
+    def over(self, value: Floats, _h: History) -> Floats:
+        return np.asarray(value + self.quadratic * value * np.abs(value) + self.cubic * value**3)
 
 
 @dataclass(slots=True)
@@ -73,6 +92,13 @@ class PeriodicDisturbance:
             self.turns = (self.turns + self.frequency * dt) % 1.0
         return value + self.amplitude * sin(2.0 * pi * self.turns + self.phase)
 
+    def over(self, value: Floats, h: History) -> Floats:
+        if not self.blades:
+            return np.asarray(value + self.amplitude * np.sin(2.0 * pi * self.frequency * h.t + self.phase))
+        turns = np.cumsum(self.blades * np.abs(h.n)) * h.dt
+        wave = self.amplitude * np.sin(2.0 * pi * turns + self.phase)
+        return np.where(np.abs(h.n) < 0.1, value, value + wave)
+
 
 @dataclass(slots=True)
 class ZeroDrift:
@@ -92,6 +118,26 @@ class ZeroDrift:
     def apply(self, value: float, s: State, _dt: float) -> float:
         return value + self.amplitude * (1.0 - exp(-s.t / self.time_constant)) + self.rate * s.t
 
+    def over(self, value: Floats, h: History) -> Floats:
+        return np.asarray(value + self.amplitude * (1.0 - np.exp(-h.t / self.time_constant)) + self.rate * h.t)
+
+
+@dataclass(slots=True)
+class ZeroOffset:
+    """The zero jumps at `start` (a knock, a cable that pulls) and stays: + offset from then on."""
+
+    stage: ClassVar[Stage] = "cell"
+    offset: float
+    """N."""
+    start: float = 0.0
+    """s of world time; 0: a tare error of the whole run."""
+
+    def apply(self, value: float, s: State, _dt: float) -> float:
+        return value + self.offset if s.t >= self.start else value
+
+    def over(self, value: Floats, h: History) -> Floats:
+        return np.where(h.t >= self.start, value + self.offset, value)
+
 
 @dataclass(slots=True)
 class LoadCellSaturation:
@@ -106,3 +152,6 @@ class LoadCellSaturation:
 
     def apply(self, value: float, _s: State, _dt: float) -> float:
         return min(max(value, -self.limit), self.limit)
+
+    def over(self, value: Floats, _h: History) -> Floats:
+        return np.clip(value, -self.limit, self.limit)

@@ -6,7 +6,10 @@ from dataclasses import dataclass, field
 from math import nan
 from typing import ClassVar
 
-from sim_devices.world.effects.stage import Stage, require_choice, require_positive
+import numpy as np
+
+from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
+from sim_devices.world.history import History
 from sim_devices.world.noise import CHANNELS
 from sim_devices.world.state import State
 
@@ -42,6 +45,28 @@ class ChannelFault:
             self.last = value
             return value
         return self._faulty(value, s.t)
+
+    def over(self, value: Floats, h: History) -> Floats:
+        """`h` is on the channel's own sample times."""
+        late = h.t >= self.start + self.duration if self.duration else np.zeros(h.t.shape, dtype=bool)
+        faulty = (h.t >= self.start) & ~late
+        return np.where(faulty, self._all_faulty(value, h.t), value)
+
+    def _all_faulty(self, value: Floats, t: Floats) -> Floats:
+        match self.kind:
+            case "frozen":
+                before = np.flatnonzero(t < self.start)
+                return np.full_like(value, value[before[-1]] if before.size else 0.0)
+            case "reversed":
+                return -value
+            case "rescaled":
+                return value * self.factor
+            case "unsigned":
+                return np.abs(value)
+            case "dropout":
+                return np.where(t % 1.0 >= 1.0 - self.factor, nan, value)
+            case _:
+                return np.full_like(value, nan)
 
     def _faulty(self, value: float, t: float) -> float:
         match self.kind:

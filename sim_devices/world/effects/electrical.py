@@ -6,8 +6,15 @@ from dataclasses import dataclass, field
 from math import copysign, sqrt
 from typing import ClassVar
 
-from sim_devices.world.effects.stage import Stage, require_choice, require_positive
+import numpy as np
+
+from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
+from sim_devices.world.filters import low_pass
+from sim_devices.world.history import History
 from sim_devices.world.state import State
+
+OUTPUT_CAPACITOR = 0.02
+"""s: the supply's output capacitor, so that current and voltage do not chase each other step by step."""
 
 
 @dataclass(slots=True)
@@ -23,6 +30,9 @@ class CommandSaturation:
 
     def apply(self, value: float, _s: State, _dt: float) -> float:
         return min(max(value, -self.limit), self.limit)
+
+    def over(self, value: Floats, _h: History) -> Floats:
+        return np.clip(value, -self.limit, self.limit)
 
 
 @dataclass(slots=True)
@@ -44,9 +54,15 @@ class SupplySag:
     def apply(self, value: float, s: State, dt: float) -> float:
         self.charge += s.input_current * dt
         sagged = s.nominal_bus - self.source_resistance * s.input_current - self.discharge * self.charge
-        # the supply's output capacitor: 20 ms, so that current and voltage do not chase each other step by step
-        s.bus_voltage += (sagged - s.bus_voltage) * min(dt / 0.02, 1.0)
+        s.bus_voltage += (sagged - s.bus_voltage) * min(dt / OUTPUT_CAPACITOR, 1.0)
         return float(value * (max(s.bus_voltage, 0.0) / s.nominal_bus) ** self.exponent)
+
+    def over(self, value: Floats, h: History) -> Floats:
+        """`h.input_current` is that of the pass before: the sweep passes here until it stands still."""
+        charge = np.cumsum(h.input_current) * h.dt
+        sagged = h.nominal_bus - self.source_resistance * h.input_current - self.discharge * charge
+        h.bus_voltage = h.nominal_bus + low_pass(sagged - h.nominal_bus, OUTPUT_CAPACITOR, h.dt)
+        return np.asarray(value * (np.maximum(h.bus_voltage, 0.0) / h.nominal_bus) ** self.exponent)
 
 
 @dataclass(slots=True)
@@ -71,6 +87,12 @@ class DeadBand:
             return 0.0
         return value if self.form == "jump" else copysign(size - self.half_width, value)
 
+    def over(self, value: Floats, _h: History) -> Floats:
+        size = np.abs(value)
+        if self.form == "jump":
+            return np.where(size < self.half_width, 0.0, value)
+        return np.asarray(np.sign(value) * np.maximum(size - self.half_width, 0.0))
+
 
 @dataclass(slots=True)
 class WindingResistance:
@@ -84,5 +106,13 @@ class WindingResistance:
         require_positive(resistance=self.resistance)
 
     def apply(self, value: float, s: State, _dt: float) -> float:
-        loss = self.resistance * s.drag * s.rate_per_volt**2 / s.torque_acceleration  # 1/V: V = e + loss e^2
+        loss = self._loss(s)
         return copysign((sqrt(1.0 + 4.0 * loss * abs(value)) - 1.0) / (2.0 * loss), value)
+
+    def over(self, value: Floats, h: History) -> Floats:
+        loss = self._loss(h)
+        return np.asarray(np.sign(value) * (np.sqrt(1.0 + 4.0 * loss * np.abs(value)) - 1.0) / (2.0 * loss))
+
+    def _loss(self, s: State | History) -> float:
+        """1/V, of V = e + loss e^2."""
+        return self.resistance * s.drag * s.rate_per_volt**2 / s.torque_acceleration

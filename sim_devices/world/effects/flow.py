@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from math import copysign, sqrt
 from typing import ClassVar
 
-from sim_devices.world.effects.stage import Stage, require_positive
+import numpy as np
+
+from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
+from sim_devices.world.filters import low_pass
+from sim_devices.world.history import History
 from sim_devices.world.state import State
 
 
@@ -30,6 +35,10 @@ class InflowDynamics:
         self.inflow += (s.n - self.inflow) * min(dt / self.time_constant, 1.0)
         return value + s.thrust_constant * abs(s.n) * self.share * (s.n - self.inflow)
 
+    def over(self, value: Floats, h: History) -> Floats:
+        inflow = low_pass(h.n, self.time_constant, h.dt)
+        return np.asarray(value + h.thrust_constant * np.abs(h.n) * self.share * (h.n - inflow))
+
 
 @dataclass(slots=True)
 class SpeedOfAdvance:
@@ -42,25 +51,38 @@ class SpeedOfAdvance:
     def apply(self, value: float, s: State, _dt: float) -> float:
         return value - self.coefficient * abs(s.n) * s.flow
 
+    def over(self, value: Floats, h: History) -> Floats:
+        return np.asarray(value - self.coefficient * np.abs(h.n) * h.flow)
+
 
 @dataclass(slots=True)
 class Recirculation:
-    """The jet comes round the tunnel: T - coefficient |n| u, u' = (n - u)/time_constant."""
+    """The jet comes round the tunnel: T - coefficient |n| u, u' = (j - u)/time_constant.
+
+    form "rate": the jet j is n. form "thrust": j = sgn(T) sqrt(|T| / C_t), momentum theory's jet of the thrust itself.
+    """
 
     stage: ClassVar[Stage] = "hydro"
     coefficient: float
     """N/(rev/s)^2."""
     time_constant: float
     """s."""
+    form: str = "rate"
     jet: float = field(init=False, default=0.0)
-    """rev/s."""
+    """rev/s: u."""
 
     def __post_init__(self) -> None:
         require_positive(time_constant=self.time_constant)
+        require_choice("form", self.form, ("rate", "thrust"))
 
     def apply(self, value: float, s: State, dt: float) -> float:
-        self.jet += (s.n - self.jet) * min(dt / self.time_constant, 1.0)
+        made = s.n if self.form == "rate" else copysign(sqrt(abs(value) / s.thrust_constant), value)
+        self.jet += (made - self.jet) * min(dt / self.time_constant, 1.0)
         return value - self.coefficient * abs(s.n) * self.jet
+
+    def over(self, value: Floats, h: History) -> Floats:
+        made = h.n if self.form == "rate" else np.sign(value) * np.sqrt(np.abs(value) / h.thrust_constant)
+        return np.asarray(value - self.coefficient * np.abs(h.n) * low_pass(made, self.time_constant, h.dt))
 
 
 @dataclass(slots=True)
@@ -84,3 +106,7 @@ class ThrusterInteraction:
     def apply(self, value: float, s: State, _dt: float) -> float:
         runs = s.t % self.period >= self.period - self.on_time
         return value * (1.0 - self.loss * abs(self.neighbour_thrust) / self.thrust_scale) if runs else value
+
+    def over(self, value: Floats, h: History) -> Floats:
+        runs = h.t % self.period >= self.period - self.on_time
+        return np.asarray(value * (1.0 - runs * self.loss * abs(self.neighbour_thrust) / self.thrust_scale))

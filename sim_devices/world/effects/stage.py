@@ -4,9 +4,14 @@ from __future__ import annotations
 
 from typing import ClassVar, Literal, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_devices.world.history import History
 from sim_devices.world.state import State
 
-Stage = Literal["command", "hydro", "stand", "cell", "output"]
+Stage = Literal["command", "rotor", "hydro", "stand", "cell", "output"]
+Floats = NDArray[np.float64]
 
 
 class Effect(Protocol):
@@ -16,6 +21,9 @@ class Effect(Protocol):
 
     def apply(self, value: float, s: State, dt: float, /) -> float:
         """The number with this effect in it. `dt` in s; called once per world step (stage `output`: per sample)."""
+
+    def over(self, value: Floats, h: History, /) -> Floats:
+        """The same over a whole run at once, from rest; an effect is asked either way, never both."""
 
 
 def require_positive(**values: float) -> None:

@@ -7,7 +7,11 @@ from dataclasses import dataclass, field
 from math import pi
 from typing import ClassVar
 
-from sim_devices.world.effects.stage import Stage, require_choice, require_positive
+import numpy as np
+
+from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
+from sim_devices.world.filters import delayed, play, resonator
+from sim_devices.world.history import History
 from sim_devices.world.state import State
 
 
@@ -21,6 +25,9 @@ class StrutDrag:
 
     def apply(self, value: float, s: State, _dt: float) -> float:
         return value + self.coefficient * s.flow * abs(s.flow)
+
+    def over(self, value: Floats, h: History) -> Floats:
+        return np.asarray(value + self.coefficient * h.flow * np.abs(h.flow))
 
 
 @dataclass(slots=True)
@@ -37,6 +44,9 @@ class TorqueCrosstalk:
 
     def apply(self, value: float, s: State, _dt: float) -> float:
         return value + self.coefficient * s.n * (s.n if self.form == "even" else abs(s.n))
+
+    def over(self, value: Floats, h: History) -> Floats:
+        return np.asarray(value + self.coefficient * h.n * (h.n if self.form == "even" else np.abs(h.n)))
 
 
 @dataclass(slots=True)
@@ -72,6 +82,9 @@ class StandResonance:
             self.speed = 2.0 * mid - v0
         return self.position
 
+    def over(self, value: Floats, h: History) -> Floats:
+        return resonator(value, self.frequency, self.damping, h.dt)
+
 
 @dataclass(slots=True)
 class Hysteresis:
@@ -89,6 +102,9 @@ class Hysteresis:
     def apply(self, value: float, _s: State, _dt: float) -> float:
         self.position = min(max(self.position, value - self.width), value + self.width)
         return self.position
+
+    def over(self, value: Floats, _h: History) -> Floats:
+        return play(value, self.width)
 
 
 @dataclass(slots=True)
@@ -109,3 +125,7 @@ class TimeSkew:
         while len(self.line) > late + 1:
             self.line.popleft()
         return self.line[0]
+
+    def over(self, value: Floats, h: History) -> Floats:
+        """Not rounded to grid points."""
+        return delayed(value, self.delay, h.dt)

@@ -1,0 +1,44 @@
+"""Recordings in which physics is concealed with a known strength: the simulated half of the blind proof.
+
+    import numpy as np
+    from sim_devices import concealed
+
+    rng = np.random.default_rng(1)
+    case = concealed.case(rng, ["dead_band"], strength=40.0)           # everything else drawn; see draw.case
+    pair = concealed.case(rng, ["asymmetry", "heating"], 20.0, plan="interleaved", noise="white", channels=[])
+    clean = concealed.case(rng)                                        # tau = C V|V|, noise, one zero per run
+    arrays = concealed.rows(case)                                      # [Rows]: columns of plain arrays, steps
+    truth = concealed.truth(case)                                      # dict for a sealed JSON file
+
+`strength` is d': the sigma at which an oracle sees the effect that knows it, its shape and the noise (`oracle`).
+Effects are the ids of `shapes.SHAPES`: the world's catalogue, and those of `world.effects.uncatalogued`.
+
+What a clean recording still holds: thrust C V|V| of the command in force at each sample, at once (rotor
+"instant"), one zero per run, the noise of its law. Beside it n = k V, the current drag n|n| / torque_acceleration,
+the winding's warmth, a bus that stands still or (decoy) sags while the drive makes up for it, a flow that may change
+and does nothing.
+This package knows nothing of identification or rig; `tests/concealed/recordings.py` makes Recordings of the rows.
+"""
+
+from sim_devices.concealed.definition import Case
+from sim_devices.concealed.draw import NOISE_KINDS, case
+from sim_devices.concealed.oracle import OutOfReach, scaled_to, strength
+from sim_devices.concealed.plans import KINDS as PLAN_KINDS
+from sim_devices.concealed.records import Column, Rows, rows, truth
+from sim_devices.concealed.shapes import FORMS, SHAPES
+
+__all__ = [
+    "FORMS",
+    "NOISE_KINDS",
+    "PLAN_KINDS",
+    "SHAPES",
+    "Case",
+    "Column",
+    "OutOfReach",
+    "Rows",
+    "case",
+    "rows",
+    "scaled_to",
+    "strength",
+    "truth",
+]
