@@ -65,6 +65,9 @@ def fit_text(answers: tuple[Answer, ...]) -> str:
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write the fit here; - is standard output.")
 @click.option(
+    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
+)
+@click.option(
     "--model", type=click.Choice(list(NAMES)), help="Model to report; by default C V|V| first, the others beside it."
 )
 @click.option(
@@ -83,6 +86,7 @@ def fit_text(answers: tuple[Answer, ...]) -> str:
 def fit_command(
     files: tuple[Path, ...],
     json_path: Path | None,
+    report: Path | None,
     model: str | None,
     against: str | None,
     voltage: str | None,
@@ -100,6 +104,10 @@ def fit_command(
         text = json.dumps(answer_json(answers, changes), indent=1, allow_nan=False)
         if json_path is not None and str(json_path) != "-":
             json_path.write_text(text + "\n", encoding="utf-8")
+        if report is not None:
+            from rig.report.fit import write_report  # matplotlib takes a second to come up: only where it is used
+
+            write_report(answers, report, files, changes)
     except (RigError, OSError) as error:
         click.echo(f"rig fit: {error}", err=True)
         raise SystemExit(2) from error

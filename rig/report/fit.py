@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
 from identification.thrust import ThrustFit
 from identification.thrust_report import digits, sentence, table, verdicts
+from rig.fit_answer import Answer
+from rig.fit_comparison import Changed
 from rig.report import figures, provenance
 from rig.report.figures import Interval
+from rig.report.fit_beside import alike_sentences, change_sections, models_section, rotor_section, value_and_interval
 from rig.report.fit_pictures import QUANTITY, pictures
 from rig.report.look import prose, unit_text
 from rig.report.page import Page, Picture, Remark, Section, Table, Tone, columns, sentences, write
@@ -35,28 +37,22 @@ SIGNS: tuple[tuple[str, Tone], ...] = (
 """What a verdict says, and the sign it gets; the first that is found counts."""
 
 
-class Answer(Protocol):
-    """What `rig fit` says of one thruster."""
-
-    @property
-    def fit(self) -> ThrustFit: ...
-    @property
-    def alternatives(self) -> tuple[ThrustFit, ...]: ...
-    @property
-    def notes(self) -> tuple[str, ...]: ...
-
-
-def write_report(answers: Sequence[Answer], path: Path, files: Sequence[Path] = ()) -> None:
+def write_report(
+    answers: Sequence[Answer], path: Path, files: Sequence[Path] = (), changes: Sequence[Changed] = ()
+) -> None:
     """One page for all thrusters. `files`: the recordings, to be hashed. Raises RecordingError, OSError."""
-    write(fit_page(answers, provenance.sources(files)), path)
+    write(fit_page(answers, provenance.sources(files), changes), path)
 
 
-def fit_page(answers: Sequence[Answer], found: Sequence[provenance.Source] = ()) -> Page:
+def fit_page(
+    answers: Sequence[Answer], found: Sequence[provenance.Source] = (), changes: Sequence[Changed] = ()
+) -> Page:
     """The page of one or more answers."""
     names = [answer.fit.thruster or "thruster" for answer in answers]
     ids = [name for answer in answers for name in answer.fit.recordings]
     parts = [comparison(answers)] if len(answers) > 1 else []
     parts += [thruster_section(answer, alone=len(answers) == 1) for answer in answers]
+    parts += change_sections(changes)
     many = f"{', '.join(names[:-1])} and {names[-1]}" if len(names) > 1 else names[0]
     lead = prose(sentence(answers[0].fit)) if len(answers) == 1 else _spread(answers)
     return Page(f"Thrust fit of {many}", lead, (*parts, provenance.section(found, ids)), contents=len(answers) > 1)
@@ -94,20 +90,7 @@ def comparison(answers: Sequence[Answer]) -> Section:
     plot = figures.forest(intervals, f"coefficient of {answers[0].fit.model} / ({unit_text(first.unit)})")
     caption = "Bars are 95 % intervals, the load cell's calibration included: that part is common to all thrusters."
     told = Table("Coefficients of all thrusters", head, tuple(rows), columns(head, "thruster", "coefficient", "unit"))
-    return Section("All thrusters", (told, Picture("Thrusters side by side", plot, caption)))
-
-
-def value_and_interval(value: float, std: float, low: float, high: float) -> tuple[str, str]:
-    """Two cells of a table; what is not known is a dash.
-
-    >>> value_and_interval(0.40123, 0.0012, 0.39883, 0.40363), value_and_interval(1.0, np.nan, np.nan, np.nan)
-    (('0.4012 ± 0.0012', '0.3988 to 0.4036'), ('1', '–'))
-    """
-    if not np.isfinite(value):
-        return "–", "–"
-    if not np.isfinite(std):
-        return digits(value, std), "–"
-    return f"{digits(value, std)} ± {digits(std, std)}", f"{digits(low, std)} to {digits(high, std)}"
+    return Section("All thrusters", (told, *alike_sentences(answers), Picture("Thrusters side by side", plot, caption)))
 
 
 def thruster_section(answer: Answer, *, alone: bool = False) -> Section:
@@ -119,7 +102,14 @@ def thruster_section(answer: Answer, *, alone: bool = False) -> Section:
     )
     return Section(
         "The fit" if alone else fit.thruster or "Thruster",
-        (parameter_table(answer), judgement, *pictures(fit), *points_table(fit)),
+        (
+            parameter_table(answer),
+            judgement,
+            *pictures(fit),
+            *models_section(answer.candidates),
+            *rotor_section(answer.dynamics),
+            *points_table(fit),
+        ),
         "" if alone else prose(sentence(fit)),
     )
 

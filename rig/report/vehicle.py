@@ -19,7 +19,8 @@ from identification.vehicle_simulation import current_along
 from rig.report import figures, figures_vehicle, provenance
 from rig.report.figures import Curve, Group, Interval
 from rig.report.figures_mismatch import Panel, before_after
-from rig.report.fit import tone, value_and_interval
+from rig.report.fit import tone
+from rig.report.fit_beside import value_and_interval
 from rig.report.look import prose, unit_text
 from rig.report.page import Page, Picture, Remark, Section, Table, columns, sentences, write
 from rig.vehicle import HeldOut, VehicleAnswer
