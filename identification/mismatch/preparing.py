@@ -211,8 +211,18 @@ def _binned(time: Floats, value: Floats, edges: Floats) -> tuple[Floats, NDArray
     return mean, count, np.where(count > 0, when, middle)
 
 
+def _within(time: Floats, value: Floats, edges: Floats, mean: Floats) -> Floats:
+    """Sum of squares about the mean of each interval."""
+    index = np.searchsorted(edges, time, side="right") - 1
+    inside = (index >= 0) & (index < mean.size)
+    index = index[inside]
+    out: Floats = np.bincount(index, weights=(value[inside] - mean[index]) ** 2, minlength=mean.size)
+    return out
+
+
 def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, time: Floats, force: Floats) -> History:
     mean, count, sampled = _binned(time, force, edges)
+    within = _within(time, force, edges, mean)
     middle = 0.5 * (edges[1:] + edges[:-1])
     others: dict[str, Floats] = {}
     for quantity in FOLLOWED:
@@ -241,6 +251,7 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
         thrust=mean,
         count=count,
         sampled=sampled,
+        within=within,
         rate=rate,
         rate_count=rate_count,
         others=others,

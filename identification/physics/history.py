@@ -38,6 +38,8 @@ class History:
     """(M,) thrust samples in the interval."""
     sampled: Floats
     """(M,) s, mean time of those samples; the middle of the interval where there are none."""
+    within: Floats
+    """(M,) N^2, sum of squares of the samples about the mean of their interval."""
     rate: Floats | None = None
     """(M,) rev/s, mean of the rotation rate measured in the interval, NaN where none."""
     rate_count: NDArray[np.int64] | None = None

@@ -1,0 +1,218 @@
+"""Recordings in, diagnosis out: locate, name, refit, judge."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.mismatch.diagnosis import (
+    Curves,
+    Diagnosis,
+    Finding,
+    HeldOutRmse,
+    Mismatch,
+    RivalFinding,
+    Rmse,
+    Unexplained,
+    Value,
+    Verdict,
+    Where,
+)
+from identification.mismatch.fitting import Fit, fit, raw
+from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
+from identification.mismatch.model import Data, parameters, weights
+from identification.mismatch.naming import EQUAL, Named, Rival, name, settle_forms
+from identification.mismatch.omnibus import Judged, Omnibus, locate, test
+from identification.mismatch.preparing import Refusal, history_of
+from identification.mismatch.search import Found, State, forces, search
+from identification.physics.history import History
+from identification.physics.term import Term
+from identification.recording import Floats, Recording
+
+ALARM = 0.01
+"""False-alarm rate of the omnibus tests, family-wise."""
+MOST_PLACES = 3
+DRIVER_NAMES = {"command_voltage": "V|V|", "motor_voltage": "V|V|", "rotation_rate": "n|n|"}
+
+
+def diagnose(recordings: Sequence[Recording], holdout: Sequence[Recording] = (), seed: int = 0) -> Diagnosis | Refusal:
+    """Everything that `rig diagnose` says, for recordings of one thruster. A Refusal says what is wrong with them."""
+    histories = _histories(recordings)
+    if isinstance(histories, Refusal):
+        return histories
+    others = _histories(holdout) if holdout else ()
+    if isinstance(others, Refusal):
+        return others
+    rng = np.random.default_rng(seed)
+    found = search(histories, rng)
+    after = settle_forms(found.after, found.data, found.terms) if found.after.fit.model.terms else found.after
+    left = test(after.fit, found.data, after.weights, rng)
+    return _answer(recordings, replace(found, after=after), left, others, rng)
+
+
+def _histories(recordings: Sequence[Recording]) -> tuple[History, ...] | Refusal:
+    if not recordings:
+        return Refusal("no recording was given")
+    seen = {r.thruster for r in recordings}
+    if len(seen) > 1:
+        return Refusal(f"recordings of several thrusters ({', '.join(sorted(seen))}); diagnose one at a time")
+    ids = [r.recording_id for r in recordings]
+    if len(set(ids)) < len(ids):
+        return Refusal("the same recording was given twice")
+    out = []
+    for recording in recordings:
+        history = history_of(recording)
+        if isinstance(history, Refusal):
+            return history
+        out.append(history)
+    if len({h.driver_quantity for h in out}) > 1:
+        return Refusal("the recordings are driven by different quantities; give those with one kind of command")
+    return tuple(out)
+
+
+def _answer(
+    recordings: Sequence[Recording],
+    found: Found,
+    left: Omnibus,
+    others: Sequence[History],
+    rng: np.random.Generator,
+) -> Diagnosis:
+    data, before, after = found.data, found.before, found.after
+    named = name(after, data, found.terms)
+    earned = [n for n in named if not n.doubts]
+    doubted = [n for n in named if n.doubts]
+    structure = left.p_value < ALARM
+    unexplained = _unexplained(left, after, data, doubted) if structure or doubted else None
+    verdict = _verdict(earned, unexplained)
+    every = [np.ones(r.size, dtype=bool) for r in data.rows]
+    held = by_runs(before, after, data, others) if others else by_blocks(before, after, data)
+    n, p = after.fit.residual.size, int(after.fit.free.sum())
+    return Diagnosis(
+        recordings=tuple(r.recording_id for r in recordings),
+        thruster=recordings[0].thruster,
+        verdict=verdict,
+        baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
+        baseline=_values(before.fit, data),
+        mismatch=_places(found, rng),
+        findings=tuple(_finding(n, data) for n in earned),
+        unexplained=unexplained,
+        model_terms=tuple(t.id for t in after.fit.model.terms),
+        model=_values(after.fit, data),
+        train=Rmse(
+            rmse(before.fit.model, before.fit.theta, data, every), rmse(after.fit.model, after.fit.theta, data, every)
+        ),
+        heldout=HeldOutRmse(held.before, held.after, held.noise, held.what),
+        chi2_per_dof=after.fit.chi2 / max(n - p, 1),
+        whiteness_p=whiteness(after.fit, data),
+        next_experiment=None,
+        curves=_curves(before, after, data),
+    )
+
+
+def _verdict(earned: Sequence[Named], unexplained: Unexplained | None) -> Verdict:
+    if unexplained is not None:
+        return "unexplained"
+    if not earned:
+        return "adequate"
+    if any(r.bic_loss < EQUAL for n in earned for r in n.rivals):
+        return "ambiguous"
+    return "explained"
+
+
+def _values(fitted: Fit, data: Data) -> dict[str, Value]:
+    """C, tares and all parameters of the terms with their standard errors."""
+    std = fitted.std
+    unit = data.scale.driver_unit
+    out = {"C": Value(fitted.theta.C, float(std[0]), f"N/{unit}^2" if unit == "V" else "N s^2/rev^2")}
+    at = 1
+    for term, values, known in zip(
+        fitted.model.terms, fitted.theta.terms, parameters(fitted.model, data.scale), strict=True
+    ):
+        for p, value in zip(known, values, strict=True):
+            out[f"{term.id}.{p.name}"] = Value(value, float(std[at]), p.unit)
+            at += 1
+    for history, tare in zip(data.histories, fitted.theta.tares, strict=True):
+        key = "tare" if len(data.histories) == 1 else f"tare[{history.recording_id}]"
+        out[key] = Value(tare, float(std[at]), "N")
+        at += 1
+    return out
+
+
+def _term_values(term: Term, theta: Sequence[float], std: Sequence[float], data: Data) -> dict[str, Value]:
+    known = term.parameters(data.scale)
+    return {p.name: Value(v, s, p.unit) for p, v, s in zip(known, theta, std, strict=True)}
+
+
+def _finding(named: Named, data: Data) -> Finding:
+    return Finding(
+        named.term.id,
+        named.term.form,
+        named.term.statement(named.theta, data.scale),
+        _term_values(named.term, named.theta, named.std, data),
+        named.p_value,
+        named.bic_gain,
+        named.probability,
+        tuple(_rival(r, data) for r in named.rivals),
+    )
+
+
+def _rival(rival: Rival, data: Data) -> RivalFinding:
+    fitted, at = rival.fit, 1
+    for term, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
+        if term == rival.term:
+            std = fitted.std[at : at + len(values)]
+            known = _term_values(term, values, [float(s) for s in std], data)
+            return RivalFinding(term.id, term.form, known, rival.bic_loss, term.statement(values, data.scale))
+        at += len(values)
+    raise ValueError(f"{rival.term.id} is not in its own fit")
+
+
+def _where(judged: Judged, fitted: Fit, data: Data) -> tuple[Where, float, tuple[tuple[float, float, float], ...]]:
+    place = locate(judged, fitted, data)
+    return Where(place.quantity, place.low, place.high, place.unit), place.share, place.table
+
+
+def _says(where: Where, share: float, what: str) -> str:
+    unit = "" if where.unit == "1" else f" {where.unit}"
+    return f"{100 * share:.0f} % of the residual lies at {where.quantity} {where.low:.3g} to {where.high:.3g}{unit}: {what}."
+
+
+def _places(found: Found, rng: np.random.Generator) -> tuple[Mismatch, ...]:
+    """Where the baseline fails, the clearest coordinates first."""
+    seen = test(found.before.fit, found.data, found.before.weights, rng)
+    if seen.p_value >= ALARM and not found.after.fit.model.terms:
+        return ()
+    out = []
+    for judged in seen.groups[:MOST_PLACES]:
+        if out and judged.p_value > ALARM / 10:
+            break
+        where, share, _ = _where(judged, found.before.fit, found.data)
+        what = judged.coordinate.what
+        out.append(Mismatch("thrust", where, share, judged.p_value, _says(where, share, what)))
+    return tuple(out)
+
+
+def _unexplained(left: Omnibus, after: State, data: Data, doubted: Sequence[Named]) -> Unexplained | None:
+    if not left.groups:
+        return None
+    judged = left.groups[0]
+    where, share, table = _where(judged, after.fit, data)
+    resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in doubted)
+    says = f"Something is left that no term of the catalogue carries: {_says(where, share, judged.coordinate.what)}"
+    if doubted:
+        says += f" It resembles {', '.join(n.term.id for n in doubted)}, but {doubted[0].doubts[0]}."
+    return Unexplained(where, judged.share, left.p_value, table, says, resembles)
+
+
+def _curves(before: State, after: State, data: Data) -> tuple[Curves, ...]:
+    old, _ = raw(before.fit.model, before.fit.theta, data, with_rate=False)
+    new, _ = raw(after.fit.model, after.fit.theta, data, with_rate=False)
+    return tuple(
+        Curves(h.recording_id, h.sampled[r], h.driver[r], y, a, b)
+        for h, r, y, a, b in zip(data.histories, data.rows, data.thrust, old, new, strict=True)
+    )
+
+
+__all__ = ["Floats", "diagnose", "fit", "forces", "weights"]

@@ -1,0 +1,130 @@
+"""How much better, on data that was not fitted: blocks of time kept back, or whole runs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2 as chi2_law
+
+from identification.mismatch.fitting import Fit, fit, raw
+from identification.mismatch.model import Data, Model, Theta, weights
+from identification.mismatch.noise import Noise
+from identification.mismatch.search import State, forces
+from identification.physics.history import History
+from identification.recording import Floats
+
+KEPT_BACK = 4
+"""One block of so many is not fitted."""
+BLOCKS_PER_RUN = 24
+LEAST_BLOCK = 8.0
+"""s."""
+LAGS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Error:
+    """Root mean square per sample, N, before (C V|V| and tare) and after."""
+
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    before: float
+    after: float
+    noise: float
+    what: str
+
+
+def blocks(history: History) -> Floats:
+    """(n,) of bool at the thrust rows: which are fitted. Every fourth block of time (or level) is kept back."""
+    t = history.sampled[history.rows]
+    if history.static:
+        return np.arange(t.size) % KEPT_BACK != KEPT_BACK - 2
+    span = float(t[-1] - t[0])
+    length = max(span / BLOCKS_PER_RUN, min(LEAST_BLOCK, span / 8))
+    index = np.floor((t - t[0]) / length).astype(int)
+    return index % KEPT_BACK != KEPT_BACK - 2
+
+
+def rmse(model: Model, theta: Theta, data: Data, which: Sequence[Floats]) -> float:
+    """Per sample, N, over the rows in `which`: scatter within a row is in it."""
+    thrust, _ = raw(model, theta, data, with_rate=False)
+    total = samples = 0.0
+    for h, rows, f, w in zip(data.histories, data.rows, thrust, which, strict=True):
+        r = rows[w]
+        total += float(h.count[r] @ (h.thrust[r] - f[w]) ** 2) + float(np.sum(h.within[r]))
+        samples += float(h.count[r].sum())
+    return float(np.sqrt(total / samples)) if samples else float("nan")
+
+
+def noise_rms(noise: Noise, model: Model, theta: Theta, data: Data, which: Sequence[Floats]) -> float:
+    """What the estimated noise alone gives per sample, N."""
+    size = forces(model, theta, data)
+    total = samples = 0.0
+    for h, rows, f, w in zip(data.histories, data.rows, size, which, strict=True):
+        count = h.count[rows[w]].astype(np.float64)
+        each = noise.white + noise.proportional * f[w] ** 2 + sum(noise.slow) + sum(noise.band)
+        total += float(count @ each)
+        samples += float(count.sum())
+    return float(np.sqrt(total / samples)) if samples else float("nan")
+
+
+def refitted(state: State, data: Data, keep: Sequence[Floats]) -> Fit:
+    """Parameters of the same model from a part of the rows, with the same noise."""
+    part = replace(data, keep=tuple(keep))
+    w = weights(part, state.noise, forces(state.fit.model, state.fit.theta, part), state.rate_noise)
+    return fit(state.fit.model, state.fit.theta, part, w)
+
+
+def by_blocks(before: State, after: State, data: Data) -> HeldOut:
+    """Parameters of both models without every fourth block, judged on those blocks."""
+    keep = [blocks(h) for h in data.histories]
+    back = [~k for k in keep]
+    old, new = refitted(before, data, keep), refitted(after, data, keep)
+    noise = noise_rms(after.noise, new.model, new.theta, data, back)
+    held = "levels" if data.histories[0].static else "blocks of time"
+    what = f"every fourth of the {held}, {sum(int(b.sum()) for b in back)} rows; terms were chosen on all of them"
+    return HeldOut(rmse(old.model, old.theta, data, back), rmse(new.model, new.theta, data, back), noise, what)
+
+
+def by_runs(before: State, after: State, data: Data, others: Sequence[History]) -> HeldOut:
+    """Both models on whole runs that were not fitted; of these only the tare is."""
+    unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
+    every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
+    errors, last = [], None
+    for state in (before, after):
+        theta = _with_tares(state.fit.model, state.fit.theta, unseen)
+        errors.append(rmse(state.fit.model, theta, unseen, every))
+        last = theta
+    assert last is not None
+    noise = noise_rms(after.noise, after.fit.model, last, unseen, every)
+    names = ", ".join(h.recording_id for h in others)
+    return HeldOut(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
+
+
+def _with_tares(model: Model, theta: Theta, data: Data) -> Theta:
+    zero = replace(theta, tares=tuple(0.0 for _ in data.histories))
+    thrust, _ = raw(model, zero, data, with_rate=False)
+    tares = [
+        float(np.average(y - f, weights=h.count[r]))
+        for y, f, h, r in zip(data.thrust, thrust, data.histories, data.rows, strict=True)
+    ]
+    return replace(theta, tares=tuple(tares))
+
+
+def whiteness(fitted: Fit, data: Data) -> float:
+    """p-value of Ljung and Box over LAGS lags of the whitened thrust residual, run by run."""
+    ends = np.cumsum([r.size for r in data.rows])
+    statistic, dof = 0.0, 0
+    for e in np.split(fitted.residual[: ends[-1]], ends[:-1]):
+        n, lags = e.size, min(LAGS, e.size // 5)
+        e = np.clip(e - e.mean(), -4, 4)
+        power = float(e @ e)
+        for k in range(1, lags + 1):
+            statistic += n * (n + 2) * (float(e[k:] @ e[:-k]) / power) ** 2 / (n - k) if power > 0 else 0.0
+        dof += lags
+    return float(chi2_law.sf(statistic, dof)) if dof else 1.0

@@ -1,0 +1,222 @@
+"""A name is earned: no rival does as well, the parameter is the same everywhere, and its value is possible."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2 as chi2_law
+from scipy.stats import ncx2
+
+from identification.mismatch.fitting import Fit, bounds_of, extended, fit
+from identification.mismatch.model import Data, Theta, predict
+from identification.mismatch.omnibus import SHAPE_ERROR
+from identification.mismatch.screening import directions, orthogonal_basis
+from identification.mismatch.search import State, refresh
+from identification.physics.term import Term
+from identification.recording import Floats
+
+NEAR = 9.0
+"""BIC units: a rival this near is stated."""
+EQUAL = 4.0
+"""BIC units: nearer than this two answers are equally good."""
+LIKELY = 40.0
+"""Chi-square that a rival may lose by the tangent alone and is still refitted: its inner parameters may move."""
+MOST_REFITS = 7
+INCONSTANT = 1e-3
+"""p-value, after all tests of a term, below which its parameter is not the same everywhere."""
+ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Another term in the place of one, refitted."""
+
+    term: Term
+    fit: Fit
+    bic_loss: float
+    """By how much its BIC is worse."""
+
+
+@dataclass(frozen=True, eq=False)
+class Named:
+    """One term of the final model and what speaks for its name."""
+
+    term: Term
+    theta: tuple[float, ...]
+    std: tuple[float, ...]
+    chi2_gain: float
+    bic_gain: float
+    p_value: float
+    probability: float
+    rivals: tuple[Rival, ...]
+    """Other effects within NEAR, best first."""
+    doubts: tuple[str, ...]
+    """Why the name is not earned; empty when it is."""
+
+
+def without(state: State, term: Term, data: Data) -> Fit:
+    """The model without one term, refitted with the same noise."""
+    smaller = state.fit.model.without(term)
+    known = dict(zip(state.fit.model.terms, state.fit.theta.terms, strict=True))
+    theta = replace(state.fit.theta, terms=tuple(known[t] for t in smaller.terms))
+    return fit(smaller, theta, data, state.weights)
+
+
+def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> State:
+    """Exchange a term for a rival wherever that makes the BIC smaller."""
+    for _ in range(ROUNDS):
+        best: tuple[float, Fit] | None = None
+        for term in state.fit.model.terms:
+            less = without(state, term, data)
+            for rival in swaps(state, term, less, data, terms):
+                if rival.bic_loss < -1e-6 and (best is None or rival.bic_loss < best[0]):
+                    best = (rival.bic_loss, rival.fit)
+        if best is None:
+            return state
+        state = refresh(best[1].model, best[1].theta, data, None, state)
+    return state
+
+
+def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> list[Rival]:
+    """Every other term (and form) that could do what this one does, refitted in its place; best first."""
+    now = state.fit
+    gain = less.chi2 - now.chi2
+    inside = {t.id for t in now.model.terms} - {term.id}
+    others = [t for t in terms if t.id not in inside and t != term]
+    found = directions(less, data, state.weights, others)
+    if not found.terms:
+        return []
+    change = _effect(now, term, data, state)
+    basis = orthogonal_basis(less.jacobian)
+    change = change - basis @ (basis.T @ change)
+    size = float(np.linalg.norm(change))
+    if size == 0:
+        return []
+    rho = found.columns.T @ (change / size)
+    rho = np.where(found.one_sided, np.maximum(rho, 0.0), np.abs(rho))
+    best: dict[Term, tuple[float, tuple[float, ...]]] = {}
+    for j, other in enumerate(found.terms):
+        if other not in best or rho[j] > best[other][0]:
+            best[other] = (float(rho[j]), found.values[j])
+    ranked = sorted(best.items(), key=lambda item: -item[1][0])
+    out = []
+    extra_now = len(dict(zip(now.model.terms, now.theta.terms, strict=True))[term])
+    logn = float(np.log(max(now.residual.size, 2)))
+    for other, (r, values) in ranked[:MOST_REFITS]:
+        if (1 - r**2) * gain > LIKELY and r < 0.9:
+            break
+        bigger = less.model.plus(other)
+        new = fit(bigger, extended(less.theta, less.model, other, values, bigger), data, state.weights)
+        if at_bound(other, new, data):
+            continue
+        loss = new.chi2 - now.chi2 + (len(values) - extra_now) * logn
+        out.append(Rival(other, new, float(loss)))
+    return sorted(out, key=lambda rival: rival.bic_loss)
+
+
+def at_bound(term: Term, fitted: Fit, data: Data) -> bool:
+    """Whether a parameter sits at the end of what is physically possible."""
+    values = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))[term]
+    for p, value in zip(term.parameters(data.scale), values, strict=True):
+        edge = 1e-3 * (p.high - p.low)
+        if (value <= p.low + edge and p.neutral != p.low) or (value >= p.high - edge and p.neutral != p.high):
+            return True
+    return False
+
+
+def _effect(now: Fit, term: Term, data: Data, state: State) -> Floats:
+    """(n,) whitened change that the term makes at its fitted values; the rate's rows with it."""
+    from identification.mismatch.fitting import raw
+
+    with_rate = bool(state.weights.rate)
+    smaller = now.model.without(term)
+    known = dict(zip(now.model.terms, now.theta.terms, strict=True))
+    theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
+    full, full_rate = raw(now.model, now.theta, data, with_rate=with_rate)
+    less, less_rate = raw(smaller, theta, data, with_rate=with_rate)
+    return state.weights.whiten(
+        [a - b for a, b in zip(full, less, strict=True)], [a - b for a, b in zip(full_rate, less_rate, strict=True)]
+    )
+
+
+def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
+    """Where the parameter of a term is not the same: halves of the run, directions, levels, runs."""
+    out = []
+    if at_bound(term, state.fit, data):
+        out.append("its parameters end at what is physically possible")
+    change = _raw_effect(state.fit, term, data)
+    n = data.size
+    basis = orthogonal_basis(state.fit.jacobian[:n])
+    driver = [h.driver[r] for h, r in zip(data.histories, data.rows, strict=True)]
+    middle = [h.middle[r] for h, r in zip(data.histories, data.rows, strict=True)]
+    half = np.median(np.abs(np.concatenate(driver)))
+    splits = {
+        "in both halves of the run": [t > np.median(t) for t in middle],
+        "in both directions": [v < 0 for v in driver],
+        "at all levels": [np.abs(v) > half for v in driver],
+    }
+    if len(driver) > 1:
+        splits["in all runs"] = [np.full(v.size, i >= len(driver) / 2) for i, v in enumerate(driver)]
+    from identification.mismatch.model import Weights
+
+    weights = Weights(state.weights.thrust)
+    for what, masks in splits.items():
+        column = weights.whiten([c * m for c, m in zip(change, masks, strict=True)], [])
+        rest = column - basis @ (basis.T @ column)
+        size = float(np.linalg.norm(rest))
+        if size < 1e-3 * float(np.linalg.norm(column)) or size < 0.3:
+            continue
+        score = float(rest @ state.fit.residual[:n]) / size
+        p = float(ncx2.sf(score**2, 1, (SHAPE_ERROR * 2 * size) ** 2))
+        if p * len(splits) * many < INCONSTANT:
+            out.append(f"its parameter is not the same {what} ({abs(score) / size * 100:.0f} % apart)")
+    return tuple(out)
+
+
+def _raw_effect(now: Fit, term: Term, data: Data) -> list[Floats]:
+    smaller = now.model.without(term)
+    known = dict(zip(now.model.terms, now.theta.terms, strict=True))
+    theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
+    out = []
+    for h, r in zip(data.histories, data.rows, strict=True):
+        full, _ = predict(now.model, now.theta, h, data.scale)
+        less, _ = predict(smaller, theta, h, data.scale)
+        out.append((full - less)[r])
+    return out
+
+
+def name(state: State, data: Data, terms: Sequence[Term]) -> tuple[Named, ...]:
+    """Every term of the model with its rivals and doubts, the largest gain first."""
+    out = []
+    logn = float(np.log(max(state.fit.residual.size, 2)))
+    at = 1
+    std = state.fit.std
+    many = max(len(state.fit.model.terms), 1)
+    for term, values in zip(state.fit.model.terms, state.fit.theta.terms, strict=True):
+        less = without(state, term, data)
+        gain = less.chi2 - state.fit.chi2
+        close = [r for r in swaps(state, term, less, data, terms) if r.bic_loss < NEAR and r.term.id != term.id]
+        unique: dict[str, Rival] = {}
+        for r in close:
+            unique.setdefault(r.term.id, r)
+        probability = 1.0 / (1.0 + sum(np.exp(-0.5 * max(r.bic_loss, 0.0)) for r in unique.values()))
+        out.append(
+            Named(
+                term,
+                values,
+                tuple(float(s) for s in std[at : at + len(values)]),
+                gain,
+                gain - len(values) * logn,
+                float(max(chi2_law.sf(max(gain, 0.0), len(values)), 1e-300)),
+                float(probability),
+                tuple(unique.values()),
+                doubts(state, term, data, many),
+            )
+        )
+        at += len(values)
+    return tuple(sorted(out, key=lambda n: -n.chi2_gain))
+
+
+__all__ = ["Named", "Rival", "Theta", "at_bound", "bounds_of", "name", "settle_forms", "swaps"]
