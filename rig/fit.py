@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,10 +13,12 @@ from identification.estimation import Method
 from identification.thrust_data import Unusable
 from identification.thrust_forms import Model
 from rig.errors import RecordingError, RigError
-from rig.fit_answer import Answer, fit_files, fit_recordings
+from rig.fit_answer import Answer, expand, fit_files, fit_recordings
 from rig.fit_comparison import alike, changed
 from rig.fit_json import answer_json, fit_json
 from rig.fit_text import alike_text, answer_text, changed_text, set_text
+from rig.one_pass import LONG, fit_one_pass, thrust_rows
+from rig.one_pass_text import one_pass_json, one_pass_text
 
 __all__ = ["Answer", "answer_json", "answer_text", "fit_command", "fit_files", "fit_json", "fit_recordings"]
 
@@ -61,6 +64,26 @@ def fit_text(answers: tuple[Answer, ...]) -> str:
     return "\n\n".join(parts)
 
 
+def _not_with_one_pass(*asked: tuple[str, object]) -> None:
+    """Raises RecordingError for what a fit that has not kept its samples can't do."""
+    given = [name for name, wanted in asked if wanted]
+    if given:
+        raise RecordingError(
+            f"{', '.join(given)}: not in one pass, which keeps no samples (it is the way for more than {LONG:,} of "
+            "them); leave it out, or ask for --in-memory"
+        )
+
+
+def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:
+    """JSON where it is wanted; what a person reads on standard output, unless the JSON goes there."""
+    if json_path is not None and str(json_path) == "-":
+        click.echo(text)
+        return
+    if json_path is not None:
+        json_path.write_text(text + "\n", encoding="utf-8")
+    click.echo("\n\n".join(said))
+
+
 @click.command("fit")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write the fit here; - is standard output.")
@@ -83,6 +106,11 @@ def fit_text(answers: tuple[Answer, ...]) -> str:
     multiple=True,
     help="JSON of an earlier fit: has a thruster changed since?",
 )
+@click.option(
+    "--one-pass/--in-memory",
+    default=None,
+    help="Fit all samples in one pass, in constant memory; by default above a million of them.",
+)
 def fit_command(
     files: tuple[Path, ...],
     json_path: Path | None,
@@ -92,26 +120,28 @@ def fit_command(
     voltage: str | None,
     method: Method,
     compare: tuple[Path, ...],
+    one_pass: bool | None,
 ) -> None:
     """Fit thrust = C V|V| + tare and its rivals to one or more recordings, per thruster; compare the thrusters."""
     try:
         choice = NAMES[model or "C V|V|"]
         signal = choice.against or voltage or against or AGAINST[0]
+        if one_pass or (one_pass is None and thrust_rows(expand(files)) > LONG):
+            refused = ("--model dynamics", model == "dynamics"), ("--report", report), ("--compare", compare)
+            _not_with_one_pass(*refused, ("--method ls", method == "ls"))
+            long = fit_one_pass(expand(files), choice.model, signal)
+            _tell(json.dumps(one_pass_json(long), indent=1, allow_nan=False), json_path, map(one_pass_text, long))
+            return
         answers = fit_files(files, choice.model, signal, method, dynamics=True)
         if model == "dynamics":
             _rotor_told(answers)
         changes = [changed(answers, path) for path in compare]
-        text = json.dumps(answer_json(answers, changes), indent=1, allow_nan=False)
-        if json_path is not None and str(json_path) != "-":
-            json_path.write_text(text + "\n", encoding="utf-8")
         if report is not None:
             from rig.report.fit import write_report  # matplotlib takes a second to come up: only where it is used
 
             write_report(answers, report, files, changes)
+        text = json.dumps(answer_json(answers, changes), indent=1, allow_nan=False)
+        _tell(text, json_path, [fit_text(answers), *(changed_text(one) for one in changes)])
     except (RigError, OSError) as error:
         click.echo(f"rig fit: {error}", err=True)
         raise SystemExit(2) from error
-    if json_path is not None and str(json_path) == "-":
-        click.echo(text)
-        return
-    click.echo("\n\n".join([fit_text(answers), *(changed_text(one) for one in changes)]))

@@ -127,10 +127,15 @@ def fit_files(
     dynamics: bool = False,
 ) -> tuple[Answer, ...]:
     """Load and fit; a folder stands for every `*.h5` in it. Raises RecordingError with one sentence."""
+    return fit_recordings([load(path) for path in expand(paths)], model, voltage, method, dynamics=dynamics)
+
+
+def expand(paths: Iterable[Path]) -> list[Path]:
+    """The recordings meant by files and folders. Raises RecordingError."""
     files = list(chain.from_iterable(_expand(Path(path)) for path in paths))
     if not files:
         raise RecordingError("rig fit: no recording was given; expected one or more *.h5 files")
-    return fit_recordings([load(path) for path in files], model, voltage, method, dynamics=dynamics)
+    return files
 
 
 def _expand(path: Path) -> list[Path]:

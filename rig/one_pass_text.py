@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from identification.batches import BATCHES
 from identification.settling import LONGEST_CUT
 from identification.thrust_data import gain_std
 from identification.thrust_report import digits
+from rig.fit_json import parameter_json
 from rig.one_pass import OnePass
 
 
@@ -57,14 +58,18 @@ def one_pass_text(found: OnePass) -> str:
     return "\n".join([*lines, "", *(f"  - {text}" for text in remarks(found))])
 
 
-def one_pass_json(found: OnePass, parameter: Any) -> dict[str, Any]:
-    """The keys of a fit in memory, as far as they apply; `parameter` turns a Parameter into JSON."""
+def one_pass_json(fits: Sequence[OnePass]) -> dict[str, Any]:
+    """`thruster-rig-fit` version 1, the keys of a fit in memory as far as they apply, and `one_pass`."""
+    return {"format": "thruster-rig-fit", "version": 1, "fits": [_entry(found) for found in fits]}
+
+
+def _entry(found: OnePass) -> dict[str, Any]:
     return {
         "thruster": found.thruster,
         "recordings": [run.recording.recording_id for run in found.passes],
         "model": found.form.name,
-        "parameters": {name: parameter(p) for name, p in found.parameters.items()},
-        "tare": {name: parameter(p) for name, p in found.tare.items()},
+        "parameters": {name: parameter_json(p) for name, p in found.parameters.items()},
+        "tare": {name: parameter_json(p) for name, p in found.tare.items()},
         "rmse": found.rmse,
         "rmse_of": "samples",
         "n": found.rows,

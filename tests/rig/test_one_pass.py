@@ -1,15 +1,18 @@
 """`rig.one_pass`: the same numbers as a fit in memory, from files read once and in blocks."""
 
+import json
 import tracemalloc
 from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
+from click.testing import CliRunner
 
 from identification.recording import Channel
 from identification.thrust_data import voltage_at
 from rig.errors import RecordingError
+from rig.fit import fit_command
 from rig.hdf5 import blocks, load
 from rig.one_pass import fit_one_pass, thrust_rows
 from rig.one_pass_text import one_pass_json, one_pass_text
@@ -136,11 +139,23 @@ def test_noise_slower_than_the_batches_is_said(tmp_path):
 
 def test_json_is_finite_and_says_what_was_left_out(tmp_path):
     (found,) = fit_one_pass([sine_run(tmp_path / "a.h5", n=20_000)])
-    content = one_pass_json(found, lambda p: p.value)
-    assert content["parameters"]["C"] == found.parameters["C"].value
+    (content,) = one_pass_json([found])["fits"]
+    assert content["parameters"]["C"]["value"] == found.parameters["C"].value
     assert content["skipped_samples"] > 70
     assert "explained by motor_voltage, not by the command" in content["verdicts"]
     assert np.isfinite(content["sigma"])
+
+
+def test_the_command_in_one_pass(tmp_path):
+    sine_run(tmp_path / "a.h5", n=20_000)
+    said = CliRunner().invoke(fit_command, [str(tmp_path), "--one-pass", "--json", str(tmp_path / "fit.json")])
+    assert said.exit_code == 0
+    assert "samples read in one pass" in said.output
+    assert json.loads((tmp_path / "fit.json").read_text())["fits"][0]["one_pass"]["batches"] > 30
+    for more in (["--report", "page.html"], ["--compare", "old.json"], ["--model", "dynamics"], ["--method", "ls"]):
+        refused = CliRunner().invoke(fit_command, [str(tmp_path), "--one-pass", *more])
+        assert refused.exit_code == 2
+        assert f"{more[0]} {more[1] if more[0] == '--model' else ''}".strip() in refused.output
 
 
 def test_counts_by_rate_with_missing_rows(tmp_path):
