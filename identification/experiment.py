@@ -107,12 +107,14 @@ def optimal_levels(
     max_mean_heat: float = float("inf"),
     size: Floats | None = None,
     prior: Floats | None = None,
+    gap: float = GAP,
 ) -> Design | Deficiency | Impossible:
     """Shares of `total_time` (s) over the candidates; a Deficiency when no choice of levels tells the parameters apart.
 
     `size` (p,): expected magnitude of each parameter, for criterion A (default 1 each, inf: it does not count).
     `max_mean_heat` limits the mean of candidates.heat over the time. `prior` (p, p): information there is anyhow, from
-    tares or an earlier run. Raises ValueError for arrays that do not fit.
+    tares or an earlier run. `gap`: how far from the optimum is good enough, see GAP. Raises ValueError for arrays that
+    do not fit.
 
     >>> V = np.linspace(-20, 20, 41)
     >>> plan = optimal_levels(Candidates(V, np.column_stack([V * abs(V), np.ones(41)]), ("C", "tare")), 60.0)
@@ -133,8 +135,8 @@ def optimal_levels(
     scale = np.ones(p) if size is None else np.asarray(size, dtype=np.float64)
     target = np.diag(1 / scale**2) if criterion == "A" else None
     information = np.einsum("vi,ij,ik->vjk", corners, rows, rows) + given
-    weights = _exchange(information, target) @ corners
-    kept: Floats = _pruned(weights, rows, information, target, given)
+    weights = _exchange(information, target, gap) @ corners
+    kept: Floats = _pruned(weights, rows, information, target, given, max(2 * gap, GAP_AFTER))
     M = rows.T @ (kept[:, None] * rows) + given
     on = np.flatnonzero(kept)
     cov: Floats = np.asarray(np.linalg.inv(M) / total_time, dtype=np.float64)
@@ -202,13 +204,13 @@ def _excess(information: Floats, M: Floats, target: Floats | None) -> float:
     return float(max(_gradient(information, M, target).max() - 1, 0.0))
 
 
-def _exchange(information: Floats, target: Floats | None) -> Floats:
+def _exchange(information: Floats, target: Floats | None, gap: float) -> Floats:
     """Weights (v,) of the corners."""
     weights = _start(information, target)
     for _ in range(MOST_EXCHANGES):
         M = np.einsum("v,vij->ij", weights, information)
         gain = _gradient(information, M, target)
-        if gain.max() - 1 <= GAP:
+        if gain.max() - 1 <= gap:
             break
         _move(weights, M, information, target, int(np.argmax(gain)), gain)
         used = np.flatnonzero(weights)
@@ -262,9 +264,11 @@ def _line_search(M: Floats, change: Floats, target: Floats | None, most: float) 
     return float(brentq(slope, 0.0, most, rtol=1e-12)) if slope(0.0) > 0 > slope(most) else 0.0
 
 
-def _pruned(weights: Floats, rows: Floats, information: Floats, target: Floats | None, given: Floats) -> Floats:
+def _pruned(
+    weights: Floats, rows: Floats, information: Floats, target: Floats | None, given: Floats, gap: float
+) -> Floats:
     """Without the traces that the exchange leaves behind, unless they matter."""
     kept = np.where(weights >= LEAST_WEIGHT, weights, 0.0)
     kept /= kept.sum()
     M = rows.T @ (kept[:, None] * rows) + given
-    return kept if np.linalg.cond(M) < 1e15 and _excess(information, M, target) <= GAP_AFTER else weights
+    return kept if np.linalg.cond(M) < 1e15 and _excess(information, M, target) <= gap else weights

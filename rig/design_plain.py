@@ -72,12 +72,12 @@ def plain_plans(ask: Ask, tare: TareConfig) -> tuple[Judged, ...]:
         shapes: dict[str, Shape] = {"staircase": Staircase(top, LEVELS), "interleaved": Interleaved(top, LEVELS)}
     else:
         shapes = {"staircase": Staircase(ask.V_max, LEVELS, sides="forward" if high > 0 else "reverse")}
-    plans = {name: _filling(shape, ask, tare) for name, shape in shapes.items()}
+    plans = {name: filling(shape, ask, tare) for name, shape in shapes.items()}
     judged = [judge(name, plan, ask) for name, plan in plans.items() if plan is not None]
     return tuple(found for found in judged if found is not None)
 
 
-def _filling(shape: Shape, ask: Ask, tare: TareConfig) -> Plan | None:
+def filling(shape: Shape, ask: Ask, tare: TareConfig) -> Plan | None:
     """As few repeats as the longest dwell allows; None when the time is too short for one."""
     repeats = 1
     while True:

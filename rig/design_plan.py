@@ -14,6 +14,8 @@ from identification.thrust_design import Noise, Promise, Terms, promise
 from rig.errors import PlanError
 from rig.plan_file import Level
 
+GOOD = 2e-3
+"""Loss of efficiency allowed to the continuous optimum: whole holds lose more."""
 LEAST_REPEATS = 2
 """Holds of each level of the optimum: one that went wrong shall show against another."""
 ROUNDS = 3
@@ -21,7 +23,7 @@ ROUNDS = 3
 SHORTER = (1.0, 0.6, 0.35)
 """Dwells tried, as shares of the longest allowed: shorter ones pay when a hold does not repeat well."""
 QUICK, THOROUGH = 60, 1500
-"""Exchanges tried in search of the order, for each dwell length and for the chosen one."""
+"""Exchanges tried in search of the order: for each dwell length, and for the chosen one."""
 STRETCHES = (1, 2, 4)
 """Zero returns between which the order goes from one end of the levels to the other, and then back."""
 DRIFT = 1e-3
@@ -56,6 +58,7 @@ class Ask:
     slow: Slow | None = None
     """None: a drift of DRIFT times the highest thrust."""
     only_these: bool = False
+    tries: int = THOROUGH
     seed: int = 0
 
     @property
@@ -121,9 +124,9 @@ def mean_heat(levels: Floats, dwells: Floats, course: Course, V_max: float) -> f
 def choose(ask: Ask) -> Chosen:
     """Levels, order and dwells. Raises PlanError with one sentence when the limits leave no run."""
     _require_choice(ask)
-    inner = ask
+    length, inner = _best_length(ask), ask
     for _ in range(ROUNDS):
-        found = _best_length(inner)
+        found = _filled(ask, _trial(inner, length), ask.tries)
         heat = mean_heat(found.levels, found.dwells, ask.course, ask.V_max)
         if heat <= ask.max_heat:
             return found
@@ -134,7 +137,8 @@ def choose(ask: Ask) -> Chosen:
     )
 
 
-def _best_length(ask: Ask) -> Chosen:
+def _best_length(ask: Ask) -> float:
+    """Length of the holds in s, tried with orders that are searched for quickly."""
     lengths = [share * ask.max_dwell for share in SHORTER if share * ask.max_dwell >= _shortest(ask)]
     if not lengths:
         raise PlanError(
@@ -144,12 +148,12 @@ def _best_length(ask: Ask) -> Chosen:
     trials, refused = [], []
     for length in lengths:
         try:
-            trials.append(_filled(ask, _trial(ask, length), QUICK))
+            trials.append((_filled(ask, _trial(ask, length), QUICK).value, length))
         except PlanError as error:
             refused.append(error)
     if not trials:
         raise refused[-1]
-    return _filled(ask, min(trials, key=lambda trial: trial.value), THOROUGH)
+    return min(trials)[1]
 
 
 def _shortest(ask: Ask) -> float:
@@ -235,7 +239,7 @@ def _optimum(ask: Ask, spent: _Spent, net: float, checks: Floats | None = None) 
     H = terms.rows(others) / ask.noise.std(terms.thrust(others), seconds)[:, None]
     sigma = ask.noise.std(terms.thrust(V), np.full(V.size, net)) * np.sqrt(net)
     choices = Candidates(V, terms.rows(V), terms.names, sigma, copper_heat(V, ask.V_max))
-    found = optimal_levels(choices, left, ask.criterion, spent.max_heat, terms.size(ask.V_max), H.T @ H)
+    found = optimal_levels(choices, left, ask.criterion, spent.max_heat, terms.size(ask.V_max), H.T @ H, GOOD)
     if not isinstance(found, Design):
         raise PlanError(f"no run can be designed: {found.statement}")
     shares = Shares(found.levels, found.dwells)

@@ -187,6 +187,8 @@ def _slow(found: Judged) -> str:
 
 
 def _percent(share: float) -> str:
+    if share > 1:
+        return f"{share:.2g} times that of the noise"
     return f"{100 * share:.2g} %" if share >= 1e-5 else "0 %"
 
 
