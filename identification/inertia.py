@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from scipy.fft import dct
+from scipy.fft import dct, idct
 
 from identification.inertia_by_derivative import LEAST, SMOOTHING, inverse_inertia, sensor_noise, smoothed
 from identification.maximum_likelihood import NOTHING, Gaussian, Maximum, maximise
@@ -20,7 +20,7 @@ from identification.recording import Floats
 from identification.thrust_data import Unusable
 from identification.vehicle import unit_of
 from identification.vehicle_entangled import entanglement
-from identification.vehicle_simulation import Validation, simulate, validate
+from identification.vehicle_simulation import Validation, simulate_all, validate
 from identification.vehicle_trials import Trial
 from identification.velocity import derivative
 from identification.verdicts import Whiteness, significance, whiteness
@@ -98,11 +98,10 @@ def responses(
     trials: Sequence[Trial], names: Sequence[str], theta: Floats, buoyancy: Mapping[str, str]
 ) -> list[Floats]:
     """Simulated measurement (k, n_i) of each trial."""
-    out = []
-    for i, one in enumerate(trials):
-        moved = simulate(one, names, theta, buoyancy.get(one.recording_id, ""), (f"x0[{i}]", f"v0[{i}]"))
-        out.append(moved.position if one.quantity == "position" else moved.velocity)
-    return out
+    floats = [buoyancy.get(one.recording_id, "") for one in trials]
+    states = [(f"x0[{i}]", f"v0[{i}]") for i in range(len(trials))]
+    moved = simulate_all(trials, names, theta, floats, states)
+    return [m.position if one.quantity == "position" else m.velocity for one, m in zip(trials, moved, strict=True)]
 
 
 def output_error(
@@ -110,12 +109,15 @@ def output_error(
     known: Gaussian = NOTHING,
     free: Mapping[str, float] | None = None,
     buoyancy: Mapping[str, str] | None = None,
+    *,
+    correlated: bool = False,
 ) -> InertiaFit | Unusable:
     """Fit the simulated vehicle to trials of one axis.
 
     `known`: parameters with their covariance from step one or from elsewhere (a weighed mass). `free`: further
     parameters and where to start; default: m alone, started by `start_inertia`. Noise may be autocorrelated: the
-    covariance allows for it.
+    covariance allows for it. `correlated` weighs by the spectrum of the residual as well, which is the most likely
+    fit under slow sensor noise (and also forgives slowly what the model lacks: on real vehicles look at both).
     """
     if not trials:
         return Unusable("no trial was given; expected at least one with a measured motion")
@@ -126,27 +128,27 @@ def output_error(
     start = np.array([*chosen.values(), *(known[n] for n in known.names if n not in chosen), *starts.values()])
     scale = _scales(names, start, known)
     measured = [one.response for one in trials]
-    sigma = [sensor_noise(one) for one in trials]
+    roots = [np.full(one.time.size, sensor_noise(one)) for one in trials]
     for _ in range(ROUNDS):
 
-        def misfit(theta: Floats, sigma: Sequence[float] = tuple(sigma)) -> Floats:
+        def misfit(theta: Floats, roots: Sequence[Floats] = tuple(roots)) -> Floats:
             found = responses(trials, names, theta, floats)
-            return np.hstack([(y - f) / s for y, f, s in zip(measured, found, sigma, strict=True)])
+            return np.hstack([_cosines(y - f) / s for y, f, s in zip(measured, found, roots, strict=True)])
 
         best = maximise(names, start, scale, misfit, known)
-        start, used = best.estimate.mean, sigma
-        left = _residuals(best, trials, used)
-        sigma = [max(float(np.sqrt(r @ r / max(r.size - _share(best, trials), 1.0))), 1e-12) for r in left]
-        if max(abs(new / old - 1) for new, old in zip(sigma, used, strict=True)) < SAME_NOISE:
+        start, used = best.estimate.mean, roots
+        left = _residuals(best, used)
+        spectra = [_spectrum(r) for r in left]
+        roots = spectra if correlated else [_level(r, len(names) / len(trials)) for r in left]
+        if max(float(np.abs(np.log(new / old)).mean()) for new, old in zip(roots, used, strict=True)) < SAME_NOISE:
             break
-    left = _residuals(best, trials, [1.0] * len(trials))
-    cov = best.with_noise(_noise_matrix(left))
+    ratio = np.hstack([found / root for found, root in zip(spectra, used, strict=True)])
+    cov = best.with_noise(np.diag(ratio**2))
     wanted = [name for name in names if name not in starts]
     estimate = Gaussian(names, best.estimate.mean, cov).select(wanted)
-    checked = _validation(trials, left, used)
-    return InertiaFit(
-        axis, "output error", estimate, tuple(sigma), checked, tuple(whiteness(r) for r in left), best
-    )  # fmt: skip
+    sigma = tuple(float(np.sqrt(np.mean(root**2))) for root in roots)
+    white = tuple(whiteness(r) for r in left)
+    return InertiaFit(axis, "output error", estimate, sigma, _validation(trials, left), white, best)
 
 
 def _scales(names: Sequence[str], start: Floats, known: Gaussian) -> Floats:
@@ -158,34 +160,38 @@ def _scales(names: Sequence[str], start: Floats, known: Gaussian) -> Floats:
     )
 
 
-def _share(best: Maximum, trials: Sequence[Trial]) -> float:
-    return len(best.estimate.names) / len(trials)
-
-
-def _residuals(best: Maximum, trials: Sequence[Trial], sigma: Sequence[float]) -> list[Floats]:
-    parts = np.split(best.misfit, np.cumsum([one.time.size for one in trials])[:-1])
-    return [part * s for part, s in zip(parts, sigma, strict=True)]
-
-
-def _noise_matrix(residuals: Sequence[Floats]) -> Floats:
-    """Covariance (n, n), block by trial, of autocorrelated noise like these residuals (cosine domain)."""
-    total = sum(r.size for r in residuals)
-    out, at = np.zeros((total, total)), 0
-    for r in residuals:
-        model, n = fit_noise(r), r.size
-        cosines = dct(np.eye(n), axis=0, norm="ortho")
-        power = np.concatenate([[n * model.mean_variance()], model.spectrum(np.arange(1, n) / (2 * n))])
-        out[at : at + n, at : at + n] = cosines.T @ (power[:, None] * cosines)
-        at += n
+def _cosines(y: Floats) -> Floats:
+    """Cosine coefficients of the last axis: white noise stays white, other noise becomes nearly independent."""
+    out: Floats = dct(y, axis=-1, norm="ortho")
     return out
 
 
-def _validation(trials: Sequence[Trial], left: Sequence[Floats], sigma: Sequence[float]) -> tuple[Validation, ...]:
+def _residuals(best: Maximum, roots: Sequence[Floats]) -> list[Floats]:
+    """Of each trial, in the unit of the measurement."""
+    parts = np.split(best.misfit, np.cumsum([root.size for root in roots])[:-1])
+    return [idct(part * root, norm="ortho") for part, root in zip(parts, roots, strict=True)]
+
+
+def _level(residual: Floats, parameters: float) -> Floats:
+    """Standard deviation (n,) of each cosine coefficient of white noise (eq. 4.12)."""
+    dof = max(residual.size - parameters, 1.0)
+    return np.full(residual.size, max(float(np.sqrt(residual @ residual / dof)), 1e-12))
+
+
+def _spectrum(residual: Floats) -> Floats:
+    """Standard deviation (n,) of each cosine coefficient of autocorrelated noise."""
+    model, n = fit_noise(residual), residual.size
+    power = np.concatenate([[n * model.mean_variance()], model.spectrum(np.arange(1, n) / (2 * n))])
+    out: Floats = np.sqrt(np.maximum(power, 1e-24))
+    return out
+
+
+def _validation(trials: Sequence[Trial], left: Sequence[Floats]) -> tuple[Validation, ...]:
     out = []
-    for one, r, s in zip(trials, left, sigma, strict=True):
+    for one, r in zip(trials, left, strict=True):
         power = float(np.linalg.norm(one.response - one.response.mean()))
-        fit = 100 * (1 - float(np.linalg.norm(r * s)) / power) if power > 0 else float("nan")
-        out.append(Validation(one.recording_id, one.quantity, float(np.sqrt(np.mean((r * s) ** 2))), fit))
+        fit = 100 * (1 - float(np.linalg.norm(r)) / power) if power > 0 else float("nan")
+        out.append(Validation(one.recording_id, one.quantity, float(np.sqrt(np.mean(r**2))), fit))
     return tuple(out)
 
 

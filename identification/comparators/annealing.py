@@ -1,7 +1,9 @@
 """The vehicle found by simulated annealing on the error of the simulated position: no derivative, no start needed.
 
-It says where the error is least, not how well that is known: the covariance is that of the likelihood's curvature
-there, by `identification.inertia.output_error` started from it.
+It says in which valley the error is least, not how well that is known: from there `identification.inertia.output_error`
+goes to the bottom, with the starts of the trials and all that was known beforehand free to move, and the covariance is
+that of its estimate. (The annealed values themselves have 20 times the variance: they are found with the velocity at
+the start held at what the first, noisy, measurements show.)
 """
 
 from __future__ import annotations
@@ -52,13 +54,7 @@ def by_annealing(
     local = output_error(trials, known, chosen, floats)
     if isinstance(local, Unusable):
         return local
-    mean = local.estimate.mean.copy()
-    for name, value in {**chosen, **{n: known[n] for n in fixed}}.items():
-        mean[local.estimate.names.index(name)] = value
-    estimate = Gaussian(local.estimate.names, mean, local.estimate.cov)
-    return replace(
-        local, method="simulated annealing", estimate=estimate, validation=validate(trials, estimate, floats)
-    )
+    return replace(local, method="simulated annealing", validation=validate(trials, local.estimate, floats))
 
 
 def _error(one: Trial, y: Floats) -> float:

@@ -170,6 +170,11 @@ def cases():
     for noise in NOISES:
         yield step_two("inertia, output error", noise, lambda trials, known, rng: output_error(trials, known))
     for noise in NOISES:
+        yield step_two(
+            "inertia, output error, spectrum", noise,
+            lambda trials, known, rng: output_error(trials, known, correlated=True),
+        )  # fmt: skip
+    for noise in NOISES:
         yield step_two("inertia by derivative", noise, lambda trials, known, rng: by_derivative(trials, known), ("m",))
     for noise in NOISES:
         yield step_two("inertia, Kalman smoother", noise, lambda trials, known, rng: by_kalman(trials, known))
