@@ -25,6 +25,8 @@ class Concealed:
 
     shape: Shape
     amount: float
+    seen: float = 0.0
+    """Strength d' as measured when the amount was found; 0: not measured."""
 
     @property
     def effect(self) -> str:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from sim_devices.concealed.definition import Case, Concealed, Run, Sensor
-from sim_devices.concealed.oracle import OutOfReach, scaled_to
+from sim_devices.concealed.oracle import OutOfReach, measured, scaled_to
 from sim_devices.concealed.plans import KINDS, profile
 from sim_devices.concealed.shapes import Scale, shape
 from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, flicker
@@ -22,6 +22,9 @@ CHANNELS = ("rotation_rate", "current", "bus_voltage", "motor_temperature", "flo
 """Present or missing at random."""
 NEEDS_FLOW = frozenset({"speed_of_advance", "strut_drag", "reversed_flow_loss", "crossed_flow_loss"})
 NEEDS_REVERSED_FLOW = frozenset({"reversed_flow_loss"})
+NEEDS_ROTATION = frozenset({"rotation_coupling"})
+NEEDS_SLEW = frozenset({"motor_lag", "time_skew", "stand_resonance"})
+"""Where steps come at once a millisecond of these is plain to see: they would never be faint."""
 NEEDS_DRIFT = frozenset({"temperature_squared"})
 TRIES = 30
 """Cases drawn before a strength is given up."""
@@ -58,7 +61,7 @@ def case(
                 drawn = scaled_to(replace(drawn, effects=(*drawn.effects, added)), effect, strength)
         except OutOfReach:
             continue
-        return drawn
+        return measured(drawn) if len(effects) > 1 else drawn
     raise OutOfReach(f"no case of {TRIES} shows {', '.join(effects)} at {strength} sigma; expected a lower strength")
 
 
@@ -80,22 +83,25 @@ def _bare(
     named = frozenset(effects)
     top, full = voltage or _log(rng, 5.0, 48.0), thrust or _log(rng, 10.0, 300.0)
     every = max(int(np.ceil(250.0 / rate)), 1)  # a grid of 250 Hz or finer
-    scale = _scale(rng, top, full, rate, long * runs, flow=float(rng.uniform(0.4, 1.6)))
+    grid = 1.0 / (rate * every)
+    scale = _scale(rng, top, full, rate, long * runs, flow=float(rng.uniform(0.4, 1.6)), grid=grid)
     with_flow = bool(named & NEEDS_FLOW) or rng.random() < 0.3
     drift = float(rng.uniform(4.0, 8.0)) * float(rng.choice((-1.0, 1.0))) if named & NEEDS_DRIFT else 0.0
     kind = plan or str(rng.choice(KINDS))
-    made, start = [], 0.0
+    made, start, smooth = [], 0.0, bool(named & NEEDS_SLEW)
     for _ in range(runs):
         flow = (
             _flow(rng, scale.flow, long, reversed_too=bool(named & NEEDS_REVERSED_FLOW)) if with_flow else ((0.0, 0.0),)
         )
         tare = full * float(rng.uniform(-0.02, 0.02))
-        made.append(Run(profile(kind, top, long, rng), flow, tare, start, int(rng.integers(2**62))))
+        made.append(
+            Run(profile(kind, top, long, grid, rng, smooth=smooth), flow, tare, start, int(rng.integers(2**62)))
+        )
         start += long
     loud = full * _log(rng, 5e-4, 0.01)
     noise_kind = noise or str(rng.choice(NOISE_KINDS))
-    grid = 1.0 / (rate * every)
     forced = {"flow_speed"} if named & NEEDS_FLOW else set()
+    forced |= {"rotation_rate"} if named & NEEDS_ROTATION else set()
     return Case(
         thruster=_thruster(rng, scale),
         scale=scale,
@@ -116,7 +122,7 @@ def _log(rng: Rng, low: float, high: float) -> float:
     return float(np.exp(rng.uniform(np.log(low), np.log(high))))
 
 
-def _scale(rng: Rng, top: float, full: float, rate: float, duration: float, flow: float) -> Scale:
+def _scale(rng: Rng, top: float, full: float, rate: float, duration: float, flow: float, grid: float) -> Scale:
     return Scale(
         voltage=top,
         thrust=full,
@@ -127,6 +133,7 @@ def _scale(rng: Rng, top: float, full: float, rate: float, duration: float, flow
         bus=top * float(rng.uniform(1.05, 1.8)),
         flow=flow,
         sampling=rate,
+        grid=grid,
     )
 
 

@@ -15,13 +15,14 @@ from numpy.typing import NDArray
 
 from sim_devices.concealed.definition import Case, Concealed, history, thrust_of
 from sim_devices.concealed.plans import held
+from sim_devices.concealed.shapes import LEAST
 from sim_devices.concealed.whitening import Whitening
 from sim_devices.world.history import clock
-from sim_devices.world.noise_law import scaled
+from sim_devices.world.noise_law import scaled, spectrum
 
 Floats = NDArray[np.float64]
 
-CLOSE = 0.02
+CLOSE = 0.03
 """relative error of d' at which the search for the amount ends; the noise then takes up the rest."""
 QUIETEST, LOUDEST = 3e-5, 0.05
 """Noise of the cell as a share of the largest thrust: what can still be called a load cell."""
@@ -40,28 +41,33 @@ def strength(case: Case, effect: str) -> float:
     return _Projection(case, _signals(case)).strength(_signals(case), without)
 
 
+def measured(case: Case) -> Case:
+    """The case with the strength of each of its effects written beside it."""
+    return replace(case, effects=tuple(replace(c, seen=strength(case, c.effect)) for c in case.effects))
+
+
 def scaled_to(case: Case, effect: str, d_prime: float) -> Case:
     """The case with as much of `effect` as the oracle sees at `d_prime` sigma.
 
-    The amount is searched within its physical bounds; where it jumps over the strength asked for, or its bounds end
-    before, the noise is scaled to meet it. Raises OutOfReach when that noise would be no load cell's.
+    The amount is searched within its physical bounds with noise taken as stationary (frequency domain, fast); then the
+    noise is scaled so that the exact strength is met, also where the amount jumps over it or its bounds end before.
+    Raises OutOfReach when that noise would be no load cell's.
     """
     without = _signals(case, frozenset({effect}))
-    projection = _Projection(case, without)
+    screen = Screen(case, without)
     shape = next(c.shape for c in case.effects if c.effect == effect)
 
     def seen(amount: float) -> float:
-        return projection.strength(_signals(with_amount(case, effect, amount)), without)
+        return screen.strength(_signals(with_amount(case, effect, amount)), without)
 
-    amount, _ = _searched(seen, d_prime, shape.highest)
-    found = with_amount(case, effect, amount)
-    reached = strength(found, effect)
-    if abs(reached / d_prime - 1.0) < CLOSE / 4:
-        return found
+    lowest = shape.lowest or LEAST * shape.highest
+    found = with_amount(case, effect, _searched(seen, d_prime, lowest, shape.highest))
+    reached = _Projection(found, without).strength(_signals(found), without)
     return _with_noise(found, effect, reached / d_prime)
 
 
 def with_amount(case: Case, effect: str, amount: float) -> Case:
+    """The case with another amount of one effect."""
     changed = tuple(Concealed(c.shape, amount) if c.effect == effect else c for c in case.effects)
     return replace(case, effects=changed)
 
@@ -81,24 +87,26 @@ def _with_noise(case: Case, effect: str, factor: float) -> Case:
             f"{effect} needs noise of {loud:.2g} of the largest thrust to be seen as asked; expected {QUIETEST:.2g} to "
             f"{LOUDEST:.2g}: draw another case"
         )
-    return replace(case, noise=scaled(case.noise, factor))
+    louder = replace(case, noise=scaled(case.noise, factor))
+    return louder if len(case.effects) > 1 else measured(louder)
 
 
-def _searched(seen: Callable[[float], float], target: float, highest: float) -> tuple[float, float]:
-    """(amount, d' there): false position on log d' against log amount, which is nearly a straight line."""
-    low, high = _Point(0.0, 0.0), _Point(np.inf, np.inf)
-    amount, best = 0.05 * highest, _Point(0.0, 0.0)
+def _searched(seen: Callable[[float], float], target: float, lowest: float, highest: float) -> float:
+    """Amount that is seen at `target`: false position on log d' against log amount, which is nearly a straight line."""
+    low, high, best = _Point(0.0, 0.0), _Point(np.inf, np.inf), _Point(lowest, 0.0)
+    amount = min(max(0.05 * highest, lowest), highest)
     for _ in range(EVALUATIONS):
         point = _Point(amount, seen(amount))
-        if abs(point.log_ratio(target)) < abs(best.log_ratio(target)):
+        if abs(point.log_ratio(target)) <= abs(best.log_ratio(target)):
             best = point
-        if abs(point.seen / target - 1.0) < CLOSE or (point.seen < target and amount >= highest):
+        at_bound = amount >= highest if point.seen < target else amount <= lowest
+        if abs(point.seen / target - 1.0) < CLOSE or at_bound:
             break
         low, high = (point, high) if point.seen < target else (low, point)
-        amount = min(_next(low, high, target), highest)
-        if high.amount - low.amount < 1e-6 * high.amount:
+        amount = min(max(_next(low, high, target), lowest), highest)
+        if high.amount - low.amount < 1e-3 * high.amount:
             break
-    return best.amount, best.seen
+    return best.amount
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,27 +134,68 @@ def _signals(case: Case, without: frozenset[str] = frozenset()) -> list[Floats]:
 
 
 class _Projection:
-    """Whitening and baseline columns of all runs; made once, asked for many differences."""
+    """Exact whitening and baseline columns of all runs; made once, asked for differences."""
 
     def __init__(self, case: Case, values: list[Floats]) -> None:
         self._runs = []
-        count = len(case.runs)
-        for index, (run, value) in enumerate(zip(case.runs, values, strict=True)):
-            volts = history_volts(case, index)
-            columns = np.zeros((value.size, 1 + count))
-            columns[:, 0], columns[:, 1 + index] = volts * np.abs(volts), 1.0
+        for run, value, columns in zip(case.runs, values, _baseline(case, values), strict=True):
             whitening = Whitening(case.noise, value - run.tare, case.rate)
-            self._runs.append((whitening, columns, whitening.solve(columns)))
-        self._gram = np.sum([columns.T @ solved for _, columns, solved in self._runs], axis=0)
+            self._runs.append((whitening, whitening.solve(columns)))
+        grams = [c.T @ solved for c, (_, solved) in zip(_baseline(case, values), self._runs, strict=True)]
+        self._gram = np.sum(grams, axis=0)
 
     def strength(self, with_effect: list[Floats], without: list[Floats]) -> float:
         energy, shared = 0.0, np.zeros(len(self._gram))
-        for (whitening, _, solved), one, other in zip(self._runs, with_effect, without, strict=True):
+        for (whitening, solved), one, other in zip(self._runs, with_effect, without, strict=True):
             x = one - other
             energy += float(x @ whitening.solve(x[:, None])[:, 0])
             shared += solved.T @ x
-        seen = energy - float(shared @ np.linalg.solve(self._gram, shared))
-        return float(np.sqrt(max(seen, 0.0)))
+        return _projected(energy, shared, self._gram)
+
+
+class Screen:
+    """The same with the noise taken as stationary and periodic: a Fourier transform a question. Good to some per cent
+    where the noise is not slower than the run.
+    """
+
+    def __init__(self, case: Case, values: list[Floats]) -> None:
+        self._weights, self._columns = [], []
+        for run, value, columns in zip(case.runs, values, _baseline(case, values), strict=True):
+            n = value.size
+            white = np.mean(case.noise.white_std(value - run.tare) ** 2)
+            law = replace(case.noise, white=float(np.sqrt(white)), proportional=0.0)
+            frequency = np.asarray(np.fft.rfftfreq(n, 1.0 / case.rate), dtype=np.float64)
+            # one-sided density S: sum over the positive lines of 4 |X|^2 / (n rate S) is x' K^-1 x
+            self._weights.append(4.0 / (n * case.rate * spectrum(law, frequency, case.rate)))
+            self._weights[-1][0] *= 0.5
+            self._columns.append(np.fft.rfft(columns, axis=0))
+        grams = [(c.conj().T * w @ c).real for c, w in zip(self._columns, self._weights, strict=True)]
+        self._gram = np.sum(grams, axis=0)
+
+    def strength(self, with_effect: list[Floats], without: list[Floats]) -> float:
+        energy, shared = 0.0, np.zeros(len(self._gram))
+        for columns, weights, one, other in zip(self._columns, self._weights, with_effect, without, strict=True):
+            x = np.fft.rfft(one - other)
+            energy += float(weights @ np.abs(x) ** 2)
+            shared += (columns.conj().T @ (weights * x)).real
+        return _projected(energy, shared, self._gram)
+
+
+def _projected(energy: float, shared: Floats, gram: Floats) -> float:
+    """Square root of the energy that the baseline's columns do not take."""
+    left = energy - float(shared @ np.linalg.solve(gram, shared))
+    return float(np.sqrt(max(left, 0.0)))
+
+
+def _baseline(case: Case, values: list[Floats]) -> list[Floats]:
+    """V|V| and one zero per run, (n, 1 + runs) for each run."""
+    found = []
+    for index, value in enumerate(values):
+        volts = history_volts(case, index)
+        columns = np.zeros((value.size, 1 + len(values)))
+        columns[:, 0], columns[:, 1 + index] = volts * np.abs(volts), 1.0
+        found.append(columns)
+    return found
 
 
 def history_volts(case: Case, index: int) -> Floats:

@@ -36,70 +36,83 @@ class Profile:
 
 
 class _Writer:
-    """Rows and steps as they are laid down."""
+    """Rows and steps as they are laid down, each half a grid step before the grid point that first knows it.
 
-    def __init__(self, tick: float, slew: float) -> None:
-        self._tick, self._slew = tick, slew
-        self._t, self._at = 0.0, 0.0
+    So no sample is ever taken at the very instant of a change.
+    """
+
+    def __init__(self, tick: float, slew: float, dt: float) -> None:
+        self._points = max(round(tick / dt), 1)
+        self._dt, self._tick, self._slew = dt, self._points * dt, slew
+        self._now, self._at = 0, 0.0
         self._rows: list[tuple[float, float]] = [(0.0, 0.0)]
         self._steps: list[Step] = []
 
     @property
     def t(self) -> float:
-        return self._t
+        return max(self._now - 0.5, 0.0) * self._dt
+
+    @property
+    def tick(self) -> float:
+        """S between two commands."""
+        return self._tick
 
     def hold(self, volts: float, seconds: float, phase: str = "hold") -> None:
         """Go to `volts` at the slew rate (0: at once), then stay for `seconds`."""
         volts = round(volts, 3)
         if self._slew and volts != self._at:
-            start, first = self._t, self._at
+            start, first = self.t, self._at
             count = int(np.ceil(abs(volts - first) / (self._slew * self._tick)))
             for i in range(1, count + 1):
-                self._set(first + (volts - first) * i / count)
-                self._t += self._tick
-            self._steps.append(Step("ramp", volts, start, self._t))
+                self._set(round(first + (volts - first) * i / count, 3))
+                self._now += self._points
+            self._steps.append(Step("ramp", volts, start, self.t))
         self._set(volts)
         self._stay(seconds, phase, volts)
 
     def follow(self, values: Floats, phase: str) -> None:
         """One value a tick."""
-        start = self._t
+        start = self.t
         for value in values.tolist():
             self._set(round(value, 3))
-            self._t += self._tick
-        self._steps.append(Step(phase, float(values[-1]), start, self._t))
+            self._now += self._points
+        self._steps.append(Step(phase, float(values[-1]), start, self.t))
 
     def _stay(self, seconds: float, phase: str, volts: float) -> None:
         ticks = max(round(seconds / self._tick), 1)
-        self._steps.append(Step(phase, volts, self._t, self._t + ticks * self._tick))
-        self._t += ticks * self._tick
+        start = self.t
+        self._now += ticks * self._points
+        self._steps.append(Step(phase, volts, start, self.t))
 
     def _set(self, volts: float) -> None:
         if volts != self._rows[-1][1]:
-            self._rows.append((self._t, volts))
+            self._rows.append((self.t, volts))
             self._at = volts
 
     def profile(self, kind: str) -> Profile:
         rows = np.array(self._rows, dtype=np.float64)
-        return Profile(kind, rows[:, 0], rows[:, 1], tuple(self._steps), self._t)
+        return Profile(kind, rows[:, 0], rows[:, 1], tuple(self._steps), self.t)
 
 
-def profile(kind: str, top: float, duration: float, rng: Rng) -> Profile:
-    """About `duration` s of a plan of `kind`, within +-`top` V. Raises ValueError for an unknown kind."""
+def profile(kind: str, top: float, duration: float, dt: float, rng: Rng, *, smooth: bool = False) -> Profile:
+    """About `duration` s of a plan of `kind`, within +-`top` V, on a grid of `dt` s; `smooth`: always slewed.
+
+    Raises ValueError for an unknown kind.
+    """
     if kind not in KINDS:
         raise ValueError(f"plan must be one of {', '.join(KINDS)}, got {kind!r}")
     tick = 1.0 / float(rng.choice((20.0, 25.0, 50.0, 100.0)))
-    slew = 0.0 if rng.random() < 0.5 else top / float(rng.uniform(0.3, 3.0))
-    w = _Writer(tick, slew)
+    slew = 0.0 if rng.random() < 0.5 and not smooth else top / float(rng.uniform(0.3, 3.0))
+    w = _Writer(tick, slew, dt)
     w.hold(0.0, float(rng.uniform(3.0, 10.0)), "tare")
     parts = [kind] if kind != "mixed" else [str(p) for p in rng.permutation(KINDS[:-1])[:3]]
     for i, part in enumerate(parts):
-        _lay(w, part, top, w.t + (duration - 5.0 - w.t) / (len(parts) - i), rng, tick)
+        _lay(w, part, top, w.t + (duration - 5.0 - w.t) / (len(parts) - i), rng)
     w.hold(0.0, float(rng.uniform(3.0, 8.0)), "rest")
     return w.profile(kind)
 
 
-def _lay(w: _Writer, part: str, top: float, end: float, rng: Rng, tick: float) -> None:
+def _lay(w: _Writer, part: str, top: float, end: float, rng: Rng) -> None:
     match part:
         case "staircase":
             _levels(w, _staircase(top, rng), end)
@@ -108,9 +121,9 @@ def _lay(w: _Writer, part: str, top: float, end: float, rng: Rng, tick: float) -
         case "random":
             _random(w, top, end, rng)
         case "ramp":
-            _waves(w, end, top, rng, tick, "free")
+            _waves(w, end, top, rng, "free")
         case _:
-            _waves(w, end, top, rng, tick, "sine")
+            _waves(w, end, top, rng, "sine")
 
 
 def _staircase(top: float, rng: Rng) -> Floats:
@@ -151,12 +164,12 @@ def _random(w: _Writer, top: float, end: float, rng: Rng) -> None:
             w.hold(0.0, float(rng.uniform(4.0, 15.0)), "rest")
 
 
-def _waves(w: _Writer, end: float, top: float, rng: Rng, tick: float, phase: str) -> None:
+def _waves(w: _Writer, end: float, top: float, rng: Rng, phase: str) -> None:
     """Triangles (`free`) or sines of several sizes and periods, a rest between."""
     while w.t < end:
         period, size = float(rng.uniform(8.0, 50.0)), top * float(rng.uniform(0.3, 1.0))
         size = top if w.t + 2 * period > end else size
-        turn = np.arange(int(int(rng.integers(1, 4)) * period / tick)) * tick / period
+        turn = np.arange(int(int(rng.integers(1, 4)) * period / w.tick)) * w.tick / period
         wave = np.sin(2 * pi * turn) if phase == "sine" else 2 / pi * np.arcsin(np.sin(2 * pi * turn))
         w.follow(size * wave, phase)
         w.hold(0.0, float(rng.uniform(2.0, 8.0)), "rest")

@@ -105,7 +105,12 @@ def truth(case: Case) -> dict[str, Any]:
     """Everything that was concealed, in SI, ready for JSON: for a sealed file, never for the diagnosis."""
     return {
         "effects": [
-            {"effect": c.effect, "parameters": c.parameters, "amount": c.amount, "d_prime": strength(case, c.effect)}
+            {
+                "effect": c.effect,
+                "parameters": c.parameters,
+                "amount": c.amount,
+                "d_prime": c.seen or strength(case, c.effect),
+            }
             for c in case.effects
         ],
         "baseline": {"C": case.thruster.C},

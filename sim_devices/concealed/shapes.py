@@ -11,6 +11,10 @@ import numpy as np
 Rng = np.random.Generator
 
 
+LEAST = 0.002
+"""Of the highest amount: below it nobody would speak of the effect."""
+
+
 @dataclass(frozen=True, slots=True)
 class Scale:
     """What is large for the thruster and the run under test."""
@@ -33,6 +37,8 @@ class Scale:
     """m/s, fastest of the run."""
     sampling: float
     """1/s, of the thrust."""
+    grid: float
+    """s, of the world: nothing shorter happens in it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,10 +55,16 @@ class Shape:
     fixed: Mapping[str, Any] = field(default_factory=dict)
     with_knob: Mapping[str, float] = field(default_factory=dict)
     """Further parameters in proportion to gain * amount."""
+    lowest: float = 0.0
+    """Least amount worth the name; 0: LEAST of the highest."""
+    quantum: float = 0.0
+    """gain * amount comes in whole multiples of it, one at least; 0: it is continuous."""
 
     def parameters(self, amount: float) -> dict[str, Any]:
         """Of the world's effect."""
         moved = self.gain * amount
+        if self.quantum:
+            moved = max(round(moved / self.quantum), 1) * self.quantum
         turned = {name: ratio * moved for name, ratio in self.with_knob.items()}
         return {**self.fixed, **turned, self.knob: 1.0 / moved if self.inverse else self.base + moved}
 
@@ -147,7 +159,7 @@ def _sag(s: Scale, _rng: Rng, form: str) -> Shape:
 
 def _lag(s: Scale, rng: Rng, form: str) -> Shape:
     fixed = {"form": form, "reference_voltage": s.voltage * _uniform(rng, 0.4, 0.8)}
-    return Shape("motor_lag", "time_constant", 1.5, fixed=fixed)
+    return Shape("motor_lag", "time_constant", 1.5, fixed=fixed, lowest=s.grid)
 
 
 def _winding(s: Scale, _rng: Rng, _form: str) -> Shape:
@@ -194,11 +206,16 @@ SHAPES: dict[str, Callable[[Scale, Rng, str], Shape]] = {
     "torque_crosstalk": lambda s, r, f: Shape(
         "torque_crosstalk", "coefficient", 0.4, _sign(r) * s.thrust / s.rate**2, fixed={"form": f}
     ),
-    "stand_resonance": lambda _s, r, _f: Shape(
-        "stand_resonance", "frequency", 2.0, inverse=True, fixed={"damping": _log(r, 0.02, 0.3)}
+    "stand_resonance": lambda s, r, _f: Shape(
+        "stand_resonance",
+        "frequency",
+        2.0,
+        inverse=True,
+        fixed={"damping": _log(r, 0.02, 0.3)},
+        lowest=1.0 / (0.45 * s.sampling),  # below half the sampling rate, or it rings between the samples
     ),
     "hysteresis": lambda s, _r, _f: Shape("hysteresis", "width", 0.2, s.thrust),
-    "time_skew": lambda _s, _r, _f: Shape("time_skew", "delay", 1.0),
+    "time_skew": lambda s, _r, _f: Shape("time_skew", "delay", 1.0, lowest=s.grid, quantum=s.grid),
     "load_cell_creep": _creep,
     "load_cell_nonlinearity": _cell_curve,
     "periodic_disturbance": _line,

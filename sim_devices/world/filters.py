@@ -1,12 +1,16 @@
-"""Filters over a whole run at once, for the array form of the effects. Inputs held over each step (zero-order hold)."""
+"""Filters over a whole run at once, for the array form of the effects.
+
+An input is held and changes halfway between grid points: that is where the command of a sweep changes.
+"""
 
 from __future__ import annotations
 
-from math import exp, pi
+from math import exp, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import cont2discrete, lfilter
+from scipy.linalg import expm
+from scipy.signal import lfilter
 
 Floats = NDArray[np.float64]
 
@@ -14,17 +18,20 @@ Floats = NDArray[np.float64]
 def low_pass(values: Floats, time_constant: float, dt: float) -> Floats:
     """First order: y' = (x - y)/time_constant from y = 0, exact for a held x. `dt` in s."""
     keep = exp(-dt / time_constant)
-    return np.asarray(lfilter([1.0 - keep], [1.0, -keep], values), dtype=np.float64)
+    half = sqrt(keep)
+    return np.asarray(lfilter([1.0 - half, half - keep], [1.0, -keep], values), dtype=np.float64)
 
 
 def resonator(values: Floats, frequency: float, damping: float, dt: float) -> Floats:
     """Second order: y'' + 2 damping w y' + w^2 y = w^2 x from rest. `frequency` in Hz, `damping` of critical."""
     w = 2.0 * pi * frequency
-    numerator, denominator, _ = cont2discrete(
-        (np.array([w * w]), np.array([1.0, 2.0 * damping * w, w * w])), dt, method="zoh"
-    )
-    late = lfilter(np.ravel(numerator), denominator, values)
-    return np.asarray(np.append(late[1:], late[-1]), dtype=np.float64)
+    # x_i = half (half x_{i-1} + push u_{i-1}) + push u_i, position first, with half and push over dt/2
+    step = expm(np.array([[0.0, 1.0, 0.0], [-w * w, -2.0 * damping * w, w * w], [0.0, 0.0, 0.0]]) * dt / 2.0)
+    half, push = step[:2, :2], step[:2, 2]
+    whole = half @ half
+    turned = np.trace(whole) * np.eye(2) - whole
+    numerator = [push[0], (half @ push - turned @ push)[0], -(turned @ half @ push)[0]]
+    return np.asarray(lfilter(numerator, [1.0, -np.trace(whole), np.linalg.det(whole)], values), dtype=np.float64)
 
 
 def changes(values: Floats) -> NDArray[np.intp]:
@@ -43,6 +50,6 @@ def play(values: Floats, width: float) -> Floats:
 
 
 def delayed(values: Floats, delay: float, dt: float) -> Floats:
-    """x(t - delay), straight lines between samples, the first value before the start."""
-    at = np.arange(values.size, dtype=np.float64)
-    return np.interp(at - delay / dt, at, values)
+    """x(t - delay) to the nearest grid point, the first value before the start."""
+    late = min(round(delay / dt), values.size)
+    return np.concatenate([np.full(late, values[0]), values[: values.size - late]])

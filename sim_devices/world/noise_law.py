@@ -71,11 +71,11 @@ def scaled(law: NoiseLaw, factor: float) -> NoiseLaw:
 
 
 def flicker(std: float, longest: float, shortest: float) -> tuple[Slow, ...]:
-    """1/f noise of standard deviation `std` between the time constants (s): a ladder, half a decade a rung.
+    """1/f noise of standard deviation `std` between the time constants (s): a ladder, a decade a rung.
 
-    Equal variances at time constants in geometric progression add up to 1/f within 3 % between the outer corners.
+    Equal variances at time constants in geometric progression add up to 1/f within 6 % between the outer corners.
     """
-    rungs = max(int(np.ceil(2.0 * np.log10(longest / shortest))) + 1, 2)
+    rungs = max(int(np.ceil(np.log10(longest / shortest))) + 1, 2)
     return tuple(Slow(std / sqrt(rungs), float(t)) for t in np.geomspace(longest, shortest, rungs))
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import exp, pi, sin
+from math import atan, exp, pi, sin, tan, tanh
 from typing import ClassVar
 
 import numpy as np
@@ -59,26 +59,57 @@ class MotorLag:
 
     @staticmethod
     def _quadratic(value: Floats, alpha: float, dt: float) -> Floats:
-        """Stepped while it moves, filled once it rests."""
-        n, at = 0.0, changes(value)
+        """Segment by segment of a held target, which changes halfway to its first point."""
+        n, old, at = 0.0, 0.0, changes(value)
         out = np.empty_like(value)
         for start, stop, target in zip(at.tolist(), [*at[1:].tolist(), value.size], value[at].tolist(), strict=True):
-            i = start
-            while i < stop and abs(n - target) > 1e-9 * (1.0 + abs(target)):
-                out[i] = n = _quadratic_step(n, target, alpha, dt)
-                i += 1
-            out[i:stop] = n = target if i < stop else n
+            n = _quadratic_step(n, old, alpha, dt / 2.0)
+            if stop - start < SHORT:
+                n = out[start] = _quadratic_step(n, target, alpha, dt / 2.0)
+                for i in range(start + 1, stop):
+                    n = out[i] = _quadratic_step(n, target, alpha, dt)
+            else:
+                out[start:stop] = _quadratic_path(n, target, alpha, (np.arange(stop - start) + 0.5) * dt)
+                n = float(out[stop - 1])
+            old = target
         return out
 
 
-def _quadratic_step(n: float, target: float, alpha: float, dt: float) -> float:
-    """Integrate n' = alpha (target|target| - n|n|) over dt: exact for a drag linearised at the mean rate, twice."""
-    push = alpha * target * abs(target)
-    ahead = n
-    for _ in range(2):
-        rate = alpha * abs(0.5 * (n + ahead)) + 1e-12
-        ahead = push / rate + (n - push / rate) * exp(-rate * dt)
-    return ahead
+SHORT = 16
+"""points: a shorter segment is quicker step by step."""
+
+
+def _quadratic_step(n: float, target: float, alpha: float, t: float) -> float:
+    """Solve n' = alpha (N|N| - n|n|) over t (s), N the target, exactly.
+
+    With N >= 0 (else mirrored): n = N (n0 + N tanh)/(N + n0 tanh) from n0 >= 0, and with tan and a minus sign below 0
+    until it crosses there; tanh and tan of alpha N t.
+    """
+    if target < 0.0:
+        return -_quadratic_step(-n, -target, alpha, t)
+    if target == 0.0:
+        return n / (1.0 + alpha * abs(n) * t)
+    if n < 0.0:
+        crossing = atan(-n / target) / (alpha * target)
+        if t < crossing:
+            turn = tan(alpha * target * t)
+            return target * (n + target * turn) / (target - n * turn)
+        n, t = 0.0, t - crossing
+    turn = tanh(alpha * target * t)
+    return target * (n + target * turn) / (target + n * turn)
+
+
+def _quadratic_path(n: float, target: float, alpha: float, t: Floats) -> Floats:
+    """The same at each time of t (n,)."""
+    if target < 0.0:
+        return -_quadratic_path(-n, -target, alpha, t)
+    if target == 0.0:
+        return np.asarray(n / (1.0 + alpha * abs(n) * t))
+    crossing = atan(max(-n, 0.0) / target) / (alpha * target)
+    turn = np.tan(alpha * target * np.minimum(t, crossing))
+    backwards = target * (n + target * turn) / (target - n * turn)
+    turn, n = np.tanh(alpha * target * (t - crossing)), max(n, 0.0)
+    return np.where(t < crossing, backwards, target * (n + target * turn) / (target + n * turn))
 
 
 @dataclass(slots=True)

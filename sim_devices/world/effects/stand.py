@@ -127,5 +127,4 @@ class TimeSkew:
         return self.line[0]
 
     def over(self, value: Floats, h: History) -> Floats:
-        """Not rounded to grid points."""
         return delayed(value, self.delay, h.dt)
