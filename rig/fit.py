@@ -109,7 +109,7 @@ def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:
 @click.option(
     "--one-pass/--in-memory",
     default=None,
-    help="Fit all samples in one pass, in constant memory; by default above a million of them.",
+    help="Fit all samples in one pass, in constant memory; by default above 200,000 of them.",
 )
 def fit_command(
     files: tuple[Path, ...],
