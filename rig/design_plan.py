@@ -188,15 +188,14 @@ def _trial(ask: Ask, length: float) -> Chosen:
 
 
 def _ordered(ask: Ask, levels: Floats, counts: Floats, each: Floats) -> tuple[Floats, Floats]:
-    """Holds and dwells: the best of some evenly spread orders, and a quick search from there."""
+    """Holds and dwells: the best of some evenly spread orders."""
     starts = []
     for stretch in STRETCHES:
         V = spread_out(levels, counts, stretch * ask.course.zero_every)
         dwells: Floats = each[np.argmax(V[:, None] == levels, axis=1)]
         starts.append((ask.setting.loss(V, dwells), V, dwells))
     _, V, dwells = min(starts, key=lambda start: start[0])
-    order = best_order(V, dwells, ask.setting, QUICK, np.random.default_rng(ask.seed))
-    return V[order], dwells[order]
+    return V, dwells
 
 
 @dataclass(frozen=True, slots=True)
