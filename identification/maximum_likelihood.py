@@ -175,7 +175,7 @@ def _covariance(J: Floats, scale: Floats, names: tuple[str, ...]) -> tuple[Float
     """Covariance and pseudo-inverse from the Jacobian (n, p) by scaled parameters, and what it does not see."""
     size = np.linalg.norm(J, axis=0)
     size[size == 0] = 1.0
-    U, s, Vt = np.linalg.svd(J / size, full_matrices=True)
+    U, s, Vt = np.linalg.svd(J / size, full_matrices=J.shape[0] < J.shape[1])  # V whole, U never wider than needed
     seen = np.zeros(len(names), dtype=np.bool_)
     seen[: s.size] = s > UNSEEN * (s[0] if s.size else 1.0)
     kept = seen[: s.size]

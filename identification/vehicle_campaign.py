@@ -22,6 +22,8 @@ from identification.vehicle_trials import Trial, ballast_of, dominant_axis, hold
 Step = Literal["steady", "moving"]
 HELD = 0.5
 """Share of a recording in long holds above which it is one of constant-velocity runs, when it has no table of steps."""
+FAR = 3.0
+"""Standard deviations from what was stated beforehand that are worth a sentence."""
 EMPTY: Mapping[str, str] = MappingProxyType({})
 
 
@@ -60,6 +62,8 @@ class AxisResult:
     """What step two was told."""
     ballast: Mapping[str, str] = field(default_factory=dict)
     """recording id -> buoyancy parameter of every recording, heave only."""
+    stated: Gaussian = NOTHING
+    """What the campaign knew of this axis from elsewhere."""
 
     @property
     def estimate(self) -> Gaussian | None:
@@ -71,8 +75,22 @@ class AxisResult:
         return independent(last, drag.select([name for name in drag.names if name not in last.names]))
 
     @property
+    def contradictions(self) -> tuple[str, ...]:
+        """Parameters that came out far from what was stated of them beforehand."""
+        estimate, out = self.estimate, []
+        for name in self.stated.names if estimate is not None else ():
+            before, std = self.stated[name], self.stated.std_of(name)
+            if estimate is not None and name in estimate.names and abs(estimate[name] - before) > FAR * std:
+                off = abs(estimate[name] - before) / std
+                out.append(
+                    f"{self.axis}: {name} = {estimate[name]:.3g} is {off:.0f} standard deviations from the "
+                    f"{before:.4g} ± {std:.2g} stated: the model contradicts what is known"
+                )
+        return tuple(out)
+
+    @property
     def statements(self) -> tuple[str, ...]:
-        out: list[str] = []
+        out: list[str] = list(self.contradictions)
         for found in (self.drag, self.inertia):
             out.extend([found.reason] if isinstance(found, Unusable) else found.statements)
         return tuple(out)
@@ -177,13 +195,15 @@ def identify_axis(
         )  # fmt: skip
     if isinstance(drag, Unusable):
         why = drag if trials.steady else Unusable(f"{axis}: no constant-velocity run: all from the trials at once")
-        return AxisResult(axis, why, at_once(moving, installation, told, ballast, facts.current), moving, told, ballast)
+        return AxisResult(
+            axis, why, at_once(moving, installation, told, ballast, facts.current), moving, told, ballast, stated
+        )
     if drag.maximum.deficiency is not None:
         lost = Unusable(f"{axis}: inertia not identified: drag and efficiency are not known")
         return AxisResult(axis, drag, lost, moving, ballast=ballast)
     mass = told.select([name for name in told.names if name == "m"])
     last, step_one = step_two(moving, drag, ballast, mass)
-    return AxisResult(axis, drag, last, moving, step_one, ballast)
+    return AxisResult(axis, drag, last, moving, step_one, ballast, stated)
 
 
 def step_two(

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.maximum_likelihood import Gaussian, maximise
+from identification.maximum_likelihood import Gaussian
 from identification.recording import Floats
 from identification.vehicle_trials import Trial
 
@@ -37,9 +37,18 @@ def drag_slope(xi: Floats, push: Floats, k: Floats, k2: Floats, m: Floats) -> Fl
 
 
 def integrate(
-    push: Floats, step: float, xi0: Floats, k: Floats, k2: Floats, m: Floats, drift: Floats
+    push: Floats,
+    step: float,
+    xi0: Floats,
+    k: Floats,
+    k2: Floats,
+    m: Floats,
+    drift: Floats,
+    half: Floats | None = None,
 ) -> tuple[Floats, Floats]:
     """Velocity through the water and distance over ground (k, g + 1) at the ends of g steps; `push` (k, g) N.
+
+    `half` (k, g): change of the force within half a step, by default as neighbouring steps have it.
 
     >>> one = np.ones(1)
     >>> xi, x = integrate(np.full((1, 100), 8.0), 0.1, 0 * one, 2 * one, 0 * one, 4 * one, 0 * one)
@@ -47,7 +56,7 @@ def integrate(
     (True, True)
     """
     count, steps = push.shape
-    half = 0.5 * np.gradient(push, axis=1) if steps > 1 else np.zeros(push.shape)
+    half = half_change(push) if half is None else half
     xi, x = np.empty((steps + 1, count)), np.zeros((steps + 1, count))
     xi[0] = v = np.asarray(xi0, dtype=np.float64)
     m = np.maximum(m, HEAVY)
@@ -65,6 +74,12 @@ def integrate(
             xi[i + 1] = v
     far = x + drift * step * np.arange(steps + 1)[:, None]
     return _bounded(xi.T), _bounded(far.T)
+
+
+def half_change(push: Floats) -> Floats:
+    """Change of a force (k, g) within half a step, from its neighbours."""
+    out: Floats = 0.5 * np.gradient(push, axis=1) if push.shape[1] > 1 else np.zeros(push.shape)
+    return out
 
 
 def _bounded(y: Floats) -> Floats:
@@ -100,14 +115,62 @@ def simulate(
     Parameters by name: m, k, k2, efficiencies, thruster coefficients, current_north, current_east, the one that
     `buoyancy` names, and the position and velocity over ground at the start (`state`); what is absent is 0 (m: 1).
     """
+    return simulate_all([trial], names, theta, [buoyancy], [state])[0]
+
+
+def simulate_all(
+    trials: Sequence[Trial],
+    names: Sequence[str],
+    theta: Floats,
+    buoyancies: Sequence[str],
+    states: Sequence[tuple[str, str]],
+) -> list[Motion]:
+    """`simulate` of several trials, those of one grid step in one sweep."""
+    found: dict[int, Motion] = {}
+    for step in dict.fromkeys(one.step for one in trials):
+        chosen = [i for i, one in enumerate(trials) if one.step == step]
+        parts = [_prepared(trials[i], names, theta, buoyancies[i], states[i]) for i in chosen]
+        longest = max(part.push.shape[1] for part in parts)
+        push, half = (np.vstack([_padded(x, longest) for x in xs]) for xs in zip(*map(_forces, parts), strict=True))
+        xi0, drift = np.hstack([part.xi0 for part in parts]), np.hstack([part.drift for part in parts])
+        k, k2, m = (
+            np.tile(column(names, theta, name, value), len(parts))
+            for name, value in (("k", 0.0), ("k2", 0.0), ("m", 1.0))
+        )
+        xi, x = integrate(push, step, xi0, k, k2, m, drift, half)
+        sets = theta.shape[0]
+        for j, (i, part) in enumerate(zip(chosen, parts, strict=True)):
+            rows, cols = slice(j * sets, (j + 1) * sets), slice(part.push.shape[1] + 1)
+            v, place = xi[rows, cols] + part.drift[:, None], x[rows, cols] + part.x0[:, None]
+            found[i] = Motion(*_at_measurements(trials[i], v, place))
+    return [found[i] for i in range(len(trials))]
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """One trial of k vehicles before the sweep."""
+
+    push: Floats
+    """(k, g)"""
+    xi0: Floats
+    drift: Floats
+    x0: Floats
+
+
+def _prepared(trial: Trial, names: Sequence[str], theta: Floats, buoyancy: str, state: tuple[str, str]) -> _Prepared:
     weights = trial.force.weights(names, theta)
     push = weights @ trial.force.signal + column(names, theta, buoyancy, 0.0)[:, None]
     drift = current_along(names, theta, trial.axis, trial.heading)
-    k, k2, m = (column(names, theta, name, value) for name, value in (("k", 0.0), ("k2", 0.0), ("m", 1.0)))
-    v0 = column(names, theta, state[1], 0.0)
-    xi, x = integrate(push, trial.step, v0 - drift, k, k2, m, drift)
-    x = x + column(names, theta, state[0], 0.0)[:, None]
-    return Motion(*_at_measurements(trial, xi + drift[:, None], x))
+    xi0 = column(names, theta, state[1], 0.0) - drift
+    return _Prepared(push, xi0, drift, column(names, theta, state[0], 0.0))
+
+
+def _forces(part: _Prepared) -> tuple[Floats, Floats]:
+    return part.push, half_change(part.push)
+
+
+def _padded(x: Floats, steps: int) -> Floats:
+    return np.pad(x, ((0, 0), (0, steps - x.shape[1])))
 
 
 def _at_measurements(trial: Trial, v: Floats, x: Floats) -> tuple[Floats, Floats]:
@@ -167,35 +230,58 @@ class Replay:
         return Validation(self.recording_id, self.quantity, rmse, fit_percent(self.measured, self.simulated))
 
 
-def replay(one: Trial, estimate: Gaussian, buoyancy: str = "", *, fit_start: bool = True) -> Replay:
-    """Simulate a trial; the model sees the commands and how the trial began, nothing else.
+STARTS = 5
+"""Gauss and Newton's steps for the start of a trial: its position enters as it is, its velocity nearly so."""
+
+
+def replay(
+    trials: Sequence[Trial], estimate: Gaussian, buoyancy: Mapping[str, str] | None = None, *, fit_start: bool = True
+) -> tuple[Replay, ...]:
+    """Simulate each trial; the model sees the commands and how the trial began, nothing else.
 
     `fit_start`: position and velocity at the start are those that suit the whole trial best; else a speed trial
     starts from its first measurement and a position trial from the straight line through its first five, noise and
-    all. `buoyancy`: the parameter of this trial's ballast.
+    all. `buoyancy`: recording id -> parameter.
     """
-    names = (*estimate.names, "x0", "v0")
-    start = _start(one)
+    starts = np.array([_start(one) for one in trials]).reshape(-1, 2)
+    for _ in range(STARTS if fit_start else 0):
+        step = 0.01 * np.abs(starts[:, 1]) + 1e-3 * np.array([_rate(one) for one in trials])
+        both = _responses(trials, estimate, buoyancy or {}, np.array([starts, starts + step[:, None] * [0.0, 1.0]]))
+        for i, (one, (now, faster)) in enumerate(zip(trials, both, strict=True)):
+            slope = (faster - now)[:, None] / step[i]
+            H = np.hstack([np.ones(slope.shape), slope]) if one.quantity == "position" else slope
+            gain, *_ = np.linalg.lstsq(H, one.response - now, rcond=None)
+            starts[i, -gain.size :] += gain
+    found = _responses(trials, estimate, buoyancy or {}, starts[None])
+    return tuple(
+        Replay(one.recording_id, one.quantity, one.time, one.response, y[0])
+        for one, y in zip(trials, found, strict=True)
+    )
 
-    def response(starts: Floats) -> Floats:
-        theta = np.column_stack([np.tile(estimate.mean, (len(starts), 1)), starts])
-        moved = simulate(one, names, theta, buoyancy)
-        return moved.position if one.quantity == "position" else moved.velocity
 
-    if fit_start:
-        size = np.maximum(np.abs(start), 0.01 * max(float(np.ptp(one.response)), 1e-6))
-        start = maximise(("x0", "v0"), start, size, lambda starts: one.response - response(starts)).estimate.mean
-    return Replay(one.recording_id, one.quantity, one.time, one.response, response(start[None])[0])
+def _rate(one: Trial) -> float:
+    """Size of the velocities of a trial, above 0."""
+    size = float(np.ptp(one.response))
+    return max(size if one.quantity == "speed" else size / float(np.ptp(one.time)), 1e-6)
+
+
+def _responses(
+    trials: Sequence[Trial], estimate: Gaussian, buoyancy: Mapping[str, str], starts: Floats
+) -> list[Floats]:
+    """What would have been measured (k, n) in each of t trials, for k sets of starts (k, t, 2)."""
+    states = [(f"x0[{i}]", f"v0[{i}]") for i in range(len(trials))]
+    names = (*estimate.names, *(name for state in states for name in state))
+    theta = np.hstack([np.tile(estimate.mean, (len(starts), 1)), starts.reshape(len(starts), -1)])
+    floats = [buoyancy.get(one.recording_id, "") for one in trials]
+    moved = simulate_all(trials, names, theta, floats, states)
+    return [m.position if one.quantity == "position" else m.velocity for one, m in zip(trials, moved, strict=True)]
 
 
 def validate(
     trials: Sequence[Trial], estimate: Gaussian, buoyancy: Mapping[str, str] | None = None, *, fit_start: bool = True
 ) -> tuple[Validation, ...]:
-    """`replay` of each trial in numbers. `buoyancy`: recording id -> parameter."""
-    floats = buoyancy or {}
-    return tuple(
-        replay(one, estimate, floats.get(one.recording_id, ""), fit_start=fit_start).validation for one in trials
-    )
+    """`replay` in numbers."""
+    return tuple(found.validation for found in replay(trials, estimate, buoyancy, fit_start=fit_start))
 
 
 def _start(one: Trial) -> Floats:

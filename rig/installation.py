@@ -45,20 +45,31 @@ class Mounting:
     C: float | None = None
     """N/V^2, stated here instead of fitted."""
     C_std: float = 0.0
-    curve: Path | None = None
-    """A tunnel or bollard recording: thrust at each level, straight lines between. For thrusters that are no C V|V|."""
+    curve: str = ""
+    """Path, relative to this file, of a tunnel or bollard recording: thrust at each level, straight lines between.
+
+    For thrusters that are no C V|V|.
+    """
+
+    table: tuple[tuple[float, float], ...] = ()
+    """The same written down: [[V, N], ...], V ascending."""
 
     def __post_init__(self) -> None:
-        if sum(given is not None for given in (self.C, self.curve)) + bool(self.fit) > 1:
-            raise ValueError("takes one of fit, C and curve")
-        if not any(self.arms.values()):
+        if sum((self.C is not None, bool(self.curve), bool(self.table), bool(self.fit))) > 1:
+            raise ValueError("takes one of fit, C, curve and table")
+        levels = [V for V, _ in self.table]
+        if self.table and (len(levels) < 2 or sorted(set(levels)) != levels):
+            raise ValueError("table needs two or more pairs [V, N], V ascending")
+        if not self.arms:
             raise ValueError("pushes along no axis; give surge, sway, heave or yaw a number other than 0")
         if not all(map(math.isfinite, self.arms.values())) or not 0 <= self.C_std < math.inf:
             raise ValueError("numbers must be finite and C_std not negative")
 
     @property
     def arms(self) -> dict[str, float]:
-        return {"surge": self.surge, "sway": self.sway, "heave": self.heave, "yaw": self.yaw}
+        """Axis -> arm, of those that are not 0."""
+        arms = {"surge": self.surge, "sway": self.sway, "heave": self.heave, "yaw": self.yaw}
+        return {axis: arm for axis, arm in arms.items() if arm != 0}
 
 
 @dataclass(frozen=True, slots=True)

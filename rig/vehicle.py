@@ -54,6 +54,8 @@ class VehicleAnswer:
     held_out: tuple[HeldOut, ...] = ()
     comparators: Mapping[str, tuple[InertiaFit | Unusable, ...]] = field(default_factory=dict)
     """axis -> other ways to the inertia."""
+    without: VehicleFit | None = None
+    """The vehicle identified as if every efficiency were 1, when recordings were held out."""
     notes: tuple[str, ...] = ()
 
 
@@ -78,6 +80,8 @@ def identify_files(
     recordings = [one.recording for one in named]
     fit = identify_vehicle(recordings, lay_out, facts)
     _require_something(fit)
+    bare = replace(lay_out, interactions=())
+    plain = identify_vehicle(recordings, bare, facts) if kept and lay_out.interactions else None
     return VehicleAnswer(
         vehicle=file.vehicle.name or named[0].recording.thruster,
         recordings=named,
@@ -85,7 +89,8 @@ def identify_files(
         calibrations={name: fits[m.fit or name] for name, m in file.thrusters.items() if (m.fit or name) in fits},
         fit=fit,
         replays={axis: _replays(recordings, lay_out, result, fit) for axis, result in fit.axes.items()},
-        held_out=_held_out(kept, recordings, lay_out, facts, fit) if kept else (),
+        held_out=_held_out(kept, lay_out, facts, fit, plain) if kept else (),
+        without=plain,
         comparators=_comparators(fit) if comparators else {},
         notes=notes,
     )
@@ -156,7 +161,7 @@ def _replays(
     steady = {one.recording_id for one in fit.trials[result.axis].steady}
     made = [trial(one, lay_out, result.axis, REPLAY_STEP) for one in recordings if one.recording_id in steady]
     ready = [*(one for one in made if isinstance(one, Trial)), *result.moving]
-    return tuple(replay(one, estimate, result.ballast.get(one.recording_id, "")) for one in ready)
+    return replay(ready, estimate, result.ballast) if ready else ()
 
 
 def _simulated_by(result: AxisResult) -> Gaussian | None:
@@ -168,16 +173,10 @@ def _simulated_by(result: AxisResult) -> Gaussian | None:
 
 
 def _held_out(
-    kept: Sequence[Named],
-    recordings: Sequence[Recording],
-    lay_out: Installation,
-    facts: CampaignFacts,
-    fit: VehicleFit,
+    kept: Sequence[Named], lay_out: Installation, facts: CampaignFacts, fit: VehicleFit, plain: VehicleFit | None
 ) -> tuple[HeldOut, ...]:
-    """Each kept recording by the identified vehicle, and by one identified as if there were no interactions."""
-    bare = replace(lay_out, interactions=())
-    plain = identify_vehicle(recordings, bare, facts) if lay_out.interactions else None
-    out = []
+    """Each kept recording by the identified vehicle, and by `plain`, identified as if there were no interactions."""
+    bare, out = replace(lay_out, interactions=()), []
     for axis, group in sort_trials([one.recording for one in kept], lay_out, facts).axes.items():
         for recording in (*group.steady, *group.moving):
             found = _one_replay(recording, lay_out, axis, facts, fit)
@@ -201,8 +200,8 @@ def _one_replay(
     if estimate is None or isinstance(one, Unusable):
         return None
     name = recording.recording_id
-    floats = ballast_of([name], facts.ballast)[name] if axis == "heave" else ""
-    return replay(one, estimate, floats, fit_start=one.quantity != "speed")
+    floats = ballast_of([name], facts.ballast) if axis == "heave" else {}
+    return replay([one], estimate, floats, fit_start=one.quantity != "speed")[0]
 
 
 def _comparators(fit: VehicleFit) -> dict[str, tuple[InertiaFit | Unusable, ...]]:

@@ -15,8 +15,10 @@ from identification.vehicle import DragFit
 from identification.vehicle_campaign import AxisResult
 from identification.vehicle_report import Row, rows
 from identification.vehicle_simulation import Replay
-from rig.vehicle import HeldOut, VehicleAnswer
+from rig.vehicle import VehicleAnswer
 
+LEARNT = 0.5
+"""Share of the earlier standard deviation below which these trials have told more than the calibration had."""
 FORM = "  {:<22}{:>12}{:>11}{:>12}{:>12}  {:<15}{}"
 
 
@@ -28,15 +30,21 @@ def answer_text(answer: VehicleAnswer) -> str:
         estimate = result.estimate
         if estimate is not None:
             lines.append(FORM.format("", "value", "std", "95 % from", "to", "unit", "").rstrip())
-            lines += [_table_line(row) for row in rows(estimate, axis)]
+            lines += [_table_line(row) for row in (*rows(estimate, axis), *_learnt(answer, axis, estimate))]
         lines += [f"  - {text}" for text in _verdicts(result)]
         lines += list(_replay_lines(answer.replays.get(axis, ()), axis))
         lines += list(_rival_lines(answer, axis))
-    lines += list(_held_out_lines(answer.held_out))
+    lines += list(_held_out_lines(answer))
     unused = [f"{name} was not used: no thruster of the installation is driven in it" for name in answer.fit.unused]
     if answer.notes or unused:
         lines += ["", *(f"note: {text}" for text in (*answer.notes, *unused))]
     return "\n".join(lines)
+
+
+def _learnt(answer: VehicleAnswer, axis: str, estimate: Gaussian) -> list[Row]:
+    """Thruster coefficients that the trials tell better than what was known before them."""
+    before = dict(zip(answer.installation.names, np.sqrt(np.diag(answer.installation.cov)), strict=True))
+    return [row for row in rows(estimate, axis, calibration=True) if row.std < LEARNT * before[row.name]]
 
 
 def _head(answer: VehicleAnswer) -> str:
@@ -71,7 +79,8 @@ def _table_line(row: Row) -> str:
 
 def _verdicts(result: AxisResult) -> list[str]:
     """Of both steps, each once."""
-    found = [
+    found = [_without(text, result.axis) for text in result.contradictions]
+    found += [
         _without(text, result.axis)
         for step in (result.drag, result.inertia)
         if not isinstance(step, Unusable)
@@ -116,7 +125,8 @@ def rms_of(fit: InertiaFit) -> float:
     return float(np.sqrt(np.mean([one.rmse**2 for one in fit.validation])))
 
 
-def _held_out_lines(found: tuple[HeldOut, ...]) -> Iterator[str]:
+def _held_out_lines(answer: VehicleAnswer) -> Iterator[str]:
+    found = answer.held_out
     if not found:
         return
     yield ""
@@ -127,6 +137,8 @@ def _held_out_lines(found: tuple[HeldOut, ...]) -> Iterator[str]:
         if one.without is not None:
             line += f"; without efficiencies {one.without.validation.rmse:.3g} {unit}"
         yield line
+    for result in answer.without.axes.values() if answer.without is not None else ():
+        yield from (f"  - without efficiencies, {text}" for text in result.contradictions)
 
 
 def _number(value: float | None) -> float | None:

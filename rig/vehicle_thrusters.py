@@ -126,8 +126,12 @@ def covariance(coefficients: Sequence[Coefficient]) -> Floats:
 def _placed(
     file: InstallationFile, name: str, mounting: Mounting, fits: Mapping[str, Calibration]
 ) -> tuple[Thruster, tuple[Coefficient, ...]]:
-    if mounting.curve is not None:
-        levels, thrust = _curve(file.path.parent / mounting.curve, file.path)
+    if mounting.curve or mounting.table:
+        levels, thrust = (
+            _curve(file.path.parent / mounting.curve, file.path)
+            if mounting.curve
+            else np.array(mounting.table, dtype=np.float64).T
+        )
         found = tuple(Coefficient(float(value), 0.0, 0.0) for value in thrust)
         return Thruster(name, thrust, mounting.arms, levels), found
     if mounting.C is not None:
