@@ -22,6 +22,8 @@ from identification.regression import RANK_TOLERANCE, LinearFit, block_noise, co
 from identification.verdicts import ALPHA, Significance, Underfit, Whiteness, significance, underfit, whiteness
 
 T = TypeVar("T")
+ROUNDING = 1e-12
+"""Residuals below this share of the largest y are rounding, not noise."""
 LIKELY = 1e-6
 """Spectra less likely than this are left out."""
 
@@ -51,6 +53,8 @@ class Judgement:
     whiteness: Whiteness | None
     dof: Both[float]
     """Of the residual: n - p, and what that is worth."""
+    exact: bool = False
+    """No sigma was given and the residual shows none: nothing can be said of any error."""
 
     @property
     def insignificant(self) -> tuple[str, ...]:
@@ -63,8 +67,13 @@ class Judgement:
         out = [self.excitation.statement]
         for name, tested in self.significance.items():
             std = self.std[name]
+            if not np.isfinite(std.plain):
+                continue
             figures = f"{self.fit.theta[self.fit.index(name)]:.4g} ± {std.corrected:.2g} (uncorrected {std.plain:.2g})"
             out.append(f"{name} = {figures}, {tested.corrected.statement}")
+        if self.exact:
+            out.append("the residual is zero to rounding: it shows no noise to judge by; give sigma where it is known")
+            return tuple(out)
         if self.underfit is not None:
             judged = self.underfit
             out.append(f"{judged.corrected.statement}; taken as independent: {judged.plain.statement}")
@@ -87,13 +96,14 @@ def judge(H: Floats, y: Floats, names: tuple[str, ...], sigma: float | None = No
     """
     fit = least_squares(H, y, names)
     known = least_squares(H, y, names, sigma) if sigma is not None else fit
+    exact = sigma is None and float(np.abs(fit.residual).max()) <= ROUNDING * float(np.abs(y).max())
     noise = block_noise(H, fit.residual, (slice(0, y.size),)) if y.size >= MIN_SAMPLES and fit.dof > 0 else ()
     spectra = _spectra(H, noise[0], fit.dof) if noise else None
     worth = float(fit.dof) if spectra is None else spectra.average(spectra.worth)
     plain_dof = float("inf") if sigma is not None else float(fit.dof)
     std, verdict = {}, {}
     for i, name in enumerate(names):
-        plain, corrected, dof = float(known.std[i]), float("nan"), 0.0
+        plain, corrected, dof = float("nan") if exact else float(known.std[i]), float("nan"), 0.0
         if np.isfinite(plain):
             corrected, dof = correlated_std(fit, np.eye(len(names))[i], noise) if noise else (plain, plain_dof)
         value = float(fit.theta[i])
@@ -111,6 +121,7 @@ def judge(H: Floats, y: Floats, names: tuple[str, ...], sigma: float | None = No
         None if known.chi2 is None else _underfit(known, spectra, alpha),
         whiteness(fit.residual),
         Both(float(fit.dof), worth),
+        exact,
     )
 
 

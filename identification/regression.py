@@ -84,9 +84,11 @@ def weighted(H: Floats, y: Floats, sigma: float | Floats | None) -> tuple[Floats
 
 
 def least_squares(H: Floats, y: Floats, names: tuple[str, ...], sigma: float | Floats | None = None) -> LinearFit:
-    """LS (eq. 4.5, 4.6, 4.12) without `sigma`, WLS (eq. 4.8, 4.9, 4.10) with it; see `weighted` for its forms.
+    """LS (eq. 4.3 to 4.6, 4.12) without `sigma`, WLS (eq. 4.8, 4.9, 4.10) with it; see `weighted` for its forms.
 
-    H (n, p), y (n,). Raises ValueError for shapes that do not fit or numbers that are not finite.
+    With the covariance of y as `sigma` it is the best linear unbiased estimator (BLUE, property 4 of section 4.1.1:
+    `solver` is the C of eq. 4.7), and for normal errors the most likely one (section 4.1.3). H (n, p), y (n,). Raises
+    ValueError for shapes that do not fit, no rows, or numbers that are not finite.
 
     >>> fit = least_squares(np.array([[1.0, 1], [2, 1], [3, 1]]), np.array([2.0, 4, 6]), ("a", "b"))
     >>> (fit.theta.round(6) + 0.0).tolist(), fit.dof
@@ -95,6 +97,8 @@ def least_squares(H: Floats, y: Floats, names: tuple[str, ...], sigma: float | F
     n, p = H.shape
     if y.shape != (n,) or len(names) != p:
         raise ValueError(f"least_squares: H {H.shape}, y {y.shape} and {len(names)} names do not fit together")
+    if n == 0 or p == 0:
+        raise ValueError(f"least_squares: there is nothing to fit: {n} rows, {p} parameters")
     if not (np.all(np.isfinite(H)) and np.all(np.isfinite(y))):
         raise ValueError("least_squares: H and y must be finite; leave out missing samples first")
     A, b, root = weighted(H, y, sigma)

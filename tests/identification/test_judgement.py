@@ -92,6 +92,7 @@ def test_of_parameters_that_cannot_be_told_apart_the_last_goes():
 
 def test_as_many_samples_as_parameters():
     found = judge(np.array([[1.0, 0.0], [1.0, 1.0]]), np.array([1.0, 2.0]), ("a", "b"))
+    assert "zero to rounding" in found.statements[-1]
     assert found.insignificant == ("a", "b")
     assert found.whiteness is None
     judged = judge(np.array([[1.0, 0.0], [1.0, 1.0]]), np.array([1.0, 2.0]), ("a", "b"), sigma=0.1)
@@ -112,3 +113,9 @@ def test_no_other_linear_unbiased_estimator_is_better_than_blue():
         C = fit.solver + rng.standard_normal((3, 10)) @ free
         assert np.abs(C @ A - np.eye(3)).max() < 1e-8
         assert np.linalg.eigvalsh(C @ Sigma @ C.T - fit.cov)[0] > -1e-9
+
+
+def test_what_cannot_be_judged_is_said():
+    assert judge(H, np.full(N, 1.5), NAMES).exact
+    with pytest.raises(ValueError, match="nothing to fit: 0 rows"):
+        judge(H[:0], np.zeros(0), NAMES)
