@@ -33,6 +33,7 @@ COMMANDS: Final = {
     "stop": Entry("rig.run:stop_command", "Stop a run that is going on: zero volts now, close the recording."),
     "design": Entry("rig.design:design_command", "Best levels, order and dwells for the time in the tunnel."),
     "fit": Entry("rig.fit:fit_command", "Fit tau = C V|V| to recordings."),
+    "diagnose": Entry("rig.diagnose:diagnose_command", "Find, name and model the physics that C V|V| leaves out."),
     "vehicle": Entry(
         "rig.vehicle:vehicle_command", "Identify drag, efficiency and inertia of a vehicle from its trials."
     ),

@@ -1,0 +1,95 @@
+"""A twin: a thruster's model with its numbers, their covariance, the noise and where all that came from. Data only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from identification.physics.catalogue import CATALOGUE
+from identification.physics.term import Scale, Term
+
+
+@dataclass(frozen=True, slots=True)
+class TwinTerm:
+    """One effect of the catalogue with its values. The same effect may stand there twice: terms add up."""
+
+    effect: str
+    form: str
+    parameters: Mapping[str, float]
+    """name -> value, in the units of the catalogue."""
+    scale: Scale
+    """The sizes that its form refers to (an exponent is relative to a voltage)."""
+
+    @property
+    def values(self) -> tuple[float, ...]:
+        """In the order of the catalogue."""
+        return tuple(self.parameters[p.name] for p in self.term.parameters(self.scale))
+
+    @property
+    def term(self) -> Term:
+        """Of the catalogue. Raises KeyError when there is none of that effect and form."""
+        return TERMS[self.effect, self.form]
+
+
+TERMS: Mapping[tuple[str, str], Term] = {(term.id, term.form): term for term in CATALOGUE}
+
+
+@dataclass(frozen=True, slots=True)
+class TwinNoise:
+    """Of one thrust sample: variances in N^2, times in s; the law of identification.mismatch.noise."""
+
+    white: float
+    proportional: float
+    """Relative to |F| squared."""
+    scales: tuple[float, ...] = ()
+    slow: tuple[float, ...] = ()
+    bands: tuple[tuple[float, float], ...] = ()
+    """(Hz, quality) of damped oscillators."""
+    band: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Source:
+    """A recording that the numbers come from."""
+
+    recording_id: str
+    sha256: str = ""
+    """Of the file; empty where there was none."""
+    tare: float = 0.0
+    """N, of that run; another run has another one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Twin:
+    """tau = C x|x| with terms, for the thruster of that name."""
+
+    thruster: str
+    driver_quantity: str
+    """command_voltage, motor_voltage or rotation_rate: what drives the model."""
+    C: float
+    """N per unit of the driver squared."""
+    terms: tuple[TwinTerm, ...]
+    names: tuple[str, ...]
+    """`C`, then `effect.parameter` term by term: rows of the covariance."""
+    covariance: tuple[tuple[float, ...], ...]
+    noise: TwinNoise
+    sources: tuple[Source, ...]
+    interval: float
+    """s between samples of the recordings behind it."""
+    highest_driver: float
+    """The largest |driver| it was fitted with."""
+    rate_per_driver: float | None = None
+    """rev/s per unit of the driver; None where no rotation rate was recorded."""
+    created: str = ""
+    """ISO 8601 UTC."""
+    software: str = ""
+
+
+def names_of(terms: tuple[TwinTerm, ...]) -> tuple[str, ...]:
+    """Rows of the covariance. A second term of one effect is `effect#2`."""
+    out, seen = ["C"], dict[str, int]()
+    for term in terms:
+        seen[term.effect] = seen.get(term.effect, 0) + 1
+        label = term.effect if seen[term.effect] == 1 else f"{term.effect}#{seen[term.effect]}"
+        out += [f"{label}.{p.name}" for p in term.term.parameters(term.scale)]
+    return tuple(out)

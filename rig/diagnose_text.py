@@ -1,0 +1,153 @@
+"""A diagnosis in words: verdict, where, what, how much better, what next. Plain text, 100 columns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from math import floor, isfinite, log10
+from textwrap import wrap
+
+from identification.mismatch.diagnosis import Diagnosis, Finding, Unexplained, Value, Where
+
+WIDTH = 100
+MOST_STEPS = 12
+BAR = 24
+"""Characters of the longest bar in the table of a shape."""
+
+
+def diagnosis_text(d: Diagnosis) -> str:
+    """Everything that a person needs to act."""
+    lines = [*_para(f"{d.thruster or 'This thruster'}: {d.verdict}. {d.statement}"), ""]
+    lines += _where(d)
+    lines += _findings(d)
+    if d.unexplained is not None:
+        lines += _unexplained(d.unexplained)
+    lines += _model(d)
+    lines += _fit(d)
+    lines += _next(d)
+    lines += [line for note in d.notes for line in _para(f"- {note}")]
+    return "\n".join(lines).rstrip()
+
+
+def with_error(value: Value) -> str:
+    """Value and standard error to the error's second digit.
+
+    >>> with_error(Value(0.41234, 0.00123, "N/V^2")), with_error(Value(3.0, float("nan"), "s"))
+    ('0.4123 +- 0.0012 N/V^2', '3 s')
+    """
+    unit = "" if value.unit in ("", "1") else f" {value.unit}"
+    if not (isfinite(value.std) and value.std > 0):
+        return f"{value.value:.4g}{unit}"
+    digits = max(1 - floor(log10(value.std)), 0)
+    if digits > 9:
+        return f"{value.value:.4g} +- {value.std:.2g}{unit}"
+    return f"{value.value:.{digits}f} +- {value.std:.{digits}f}{unit}"
+
+
+def rarity(p: float) -> str:
+    """A p value as text.
+
+    >>> rarity(0.0312), rarity(0.0)
+    ('p = 0.031', 'p < 1e-12')
+    """
+    return "p < 1e-12" if p < 1e-12 else f"p = {p:.2g}"
+
+
+def place(where: Where) -> str:
+    """A stretch of a quantity in words.
+
+    >>> place(Where("command_voltage", -1.0, 1.0, "V"))
+    'command_voltage -1 to 1 V'
+    """
+    unit = "" if where.unit in ("", "1") else f" {where.unit}"
+    return f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
+
+
+def _para(text: str, indent: str = "") -> list[str]:
+    hang = indent + ("  " if text.startswith("- ") else "")
+    return wrap(text, WIDTH, initial_indent=indent, subsequent_indent=hang)
+
+
+def _values(values: Mapping[str, Value]) -> str:
+    return ", ".join(f"{name} {with_error(value)}" for name, value in values.items())
+
+
+def _where(d: Diagnosis) -> Iterator[str]:
+    if not d.mismatch:
+        return
+    yield f"Where {d.baseline_model} fails:"
+    for m in d.mismatch:
+        yield from _para(f"- {m.statement[:-1]} ({rarity(m.p_value)}).", "  ")
+    yield ""
+
+
+def _findings(d: Diagnosis) -> Iterator[str]:
+    for finding in d.findings:
+        yield from _finding(finding)
+        yield ""
+
+
+def _finding(f: Finding) -> Iterator[str]:
+    form = f" ({f.form.replace('_', ' ')})" if f.form else ""
+    yield f"{f.effect}{form}"
+    yield from _para(f.statement, "  ")
+    if f.parameters:
+        yield from _para(_values(f.parameters), "  ")
+    yield from _para(
+        f"{rarity(f.p_value)}, BIC better by {f.bic_gain:.4g}, probability among its rivals {f.probability:.2g}", "  "
+    )
+    for rival in f.rivals:
+        yield from _para(f"- or {rival.effect} (BIC worse by {rival.bic_loss:.1f}): {rival.statement}", "  ")
+
+
+def _unexplained(u: Unexplained) -> Iterator[str]:
+    yield f"Not explained: {100 * u.share:.0f} % of what remains, at {place(u.where)} ({rarity(u.p_value)})"
+    yield from _shape(u)
+    for text in u.resembles:
+        yield from _para(f"- resembles {text}", "  ")
+    yield ""
+
+
+def _shape(u: Unexplained) -> Iterator[str]:
+    """The residual over the covariate, bin by bin, as numbers and bars."""
+    rows = [(a, b, c) for a, b, c in u.shape if isfinite(b)]
+    size = max((abs(b) for _, b, _ in rows), default=0.0)
+    if not size:
+        return
+    unit = "" if u.where.unit in ("", "1") else f" / {u.where.unit}"
+    yield f"  {u.where.quantity + unit:>24}{'residual / N':>14}{'std / N':>10}"
+    for at, residual, std in rows:
+        length = round(BAR * abs(residual) / size)
+        bar = (" " * (BAR - length) + "-" * length + "|").ljust(2 * BAR + 1) if residual < 0 else " " * BAR + "|"
+        bar += "+" * length if residual >= 0 else ""
+        known = f"{std:.2g}" if isfinite(std) else "-"
+        yield f"  {at:>24.4g}{residual:>14.3g}{known:>10}  {bar}".rstrip()
+
+
+def _model(d: Diagnosis) -> Iterator[str]:
+    terms = "".join(f" + {term}" for term in d.model_terms)
+    yield from _para(f"Model: {d.baseline_model.split(' (')[0]}{terms}; {_values(d.model)}")
+
+
+def _fit(d: Diagnosis) -> Iterator[str]:
+    yield f"{'RMSE per sample / N':<24}{'before':>12}{'after':>12}{'noise':>12}"
+    yield f"{'  fitted':<24}{d.train.before:>12.4g}{d.train.after:>12.4g}"
+    yield f"{'  not fitted':<24}{d.heldout.before:>12.4g}{d.heldout.after:>12.4g}{d.heldout.noise:>12.4g}"
+    yield from _para(f"not fitted: {d.heldout.what}", "  ")
+    yield from _para(
+        f"chi2 per degree of freedom {d.chi2_per_dof:.3f}; what remains is white with {rarity(d.whiteness_p)}", "  "
+    )
+
+
+def _next(d: Diagnosis) -> Iterator[str]:
+    if d.next_experiment is None:
+        return
+    n = d.next_experiment
+    total = sum(step.duration for step in n.steps)
+    yield ""
+    yield from _para(f"Next experiment ({total:.0f} s, expected power {n.expected_power:.2f}): {n.why}")
+    flow = any(step.flow_speed for step in n.steps)
+    for step in n.steps[:MOST_STEPS]:
+        water = f", flow {step.flow_speed:.3g} m/s" if flow else ""
+        yield f"  {step.command_voltage:+8.3g} V for {step.duration:.3g} s{water}"
+    if len(n.steps) > MOST_STEPS:
+        yield f"  ... and {len(n.steps) - MOST_STEPS} more; all of them are in the JSON"
