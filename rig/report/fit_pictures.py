@@ -31,7 +31,7 @@ def pictures(fit: ThrustFit) -> tuple[Picture, ...]:
     model = _curve(fit)
     band = _scatter_band(fit, model.x)
     thin = _thinning(fit)
-    kept = f" Every {thin}th sample is drawn." if thin > 1 else ""
+    kept = f" One sample in {thin} is drawn." if thin > 1 else ""
     few = fit.estimate.rows.std_error is not None and fit.estimate.rows.y.size <= figures.MANY
     bars = " Bars are 95 % intervals of each point." if few else ""
     order = normal_order(fit.estimate)
