@@ -15,7 +15,7 @@ from identification.holds import from_voltage
 from identification.recording import Channel, Floats, Recording
 from identification.thrust_data import Unusable
 
-PIECE = 2.0
+PIECE = 1.0
 """s of samples that count."""
 WARM_UP = 1.0
 """s simulated before them; several time constants of a thruster (0.05 to 0.3 s)."""

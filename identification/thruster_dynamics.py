@@ -7,30 +7,43 @@ motor's own pull (back-EMF over winding resistance); without it this is the text
 command and motor is estimated beside them: unseen, it would pass for slowness.
 
 Output error: the model is simulated from the recorded voltage and compared with the recorded rate, whose noise then
-biases nothing. The covariance is a jackknife over pieces of 2 s (MacKinnon and White, J. Econometrics 1985, HC3 in
+biases nothing. The covariance is a jackknife over spans of 2 s (MacKinnon and White, J. Econometrics 1985, HC3 in
 clusters): right under correlated noise, and under misfit that is larger in transients than in holds.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.stats import t as student
 
-from identification.maximum_likelihood import Gaussian, Maximum, maximise
+from identification.maximum_likelihood import Gaussian
 from identification.recording import Floats, Recording
 from identification.regression import least_squares
-from identification.rotor_data import STEP, Drive, drive, steps_of
+from identification.rotor_data import STEP, Drive, drive
+from identification.rotor_simulation import lanes, simulate
 from identification.thrust_data import Unusable
 from identification.verdicts import Significance, Whiteness, significance, whiteness
 
 UNITS = {"alpha": "1/rev", "k": "rev/(s.V)", "gamma": "1/s", "delay": "s", "beta": "rev/(s^2.V^2)"}
+PULLS = (0.5, 100.0)
+"""1/s, between which a descent starts: time constants of 2 s and 10 ms."""
+MOST_STEPS = 40
+DAMPING = (0.0, 1e-3, 1e-1, 1.0, 30.0)
+"""Relative to the curvature; all are tried, the best is taken."""
+ENOUGH = 1e-3
+"""A step that lowers chi-square by less is the last."""
+SLOPE_STEP = 1e-4
+"""Of a parameter's scale, for central differences."""
+WORST_CONDITION = 1e6
+DELAYED = 0.03
+"""s, the scale of a delay; no step of the descent is longer than a parameter's scale."""
+PIECES_TOGETHER = 2
+"""Pieces that the jackknife leaves out at once: noise slower than these 2 s is not seen."""
 SETTLED = 8.0
 """Time constants after a change of voltage until a hold's rate counts as steady."""
-FASTEST = 1e4
-"""rev/s: beyond it a trial step of the optimiser is no rotor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,110 +107,104 @@ def _std(known: Gaussian, slope: dict[str, float]) -> float:
     return float(np.sqrt(max(row @ known.cov @ row, 0.0)))
 
 
-def simulate(drives: Sequence[Drive], alpha: Floats, k: Floats, gamma: Floats, delay: Floats) -> Floats:
-    """Rate (s, n) at the samples of all drives for s parameter sets (s,): Runge and Kutta, Hermite between steps."""
-    steps, sets = steps_of(drives), alpha.size
-    inputs = [[d.mean_input(steps, float(late)) for d in drives] for late in delay]
-    square = np.array([np.concatenate([q for q, _ in row]) for row in inputs])
-    plain = np.array([np.concatenate([v for _, v in row]) for row in inputs])
-    push = (alpha * k * np.abs(k))[:, None, None] * square + (gamma * k)[:, None, None] * plain
-    first = np.concatenate([d.first for d in drives])
-    rate, slope = _integrate(np.tile(first, (sets, 1)), push, alpha[:, None], gamma[:, None])
-    return np.concatenate([_sampled(d, rate, slope, at) for d, at in zip(drives, _lanes(drives), strict=True)], axis=1)
-
-
-def _lanes(drives: Sequence[Drive]) -> list[int]:
-    """First lane of each drive's pieces."""
-    return [sum(d.starts.size for d in drives[:i]) for i in range(len(drives))]
-
-
-def _integrate(n: Floats, push: Floats, alpha: Floats, gamma: Floats) -> tuple[Floats, Floats]:
-    """Rates and their slopes (steps + 1, s, c) at the step ends; push (s, c, steps) rev/s^2, constant in each step."""
-    steps = push.shape[2]
-    rates, slopes = np.empty((steps + 1, *n.shape)), np.empty((steps + 1, *n.shape))
-
-    def pull(x: Floats) -> Floats:
-        out: Floats = (alpha * np.abs(x) + gamma) * x
-        return out
-
-    for i in range(steps):
-        p = push[:, :, i]
-        a = p - pull(n)
-        rates[i], slopes[i] = n, a
-        b = p - pull(n + 0.5 * STEP * a)
-        c = p - pull(n + 0.5 * STEP * b)
-        d = p - pull(n + STEP * c)
-        n = np.clip(n + STEP / 6 * (a + 2 * b + 2 * c + d), -FASTEST, FASTEST)
-    rates[steps], slopes[steps] = n, push[:, :, -1] - pull(n)
-    return rates, slopes
-
-
-def _sampled(d: Drive, rate: Floats, slope: Floats, lane: int) -> Floats:
-    """(s, n) by cubic Hermite interpolation; the slope at a step's end is that of its own force."""
-    where = (d.time - d.starts[d.piece]) / STEP
-    i = np.minimum(where.astype(np.intp), rate.shape[0] - 2)
-    x, lanes = where - i, lane + d.piece
-    y0, y1, m0 = rate[i, :, lanes].T, rate[i + 1, :, lanes].T, STEP * slope[i, :, lanes].T
-    m1 = 2 * (y1 - y0) - m0  # parabola through both ends with the first slope: the force jumps at step ends
-    out: Floats = y0 + x * (m0 + x * (3 * (y1 - y0) - 2 * m0 - m1 + x * (2 * (y0 - y1) + m0 + m1)))
-    return out
-
-
 def _start(drives: Sequence[Drive]) -> Floats:
-    """alpha, k, gamma to start from: k from all samples, the rest from increments of n over 0.1 s (integral form)."""
+    """Start of alpha, k, gamma, either pull half of it at the fastest rate: k from all samples, the pull from
+    increments of n over 0.1 s (integral form of the equation).
+    """
     V = np.concatenate(
         [np.interp(d.time + STEP, d.edges, d.plain) - np.interp(d.time, d.edges, d.plain) for d in drives]
     )
     n = np.concatenate([d.rate for d in drives])
+    fastest = float(np.abs(n).max())
+    if fastest == 0 or not V.any():
+        return np.full(3, np.nan)
     k = float(V @ n) / float(V @ V) * STEP
-    rows, rises = [], []
+    push, rise = 0.0, 0.0
     for d in drives:
         apart = max(1, round(0.1 / max(float(np.median(np.diff(d.time))), 1e-4)))
         same = d.piece[apart:] == d.piece[:-apart]
         width = np.diff(d.time, prepend=d.time[0])
         square, plain = (np.interp(d.time, d.edges, y) for y in (d.square, d.plain))
         quadratic = k * abs(k) * square - np.cumsum(d.rate * np.abs(d.rate) * width)
-        linear = k * plain - np.cumsum(d.rate * width)
-        rises.append((d.rate[apart:] - d.rate[:-apart])[same])
-        rows.append(np.column_stack([(x[apart:] - x[:-apart])[same] for x in (quadratic, linear)]))
-    (alpha, gamma), *_ = np.linalg.lstsq(np.vstack(rows), np.concatenate(rises), rcond=None)
-    return np.array([max(float(alpha), 1e-3), k, max(float(gamma), 0.1)])
+        both = (k * plain - np.cumsum(d.rate * width) + quadratic / fastest) / 2
+        x, y = (both[apart:] - both[:-apart])[same], (d.rate[apart:] - d.rate[:-apart])[same]
+        push, rise = push + float(x @ x), rise + float(x @ y)
+    pull = float(np.clip(rise / max(push, 1e-300), *PULLS))
+    return np.array([pull / (2 * fastest), k, pull / 2])
 
 
 def _clusters(drives: Sequence[Drive]) -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    return np.concatenate([d.piece + at for d, at in zip(drives, _lanes(drives), strict=True)])
+    return np.concatenate([d.piece + at for d, at in zip(drives, lanes(drives), strict=True)]) // PIECES_TOGETHER
 
 
-def jackknife(found: Maximum, cluster: np.ndarray[tuple[int], np.dtype[np.intp]]) -> tuple[Floats, Floats]:
+@dataclass(frozen=True, eq=False)
+class Descent:
+    """Where the misfit is least. `misfit` (n,) rev/s, `J` (n, p) its slope by the parameters."""
+
+    names: tuple[str, ...]
+    theta: Floats
+    misfit: Floats
+    J: Floats
+    converged: bool
+
+    @property
+    def seen(self) -> bool:
+        """Every parameter changes the rate in a way of its own."""
+        size = np.linalg.norm(self.J, axis=0)
+        return bool(np.all(size > 0) and np.linalg.cond(self.J / size) < WORST_CONDITION)
+
+
+def descend(names: tuple[str, ...], start: Floats, scale: Floats, misfit: Callable[[Floats], Floats]) -> Descent:
+    """Levenberg and Marquardt's descent from `start` (p,); a simulation of many sets (s, p) costs hardly more than one.
+
+    >>> x = np.array([1.0, 2.0, 3.0])
+    >>> found = descend(("a",), np.array([0.5]), np.ones(1), lambda sets: np.exp(2.0 * x) - np.exp(sets * x))
+    >>> round(float(found.theta[0]), 6), found.converged
+    (2.0, True)
+    """
+    theta, step, p = start, SLOPE_STEP * scale, start.size
+    for _ in range(MOST_STEPS):
+        near = misfit(np.vstack([theta, theta + np.diag(step), theta - np.diag(step)]))
+        left, J = near[0], (near[1 : p + 1] - near[p + 1 :]).T / (2 * step)
+        A = J * scale
+        normal, slope, cost = A.T @ A, A.T @ left, float(left @ left)
+        damped = [normal + much * np.diag(np.diag(normal)) for much in DAMPING]
+        moves = np.array([-scale * (np.linalg.pinv(matrix, hermitian=True) @ slope) for matrix in damped])
+        moves = np.clip(moves, -scale, scale)
+        costs = np.sum(misfit(theta + moves) ** 2, axis=1)
+        best = int(np.argmin(costs))
+        if not cost - float(costs[best]) > ENOUGH * cost / left.size:
+            return Descent(names, theta, left, J, converged=True)
+        theta = theta + moves[best]
+    return Descent(names, theta, left, J, converged=False)
+
+
+def jackknife(found: Descent, cluster: np.ndarray[tuple[int], np.dtype[np.intp]]) -> tuple[Floats, Floats]:
     """Covariance (p, p) and dof (p,) from leaving out one cluster (n,) of samples at a time, to first order."""
-    gain = found.gain
-    bread = np.linalg.inv(gain @ gain.T)
-    J = (bread @ gain).T
+    J = found.J
+    bread, gain = J.T @ J, np.linalg.pinv(J)
     moved, share = [], []
-    for c in range(int(cluster.max()) + 1):
+    for c in np.unique(cluster):
         here = cluster == c
         rest = bread - J[here].T @ J[here]
         moved.append(np.linalg.pinv(rest, rcond=1e-12, hermitian=True) @ (J[here].T @ found.misfit[here]))
         share.append(np.sum(gain[:, here] ** 2, axis=1))
-    count = len(moved)
-    away = np.array(moved)
-    shares = np.array(share)
+    count, away, shares = len(moved), np.array(moved), np.array(share)
     effective = shares.sum(axis=0) ** 2 / np.sum(shares**2, axis=0)
     return (count - 1) / count * away.T @ away, np.maximum(effective - 1, 1.0)
 
 
-def _fitted(drives: Sequence[Drive], start: Floats, with_gamma: bool) -> Maximum:
+def _fitted(drives: Sequence[Drive], start: Floats, with_gamma: bool) -> Descent:
     rate = np.concatenate([d.rate for d in drives])
+    count = 3 if with_gamma else 2
     names = ("alpha", "k", "gamma", "delay") if with_gamma else ("alpha", "k", "delay")
-    begin = np.array([*start[: 3 if with_gamma else 2], 0.0])
 
     def misfit(theta: Floats) -> Floats:
         gamma = theta[:, 2] if with_gamma else np.zeros(theta.shape[0])
         out: Floats = rate - simulate(drives, theta[:, 0], theta[:, 1], gamma, theta[:, -1])
         return out
 
-    scale = np.array([*np.abs(start[: 3 if with_gamma else 2]), 0.02])
-    return maximise(names, begin, scale, misfit)
+    return descend(names, np.array([*start[:count], 0.0]), np.array([*np.abs(start[:count]), DELAYED]), misfit)
 
 
 def _levels(drives: Sequence[Drive], known: Gaussian) -> tuple[tuple[Level, ...], Significance | None]:
@@ -244,15 +251,19 @@ def fit_dynamics(recordings: Sequence[Recording]) -> DynamicsFit | Unusable:
     full, plain = _fitted(drives, start, with_gamma=True), _fitted(drives, start, with_gamma=False)
     fits = [_told(recordings, drives, found) for found in (full, plain)]
     rich, poor = fits
-    gamma = rich.significance.get("gamma")
-    keep = full.deficiency is None and gamma is not None and gamma.significant and gamma.value > 0
+    gamma = rich.significance["gamma"]
+    keep = full.seen and full.converged and gamma.significant and gamma.value > 0
+    if not (full if keep else plain).converged:
+        return Unusable(
+            f"recording {recordings[0].recording_id}: no rotor model n' = beta T - alpha n|n| comes to fit it"
+        )
     return replace(rich if keep else poor, rmse_without_gamma=poor.rmse)
 
 
-def _told(recordings: Sequence[Recording], drives: Sequence[Drive], found: Maximum) -> DynamicsFit:
-    names = found.estimate.names
+def _told(recordings: Sequence[Recording], drives: Sequence[Drive], found: Descent) -> DynamicsFit:
+    names = found.names
     cov, dof = jackknife(found, _clusters(drives))
-    known = Gaussian(names, found.estimate.mean, cov)
+    known = Gaussian(names, found.theta, cov)
     n, p = found.misfit.size, len(names)
     sigma = float(np.sqrt(found.misfit @ found.misfit / max(n - p, 1)))
     levels, offset = _levels(drives, known)
@@ -262,7 +273,7 @@ def _told(recordings: Sequence[Recording], drives: Sequence[Drive], found: Maxim
         tuple(r.recording_id for r in recordings),
         "gamma" in names,
         known,
-        sigma * np.linalg.norm(found.gain, axis=1),
+        sigma * np.linalg.norm(np.linalg.pinv(found.J), axis=1),
         by_name,
         {name: significance(known[name], known.std_of(name), by_name[name]) for name in names},
         float(np.sqrt(found.misfit @ found.misfit / n)),

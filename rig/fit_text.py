@@ -130,7 +130,7 @@ def alike_text(found: Alike) -> str:
     elif test.differ and found.rest is None and len(found.groups) > 2:
         lines.append("  - no majority is alike: each thruster needs its own coefficients")
     apart = sorted((d for d in found.pairs if d.differ), key=lambda d: -abs(d.value) / max(d.std, 1e-300))
-    lines.append(f"  - {len(apart)} of {len(found.pairs)} pairs differ (Games-Howell, 5 % for all pairs together)")
+    lines.append(f"  - {len(apart)} of {len(found.pairs)} pairs differ (5 % for all pairs together, Holm)")
     lines += [f"      {d.second} against {d.first}: {_effect(d)}" for d in apart[:MOST_PAIRS]]
     if found.repeat is not None:
         lines.append(f"  - {found.repeat.statement}")

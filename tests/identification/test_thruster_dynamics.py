@@ -9,8 +9,9 @@ from thrust_runs import ar1, white
 from identification.dynamics_report import levels_table, sentence, verdicts
 from identification.recording import Channel, Recording
 from identification.rotor_data import Drive, drive
+from identification.rotor_simulation import simulate
 from identification.thrust_data import Unusable
-from identification.thruster_dynamics import DynamicsFit, fit_dynamics, simulate
+from identification.thruster_dynamics import DynamicsFit, fit_dynamics
 
 ALPHA, K, GAMMA, DELAY = 0.2, 1.1, 4.0, 0.03
 LEVELS = (8.0, -8.0, 16.0, -16.0, 5.0, 12.0)
@@ -49,7 +50,7 @@ TRUTH = {"alpha": ALPHA, "k": K, "gamma": GAMMA, "delay": DELAY}
 @pytest.mark.parametrize("noise", [white, ar1(0.9)], ids=["white", "correlated"])
 def test_parameters_are_found_within_their_intervals(noise):
     rng, parts = np.random.default_rng(5), motion()
-    fits = [fit_dynamics([recorded(parts, rng, noise=noise)]) for _ in range(6)]
+    fits = [fit_dynamics([recorded(parts, rng, noise=noise)]) for _ in range(4)]
     for name, truth in TRUTH.items():
         z = np.array([(f.estimate[name] - truth) / f.estimate.std_of(name) for f in fits])
         dof = np.median([f.dof[name] for f in fits])
