@@ -14,6 +14,8 @@ import pytest
 
 from sim_devices.process import ROOT, running
 
+pytestmark = pytest.mark.alone  # a bench of its own process, in real time
+
 WORLD = Path(__file__).parents[2] / "benches" / "simulated" / "world.toml"
 PATIENCE = 10.0
 
