@@ -122,7 +122,7 @@ def prepare(options: Options) -> Prepared:
         options.check_levels,
         Slow(DRIFT * full if options.drift is None else options.drift, thermal_time=options.thermal_time),
         options.levels is not None,
-        options.seed,
+        seed=options.seed,
     )
     return Prepared(ask, template, proof, (*remarks, *short))
 

@@ -12,9 +12,10 @@ from identification.thrust_design import Noise, Terms
 from rig.check import check_campaign
 from rig.cli import main
 from rig.design import design, plan_of
+from rig.design_ask import Options, prepare
 from rig.design_noise import read_noise
 from rig.design_plain import judge, means_of, plain_plans
-from rig.design_plan import Ask, choose, mean_heat, without_checks
+from rig.design_plan import THOROUGH, Ask, choose, mean_heat, without_checks
 from rig.design_text import budget, design_json, design_text, lack_of_fit_dof, table
 from rig.errors import PlanError, RecordingError
 from rig.loading import load_campaign
@@ -312,3 +313,11 @@ def test_a_sine_too_steep_for_the_bench(tmp_path, capsys):
     arguments = [*light, "--max-force", "100", "--max-travel", "12", "--per-volt", "0.25", "-o", plan]
     assert main(["design", str(RIGHT), *arguments]) == 2
     assert "V/s, but the bench allows" in capsys.readouterr().err
+
+
+def test_the_command_searches_the_order_thoroughly():
+    options = Options(time="3min", campaign=RIGHT, noise="0.01", max_thrust=150.0, seed=3)
+    found = prepare(options)
+    assert (found.ask.tries, found.ask.seed, found.ask.only_these) == (THOROUGH, 3, False)
+    made = design(found.ask, found.template)
+    assert made.judged.exposure.drift < 0.3 * min(plain.exposure.drift for plain in made.plain)
