@@ -58,7 +58,9 @@ def rotor_section(found: DynamicsFit | Unusable | None) -> tuple[Section, ...]:
         cells = value_and_interval(found.estimate[name], std, *found.interval(name))
         rows.append((name, *cells, unit_text(UNITS[name]), "significant" if verdict.significant else "not significant"))
     beta, std = found.beta
-    rows.append(("beta", *value_and_interval(beta, std, beta - 1.96 * std, beta + 1.96 * std), UNITS["beta"], ""))
+    rows.append(
+        ("beta", *value_and_interval(beta, std, beta - 1.96 * std, beta + 1.96 * std), unit_text(UNITS["beta"]), "")
+    )
     first, *levels = dynamics_report.levels_table(found)
     parts: tuple[Table | Sentences | Picture, ...] = (
         Table(f"Parameters of {found.model}", head, tuple(rows), columns(head, "parameter", "unit", "verdict")),

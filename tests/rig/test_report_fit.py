@@ -1,4 +1,5 @@
 import hashlib
+import json
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from test_fit import write
 from identification.recording import Channel, Recording, Step
 from rig.fit import fit_command
 from rig.fit_answer import fit_recordings
+from rig.fit_comparison import changed
+from rig.fit_json import answer_json
 from rig.report.fit import fit_page
 from rig.report.look import svg
 from rig.report.normal import normal_order
@@ -143,3 +146,14 @@ def test_command_writes_the_page(tmp_path):
     found = read(out.read_text(encoding="utf-8"))
     assert "T3: thrust = C V|V|" in found.text
     assert sha256(files[1]) in found.text
+
+
+def test_change_since_an_earlier_fit_is_drawn(tmp_path):
+    earlier = tmp_path / "old.json"
+    earlier.write_text(json.dumps(answer_json(fit_recordings([recording("old", seed=7)]))), encoding="utf-8")
+    answers = fit_recordings([recording("new", C=0.5)])
+    page = fit_page(answers, (), [changed(answers, earlier)])
+    section = page.sections[1]
+    assert section.title == f"Compared with {earlier}"
+    assert f"{NAME} has changed" in section.parts[0].items[0]
+    assert section.parts[1].plot.alt.startswith("change / % with 95 % intervals")
