@@ -218,10 +218,13 @@ class Change:
     """One coefficient of one thruster, from an earlier campaign to this one."""
 
     difference: Difference
-    smallest: float
-    """Unit of the coefficient: the true change that this pair of campaigns would see in `POWER` of all cases."""
     adjusted_p: float
     """Holm's, for all that was asked together."""
+
+    @property
+    def smallest(self) -> float:
+        """Unit of the coefficient: the true change that this pair of campaigns would see in `POWER` of all cases."""
+        return smallest_change(self.difference.std, self.difference.dof)
 
     @property
     def changed(self) -> bool:
@@ -248,4 +251,4 @@ def changes(pairs_of: Sequence[tuple[Group, Group]]) -> tuple[Change, ...]:
         old, new = comparable(pair)
         found += [difference(old, new, i) for i in range(old.mean.size)]
     adjusted = holm([d.p_value for d in found])
-    return tuple(Change(d, smallest_change(d.std, d.dof), p) for d, p in zip(found, adjusted, strict=True))
+    return tuple(Change(d, p) for d, p in zip(found, adjusted, strict=True))
