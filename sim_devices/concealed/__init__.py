@@ -7,6 +7,7 @@
     case = concealed.case(rng, ["dead_band"], strength=40.0)           # everything else drawn; see draw.case
     pair = concealed.case(rng, ["asymmetry", "heating"], 20.0, plan="interleaved", noise="white", channels=[])
     clean = concealed.case(rng)                                        # tau = C V|V|, noise, one zero per run
+    lies = concealed.case(rng, lie="swapped")                          # a channel fault, of LIES
     arrays = concealed.rows(case)                                      # [Rows]: columns of plain arrays, steps
     truth = concealed.truth(case)                                      # dict for a sealed JSON file
 
@@ -22,13 +23,16 @@ This package knows nothing of identification or rig; `tests/concealed/recordings
 
 from sim_devices.concealed.definition import Case
 from sim_devices.concealed.draw import NOISE_KINDS, case
+from sim_devices.concealed.faults import KINDS as LIES
+from sim_devices.concealed.faults import Column
 from sim_devices.concealed.oracle import OutOfReach, scaled_to, strength
 from sim_devices.concealed.plans import KINDS as PLAN_KINDS
-from sim_devices.concealed.records import Column, Rows, rows, truth
+from sim_devices.concealed.records import Rows, rows, truth
 from sim_devices.concealed.shapes import FORMS, SHAPES
 
 __all__ = [
     "FORMS",
+    "LIES",
     "NOISE_KINDS",
     "PLAN_KINDS",
     "SHAPES",

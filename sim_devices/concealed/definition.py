@@ -82,7 +82,7 @@ class Case:
     decoys: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """World effects that move a recorded channel and leave the thrust alone."""
     fault: Mapping[str, Any] | None = None
-    """Parameters of `channel_fault`."""
+    """A lie about a channel, of faults.fault."""
     water_temperature: float = 18.0
     """degC at the start."""
     temperature_drift: float = 0.0

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from sim_devices.concealed.definition import Case, Concealed, Run, Sensor
+from sim_devices.concealed.faults import fault
 from sim_devices.concealed.oracle import OutOfReach, measured, scaled_to
 from sim_devices.concealed.plans import KINDS, profile
 from sim_devices.concealed.shapes import Scale, shape
@@ -44,16 +45,17 @@ def case(
     duration: float = 0.0,
     channels: Sequence[str] | None = None,
     runs: int = 1,
+    lie: str = "",
 ) -> Case:
     """A case in which each of `effects` is seen by the oracle at `strength` sigma (all of them there together).
 
     What is not given is drawn: `forms` one per effect ("" draws), `plan` of plans.KINDS, `noise` of NOISE_KINDS,
     `voltage` V and `thrust` N at full command, `sampling` 1/s, `duration` s of each of `runs` recordings, `channels`
-    beside command and thrust. Raises OutOfReach when no case of TRIES can show the effects so; ValueError for a name
-    that is not known.
+    beside command and thrust. `lie`: of faults.KINDS, about a channel, beside the effects; none when not given.
+    Raises OutOfReach when no case of TRIES can show the effects so; ValueError for a name that is not known.
     """
     for _ in range(TRIES):
-        drawn = _bare(rng, effects, plan, noise, voltage, thrust, sampling, duration, channels, runs)
+        drawn = _bare(rng, effects, plan, noise, voltage, thrust, sampling, duration, channels, runs, lie)
         wanted = [*forms, *[""] * (len(effects) - len(forms))]
         try:
             for effect, form in zip(effects, wanted, strict=True):
@@ -61,6 +63,9 @@ def case(
                 drawn = scaled_to(replace(drawn, effects=(*drawn.effects, added)), effect, strength)
         except OutOfReach:
             continue
+        if lie:
+            told = fault(lie, ["thrust", *(s.quantity for s in drawn.sensors)], drawn.scale.duration, rng)
+            drawn = replace(drawn, fault=told)
         return measured(drawn) if len(effects) > 1 else drawn
     raise OutOfReach(f"no case of {TRIES} shows {', '.join(effects)} at {strength} sigma; expected a lower strength")
 
@@ -76,6 +81,7 @@ def _bare(
     duration: float,
     channels: Sequence[str] | None,
     runs: int,
+    lie: str,
 ) -> Case:
     """Thruster, runs, noise and sensors, nothing concealed yet."""
     rate = sampling or _log(rng, 20.0, 500.0)
@@ -101,7 +107,8 @@ def _bare(
     loud = full * _log(rng, 5e-4, 0.01)
     noise_kind = noise or str(rng.choice(NOISE_KINDS))
     forced = {"flow_speed"} if named & NEEDS_FLOW else set()
-    forced |= {"rotation_rate"} if named & NEEDS_ROTATION else set()
+    forced |= {"rotation_rate"} if named & NEEDS_ROTATION or lie else set()
+    forced |= {"current"} if lie else set()
     return Case(
         thruster=_thruster(rng, scale),
         scale=scale,

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.fft import next_fast_len, rfft
 
 from sim_devices.concealed.definition import Case, Concealed, history, thrust_of
 from sim_devices.concealed.plans import held
@@ -159,23 +160,27 @@ class Screen:
     """
 
     def __init__(self, case: Case, values: list[Floats]) -> None:
-        self._weights, self._columns = [], []
+        self._weights: list[Floats] = []
+        self._columns: list[NDArray[np.complex128]] = []
+        self._length: list[int] = []
         for run, value, columns in zip(case.runs, values, _baseline(case, values), strict=True):
-            n = value.size
+            n = next_fast_len(value.size, real=True)
             white = np.mean(case.noise.white_std(value - run.tare) ** 2)
             law = replace(case.noise, white=float(np.sqrt(white)), proportional=0.0)
             frequency = np.asarray(np.fft.rfftfreq(n, 1.0 / case.rate), dtype=np.float64)
             # one-sided density S: sum over the positive lines of 4 |X|^2 / (n rate S) is x' K^-1 x
             self._weights.append(4.0 / (n * case.rate * spectrum(law, frequency, case.rate)))
             self._weights[-1][0] *= 0.5
-            self._columns.append(np.fft.rfft(columns, axis=0))
+            self._columns.append(rfft(columns, n, axis=0))
+            self._length.append(n)
         grams = [(c.conj().T * w @ c).real for c, w in zip(self._columns, self._weights, strict=True)]
         self._gram = np.sum(grams, axis=0)
 
     def strength(self, with_effect: list[Floats], without: list[Floats]) -> float:
         energy, shared = 0.0, np.zeros(len(self._gram))
-        for columns, weights, one, other in zip(self._columns, self._weights, with_effect, without, strict=True):
-            x = np.fft.rfft(one - other)
+        runs = zip(self._columns, self._weights, self._length, with_effect, without, strict=True)
+        for columns, weights, length, one, other in runs:
+            x = rfft(one - other, length)
             energy += float(weights @ np.abs(x) ** 2)
             shared += (columns.conj().T @ (weights * x)).real
         return _projected(energy, shared, self._gram)

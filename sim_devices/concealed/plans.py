@@ -176,5 +176,7 @@ def _waves(w: _Writer, end: float, top: float, rng: Rng, phase: str) -> None:
 
 
 def held(time: Floats, values: Floats, at: Floats) -> Floats:
-    """Zero-order hold of rows of changes at each time of `at`; the first value before the first row."""
-    return np.asarray(values[np.maximum(np.searchsorted(time, at + 1e-9, side="right") - 1, 0)])
+    """Zero-order hold of rows of changes at each time of `at` (ascending); the first value before the first row."""
+    first = np.searchsorted(at, time, side="left")
+    first[0] = 0
+    return np.repeat(values, np.diff(np.append(first, at.size)))

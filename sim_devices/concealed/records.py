@@ -10,26 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_devices.concealed.definition import Case, Run, Sensor, history, thrust_of
+from sim_devices.concealed.faults import Column, lying
 from sim_devices.concealed.oracle import strength
 from sim_devices.concealed.plans import Step
 from sim_devices.world.history import History, clock
 from sim_devices.world.noise_law import drawn
 
 Floats = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Column:
-    """One channel: its stream has one clock for it alone. `time` (n,) s of the recording, `value` (n,) in `unit`."""
-
-    stream: str
-    name: str
-    quantity: str
-    unit: str
-    time: Floats
-    value: Floats
-    thruster: str = ""
-    """Of another thruster than the one under test; empty: the one under test."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -65,6 +52,7 @@ def _one(case: Case, run: Run, thruster: str) -> Rows:
         *(_sensed(case, sensor, h, seconds, rng) for sensor in case.sensors),
         *_neighbour(case, run),
     ]
+    columns = list(lying(columns, case.fault, run.start)) if case.fault else columns
     steps = run.profile.steps if case.with_steps else ()
     return Rows(recording_id(run), thruster, tuple(columns), steps, run.profile.duration)
 

@@ -35,7 +35,8 @@ def sweep(
     h = _at_rest(settings, dt, command, flow, water_temperature)
     h.t = start + h.t
     _rotor(settings, effects, h)
-    for _ in range(PASSES if any(isinstance(e, SupplySag) for e in effects) else 0):
+    sag = [e.exponent for e in effects if isinstance(e, SupplySag)]
+    for _ in range((PASSES if any(sag) else 1) if sag else 0):  # without an exponent the bus moves nothing
         bus = h.bus_voltage
         _rotor(settings, effects, h)
         if np.max(np.abs(h.bus_voltage - bus)) < STILL * h.nominal_bus:
