@@ -19,13 +19,12 @@ from time import monotonic
 
 import numpy as np
 
-ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT / "tests" / "identification"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "identification"))
 from linear_cases import cases as linear_cases
 from monte_carlo import LEVELS, Case, Result, Sample, results, sample
 from vehicle_cases import cases as vehicle_cases
 
-STORE = ROOT / "build" / "estimators"
+STORE = Path(__file__).resolve().parents[1] / "build" / "estimators"
 BATCH = 100
 SEED = 2026
 RATIO, OFF = 1.02, 0.01
@@ -38,14 +37,14 @@ def key(case: Case) -> str:
     return f"{plain}-{sha256(text.encode()).hexdigest()[:6]}.npz"
 
 
-def drawn(case: Case, runs: int) -> Sample:
+def drawn(case: Case, runs: int, stored_only: bool = False) -> Sample:
     """What is stored, and what is still missing of `runs`."""
     path = STORE / key(case)
     found = None
     if path.exists():
         with np.load(path) as stored:
             found = Sample(**dict(stored))
-    while found is None or found.runs < runs:
+    while found is None or (found.runs < runs and not stored_only):
         start = 0 if found is None else found.runs
         more = sample(case, range(start, min(start + max(round(BATCH * case.cheap), 10), runs)), SEED)
         found = more if found is None else found.joined(more)
@@ -73,7 +72,9 @@ def line(case: Case, found: Result, markdown: bool) -> str:
     if markdown:
         return "| " + " | ".join(cells) + " |"
     widths = (34, 10, 9, 6, 6, 6, 16, 13, 11, 11, 6, 2)
-    return " ".join(cell.ljust(w) if i < 3 else cell.rjust(w) for i, (cell, w) in enumerate(zip(cells, widths)))
+    return " ".join(
+        cell.ljust(w) if i < 3 else cell.rjust(w) for i, (cell, w) in enumerate(zip(cells, widths, strict=True))
+    )
 
 
 HEAD = (
@@ -100,7 +101,9 @@ def head(markdown: bool) -> str:
         "width",
         "",
     )
-    return " ".join(cell.ljust(w) if i < 3 else cell.rjust(w) for i, (cell, w) in enumerate(zip(short, widths)))
+    return " ".join(
+        cell.ljust(w) if i < 3 else cell.rjust(w) for i, (cell, w) in enumerate(zip(short, widths, strict=True))
+    )
 
 
 def main() -> None:
@@ -116,11 +119,13 @@ def main() -> None:
     for case in (*linear_cases(), *vehicle_cases()):
         if args.only.lower() not in case.name.lower() or args.noise.lower() not in case.noise.lower():
             continue
-        if args.list or (args.stored and not (STORE / key(case)).exists()):
+        if args.stored and not (STORE / key(case)).exists():
+            continue
+        if args.list:
             print(case.name, case.noise, *case.parameters, sep=" | ")
             continue
         begin = monotonic()
-        found = drawn(case, 1 if args.stored else round(args.runs * case.cheap))
+        found = drawn(case, 10**9 if args.stored else round(args.runs * case.cheap), args.stored)
         for one in results(case, found):
             print(line(case, one, args.markdown), flush=True)
         if not args.markdown and monotonic() - begin > 5:
