@@ -27,9 +27,11 @@ from identification.mismatch.naming import EQUAL, Named, Rival, name, settle_for
 from identification.mismatch.omnibus import Judged, Omnibus, locate, test
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.search import Found, State, forces, search
+from identification.mismatch.twinning import starting, unfit, with_twin
 from identification.physics.history import History
 from identification.physics.term import Term
 from identification.recording import Floats, Recording
+from identification.twin import Twin
 
 ALARM = 0.01
 """False-alarm rate of the omnibus tests, family-wise."""
@@ -37,19 +39,28 @@ MOST_PLACES = 3
 DRIVER_NAMES = {"command_voltage": "V|V|", "motor_voltage": "V|V|", "rotation_rate": "n|n|"}
 
 
-def diagnose(recordings: Sequence[Recording], holdout: Sequence[Recording] = (), seed: int = 0) -> Diagnosis | Refusal:
-    """Everything that `rig diagnose` says, for recordings of one thruster. A Refusal says what is wrong with them."""
+def diagnose(
+    recordings: Sequence[Recording], holdout: Sequence[Recording] = (), seed: int = 0, baseline: Twin | None = None
+) -> Diagnosis | Refusal:
+    """Everything that `rig diagnose` says, for recordings of one thruster. A Refusal says what is wrong with them.
+
+    `baseline`: a twin in the place of C V|V|; its terms keep their values, findings are what lies beyond them.
+    """
     histories = _histories(recordings)
     if isinstance(histories, Refusal):
         return histories
     others = _histories(holdout) if holdout else ()
     if isinstance(others, Refusal):
         return others
+    wrong = unfit(recordings, holdout, histories, baseline)
+    if wrong is not None:
+        return wrong
     rng = np.random.default_rng(seed)
-    found = search(histories, rng)
+    found = search(histories, rng, given=None if baseline is None else starting(baseline))
     after = settle_forms(found.after, found.data, found.terms) if found.after.fit.model.terms else found.after
     left = test(after.fit, found.data, after.weights, rng)
-    return _answer(recordings, replace(found, after=after), left, others, rng)
+    answer = _answer(recordings, replace(found, after=after), left, others, rng)
+    return with_twin(answer, after, found.data, recordings, baseline)
 
 
 def _histories(recordings: Sequence[Recording]) -> tuple[History, ...] | Refusal:

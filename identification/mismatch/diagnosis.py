@@ -8,6 +8,7 @@ from math import isfinite
 from typing import Literal
 
 from identification.recording import Floats
+from identification.twin import Twin
 
 Verdict = Literal["adequate", "explained", "ambiguous", "unexplained"]
 
@@ -140,6 +141,8 @@ class Diagnosis:
     next_experiment: NextExperiment | None
     notes: tuple[str, ...] = ()
     curves: tuple[Curves, ...] = field(default=(), repr=False)
+    twin: Twin | None = field(default=None, repr=False)
+    """The final model with its numbers: what `--save-twin` writes."""
 
     @property
     def statement(self) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict
-from identification.physics.filters import delayed
+from identification.physics.filters import delayed, reconstructed
 from identification.recording import Floats
 
 MOST_STEPS = 25
@@ -62,14 +62,14 @@ def bounds_of(model: Model, data: Data, theta: Theta) -> tuple[Floats, Floats, F
     known = [p for group in parameters(model, scale) for p in group]
     R = len(theta.tares)
     most = 0.0 if any(term.id == "time_skew" for term in model.terms) else data.most_shift
-    low = np.array([-np.inf, *(p.low for p in known), *([-np.inf] * R), -most, -np.inf])
-    high = np.array([np.inf, *(p.high for p in known), *([np.inf] * R), most, np.inf])
+    low = np.array([-np.inf, *(p.low for p in known), *([-np.inf] * R), -most, -data.most_shift, -np.inf])
+    high = np.array([np.inf, *(p.high for p in known), *([np.inf] * R), most, data.most_shift, np.inf])
     C = scale.thrust / scale.driver**2
     steps = [1e-4 * C]
     for p, value in zip(known, theta.vector[1 : 1 + len(known)], strict=True):
         span = p.high - p.low
         steps.append(min(1e-3 * span, 1e-3 * max(abs(value), 0.02 * span)))
-    steps += [1e-3 * scale.thrust] * R + [1e-4, 1e-4 * (abs(theta.k) or 1.0)]
+    steps += [1e-3 * scale.thrust] * R + [1e-4, 1e-4, 1e-4 * (abs(theta.k) or 1.0)]
     return low, high, np.array(steps)
 
 
@@ -80,9 +80,12 @@ def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[lis
         F, x = predict(model, theta, history, data.scale)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
-        thrust.append(F[rows] + theta.tares[i])
+        thrust.append(reconstructed(F, history.middle, history.sampled)[rows] + theta.tares[i])
         if with_rate:
-            rate.append(theta.k * x[history.rate_rows])
+            assert history.rate_sampled is not None
+            if theta.rate_shift:
+                x = delayed(x, history.edges, theta.rate_shift)
+            rate.append(theta.k * reconstructed(x, history.middle, history.rate_sampled)[history.rate_rows])
     return thrust, rate
 
 
@@ -103,7 +106,7 @@ def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: 
     thrust: list[list[Floats]] = [[] for _ in data.histories]
     rate: list[list[Floats]] = [[] for _ in data.histories]
     for j in np.flatnonzero(which):
-        run = j - (q - 2 - R)
+        run = j - (q - 3 - R)
         if 0 <= run < R:  # a tare moves its own run by one
             for i in range(R):
                 thrust[i].append(np.full(base_thrust[i].size, float(i == run)))
@@ -129,7 +132,8 @@ def fit(model: Model, start: Theta, data: Data, weights: Weights, most_steps: in
     theta = start.with_vector(np.clip(start.vector, low, high))
     may = np.ones(theta.vector.size, dtype=bool)
     may[-1] = bool(weights.rate)
-    may[-2] = high[-2] > low[-2]
+    may[-3] = high[-3] > low[-3]
+    may[-2] = bool(weights.rate) and high[-2] > low[-2]
     residual = residual_of(model, theta, data, weights)
     damping = 1e-3
     J = columns_of(model, theta, data, weights, may)
@@ -165,8 +169,7 @@ def fit(model: Model, start: Theta, data: Data, weights: Weights, most_steps: in
     at_bound = (vector <= low) | (vector >= high)
     free = may & ~at_bound
     J = J[:, free[may]]
-    log_det = sum(w.log_det for w in (*weights.thrust, *weights.rate))
-    return Fit(model, theta, residual, J, free, log_det)
+    return Fit(model, theta, residual, J, free, weights.log_det)
 
 
 def extended(theta: Theta, model: Model, term: object, values: tuple[float, ...], bigger: Model) -> Theta:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,18 +17,31 @@ from identification.recording import Floats
 ORDER = {term: i for i, term in enumerate(sorted(CATALOGUE, key=lambda t: STAGES.index(t.stage)))}
 """Stage by stage, and in the order of the catalogue within one."""
 
+HYDRO = STAGES.index("hydro")
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Given:
+    """A term of the baseline (a twin's) with its values: not fitted, and none of what may be dropped or swapped."""
+
+    term: Term
+    values: tuple[float, ...]
+    scale: Scale
+    """The sizes that its values refer to."""
+
 
 @dataclass(frozen=True)
 class Model:
     """Terms in the order in which they act."""
 
     terms: tuple[Term, ...] = ()
+    given: tuple[Given, ...] = ()
 
     def plus(self, term: Term) -> Model:
-        return Model(tuple(sorted((*self.terms, term), key=_place)))
+        return replace(self, terms=tuple(sorted((*self.terms, term), key=_place)))
 
     def without(self, term: Term) -> Model:
-        return Model(tuple(t for t in self.terms if t != term))
+        return replace(self, terms=tuple(t for t in self.terms if t != term))
 
     def swapped(self, term: Term, other: Term) -> Model:
         return self.without(term).plus(other)
@@ -47,11 +60,14 @@ class Theta:
     tares: tuple[float, ...]
     shift: float = 0.0
     """s, a nuisance: how far the clocks of force and driver may disagree unnoticed."""
+    rate_shift: float = 0.0
+    """s, the same between rate and driver."""
     k: float = 1.0
 
     @property
     def vector(self) -> Floats:
-        return np.array([self.C, *(v for theta in self.terms for v in theta), *self.tares, self.shift, self.k])
+        known = (v for theta in self.terms for v in theta)
+        return np.array([self.C, *known, *self.tares, self.shift, self.rate_shift, self.k])
 
     def with_vector(self, values: Floats) -> Theta:
         """The same lay-out with other numbers."""
@@ -60,25 +76,50 @@ class Theta:
             terms.append(tuple(map(float, values[at : at + len(theta)])))
             at += len(theta)
         tares = tuple(map(float, values[at : at + len(self.tares)]))
-        return Theta(float(values[0]), tuple(terms), tares, float(values[-2]), float(values[-1]))
+        return Theta(float(values[0]), tuple(terms), tares, *map(float, values[-3:]))
+
+
+def acting(model: Model, theta: Theta, scale: Scale) -> list[tuple[Term, tuple[float, ...], Scale]]:
+    """Every term with its values and sizes in the order in which they act; a given one before a found one."""
+    found = [(term, values, scale) for term, values in zip(model.terms, theta.terms, strict=True)]
+    if not model.given:
+        return found
+    return sorted([(g.term, g.values, g.scale) for g in model.given] + found, key=lambda each: _place(each[0]))
 
 
 def predict(model: Model, theta: Theta, history: History, scale: Scale) -> tuple[Floats, Floats]:
-    """(F without tare, x) on the intervals of one run, each (M,)."""
+    """(F without tare, x) on the intervals of one run, each (M,).
+
+    x is what the model itself says of the rate: a term that reads the measured rate does not count there.
+    """
     value = history.driver
+    modelled = None
     x = value
     stage = 0
-    for term, values in zip(model.terms, theta.terms, strict=True):
+    for term, values, sizes in acting(model, theta, scale):
         at = STAGES.index(term.stage)
-        if stage < STAGES.index("hydro") <= at:
+        if stage < HYDRO <= at:
             x = value
             value = theta.C * x * np.abs(x)
         stage = at
-        value = term.apply(value, Moment(history, scale, theta.C, x if stage > 1 else value), values)
-    if stage < STAGES.index("hydro"):
+        if "rotation_rate" in term.needs and modelled is None:
+            modelled = value
+        value = term.apply(value, Moment(history, sizes, theta.C, x if stage >= HYDRO else value), values)
+    if stage < HYDRO:
         x = value
         value = theta.C * x * np.abs(x)
-    return value, x
+    return value, x if modelled is None else modelled
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Spread:
+    """Directions in which a given baseline may be off, each one standard deviation long: the prediction moves by
+    columns @ z with z standard normal. Raw, per run."""
+
+    thrust: tuple[Floats, ...]
+    """(n, k) N, at all intervals with thrust."""
+    rate: tuple[Floats, ...]
+    """(m, k) rev/s, at all intervals with a rate; empty where the rate is no response."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,6 +133,8 @@ class Data:
     with_rate: bool = False
     most_shift: float = 0.0
     """s, bound of the nuisance shift; 0 where nothing moves."""
+    spread: Spread | None = None
+    """How uncertain the baseline's own prediction is, where a twin gives it."""
 
     @cached_property
     def rows(self) -> tuple[Floats, ...]:
@@ -108,7 +151,7 @@ class Data:
     @cached_property
     def thrust_rows(self) -> tuple[Rows, ...]:
         return tuple(
-            Rows(h.sampled[r], h.count[r].astype(np.float64), np.ones(r.size))
+            Rows(h.sampled[r], h.count[r].astype(np.float64), np.ones(r.size), h.dt[r])
             for h, r in zip(self.histories, self.rows, strict=True)
         )
 
@@ -118,7 +161,7 @@ class Data:
         for h in self.histories:
             assert h.rate_count is not None
             r = h.rate_rows
-            out.append(Rows(h.middle[r], h.rate_count[r].astype(np.float64), np.ones(r.size)))
+            out.append(Rows(h.middle[r], h.rate_count[r].astype(np.float64), np.ones(r.size), h.dt[r]))
         return tuple(out)
 
     @property
@@ -151,12 +194,29 @@ class Weights:
 
     thrust: tuple[Whitener, ...]
     rate: tuple[Whitener, ...] = ()
+    spread: Floats | None = None
+    """(n, k) whitened columns of a baseline's uncertainty, orthogonal, each as long as its variance is large."""
 
     def whiten(self, thrust: Sequence[Floats], rate: Sequence[Floats]) -> Floats:
         """Columns of all runs, one under the other."""
         parts = [w.whiten(c) for w, c in zip(self.thrust, thrust, strict=True)]
         parts += [w.whiten(c) for w, c in zip(self.rate, rate, strict=True)]
-        return np.concatenate(parts)
+        out: Floats = np.concatenate(parts)
+        if self.spread is None or out.shape[0] != self.spread.shape[0]:
+            return out
+        # noise I + A A' with A = U diag(s): its inverse root is I + U diag(1/sqrt(1 + s^2) - 1) U'
+        size = np.linalg.norm(self.spread, axis=0)
+        U = self.spread / size
+        shrunk = (1 / np.sqrt(1 + size**2) - 1)[:, None] * (U.T @ out.reshape(out.shape[0], -1))
+        whitened: Floats = out + (U @ shrunk).reshape(out.shape)
+        return whitened
+
+    @property
+    def log_det(self) -> float:
+        total = sum(w.log_det for w in (*self.thrust, *self.rate))
+        if self.spread is not None:
+            total += float(np.sum(np.log1p(np.sum(self.spread**2, axis=0))))
+        return total
 
 
 def weights(
@@ -165,11 +225,23 @@ def weights(
     thrust_size: Sequence[Floats],
     rate_noise: Noise | None,
     rows: Sequence[Rows] | None = None,
+    *,
+    unit: bool = False,
 ) -> Weights:
-    """Factor the covariances. `thrust_size`: predicted F without tare at the thrust rows, run by run."""
+    """Factor the covariances. `thrust_size`: predicted F without tare at the thrust rows, run by run. `unit`: of the
+    noise alone, without the baseline's own uncertainty."""
     used = data.thrust_rows if rows is None else rows
     thrust = tuple(Whitener(noise, r, np.abs(s)) for r, s in zip(used, thrust_size, strict=True))
     rate: tuple[Whitener, ...] = ()
     if rate_noise is not None:
         rate = tuple(Whitener(rate_noise, r, np.zeros(r.time.size)) for r in data.rate_rows)
-    return Weights(thrust, rate)
+    known = Weights(thrust, rate)
+    return known if data.spread is None or unit else replace(known, spread=_spread(known, data, data.spread))
+
+
+def _spread(known: Weights, data: Data, spread: Spread) -> Floats | None:
+    """Whitened, and turned into orthogonal columns."""
+    thrust = spread.thrust if data.keep is None else [c[k] for c, k in zip(spread.thrust, data.keep, strict=True)]
+    u, s, _ = np.linalg.svd(known.whiten(thrust, spread.rate if known.rate else ()), full_matrices=False)
+    kept = s > 1e-6
+    return u[:, kept] * s[kept] if kept.any() else None

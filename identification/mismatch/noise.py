@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from celerite2 import backprop, driver
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from identification.recording import Floats
@@ -41,6 +42,8 @@ class Rows:
     """(n,) samples in each row."""
     extra: Floats
     """(n,) variance factor of the white part, above 1 for outliers."""
+    width: Floats
+    """(n,) s over which the samples of a row are spread."""
 
 
 @dataclass(frozen=True)
@@ -78,10 +81,24 @@ class Noise:
         ar, cr = np.array(self.slow), 1 / np.array(self.scales) if self.scales else np.empty(0)
         n, J = rows.time.size, ar.size + 2 * ac.size
         c = np.concatenate([cr, np.repeat(cc, 2)])
-        a, U, V = driver.get_celerite_matrices(
+        _, U, V = driver.get_celerite_matrices(
             ar, ac, bc, dc, rows.time, diag, np.empty(n), np.empty((n, J)), np.empty((n, J))
         )
-        return c, a, U, V
+        gain = self.gains(rows)
+        a = diag + gain**2 @ np.array([*self.slow, *self.band]) if J else diag
+        wide = np.repeat(gain, [1] * ar.size + [2] * ac.size, axis=1)
+        return c, a, np.ascontiguousarray(U * wide), np.ascontiguousarray(V * wide)
+
+    def gains(self, rows: Rows) -> Floats:
+        """(n, components): what the mean of a row's samples leaves of each, as a factor of its standard deviation."""
+        spacing = rows.width / rows.count
+        rates = [-1 / T + 0j for T in self.scales]
+        rates += [complex(-np.pi * f / Q, 2 * np.pi * f) for f, Q in self.bands]
+        return (
+            np.column_stack([_mean_gain(np.exp(r * spacing), rows.count) for r in rates])
+            if rates
+            else np.empty((rows.time.size, 0))
+        )
 
     def _oscillators(self) -> tuple[Floats, Floats, Floats, Floats]:
         """Underdamped harmonic oscillators with unit-height kernels times their variance."""
@@ -91,6 +108,14 @@ class Noise:
         w = 2 * np.pi * f
         root = np.sqrt(np.maximum(4 * Q**2 - 1, 1e-9))
         return a, a / root, 0.5 * w / Q if Q.size else Q, 0.5 * w * root / Q if Q.size else Q
+
+
+def _mean_gain(rho: NDArray[np.complex128], m: Floats) -> Floats:
+    """Standard deviation of the mean of m even samples whose correlation over k samples is Re rho^k."""
+    far = 1 - rho
+    variance = np.real((1 + rho) / far - 2 * rho * (1 - rho**m) / (m * far**2)) / m
+    out: Floats = np.sqrt(np.clip(np.where(m > 1.5, variance, 1.0), 1e-6, 1.0))
+    return out
 
 
 class Whitener:
@@ -120,15 +145,33 @@ class Whitener:
         return Z[:, 0] if flat else Z
 
 
-def time_scales(times: Sequence[Floats]) -> tuple[float, ...]:
-    """From a few intervals to a quarter of the longest run."""
-    longest = max(float(t[-1] - t[0]) for t in times)
-    spacing = float(np.median(np.concatenate([np.diff(t) for t in times])))
-    low, high = 2 * spacing, 0.25 * longest
-    if high <= low:
-        return ()
-    number = min(int(np.floor(np.log(high / low) / np.log(SCALE_STEP))) + 1, MOST_SCALES)
-    return tuple(float(high / SCALE_STEP**k) for k in range(number))[::-1]
+def time_scales(runs: Sequence[Rows]) -> tuple[float, ...]:
+    """From two samples to a quarter of the longest run, MOST_SCALES of them at even ratios."""
+    longest = max(float(r.time[-1] - r.time[0]) for r in runs)
+    spacing = float(np.median(np.concatenate([r.width / r.count for r in runs])))
+    low, high = max(2 * spacing, 1e-3 * longest / MOST_SCALES), 0.25 * longest
+    if high <= 2 * low:
+        return (high,) if high > 0 else ()
+    number = min(MOST_SCALES, 1 + int(np.ceil(np.log(high / low) / np.log(SCALE_STEP))))
+    return tuple(float(t) for t in np.geomspace(low, high, number))
+
+
+def refined_scales(noise: Noise, rows: Sequence[Rows]) -> tuple[float, ...]:
+    """Scales without variance give way to ones beside those with most."""
+    spread = np.array(noise.slow)
+    used = spread > 1e-3 * (spread.sum() + noise.white / float(np.median(rows[0].count)))
+    free = int(np.count_nonzero(~used))
+    if not used.any() or not free:
+        return noise.scales
+    T = np.array(noise.scales)
+    step = np.sqrt(T[1] / T[0]) if T.size > 1 else 2.0
+    kept = list(T[used])
+    for t in sorted(kept, key=lambda t: -spread[list(T).index(t)]):
+        for beside in (t / step, t * step):
+            if free and all(abs(np.log(beside / k)) > 0.3 for k in kept):
+                kept.append(float(beside))
+                free -= 1
+    return tuple(sorted(float(k) for k in kept))
 
 
 def fit_noise(
@@ -149,19 +192,32 @@ def fit_noise(
     if total.size < FEW_ROWS:
         used = max(total.size - columns[0].shape[1], 1)
         return Noise(float(np.sum(total**2 * weight) / used) or 1e-300, 0.0)
-    scales = time_scales([r.time for r in runs])
     F2 = float(np.mean(np.concatenate(sizes) ** 2)) or 1.0
     if start is None or start.bands != bands:
+        scales = time_scales(runs)[: MOST_SCALES - 2 * len(bands)]
         quick = _differences(runs, residuals)
-        start = Noise(
-            quick,
-            0.02 * quick / F2,
-            scales,
-            tuple([0.05 * variance / max(len(scales), 1)] * len(scales)),
-            bands,
-            tuple([0.05 * variance] * len(bands)),
-        )
-    floor = LEAST_SHARE * np.array([variance, variance / F2] + [variance] * (len(scales) + len(bands)))
+        slow = tuple([0.05 * variance / max(len(scales), 1)] * len(scales))
+        start = Noise(quick, 0.02 * quick / F2, scales, slow, bands, tuple([0.05 * variance] * len(bands)))
+        first = _likeliest(start, runs, residuals, columns, sizes, variance, F2)
+        scales = refined_scales(first, runs)
+        if scales == first.scales:
+            return first
+        slow = tuple(first.slow[first.scales.index(t)] if t in first.scales else 0.02 * sum(first.slow) for t in scales)
+        start = replace(first, scales=scales, slow=slow)
+    return _likeliest(start, runs, residuals, columns, sizes, variance, F2)
+
+
+def _likeliest(
+    start: Noise,
+    runs: Sequence[Rows],
+    residuals: Sequence[Floats],
+    columns: Sequence[Floats],
+    sizes: Sequence[Floats],
+    variance: float,
+    F2: float,
+) -> Noise:
+    """The variances of greatest restricted likelihood, scales and bands as in `start`."""
+    floor = LEAST_SHARE * np.array([variance, variance / F2] + [variance] * (len(start.scales) + len(start.bands)))
     begin = np.log(np.maximum(start.variances, 1e3 * floor))
 
     def cost(log_values: Floats) -> tuple[float, Floats]:
@@ -172,7 +228,7 @@ def fit_noise(
             return 1e30, np.zeros_like(log_values)
         return value, slope * values
 
-    bounds = [(np.log(low), np.log(1e3 * variance * low / (LEAST_SHARE * variance))) for low in floor]
+    bounds = [(np.log(low), np.log(1e3 * low / LEAST_SHARE)) for low in floor]
     found = minimize(cost, begin, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": 40, "ftol": 1e-7})
     return start.with_variances(np.exp(found.x))
 
@@ -251,16 +307,17 @@ def _cost(
             np.zeros((n, J)),
         )
         bU = bU1 + bU2
+        gain2 = noise.gains(rows) ** 2
         per_count = rows.extra / rows.count
         slope[0] += float(ba @ per_count)
         slope[1] += float(ba @ (per_count * size**2))
         Jr = len(noise.slow)
         for j in range(Jr):
-            slope[2 + j] += float(ba.sum() + bU[:, j].sum())
+            slope[2 + j] += float(ba @ gain2[:, j]) + float(bU[:, j] @ U[:, j]) / max(noise.slow[j], 1e-300)
         for b, value_b in enumerate(noise.band):
             at = Jr + 2 * b
             moved = float(np.sum(bU[:, at] * U[:, at]) + np.sum(bU[:, at + 1] * U[:, at + 1])) / max(value_b, 1e-300)
-            slope[2 + Jr + b] += float(ba.sum()) + moved
+            slope[2 + Jr + b] += float(ba @ gain2[:, Jr + b]) + moved
     return value, slope
 
 

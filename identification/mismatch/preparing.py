@@ -234,12 +234,12 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
     if neighbour is not None:
         others["neighbour_thrust"] = neighbour
     driven = held.mean(edges)
-    rate = rate_count = None
+    rate = rate_count = rate_sampled = None
     per_driver = 1.0
     turning = recording.first_of("rotation_rate")
     if "rotation_rate" in others and turning is not None:
         good = np.isfinite(turning.value)
-        rate, rate_count, _ = _binned(turning.time[good], turning.value[good], edges)
+        rate, rate_count, rate_sampled = _binned(turning.time[good], turning.value[good], edges)
         power = float(driven @ driven)
         per_driver = float(driven @ others["rotation_rate"]) / power if power > 0 else 1.0
     levels = 1 + int(np.count_nonzero(np.abs(np.diff(held.value)) > 0))
@@ -254,6 +254,7 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
         within=within,
         rate=rate,
         rate_count=rate_count,
+        rate_sampled=rate_sampled,
         others=others,
         rate_per_driver=per_driver or 1.0,
         static=bool(held.stepwise and time.size <= FEW_SAMPLES * levels),

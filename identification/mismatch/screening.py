@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.mismatch.fitting import Fit, extended, raw
-from identification.mismatch.model import Data, Model, Weights
+from identification.mismatch.model import Data, Weights
 from identification.physics.term import Term
 from identification.recording import Floats
 

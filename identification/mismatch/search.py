@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -97,7 +97,7 @@ def start(histories: Sequence[History]) -> tuple[Data, Theta]:
     moving = histories[0].driver_quantity == "command_voltage" and not any(h.static for h in histories)
     most = CLOCKS if moving else 0.0
     data = Data(tuple(histories), scale_of(histories, C or 1e-12), with_rate=with_rate, most_shift=most)
-    return data, Theta(C, (), tuple(float(ym - C * fm) for fm, ym in means), 0.0, _k(histories))
+    return data, Theta(C, (), tuple(float(ym - C * fm) for fm, ym in means), k=_k(histories))
 
 
 def _k(histories: Sequence[History]) -> float:
@@ -117,9 +117,9 @@ def refresh(model: Model, theta: Theta, data: Data, extra: Floats | None, state:
     left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
     unit = _unweighted(data)
     may = np.ones(theta.vector.size, dtype=bool)
-    may[-1] = False
+    may[-2:] = False
     low, high, _ = bounds_of(model, data, theta)
-    may[-2] = high[-2] > low[-2]
+    may[-3] = high[-3] > low[-3]
     J = columns_of(model, theta, data, unit, may)
     parts = _split(J, data)
     if extra is not None and extra.shape[1]:
@@ -151,6 +151,7 @@ def _unweighted(data: Data) -> Weights:
         [np.zeros(r.size) for r in data.rows],
         None,
         [replace(r, count=np.ones(r.time.size)) for r in data.thrust_rows],
+        unit=True,
     )
 
 
@@ -205,13 +206,13 @@ def raw_directions(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
     return np.column_stack(columns) if columns else np.empty((data.size, 0))
 
 
-def baseline(data: Data, theta: Theta, terms: Sequence[Term]) -> State:
-    """C V|V| and tares, with the noise that remains when all that any term can see is taken out."""
+def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> State:
+    """C V|V|, what is given and tares, with the noise that remains when all that any term can see is taken out."""
     unit = _unweighted(data)
-    first = fit(Model(), theta, data, unit)
-    state = refresh(Model(), first.theta, data, pursue(first, data, unit, terms), None)
+    first = fit(model, theta, data, unit)
+    state = refresh(model, first.theta, data, pursue(first, data, unit, terms), None)
     again = pursue(state.fit, data, state.weights, terms)
-    return refresh(Model(), state.fit.theta, data, again, state)
+    return refresh(model, state.fit.theta, data, again, state)
 
 
 @dataclass(frozen=True, eq=False)
@@ -230,11 +231,20 @@ def accept_threshold(extra: int) -> float:
     return float(chi2_law.isf(ALARM / 50, extra))
 
 
-def search(histories: Sequence[History], rng: np.random.Generator, trace: list[str] | None = None) -> Found:
-    """Forward: screen, fit the best few, keep the best, refresh the noise; until nothing passes. Then prune."""
+def search(
+    histories: Sequence[History],
+    rng: np.random.Generator,
+    trace: list[str] | None = None,
+    given: Callable[[Data, Theta], tuple[Data, Theta, Model]] | None = None,
+) -> Found:
+    """Forward: screen, fit the best few, keep the best, refresh the noise; until nothing passes. Then prune.
+
+    `given` puts the baseline of a twin in the place of C V|V|.
+    """
     data, theta = start(histories)
+    data, theta, first = given(data, theta) if given is not None else (data, theta, Model())
     terms = available(data)
-    state = before = baseline(data, theta, terms)
+    state = before = baseline(data, theta, terms, first)
     screenings = []
     while True:
         ids = {t.id for t in state.fit.model.terms}

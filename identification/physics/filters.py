@@ -84,6 +84,18 @@ def delayed(value: Floats, edges: Floats, delay: float) -> Floats:
     return out
 
 
+def reconstructed(mean: Floats, middle: Floats, at: Floats) -> Floats:
+    """Value at a time within each interval, from means: a straight line, of the smaller slope to both neighbours.
+
+    Where the slopes differ in sign (a step, an extremum) the mean itself (van Leer's limiter, minmod).
+    """
+    slope = np.diff(mean) / np.diff(middle)
+    left, right = np.concatenate([[0.0], slope]), np.concatenate([slope, [0.0]])
+    both = np.where(left * right > 0, np.where(np.abs(left) < np.abs(right), left, right), 0.0)
+    out: Floats = mean + both * (at - middle)
+    return out
+
+
 def resonant(value: Floats, dt: Floats, frequency: float, damping: float) -> Floats:
     """Mass on a spring y'' + 2 damping w y' + w^2 y = w^2 value, w = 2 pi frequency: exact means over each interval.
 

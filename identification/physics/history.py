@@ -43,6 +43,8 @@ class History:
     rate: Floats | None = None
     """(M,) rev/s, mean of the rotation rate measured in the interval, NaN where none."""
     rate_count: NDArray[np.int64] | None = None
+    rate_sampled: Floats | None = None
+    """(M,) s, mean time of the rate's samples."""
     others: Mapping[str, Floats] = None  # type: ignore[assignment]  # replaced in __post_init__
     """quantity -> (M,) interpolated: bus_voltage, flow_speed, current, torque, motor_temperature, water_temperature,
     rotation_rate, neighbour_thrust."""
