@@ -83,6 +83,8 @@ class Twin:
     created: str = ""
     """ISO 8601 UTC."""
     software: str = ""
+    origin: str = "the twin"
+    """What it is, in a sentence: `the twin T1.twin.json`, `the simulation SIM.h5`."""
 
 
 def names_of(terms: tuple[TwinTerm, ...]) -> tuple[str, ...]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from importlib import import_module
 from itertools import chain
 from pathlib import Path
@@ -16,6 +17,7 @@ from rig.errors import RecordingError, RigError
 if TYPE_CHECKING:  # numpy and scipy come up when a diagnosis is made, not for `rig diagnose --help`
     from identification.mismatch.diagnosis import Diagnosis
     from identification.recording import Recording
+    from identification.twin import Twin
 
 WHAT = "expected one or more recordings (*.h5) of one thruster"
 
@@ -44,22 +46,52 @@ def read(paths: Iterable[Path]) -> list[Recording]:
     return [load(path) for path in paths]
 
 
-def diagnose_files(paths: Iterable[Path], holdout: Iterable[Path] = (), seed: int = 0) -> Diagnosis:
-    """The diagnosis of recordings of one thruster. Raises RecordingError for what cannot be diagnosed."""
+def diagnose_files(
+    paths: Iterable[Path],
+    holdout: Iterable[Path] = (),
+    seed: int = 0,
+    twin: Path | None = None,
+    *,
+    any_thruster: bool = False,
+) -> Diagnosis:
+    """The diagnosis of recordings of one thruster, against C V|V| or a twin; its own twin knows the files' hashes.
+
+    Raises RecordingError for what cannot be diagnosed, TwinError for a twin that cannot be read.
+    """
+    from rig.twin import read_twin, stamped
+
+    files = recordings_in(paths)
+    baseline = None if twin is None else read_twin(twin)
+    recordings = read(files)
+    if baseline is not None and any_thruster:
+        baseline = replace(baseline, thruster=recordings[0].thruster)
+    found = diagnosed(recordings, read(holdout), seed, baseline)
+    by_id = {r.recording_id: path for r, path in zip(recordings, files, strict=True)}
+    return found if found.twin is None else replace(found, twin=stamped(found.twin, by_id))
+
+
+def diagnosed(
+    recordings: Sequence[Recording], holdout: Sequence[Recording] = (), seed: int = 0, baseline: Twin | None = None
+) -> Diagnosis:
+    """As identification has it, a refusal raised as RecordingError."""
     from identification.mismatch.diagnose import diagnose
     from identification.mismatch.preparing import Refusal
 
-    found = diagnose(read(recordings_in(paths)), read(holdout), seed)
+    found = diagnose(recordings, holdout, seed, baseline)
     if isinstance(found, Refusal):
         raise RecordingError(found.reason)
     return found
 
 
-def tell(found: Diagnosis, json_path: Path | None, report: Path | None) -> None:
-    """The page and the JSON where they are wanted; text for a person unless the JSON goes to standard output."""
+def tell(found: Diagnosis, json_path: Path | None, report: Path | None, save_twin: Path | None) -> None:
+    """Twin, page and JSON where they are wanted; text for a person unless the JSON goes to standard output."""
     from identification.mismatch.diagnosis import diagnosis_json
     from rig.diagnose_text import diagnosis_text
 
+    if save_twin is not None and found.twin is not None:
+        from rig.twin import write_twin
+
+        write_twin(found.twin, save_twin)
     if report is not None:
         import_module("rig.report.diagnosis").write(found, report)  # matplotlib: only where a page is drawn
     if json_path is not None:
@@ -76,6 +108,8 @@ PATH = click.Path(path_type=Path)
 
 @click.command("diagnose")
 @click.argument("files", nargs=-1, required=True, type=PATH)
+@click.option("--twin", type=PATH, help="Diagnose against this twin instead of C V|V|.")
+@click.option("--any-thruster", is_flag=True, help="The twin may be of another thruster.")
 @click.option(
     "--holdout", type=PATH, multiple=True, help="Recording that is not fitted, only predicted (may be repeated)."
 )
@@ -83,9 +117,21 @@ PATH = click.Path(path_type=Path)
 @click.option(
     "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
 )
+@click.option(
+    "--save-twin",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="Write the fitted model here, as a twin (JSON).",
+)
 @click.option("--seed", default=0, show_default=True, help="Of the surrogates that the false-alarm rate is judged by.")
 def diagnose_command(
-    files: tuple[Path, ...], holdout: tuple[Path, ...], json_path: Path | None, report: Path | None, seed: int
+    files: tuple[Path, ...],
+    twin: Path | None,
+    any_thruster: bool,
+    holdout: tuple[Path, ...],
+    json_path: Path | None,
+    report: Path | None,
+    save_twin: Path | None,
+    seed: int,
 ) -> None:
     """Find the physics that C V|V| leaves out of recordings of one thruster; a folder stands for its *.h5.
 
@@ -93,7 +139,8 @@ def diagnose_command(
     """
     try:
         held = recordings_in(holdout) if holdout else []
-        tell(diagnose_files(files, held, seed), json_path, report)
+        found = diagnose_files(files, held, seed, twin, any_thruster=any_thruster)
+        tell(found, json_path, report, save_twin)
     except (RigError, OSError) as error:
         click.echo(f"rig diagnose: {error}", err=True)
         raise SystemExit(2) from error

@@ -23,3 +23,7 @@ class DeviceError(RigError):
 
 class RecordingError(RigError):
     """A file that is not a recording, is of a later version, or lacks what is asked of it."""
+
+
+class TwinError(RigError):
+    """A file that is not a twin, or a twin that does not suit what is asked of it."""

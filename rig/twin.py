@@ -1,0 +1,255 @@
+"""A twin as a file: JSON, `thruster-rig-twin` version 1. Reading says what is wrong in one sentence."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from math import isfinite
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from identification.physics.term import Scale
+from identification.twin import TERMS, Source, Twin, TwinNoise, TwinTerm, names_of
+from rig.errors import TwinError
+
+FORMAT = "thruster-rig-twin"
+VERSION = 1
+DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
+ASYMMETRY = 1e-9
+"""Relative: a covariance matrix less symmetric than this is none."""
+
+
+def twin_json(twin: Twin) -> dict[str, object]:
+    """Everything that is in the file."""
+    return {
+        "format": FORMAT,
+        "version": VERSION,
+        "thruster": twin.thruster,
+        "driver": twin.driver_quantity,
+        "C": twin.C,
+        "terms": [
+            {"effect": t.effect, "form": t.form, "parameters": _with_units(t), "scale": asdict(t.scale)}
+            for t in twin.terms
+        ],
+        "covariance": {"names": list(twin.names), "matrix": [list(row) for row in twin.covariance]},
+        "noise": asdict(twin.noise),
+        "recordings": [asdict(source) for source in twin.sources],
+        "interval": twin.interval,
+        "highest_driver": twin.highest_driver,
+        "rate_per_driver": twin.rate_per_driver,
+        "created": twin.created,
+        "software": twin.software,
+    }
+
+
+def _with_units(term: TwinTerm) -> dict[str, object]:
+    units = {p.name: p.unit for p in term.term.parameters(term.scale)}
+    return {name: {"value": value, "unit": units[name]} for name, value in term.parameters.items()}
+
+
+def stamped(twin: Twin, paths: Mapping[str, Path]) -> Twin:
+    """With the time, this program's version and the hashes of the files: `paths` by recording id."""
+    sources = tuple(
+        replace(s, sha256=hashlib.sha256(paths[s.recording_id].read_bytes()).hexdigest())
+        if s.recording_id in paths
+        else s
+        for s in twin.sources
+    )
+    now = datetime.now(UTC).isoformat(timespec="seconds")
+    return replace(twin, sources=sources, created=now, software=f"thruster-rig {_version()}")
+
+
+def _version() -> str:
+    try:
+        return version("thruster-rig")
+    except PackageNotFoundError:
+        return "(not installed)"
+
+
+def write_twin(twin: Twin, path: Path) -> None:
+    """Overwrites: a twin is a result, not a measurement."""
+    path.write_text(json.dumps(twin_json(twin), indent=1, allow_nan=False) + "\n", encoding="utf-8")
+
+
+def read_twin(path: Path) -> Twin:
+    """Raises TwinError naming file, key, what was expected and what came."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise TwinError(f"{path} can't be read ({error.strerror}); give a twin that --save-twin wrote") from error
+    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise TwinError(f"{path} is no twin: it is not JSON ({error}); give a twin that --save-twin wrote") from error
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        found = content.get("format") if isinstance(content, dict) else type(content).__name__
+        raise TwinError(f"{path} is no twin: its format is {found!r} where {FORMAT!r} is expected")
+    top = Table(path, "", content)
+    if top.whole("version") > VERSION:
+        raise TwinError(f"{path}: version {content['version']} is later than {VERSION}; install a later thruster-rig")
+    return _twin(top)
+
+
+class Table(NamedTuple):
+    """One JSON object of the file, and where it is, for messages."""
+
+    path: Path
+    place: str
+    content: Mapping[str, Any]
+
+    def name(self, key: str) -> str:
+        return f"{self.place}.{key}" if self.place else key
+
+    def wrong(self, key: str, expected: str) -> TwinError:
+        return TwinError(f"{self.path}: {self.name(key)} must be {expected}, got {self.content[key]!r:.60}")
+
+    def get(self, key: str) -> Any:
+        if key not in self.content:
+            raise TwinError(f"{self.path}: {self.name(key)} is missing; it was there when --save-twin wrote it")
+        return self.content[key]
+
+    def number(self, key: str, least: float = -np.inf) -> float:
+        value = self.get(key)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not isfinite(value) or value < least:
+            raise self.wrong(key, "a finite number" + (f" of at least {least:g}" if isfinite(least) else ""))
+        return float(value)
+
+    def whole(self, key: str) -> int:
+        value = self.get(key)
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise self.wrong(key, "a whole number")
+        return value
+
+    def text(self, key: str) -> str:
+        value = self.get(key)
+        if not isinstance(value, str):
+            raise self.wrong(key, "text")
+        return value
+
+    def table(self, key: str) -> Table:
+        value = self.get(key)
+        if not isinstance(value, dict):
+            raise self.wrong(key, "an object")
+        return Table(self.path, self.name(key), value)
+
+    def tables(self, key: str) -> list[Table]:
+        value = self.get(key)
+        if not isinstance(value, list) or not all(isinstance(each, dict) for each in value):
+            raise self.wrong(key, "a list of objects")
+        return [Table(self.path, f"{self.name(key)}[{i}]", each) for i, each in enumerate(value)]
+
+    def numbers(self, key: str, least: float = -np.inf) -> tuple[float, ...]:
+        value = self.get(key)
+        if not isinstance(value, list):
+            raise self.wrong(key, "a list of numbers")
+        inner = Table(self.path, self.name(key), {str(i): each for i, each in enumerate(value)})
+        return tuple(inner.number(str(i), least) for i in range(len(value)))
+
+
+def _twin(top: Table) -> Twin:
+    driver = top.text("driver")
+    if driver not in DRIVERS:
+        raise top.wrong("driver", f"one of {', '.join(DRIVERS)}")
+    terms = tuple(_term(each) for each in top.tables("terms"))
+    names = names_of(terms)
+    rate = top.get("rate_per_driver")
+    return Twin(
+        thruster=top.text("thruster"),
+        driver_quantity=driver,
+        C=top.number("C"),
+        terms=terms,
+        names=names,
+        covariance=_covariance(top.table("covariance"), names),
+        noise=_noise(top.table("noise")),
+        sources=tuple(_source(each) for each in top.tables("recordings")),
+        interval=top.number("interval", 1e-6),
+        highest_driver=top.number("highest_driver", 0.0),
+        rate_per_driver=None if rate is None else top.number("rate_per_driver"),
+        created=top.text("created"),
+        software=top.text("software"),
+        origin=f"the twin {top.path.name}",
+    )
+
+
+def _term(table: Table) -> TwinTerm:
+    effect, form = table.text("effect"), table.text("form")
+    known = sorted({e for e, _ in TERMS})
+    if effect not in known:
+        raise table.wrong("effect", f"an effect of the catalogue ({', '.join(known)})")
+    if (effect, form) not in TERMS:
+        forms = ", ".join(repr(f) for e, f in TERMS if e == effect)
+        raise table.wrong("form", f"a form of {effect} ({forms})")
+    sizes = table.table("scale")
+    scale = Scale(
+        driver=sizes.number("driver", 0.0),
+        driver_unit=sizes.text("driver_unit"),
+        thrust=sizes.number("thrust", 0.0),
+        duration=sizes.number("duration", 0.0),
+        interval=sizes.number("interval", 0.0),
+        flow=sizes.number("flow", 0.0),
+    )
+    inside = table.table("parameters")
+    expected = TERMS[effect, form].parameters(scale)
+    odd = sorted(set(inside.content) - {p.name for p in expected})
+    if odd:
+        raise TwinError(
+            f"{table.path}: {inside.place} has {', '.join(odd)}; the parameters of {effect} are "
+            f"{', '.join(p.name for p in expected)}"
+        )
+    values = {}
+    for p in expected:
+        entry = inside.table(p.name)
+        values[p.name] = entry.number("value")
+        if entry.text("unit") != p.unit:
+            raise entry.wrong("unit", repr(p.unit))
+        if not p.low <= values[p.name] <= p.high:
+            raise entry.wrong("value", f"within {p.low:g} and {p.high:g} {p.unit}")
+    return TwinTerm(effect, form, values, scale)
+
+
+def _covariance(table: Table, names: Sequence[str]) -> tuple[tuple[float, ...], ...]:
+    if table.get("names") != list(names):
+        raise table.wrong("names", f"{list(names)!r}, in the order of C and the terms")
+    rows = table.get("matrix")
+    if not isinstance(rows, list):
+        raise table.wrong("matrix", "a list of rows")
+    inner = Table(table.path, table.name("matrix"), {str(i): row for i, row in enumerate(rows)})
+    matrix = tuple(inner.numbers(str(i)) for i in range(len(rows)))
+    if len(matrix) != len(names) or any(len(row) != len(names) for row in matrix):
+        raise table.wrong("matrix", f"{len(names)} rows of {len(names)} numbers")
+    full = np.array(matrix)
+    std = np.sqrt(np.abs(np.diag(full)))
+    size = np.where(std > 0, std, 1.0)
+    scaled = full / np.outer(size, size)
+    if np.any(np.diag(full) < 0) or np.any(np.abs(scaled - scaled.T) > ASYMMETRY):
+        raise table.wrong("matrix", "symmetric, with no variance below zero")
+    return matrix
+
+
+def _noise(table: Table) -> TwinNoise:
+    pairs = table.get("bands")
+    if not isinstance(pairs, list):
+        raise table.wrong("bands", "a list of pairs")
+    inner = Table(table.path, table.name("bands"), {str(i): pair for i, pair in enumerate(pairs)})
+    bands = [inner.numbers(str(i), 0.0) for i in range(len(pairs))]
+    noise = TwinNoise(
+        white=table.number("white", 0.0),
+        proportional=table.number("proportional", 0.0),
+        scales=table.numbers("scales", 1e-9),
+        slow=table.numbers("slow", 0.0),
+        bands=tuple((b[0], b[1]) for b in bands if len(b) == 2),
+        band=table.numbers("band", 0.0),
+    )
+    if len(noise.scales) != len(noise.slow):
+        raise table.wrong("slow", f"as long as scales ({len(noise.scales)})")
+    if len(noise.bands) != len(noise.band) or len(bands) != len(noise.bands):
+        raise table.wrong("bands", f"pairs, as many as band has numbers ({len(noise.band)})")
+    return noise
+
+
+def _source(table: Table) -> Source:
+    return Source(table.text("recording_id"), table.text("sha256"), table.number("tare"))
