@@ -9,10 +9,11 @@ correlated along the rows, sigma^2 from eq. 4.12, and no chi-square test.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.fft import dct, idct
 from scipy.optimize import brentq
 from scipy.stats import norm
 from scipy.stats import t as student
@@ -22,7 +23,8 @@ from identification.recording import Floats
 from identification.regression import LinearFit, block_noise, correlated_std, least_squares
 from identification.verdicts import Underfit, underfit
 
-Method = Literal["wls", "ls"]
+Method = Literal["wls", "ls", "gls"]
+"""`gls`: even samples are weighed by the spectrum that their own residual shows (eq. 4.8 with an estimated Sigma)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,8 +143,28 @@ def excess_std(rows: Rows) -> float:
     return float(brentq(surplus, 0.0, top, rtol=1e-6))
 
 
+def _weighed_by_spectrum(rows: Rows, noise: tuple[NoiseModel, ...]) -> LinearFit:
+    """WLS (eq. 4.8) of the cosine coefficients of each block, which are nearly independent."""
+    root = np.empty(rows.y.size)
+    for block, model in zip(rows.blocks, noise, strict=True):
+        each = model.spectrum(np.arange(1, model.n) / (2 * model.n))
+        root[block] = np.sqrt(np.concatenate([[model.n * model.mean_variance()], each]))
+    H = np.vstack([dct(rows.H[block], axis=0, norm="ortho") for block in rows.blocks])
+    y = np.concatenate([dct(rows.y[block], norm="ortho") for block in rows.blocks])
+    if not np.all(root > 0):
+        return least_squares(rows.H, rows.y, rows.names)
+    fit = least_squares(H, y, rows.names, root)
+    solver = np.hstack([idct(fit.solver[:, block], axis=1, norm="ortho") for block in rows.blocks])
+    residual = rows.y - rows.H @ fit.theta
+    sigma2 = float(residual @ residual) / fit.dof if fit.dof > 0 else float("nan")
+    return replace(fit, residual=residual, solver=solver, sigma2=sigma2, chi2=None)
+
+
 def estimate(rows: Rows, method: Method = "wls") -> Estimate:
     """Parameters of the rows; `ls` ignores known standard errors.
+
+    Even samples: least squares with an honest interval, unless `gls` is asked for. That is efficient under slow noise,
+    and gives the slow part of what the model lacks less say, too: under lack of fit the two answers differ.
 
     >>> rows = Rows(np.array([[1.0], [2.0], [3.0]]), np.array([1.1, 1.9, 3.0]), ("a",), (slice(0, 3),))
     >>> round(float(estimate(rows).fit.theta[0]), 3)
@@ -152,6 +174,8 @@ def estimate(rows: Rows, method: Method = "wls") -> Estimate:
         fit = least_squares(rows.H, rows.y, rows.names)
         long = rows.even and min(b.stop - b.start for b in rows.blocks) >= MIN_SAMPLES
         noise = block_noise(rows.H, fit.residual, rows.blocks) if long else ()
+        if method == "gls" and noise and fit.deficiency is None:
+            fit = _weighed_by_spectrum(rows, noise)
         return Estimate(rows, fit, None, None, None, noise)
     internal = least_squares(rows.H, rows.y, rows.names, rows.std_error)
     verdict = _judge(rows, internal)

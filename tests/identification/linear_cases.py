@@ -75,9 +75,9 @@ def _ml(Sigma):
     return solve
 
 
-def _rows(H, y):
+def _rows(H, y, method="wls"):
     """Even samples of unknown noise, as `rig fit` treats a sine or a ramp."""
-    found = estimate(Rows(H, y, NAMES, (slice(0, y.size),), even=True))
+    found = estimate(Rows(H, y, NAMES, (slice(0, y.size),), even=True), method)
     spread = [found.spread(c) for c in np.eye(2)]
     return found.fit.theta, np.array([s.std for s in spread]), np.array([s.dof for s in spread])
 
@@ -101,6 +101,7 @@ def linear_cases():
     yield linear("streaming LS", "white", _stream, n=2000, cheap=2)
     for noise in NOISES:
         yield linear("samples, noise unknown, 120", noise, _rows, cheap=2)
+        yield linear("samples, spectrum weighed, 120", noise, lambda H, y: _rows(H, y, "gls"), cheap=2)
         yield linear("samples, noise unknown, 1600", noise, _rows, n=1600)
 
 

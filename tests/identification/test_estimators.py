@@ -15,7 +15,7 @@ from monte_carlo import NOISES, covariance, efficient, results, sample
 from identification.regression import least_squares
 
 RUNS = {
-    "C+/C-": 0, "holds of 60": 40, "holds of 200": 0, "sine": 80, "1600": 150, "unknown, 120": 300, "Savitzky": 60,
+    "C+/C-": 0, "holds of 60": 40, "holds of 200": 0, "sine": 80, "1600": 150, ", 120": 300, "Savitzky": 60,
 }  # fmt: skip
 """By a part of the name; 400 of the others, 0: left to the benchmark."""
 CORRELATED = ("eq. 4.6 as printed", "stated for white noise")
@@ -35,8 +35,8 @@ CASES = [c for c in cases() if runs_of(c)]
 def test_variance_reaches_the_bound_and_intervals_cover(case):
     unaware = case.remark.startswith(CORRELATED)
     limit = ATTAINED
-    if unaware or "holds" in case.name or case.name.endswith("120"):
-        limit = SHORT.get(case.noise, 1.03)
+    if unaware or "holds" in case.name or "120" in case.name:
+        limit = 1.08 if "weighed" in case.name else SHORT.get(case.noise, 1.03)
     for found in results(case, sample(case, range(runs_of(case)), 11)):
         assert found.failed == 0
         assert abs(found.bias) < 4
@@ -46,7 +46,7 @@ def test_variance_reaches_the_bound_and_intervals_cover(case):
         if unaware:
             assert two + 3 * two_error < 0.90  # not corrected for correlation: said to fail, and does
         else:
-            slack = 0.01 if case.noise == "white" and "unknown" not in case.name and "holds" not in case.name else 0.09
+            slack = 0.01 if case.noise == "white" and "samples" not in case.name and "holds" not in case.name else 0.09
             assert abs(one - 0.68) < slack + 3.5 * one_error
             assert abs(two - 0.95) < slack / 2 + 3.5 * two_error
 
