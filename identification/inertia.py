@@ -20,7 +20,8 @@ from identification.recording import Floats
 from identification.thrust_data import Unusable
 from identification.vehicle import unit_of
 from identification.vehicle_entangled import entanglement
-from identification.vehicle_simulation import Validation, simulate_all, validate
+from identification.vehicle_replay import Validation, validate
+from identification.vehicle_simulation import simulate_all
 from identification.vehicle_trials import Trial
 from identification.velocity import derivative
 from identification.verdicts import Whiteness, significance, whiteness

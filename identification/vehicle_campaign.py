@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from types import MappingProxyType
 from typing import Literal
 
@@ -182,28 +182,22 @@ def identify_axis(
     told = independent(known, stated.select([name for name in stated.names if name not in known.names]))
     names = [r.recording_id for r in (*trials.steady, *trials.moving)]
     ballast = ballast_of(names, facts.ballast) if axis == "heave" else {}
-    drag = identify_drag(
-        trials.steady, installation, axis, told, current=facts.current, experiments=facts.ballast
-    )  # fmt: skip
+    drag = identify_drag(trials.steady, installation, axis, told, current=facts.current, experiments=facts.ballast)
     made = [trial(recording, installation, axis) for recording in trials.moving]
     moving = tuple(one for one in made if isinstance(one, Trial))
-    if not moving:
-        refused = "; ".join(one.reason for one in made if isinstance(one, Unusable))
-        reason = refused or "no sine-force trial was given"
-        return AxisResult(
-            axis, drag, Unusable(f"{axis}: inertia not identified: {reason}"), ballast=ballast
-        )  # fmt: skip
-    if isinstance(drag, Unusable):
+    refused = "; ".join(one.reason for one in made if isinstance(one, Unusable))
+    reason = "drag and efficiency are not known" if moving else refused or "no sine-force trial was given"
+    nothing = Unusable(f"{axis}: inertia not identified: {reason}")
+    first = AxisResult(axis, drag, nothing, moving, ballast=ballast, stated=stated)
+    if moving and isinstance(drag, Unusable):
         why = drag if trials.steady else Unusable(f"{axis}: no constant-velocity run: all from the trials at once")
-        return AxisResult(
-            axis, why, at_once(moving, installation, told, ballast, facts.current), moving, told, ballast, stated
-        )
-    if drag.maximum.deficiency is not None:
-        lost = Unusable(f"{axis}: inertia not identified: drag and efficiency are not known")
-        return AxisResult(axis, drag, lost, moving, ballast=ballast)
+        found = at_once(moving, installation, told, ballast, facts.current)
+        return replace(first, drag=why, inertia=found, known=told)
+    if not moving or isinstance(drag, Unusable) or drag.maximum.deficiency is not None:
+        return first
     mass = told.select([name for name in told.names if name == "m"])
     last, step_one = step_two(moving, drag, ballast, mass)
-    return AxisResult(axis, drag, last, moving, step_one, ballast, stated)
+    return replace(first, inertia=last, known=step_one)
 
 
 def step_two(

@@ -12,12 +12,12 @@ import numpy as np
 
 from identification.efficiency import Installation
 from identification.inertia import InertiaFit
-from identification.maximum_likelihood import Gaussian
+from identification.maximum_likelihood import NOTHING, Gaussian, independent
 from identification.recording import Recording
 from identification.thrust_data import Unusable
 from identification.vehicle_campaign import AxisResult, CampaignFacts, VehicleFit, identify_vehicle, sort_trials
+from identification.vehicle_replay import Replay, replay
 from identification.vehicle_rivals import rivals
-from identification.vehicle_simulation import Replay, replay
 from identification.vehicle_trials import Trial, ballast_of, trial
 from rig.errors import ConfigError, RecordingError, RigError
 from rig.installation import InstallationFile, Vehicle, load_installation
@@ -37,6 +37,7 @@ class HeldOut:
     replay: Replay
     without: Replay | None
     """None when the installation has no efficiency, or without one nothing was identified on that axis."""
+    note: str = ""
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +187,9 @@ def _held_out(
                     "recordings of another axis, or give trials of this one"
                 )
             without = _one_replay(recording, bare, axis, facts, plain) if plain is not None else None
-            out.append(HeldOut(recording.recording_id, axis, found, without))
+            floats = _buoyancy(recording.recording_id, axis, facts, fit)
+            note = "its ballast was not identified: buoyancy taken as the mean of the others" if floats.cov.size else ""
+            out.append(HeldOut(recording.recording_id, axis, found, without, note))
     return tuple(out)
 
 
@@ -201,7 +204,18 @@ def _one_replay(
         return None
     name = recording.recording_id
     floats = ballast_of([name], facts.ballast) if axis == "heave" else {}
-    return replay([one], estimate, floats, fit_start=one.quantity != "speed")[0]
+    whole = independent(estimate, _buoyancy(name, axis, facts, fit))
+    return replay([one], whole, floats, fit_start=one.quantity != "speed")[0]
+
+
+def _buoyancy(name: str, axis: str, facts: CampaignFacts, fit: VehicleFit) -> Gaussian:
+    """For a recording whose ballast no other has: the mean of the buoyancies that were identified."""
+    estimate = fit.axes[axis].estimate
+    wanted = ballast_of([name], facts.ballast)[name]
+    if axis != "heave" or estimate is None or wanted in estimate.names:
+        return NOTHING
+    others = [estimate[one] for one in estimate.names if one.startswith("buoyancy")]
+    return Gaussian((wanted,), np.array([np.mean(others)]), np.zeros((1, 1)))
 
 
 def _comparators(fit: VehicleFit) -> dict[str, tuple[InertiaFit | Unusable, ...]]:

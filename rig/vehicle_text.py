@@ -13,8 +13,8 @@ from identification.thrust_data import Unusable
 from identification.thrust_report import digits
 from identification.vehicle import DragFit
 from identification.vehicle_campaign import AxisResult
+from identification.vehicle_replay import Replay
 from identification.vehicle_report import Row, rows
-from identification.vehicle_simulation import Replay
 from rig.vehicle import VehicleAnswer
 
 LEARNT = 0.5
@@ -136,7 +136,7 @@ def _held_out_lines(answer: VehicleAnswer) -> Iterator[str]:
         line = f"  {one.name:<24}{one.axis:<7}{one.replay.validation.rmse:>9.3g} {unit:<6} rms"
         if one.without is not None:
             line += f"; without efficiencies {one.without.validation.rmse:.3g} {unit}"
-        yield line
+        yield f"{line}; {one.note}" if one.note else line
     for result in answer.without.axes.values() if answer.without is not None else ():
         yield from (f"  - without efficiencies, {text}" for text in result.contradictions)
 
@@ -260,6 +260,7 @@ def answer_json(answer: VehicleAnswer) -> dict[str, Any]:
                 "axis": one.axis,
                 "with_efficiency": _replay_json(one.replay, one.axis),
                 "without_efficiency": _replay_json(one.without, one.axis),
+                "note": one.note,
             }
             for one in answer.held_out
         ],

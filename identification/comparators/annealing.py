@@ -18,7 +18,7 @@ from identification.inertia import InertiaFit, output_error, responses, starts_o
 from identification.maximum_likelihood import Gaussian
 from identification.recording import Floats
 from identification.thrust_data import Unusable
-from identification.vehicle_simulation import validate
+from identification.vehicle_replay import validate
 from identification.vehicle_trials import Trial
 
 

@@ -16,7 +16,8 @@ from identification.inertia_by_derivative import sensor_noise
 from identification.maximum_likelihood import NOTHING, Gaussian
 from identification.recording import Floats
 from identification.thrust_data import Unusable
-from identification.vehicle_simulation import column, current_along, integrate, validate
+from identification.vehicle_replay import validate
+from identification.vehicle_simulation import column, current_along, integrate
 from identification.vehicle_trials import Trial
 
 START_SPREAD = 0.5

@@ -73,4 +73,6 @@ class Hull:
 
     def force(self, axis: str, volts: Mapping[str, float]) -> float:
         """N (N.m) of all thrusters on an axis."""
-        return sum(t.arms.get(axis, 0.0) * self.thrust(name, volts) for name, t in self.thrusters.items())
+        return sum(
+            self.thrusters[name].arms.get(axis, 0.0) * self.thrust(name, volts) for name, V in volts.items() if V
+        )

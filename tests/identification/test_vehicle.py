@@ -21,7 +21,7 @@ from identification.maximum_likelihood import Gaussian
 from identification.thrust_data import Unusable
 from identification.vehicle import fit_runs, identify_drag, passed_on
 from identification.vehicle_campaign import AxisTrials, CampaignFacts, identify_axis, identify_vehicle, sort_trials
-from identification.vehicle_simulation import validate
+from identification.vehicle_replay import validate
 from identification.vehicle_trials import Trial, steady_runs, trial
 from sim_devices.vehicle import romeo, run_trials
 from sim_devices.vehicle.campaign import (
@@ -203,7 +203,7 @@ def test_refusals_are_sentences():
     alone = identify_axis(AxisTrials(tuple(one)), vehicle, "surge")
     assert "no sine-force trial was given" in alone.inertia.reason
     none = identify_axis(AxisTrials(), vehicle, "surge")
-    assert "without drag" in none.inertia.reason
+    assert "at least two" in none.drag.reason
     assert len(none.statements) == 2
     heave = identify_axis(
         AxisTrials(tuple(one), tuple(steady(romeo(), [sine("heave", DIVE, 10.0)]))), vehicle, "surge",

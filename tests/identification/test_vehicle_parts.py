@@ -25,7 +25,8 @@ from identification.thrust import fit_thrust
 from identification.thrust_data import Unusable
 from identification.vehicle import identify_drag, steady_velocity, unit_of
 from identification.vehicle_entangled import entanglement
-from identification.vehicle_simulation import fit_percent, integrate
+from identification.vehicle_replay import fit_percent
+from identification.vehicle_simulation import integrate
 from identification.vehicle_trials import Trial, dominant_axis, response_of, steady_runs, trial
 from sim_devices.vehicle import romeo
 from sim_devices.vehicle.campaign import FRONT, sine, there_and_back

@@ -112,7 +112,7 @@ def compared(rng):
         lambda: output_error(moving, known),
         lambda: by_derivative(moving, known),
         lambda: by_kalman(moving, known),
-        lambda: by_annealing(moving, known, {"m": (100.0, 5000.0)}, rng),
+        lambda: by_annealing(moving, known, {"m": (100.0, 5000.0)}, rng, rounds=12),
     )
     for way in ways:
         begin = process_time()

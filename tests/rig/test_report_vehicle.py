@@ -10,7 +10,7 @@ from identification.maximum_likelihood import Gaussian, independent
 from identification.recording import Channel, Recording, Step
 from identification.thrust_data import Unusable
 from identification.vehicle_campaign import identify_vehicle
-from identification.vehicle_simulation import Replay
+from identification.vehicle_replay import Replay
 from rig.report.page import html
 from rig.report.vehicle import vehicle_page
 from rig.vehicle import HeldOut, VehicleAnswer
