@@ -84,16 +84,23 @@ def _prepared(recordings: Sequence[Recording], voltage: str) -> list[Run]:
 def _answer(recordings: Sequence[Recording], runs: Sequence[Run], wanted: Wanted) -> Answer:
     fit = fit_runs(runs, wanted.model, wanted.method)
     if isinstance(fit, Unusable):
-        raise RecordingError(fit.reason)
+        raise RecordingError("; ".join([fit.reason, *_out_of_order(recordings)]))
     notes = tuple(
         f"{recording.source or recording.recording_id} was {recording.outcome}: what it holds was used"
         for recording in recordings
         if recording.outcome in {"aborted", "tripped"}
     )
+    notes = (*_out_of_order(recordings), *notes)
     others = tuple(_beside(recordings, runs, wanted))
     dynamics = fit_dynamics(recordings) if wanted.dynamics else None
     remainders = tuple(without(fit, name) for name in fit.parameters)
     return Answer(fit, others, notes, side_by_side((fit, *others)), remainders, dynamics)
+
+
+def _out_of_order(recordings: Sequence[Recording]) -> list[str]:
+    """What the reader had to leave out since its time runs backwards."""
+    texts = [event.text for recording in recordings for event in recording.events if event.level == "warning"]
+    return [text for text in texts if "running back" in text]
 
 
 def _models(runs: Sequence[Run], but: Model | None = None) -> list[Model]:

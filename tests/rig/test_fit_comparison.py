@@ -193,3 +193,18 @@ def test_covariance_is_in_the_json(tmp_path):
     assert np.sqrt(cov[0, 0]) == pytest.approx(found["parameters"]["C_plus"]["std"])
     assert found["parameters"]["C_plus"]["std_uncorrected"] > 0
     assert found["significance"]["C_plus"]["percent_uncorrected"] > 0
+
+
+def test_rows_out_of_order_are_said(tmp_path):
+    path = write(tmp_path / "a.h5")
+    with h5py.File(path, "r+") as file:
+        time = file["streams/cell/time"]
+        time[...] = time[...][::-1]
+    result = run(path)
+    assert result.exit_code == 2
+    assert "899 rows left out: time not finite or running back" in result.output
+    with h5py.File(path, "r+") as file:
+        time = file["streams/cell/time"]
+        time[...] = time[...][::-1]
+        time[5] = 0.0
+    assert any("running back" in text for text in document(path)["fits"][0]["verdicts"])
