@@ -16,6 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
+from identification.vehicle_replay import Replay
 from rig.importer import import_file
 from rig.importing.mapping import read_map
 from rig.vehicle import VehicleAnswer, identify_files
@@ -45,19 +46,39 @@ def held_out(files: Sequence[Path], installation: Path) -> list[VehicleAnswer]:
     ]
 
 
-def rms(errors: Sequence[float]) -> float:
-    return float(np.sqrt(np.mean(np.square(errors))))
+def rms(found: Sequence[Replay]) -> str:
+    """Over all runs; those in which the vehicle runs away are counted apart."""
+    good = [one.validation.rmse for one in found if not one.ran_away]
+    lost = len(found) - len(good)
+    text = f"{np.sqrt(np.mean(np.square(good))):.4f}" if good else "-"
+    return f"{text} ({lost} of {len(found)} runs not: there the identified vehicle runs away)" if lost else text
 
 
 def show(files: Sequence[Path], installation: Path) -> None:
-    """Identify from all files, then the error on runs that were not fitted, with the efficiency and without."""
-    print(answer_text(identify_files(files, installation=installation)))
-    kept = [one for answer in held_out(files, installation) for one in answer.held_out]
+    """Identify from all files, then the error on runs that were not fitted."""
+    print(answer_text(identify_files(files, installation=installation)), "\n")
+    print("held out, a third of the runs at a time:")
+    errors(files, installation)
+
+
+def errors(files: Sequence[Path], installation: Path) -> None:
+    """Simulation error on runs that were not fitted, with the efficiency and without."""
+    folds = held_out(files, installation)
+    kept = [one for answer in folds for one in answer.held_out]
     quantity = kept[0].replay.quantity
-    found = f"{rms([one.replay.validation.rmse for one in kept]):.4f}"
-    bare = [one.without.validation.rmse for one in kept if one.without is not None]
-    print(f"\nheld out, a third of the runs at a time: {quantity} off by {found} rms with the efficiency", end="")
-    print(f", {rms(bare):.4f} without" if bare else "")
+    print(f"  {quantity} off by {rms([one.replay for one in kept])} rms", end="")
+    bare = [one.without for one in kept if one.without is not None]
+    print(f" with the efficiency, {rms(bare)} without" if bare else "")
+    for answer in folds:
+        for result in answer.without.axes.values() if answer.without is not None else ():
+            print("".join(f"  without it, {text}\n" for text in result.contradictions), end="")
+
+
+def mass_held(installation: Path) -> Path:
+    """The same installation with the mass exactly as stated: no model may buy a lower force with a heavier boat."""
+    out = installation.with_name("mass_held.toml")
+    out.write_text(installation.read_text(encoding="utf-8").replace("std = 2.8", "std = 0.01"), encoding="utf-8")
+    return out
 
 
 def main(root: Path) -> None:
@@ -74,6 +95,9 @@ def main(root: Path) -> None:
             shutil.copy(EXAMPLES / f"{name}.toml", folder)
             print(f"=== {name}")
             show(files, folder / f"{name}.toml")
+            if name == "usv_lake":
+                print("the same with the mass held at 28 kg:")
+                errors(files, mass_held(folder / f"{name}.toml"))
             print()
 
 

@@ -76,7 +76,10 @@ class InertiaFit:
         if self.maximum is not None:
             physical = [n for n in self.estimate.names if n in ("m", "k", "k2") or n.startswith("eta")]
             out.extend(entanglement(self.axis, self.maximum, physical))
-        out.extend(f"{self.axis}: {w.statement}" for w in self.whiteness if w is not None and not w.white)
+        coloured = [w for w in self.whiteness if w is not None and not w.white]
+        if coloured:
+            worst = min(coloured, key=lambda w: w.p_value)
+            out.append(f"{self.axis}: in {len(coloured)} of {len(self.whiteness)} trials {worst.statement}")
         return tuple(out)
 
     def _fitted(self, name: str) -> bool:

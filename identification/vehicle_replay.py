@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.maximum_likelihood import Gaussian
 from identification.recording import Floats
-from identification.vehicle_simulation import simulate_all
+from identification.vehicle_simulation import RUNAWAY, simulate_all
 from identification.vehicle_trials import Trial
 
 
@@ -48,6 +48,11 @@ class Replay:
     time: Floats
     measured: Floats
     simulated: Floats
+
+    @property
+    def ran_away(self) -> bool:
+        """The identified vehicle gathers speed without end: its drag is negative where the trial takes it."""
+        return bool(np.abs(self.simulated).max() >= RUNAWAY / 2)
 
     @property
     def validation(self) -> Validation:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import norm
 
-from identification.efficiency import efficiency_sentence
 from identification.maximum_likelihood import Gaussian
 from identification.vehicle import unit_of
 from identification.verdicts import significance
@@ -67,7 +66,7 @@ def verdict(name: str, value: float, std: float) -> str:
     >>> verdict("k2", 420.0, 5.0), verdict("k", 3.0, 4.0), verdict("buoyancy[1]", -40.0, 1.0)
     ('significant', 'not told apart from 0 (eq. 4.11)', 'floats')
     >>> verdict("eta_hull", 0.7, 0.02), verdict("m", -3.0, 1.0)
-    ('70 % of the thrust in the tunnel', 'negative: no body has that')
+    ('70 % of the calibrated thrust', 'negative: no body has that')
     """
     if not np.isfinite(std):
         return "not determined"
@@ -80,12 +79,12 @@ def verdict(name: str, value: float, std: float) -> str:
         return ("sinks" if value > 0 else "floats") if seen else "not told apart from neutral"
     if name in ("m", "k", "k2", "current_north", "current_east"):
         return "significant" if seen else "not told apart from 0 (eq. 4.11)"
-    return _efficiency(name, value, std)
+    return _efficiency(value, std)
 
 
-def _efficiency(name: str, value: float, std: float) -> str:
+def _efficiency(value: float, std: float) -> str:
     if not significance(1 - value, std).significant:
         return "not told apart from 1"
     if value > 1:
-        return efficiency_sentence(name, value, std).split(": ")[1]
-    return f"{100 * value:.0f} % of the thrust in the tunnel"
+        return "more than the calibrated thrust: are calibration and lay-out as stated?"
+    return f"{100 * value:.0f} % of the calibrated thrust"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -17,9 +17,12 @@ from identification.vehicle_replay import Replay
 from identification.vehicle_report import Row, rows
 from rig.vehicle import VehicleAnswer
 
+RAN_AWAY = "runs away: the drag that was identified is negative there"
 LEARNT = 0.5
 """Share of the earlier standard deviation below which these trials have told more than the calibration had."""
-FORM = "  {:<22}{:>12}{:>11}{:>12}{:>12}  {:<15}{}"
+NAMES = 18
+"""Least width of the column of names."""
+FORM = "  {:<{width}}{:>12}{:>11}{:>12}{:>12}  {:<15}{}"
 
 
 def answer_text(answer: VehicleAnswer) -> str:
@@ -29,8 +32,7 @@ def answer_text(answer: VehicleAnswer) -> str:
         lines += ["", f"{axis.upper()}: {_axis_sentence(result)}"]
         estimate = result.estimate
         if estimate is not None:
-            lines.append(FORM.format("", "value", "std", "95 % from", "to", "unit", "").rstrip())
-            lines += [_table_line(row) for row in (*rows(estimate, axis), *_learnt(answer, axis, estimate))]
+            lines += _table((*rows(estimate, axis), *_learnt(answer, axis, estimate)))
         lines += [f"  - {text}" for text in _verdicts(result)]
         lines += list(_replay_lines(answer.replays.get(axis, ()), axis))
         lines += list(_rival_lines(answer, axis))
@@ -70,11 +72,15 @@ def _without(text: str, axis: str) -> str:
     return text.removeprefix(f"{axis}: ")
 
 
-def _table_line(row: Row) -> str:
-    if not row.determined:
-        return FORM.format(row.name, "-", "-", "-", "-", row.unit, row.verdict).rstrip()
-    numbers = [digits(x, row.std) for x in (row.value, row.std, row.low, row.high)]
-    return FORM.format(row.name, *numbers, row.unit, row.verdict).rstrip()
+def _table(found: Sequence[Row]) -> list[str]:
+    """A head and a line per parameter."""
+    width = max([NAMES, *(len(row.name) + 1 for row in found)])
+    head = FORM.format("", "value", "std", "95 % from", "to", "unit", "", width=width)
+    lines = [head]
+    for row in found:
+        numbers = [digits(x, row.std) if row.determined else "-" for x in (row.value, row.std, row.low, row.high)]
+        lines.append(FORM.format(row.name, *numbers, row.unit, row.verdict, width=width))
+    return [line.rstrip() for line in lines]
 
 
 def _verdicts(result: AxisResult) -> list[str]:
@@ -103,7 +109,8 @@ def _replay_lines(found: tuple[Replay, ...], axis: str) -> Iterator[str]:
     for one in found:
         check = one.validation
         unit = unit_of_response(axis, one.quantity)
-        yield f"    {one.recording_id:<24}{check.rmse:>9.3g} {unit:<6} rms, fit {check.fit:6.2f} %"
+        said = RAN_AWAY if one.ran_away else f"{check.rmse:>9.3g} {unit:<6} rms, fit {check.fit:6.2f} %"
+        yield f"    {one.recording_id:<24}{said}"
 
 
 def _rival_lines(answer: VehicleAnswer, axis: str) -> Iterator[str]:
@@ -133,12 +140,16 @@ def _held_out_lines(answer: VehicleAnswer) -> Iterator[str]:
     yield "HELD OUT (not fitted; simulated from the commands and how the recording began):"
     for one in found:
         unit = unit_of_response(one.axis, one.replay.quantity)
-        line = f"  {one.name:<24}{one.axis:<7}{one.replay.validation.rmse:>9.3g} {unit:<6} rms"
+        line = f"  {one.name:<24}{one.axis:<7}{_off(one.replay, unit)}"
         if one.without is not None:
-            line += f"; without efficiencies {one.without.validation.rmse:.3g} {unit}"
+            line += f"; without efficiencies {_off(one.without, unit)}"
         yield f"{line}; {one.note}" if one.note else line
     for result in answer.without.axes.values() if answer.without is not None else ():
         yield from (f"  - without efficiencies, {text}" for text in result.contradictions)
+
+
+def _off(one: Replay, unit: str) -> str:
+    return RAN_AWAY if one.ran_away else f"{one.validation.rmse:.3g} {unit} rms"
 
 
 def _number(value: float | None) -> float | None:
@@ -210,8 +221,9 @@ def _replay_json(one: Replay | None, axis: str) -> dict[str, Any] | None:
         "recording": one.recording_id,
         "quantity": one.quantity,
         "unit": unit,
-        "rmse": _number(check.rmse),
-        "fit_percent": _number(check.fit),
+        "ran_away": one.ran_away,
+        "rmse": None if one.ran_away else _number(check.rmse),
+        "fit_percent": None if one.ran_away else _number(check.fit),
     }
 
 

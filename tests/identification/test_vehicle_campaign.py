@@ -128,7 +128,7 @@ def test_replay_of_speeds_and_of_trials_on_different_grids(made, plain):
 
 def test_words_of_parameters():
     assert verdict("k", float("nan"), float("nan")) == "not determined"
-    assert verdict("eta", 1.3, 0.01).startswith("more thrust than in the tunnel")
+    assert verdict("eta", 1.3, 0.01).startswith("more than the calibrated thrust")
     assert verdict("eta", 1.0, 0.01) == "not told apart from 1"
     assert verdict("buoyancy[a]", 3.0, 0.1) == "sinks"
     assert verdict("buoyancy[a]", 0.1, 0.1) == "not told apart from neutral"

@@ -86,7 +86,7 @@ def test_other_ways_to_the_inertia_stand_beside_ours(whole):
         m = way["parameters"]["m"]
         assert abs(m["value"] - 800.0) < 5 * m["std"]
     assert "extended Kalman filter" in text
-    assert "70 % of the thrust in the tunnel" in text
+    assert "70 % of the calibrated thrust" in text
 
 
 def test_without_a_sine_the_drag_is_still_said(files):
