@@ -2,8 +2,8 @@
 
 It says in which valley the error is least, not how well that is known: from there `identification.inertia.output_error`
 goes to the bottom, with the starts of the trials and all that was known beforehand free to move, and the covariance is
-that of its estimate. (The annealed values themselves had some 20 times the variance in ten runs: they are found with the velocity at
-the start held at what the first, noisy, measurements show.)
+that of its estimate. (The annealed values themselves had some 20 times the variance in ten runs: they are found with
+the velocity at the start held at what the first, noisy, measurements show.)
 """
 
 from __future__ import annotations
