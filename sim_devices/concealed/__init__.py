@@ -12,6 +12,7 @@
     truth = concealed.truth(case)                                      # dict for a sealed JSON file
 
 `strength` is d': the sigma at which an oracle sees the effect that knows it, its shape and the noise (`oracle`).
+`concealed.twins(case, effect, rivals, rng)`: how many sigma each rival would leave in place of the effect.
 Effects are the ids of `shapes.SHAPES`: the world's catalogue, and those of `world.effects.uncatalogued`.
 
 What a clean recording still holds: thrust C V|V| of the command in force at each sample, at once (rotor
@@ -28,6 +29,7 @@ from sim_devices.concealed.faults import Column
 from sim_devices.concealed.oracle import OutOfReach, scaled_to, strength
 from sim_devices.concealed.plans import KINDS as PLAN_KINDS
 from sim_devices.concealed.records import Rows, rows, truth
+from sim_devices.concealed.rivals import twins
 from sim_devices.concealed.shapes import FORMS, SHAPES
 
 __all__ = [
@@ -45,4 +47,5 @@ __all__ = [
     "scaled_to",
     "strength",
     "truth",
+    "twins",
 ]

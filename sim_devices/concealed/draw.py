@@ -9,7 +9,7 @@ import numpy as np
 
 from sim_devices.concealed.definition import Case, Concealed, Run, Sensor
 from sim_devices.concealed.faults import fault
-from sim_devices.concealed.oracle import OutOfReach, measured, scaled_to
+from sim_devices.concealed.oracle import OutOfReach, levelled, scaled_to
 from sim_devices.concealed.plans import KINDS, profile
 from sim_devices.concealed.shapes import Scale, shape
 from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, flicker
@@ -61,12 +61,13 @@ def case(
             for effect, form in zip(effects, wanted, strict=True):
                 added = Concealed(shape(effect, drawn.scale, rng, form), 0.0)
                 drawn = scaled_to(replace(drawn, effects=(*drawn.effects, added)), effect, strength)
+            drawn = levelled(drawn, strength) if len(effects) > 1 else drawn
         except OutOfReach:
             continue
         if lie:
             told = fault(lie, ["thrust", *(s.quantity for s in drawn.sensors)], drawn.scale.duration, rng)
             drawn = replace(drawn, fault=told)
-        return measured(drawn) if len(effects) > 1 else drawn
+        return drawn
     raise OutOfReach(f"no case of {TRIES} shows {', '.join(effects)} at {strength} sigma; expected a lower strength")
 
 

@@ -12,14 +12,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft
 
-from sim_devices.concealed.definition import Case, Concealed, history, thrust_of
-from sim_devices.concealed.plans import held
+from sim_devices.concealed.definition import Case, Concealed
+from sim_devices.concealed.projection import Projection, Screen, signals
 from sim_devices.concealed.shapes import LEAST
-from sim_devices.concealed.whitening import Whitening
-from sim_devices.world.history import clock
-from sim_devices.world.noise_law import scaled, spectrum
+from sim_devices.world.noise_law import scaled
 
 Floats = NDArray[np.float64]
 
@@ -27,6 +24,8 @@ CLOSE = 0.03
 """relative error of d' at which the search for the amount ends; the noise then takes up the rest."""
 QUIETEST, LOUDEST = 3e-5, 0.05
 """Noise of the cell as a share of the largest thrust: what can still be called a load cell."""
+LEVEL = 0.15
+"""relative: how far the strengths of several effects in one case may be from the one asked for."""
 EVALUATIONS = 14
 
 
@@ -38,8 +37,8 @@ def strength(case: Case, effect: str) -> float:
     """Sigma (d') of `effect` in this case, in the presence of the others. Raises ValueError when it is not there."""
     if effect not in {c.effect for c in case.effects}:
         raise ValueError(f"strength: expected one of {[c.effect for c in case.effects]}, got {effect!r}")
-    without = _signals(case, frozenset({effect}))
-    return _Projection(case, _signals(case)).strength(_signals(case), without)
+    without = signals(case, frozenset({effect}))
+    return Projection(case, signals(case)).strength(signals(case), without)
 
 
 def measured(case: Case) -> Case:
@@ -54,17 +53,41 @@ def scaled_to(case: Case, effect: str, d_prime: float) -> Case:
     noise is scaled so that the exact strength is met, also where the amount jumps over it or its bounds end before.
     Raises OutOfReach when that noise would be no load cell's.
     """
-    without = _signals(case, frozenset({effect}))
-    screen = Screen(case, without)
+    without = signals(case, frozenset({effect}))
+    found = _with_strength(case, effect, Screen(case, without), without, d_prime)
+    reached = Projection(found, without).strength(signals(found), without)
+    return _with_noise(found, effect, reached / d_prime)
+
+
+def levelled(case: Case, d_prime: float) -> Case:
+    """The case with each of several effects at `d_prime`, the noise left as it is, strengths written beside.
+
+    The noise that suited the last effect may have been too loud for the first. Raises OutOfReach when an amount meets
+    its bounds.
+    """
+    for effect in [c.effect for c in case.effects]:
+        off = strength(case, effect) / d_prime
+        if abs(off - 1.0) > CLOSE:
+            without = signals(case, frozenset({effect}))
+            screen = Screen(case, without)
+            here = screen.strength(signals(case), without)  # times 1 / off: what it sees where the oracle sees d_prime
+            case = _with_strength(case, effect, screen, without, here / off)
+    case = measured(case)
+    for found in case.effects:
+        if abs(found.seen / d_prime - 1.0) > LEVEL:
+            raise OutOfReach(f"{found.effect} is seen at {found.seen:.3g} sigma beside the others: draw another case")
+    return case
+
+
+def _with_strength(case: Case, effect: str, screen: Screen, without: list[Floats], target: float) -> Case:
+    """As much of `effect` as the screen sees at `target`, within its bounds."""
     shape = next(c.shape for c in case.effects if c.effect == effect)
 
     def seen(amount: float) -> float:
-        return screen.strength(_signals(with_amount(case, effect, amount)), without)
+        return screen.strength(signals(with_amount(case, effect, amount)), without)
 
     lowest = shape.lowest or LEAST * shape.highest
-    found = with_amount(case, effect, _searched(seen, d_prime, lowest, shape.highest))
-    reached = _Projection(found, without).strength(_signals(found), without)
-    return _with_noise(found, effect, reached / d_prime)
+    return with_amount(case, effect, _searched(seen, target, lowest, shape.highest))
 
 
 def with_amount(case: Case, effect: str, amount: float) -> Case:
@@ -127,84 +150,3 @@ def _next(low: _Point, high: _Point, target: float) -> float:
     slope = np.log(high.amount / low.amount) / np.log(high.seen / low.seen)
     share = np.log(target / low.seen) * slope / np.log(high.amount / low.amount)
     return float(low.amount * (high.amount / low.amount) ** min(max(share, 0.1), 0.9))
-
-
-def _signals(case: Case, without: frozenset[str] = frozenset()) -> list[Floats]:
-    """Noise-free thrust of each run."""
-    return [thrust_of(case, run, history(case, run, without=without), without=without) for run in case.runs]
-
-
-class _Projection:
-    """Exact whitening and baseline columns of all runs; made once, asked for differences."""
-
-    def __init__(self, case: Case, values: list[Floats]) -> None:
-        self._runs = []
-        for run, value, columns in zip(case.runs, values, _baseline(case, values), strict=True):
-            whitening = Whitening(case.noise, value - run.tare, case.rate)
-            self._runs.append((whitening, whitening.solve(columns)))
-        grams = [c.T @ solved for c, (_, solved) in zip(_baseline(case, values), self._runs, strict=True)]
-        self._gram = np.sum(grams, axis=0)
-
-    def strength(self, with_effect: list[Floats], without: list[Floats]) -> float:
-        energy, shared = 0.0, np.zeros(len(self._gram))
-        for (whitening, solved), one, other in zip(self._runs, with_effect, without, strict=True):
-            x = one - other
-            energy += float(x @ whitening.solve(x[:, None])[:, 0])
-            shared += solved.T @ x
-        return _projected(energy, shared, self._gram)
-
-
-class Screen:
-    """The same with the noise taken as stationary and periodic: a Fourier transform a question. Good to some per cent
-    where the noise is not slower than the run.
-    """
-
-    def __init__(self, case: Case, values: list[Floats]) -> None:
-        self._weights: list[Floats] = []
-        self._columns: list[NDArray[np.complex128]] = []
-        self._length: list[int] = []
-        for run, value, columns in zip(case.runs, values, _baseline(case, values), strict=True):
-            n = next_fast_len(value.size, real=True)
-            white = np.mean(case.noise.white_std(value - run.tare) ** 2)
-            law = replace(case.noise, white=float(np.sqrt(white)), proportional=0.0)
-            frequency = np.asarray(np.fft.rfftfreq(n, 1.0 / case.rate), dtype=np.float64)
-            # one-sided density S: sum over the positive lines of 4 |X|^2 / (n rate S) is x' K^-1 x
-            self._weights.append(4.0 / (n * case.rate * spectrum(law, frequency, case.rate)))
-            self._weights[-1][0] *= 0.5
-            self._columns.append(rfft(columns, n, axis=0))
-            self._length.append(n)
-        grams = [(c.conj().T * w @ c).real for c, w in zip(self._columns, self._weights, strict=True)]
-        self._gram = np.sum(grams, axis=0)
-
-    def strength(self, with_effect: list[Floats], without: list[Floats]) -> float:
-        energy, shared = 0.0, np.zeros(len(self._gram))
-        runs = zip(self._columns, self._weights, self._length, with_effect, without, strict=True)
-        for columns, weights, length, one, other in runs:
-            x = rfft(one - other, length)
-            energy += float(weights @ np.abs(x) ** 2)
-            shared += (columns.conj().T @ (weights * x)).real
-        return _projected(energy, shared, self._gram)
-
-
-def _projected(energy: float, shared: Floats, gram: Floats) -> float:
-    """Square root of the energy that the baseline's columns do not take."""
-    left = energy - float(shared @ np.linalg.solve(gram, shared))
-    return float(np.sqrt(max(left, 0.0)))
-
-
-def _baseline(case: Case, values: list[Floats]) -> list[Floats]:
-    """V|V| and one zero per run, (n, 1 + runs) for each run."""
-    found = []
-    for index, value in enumerate(values):
-        volts = history_volts(case, index)
-        columns = np.zeros((value.size, 1 + len(values)))
-        columns[:, 0], columns[:, 1 + index] = volts * np.abs(volts), 1.0
-        found.append(columns)
-    return found
-
-
-def history_volts(case: Case, index: int) -> Floats:
-    """The command at the thrust samples of run `index`, V."""
-    profile = case.runs[index].profile
-    t = clock(int(profile.duration / case.dt), case.dt)[case.first :: case.every]
-    return held(profile.time, profile.volts, t)

@@ -1,6 +1,7 @@
 """Filters over a whole run at once, for the array form of the effects.
 
 An input is held and changes halfway between grid points: that is where the command of a sweep changes.
+scipy is imported where it is used: the live bench steps, and its commands must start quickly.
 """
 
 from __future__ import annotations
@@ -9,14 +10,14 @@ from math import exp, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
-from scipy.signal import lfilter
 
 Floats = NDArray[np.float64]
 
 
 def low_pass(values: Floats, time_constant: float, dt: float) -> Floats:
     """First order: y' = (x - y)/time_constant from y = 0, exact for a held x. `dt` in s."""
+    from scipy.signal import lfilter
+
     keep = exp(-dt / time_constant)
     half = sqrt(keep)
     return np.asarray(lfilter([1.0 - half, half - keep], [1.0, -keep], values), dtype=np.float64)
@@ -24,6 +25,9 @@ def low_pass(values: Floats, time_constant: float, dt: float) -> Floats:
 
 def resonator(values: Floats, frequency: float, damping: float, dt: float) -> Floats:
     """Second order: y'' + 2 damping w y' + w^2 y = w^2 x from rest. `frequency` in Hz, `damping` of critical."""
+    from scipy.linalg import expm
+    from scipy.signal import lfilter
+
     w = 2.0 * pi * frequency
     # x_i = half (half x_{i-1} + push u_{i-1}) + push u_i, position first, with half and push over dt/2
     step = expm(np.array([[0.0, 1.0, 0.0], [-w * w, -2.0 * damping * w, w * w], [0.0, 0.0, 0.0]]) * dt / 2.0)

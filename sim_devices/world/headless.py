@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 from sim_devices.world.noise import Noise
 from sim_devices.world.settings import WorldSettings
@@ -78,6 +77,8 @@ def noise_series(noise: Noise, values: Floats, rate: float, rng: np.random.Gener
     n = len(values)
     total = (noise.white + noise.proportional * np.abs(values)) * rng.standard_normal(n)
     if noise.slow:
+        from scipy.signal import lfilter  # only here: the live bench imports this module and must start quickly
+
         keep = exp(-1.0 / (rate * noise.slow_time))
         pushes = noise.slow * sqrt(1.0 - keep * keep) * rng.standard_normal(n)
         pushes[:1] = noise.slow * rng.standard_normal(1)

@@ -8,8 +8,9 @@ import pytest
 
 from sim_devices import concealed
 from sim_devices.concealed.definition import history
-from sim_devices.concealed.oracle import history_volts, with_amount
+from sim_devices.concealed.oracle import with_amount
 from sim_devices.concealed.plans import held, profile
+from sim_devices.concealed.projection import history_volts
 from sim_devices.concealed.whitening import Whitening
 from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, drawn, peak_coefficients
 from tests.concealed.recordings import recording, recordings
@@ -173,6 +174,15 @@ def test_a_plan_lasts_as_asked_and_keeps_to_its_volts(kind):
     assert 0.8 * 24.0 < np.max(np.abs(found.volts)) <= 24.0 + 1e-9
     assert (np.min(found.volts), found.volts[0], found.volts[-1]) == (pytest.approx(-24.0, rel=0.25), 0.0, 0.0)
     assert held(found.time, found.volts, found.time + 0.001) == pytest.approx(found.volts)
+
+
+def test_twins_are_near_and_strangers_are_far():
+    case = concealed.case(rng(16), ["winding_resistance"], 40.0, noise="white", channels=[], **SHORT)
+    case = replace(case, runs=(replace(case.runs[0], flow=((0.0, 0.0),)),))
+    rivals = ["strut_drag", "temperature_squared", "exponent", "periodic_disturbance", "winding_resistance"]
+    left = {twin.rival: twin.left for twin in concealed.twins(case, "winding_resistance", rivals, rng(17))}
+    assert left.keys() == {"exponent", "periodic_disturbance"}  # no flow, no drift, not itself
+    assert left["exponent"] < 0.5 * 40.0 < 0.95 * 40.0 < left["periodic_disturbance"] <= 40.0 * 1.05
 
 
 def test_names_that_are_not_known_and_strengths_that_cannot_be():
