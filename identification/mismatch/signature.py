@@ -1,0 +1,296 @@
+"""Signatures: what a model leaves out, as measured and as the found physics has it, over the physics' own coordinate.
+
+Everything is binned from the curves of a diagnosis. Where the recordings are at hand too, each effect is seen by itself
+(the residual of the model without it) and over what else was recorded; otherwise all effects are seen together.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import pairwise
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.mismatch.diagnosis import Curves, Diagnosis, Finding
+from identification.mismatch.model import Model, Theta, predict, scale_of
+from identification.mismatch.preparing import history_of
+from identification.mismatch.twinning import given
+from identification.physics.history import TURNING, History
+from identification.recording import Floats, Recording
+from identification.twin import TERMS, Twin
+
+Kind = Literal["force", "gain", "step", "turn"]
+"""What is averaged in a bin: the residual itself / N; its share of the thrust; its share of the last change of thrust;
+the residual towards the last change of the driver / N (half the width of a loop)."""
+SPREAD_OUT = frozenset({"time_since_step", "time_since_reversal"})
+"""Coordinates with a logarithmic scale."""
+SIGNATURES: Mapping[str, tuple[str, Kind]] = {
+    "heating": ("time", "gain"),
+    "recirculation": ("time_since_step", "gain"),
+    "zero_drift": ("time", "force"),
+    "load_cell_creep": ("time_since_step", "step"),
+    "load_cell_nonlinearity": ("driver", "force"),
+    "load_cell_saturation": ("driver", "force"),
+    "motor_lag": ("time_since_step", "step"),
+    "inflow_dynamics": ("time_since_step", "step"),
+    "stand_resonance": ("time_since_step", "step"),
+    "time_skew": ("time_since_step", "step"),
+    "reversal_loss": ("time_since_reversal", "gain"),
+    "hysteresis": ("driver", "turn"),
+    "supply_sag": ("bus_voltage", "gain"),
+    "rotation_coupling": ("rotation_rate", "force"),
+    "speed_of_advance": ("flow_speed", "gain"),
+    "strut_drag": ("flow_speed", "force"),
+    "thruster_interaction": ("neighbour_thrust", "gain"),
+}
+"""Where an effect is best seen; over the driver, as a force, when it is not here."""
+LEVELS = 24
+"""So many values of a coordinate, at most, are levels with a bin each."""
+BINS = {"time": 24, "time_since_step": 12, "time_since_reversal": 12}
+MOST = 20
+"""Bins of any other coordinate."""
+SMALL = 0.02
+"""Share of the largest change or thrust below which a row tells nothing of a share."""
+CORRELATED = 0.9
+"""Largest correlation of neighbouring rows that error bars are made for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """One run at its rows with thrust, (n,) each."""
+
+    recording_id: str
+    time: Floats
+    driver: Floats
+    before: Floats
+    """N, measured less baseline."""
+    left: Floats
+    """N, measured less model."""
+    force: Floats
+    """N, C driver |driver|."""
+    step: Floats
+    """N, change of `force` since the level before."""
+    coordinates: Mapping[str, Floats]
+    """driver, time, time_since_step, time_since_reversal, previous_voltage, direction, and what else was recorded."""
+    effects: Mapping[tuple[str, str], Floats] = field(default_factory=dict)
+    """(effect, form) -> N that it changes the model by; empty where the recordings were not at hand."""
+
+
+@dataclass(frozen=True, eq=False)
+class Signature:
+    """Of one effect, bin by bin (k,)."""
+
+    quantity: str
+    """The coordinate: a name of `Run.coordinates`."""
+    kind: Kind
+    at: Floats
+    measured: Floats
+    """N, or a share (1) for the kinds gain and step."""
+    std: Floats
+    modelled: Floats
+    alone: bool
+    """This effect by itself; otherwise everything that was found together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Profile:
+    """RMS of the residual in N over a coordinate, bin by bin (k,)."""
+
+    quantity: str
+    at: Floats
+    before: Floats
+    after: Floats
+
+
+def runs_of(diagnosis: Diagnosis, recordings: Sequence[Recording] = ()) -> tuple[Run, ...]:
+    """What can be averaged. `recordings`: those diagnosed, in any order; without them there is less to see."""
+    known = {r.recording_id: r for r in recordings}
+    C = diagnosis.baseline["C"].value
+    return tuple(_run(curves, known.get(curves.recording_id), diagnosis.twin, C) for curves in diagnosis.curves)
+
+
+def _run(curves: Curves, recording: Recording | None, twin: Twin | None, C: float) -> Run:
+    full = None if recording is None else history_of(recording)
+    if isinstance(full, History) and np.isin(curves.time, full.sampled).all():
+        history, rows = full, np.searchsorted(full.sampled, curves.time)
+        effects = {} if twin is None else _effects(twin, full, rows)
+    else:
+        history, rows, effects = _history(curves), np.arange(curves.time.size), {}
+    before = history.previous[rows]
+    others = {name: value[rows] for name, value in history.others.items()}
+    turning = np.where(np.abs(history.driver) > TURNING * history.size, np.sign(history.driver), 0.0)
+    force = C * curves.driver * np.abs(curves.driver)
+    return Run(
+        curves.recording_id,
+        curves.time,
+        curves.driver,
+        curves.thrust - curves.baseline,
+        curves.thrust - curves.model,
+        force,
+        force - C * before * np.abs(before),
+        {
+            **others,
+            "driver": curves.driver,
+            "time": curves.time,
+            "time_since_step": history.since_step[rows],
+            "time_since_reversal": _since_reversal(history, turning)[rows],
+            "previous_voltage": before,
+            "direction": turning[rows],
+            "direction_of_change": np.sign(curves.driver - before),
+        },
+        effects,
+    )
+
+
+def _history(curves: Curves) -> History:
+    """As much of a history as the curves tell."""
+    t = curves.time
+    between = 0.5 * (t[1:] + t[:-1])
+    ends = (t[0] - (between[0] - t[0]), t[-1] + (t[-1] - between[-1])) if t.size > 1 else (t[0] - 0.5, t[0] + 0.5)
+    edges = np.concatenate([[ends[0]], between, [ends[1]]])
+    ones, none = np.ones(t.size, dtype=np.int64), np.zeros(t.size)
+    return History(curves.recording_id, "command_voltage", edges, curves.driver, curves.thrust, ones, t, none)
+
+
+def _since_reversal(history: History, turning: Floats) -> Floats:
+    """(M,) s since the driver's sign was another one; NaN before the first reversal."""
+    out = np.full(turning.size, np.nan)
+    last, start = 0.0, np.nan
+    for i, sign in enumerate(turning.tolist()):
+        if sign and last and sign != last:
+            start = float(history.edges[i])
+        last = sign or last
+        out[i] = history.middle[i] - start
+    return out
+
+
+def _effects(twin: Twin, history: History, rows: NDArray[np.intp]) -> dict[tuple[str, str], Floats]:
+    """What each term of the twin changes, the others there."""
+    theta = Theta(twin.C, (), (0.0,), k=twin.rate_per_driver or 1.0)
+    terms, scale = given(twin), scale_of([history], twin.C)
+    full, _ = predict(Model((), terms), theta, history, scale)
+    out: dict[tuple[str, str], Floats] = {}
+    for i, term in enumerate(twin.terms):
+        less, _ = predict(Model((), (*terms[:i], *terms[i + 1 :])), theta, history, scale)
+        out[term.effect, term.form] = (full - less)[rows]
+    return out
+
+
+def signature(runs: Sequence[Run], finding: Finding) -> Signature | None:
+    """Of one finding; None where its coordinate does not move enough to be seen."""
+    quantity, kind = SIGNATURES.get(finding.effect, ("driver", "force"))
+    if any(quantity not in run.coordinates for run in runs):
+        quantity = "time" if kind == "gain" else "driver"
+    key = finding.effect, finding.form
+    alone = all(key in run.effects for run in runs) and (finding.effect, finding.form) in TERMS
+    modelled = [run.effects[key] if alone else run.before - run.left for run in runs]
+    over = [run.coordinates[quantity] for run in runs]
+    weight = [_weight(run, kind) for run in runs]
+    edges = _edges(np.concatenate(over), quantity)
+    rows = []
+    for low, high in pairwise(edges):
+        inside = [(x >= low) & (x < high) & (u != 0) for x, u in zip(over, weight, strict=True)]
+        if any(mask.any() for mask in inside):
+            rows.append(_bin(runs, over, weight, modelled, inside))
+    if len(rows) < 2:
+        return None
+    at, measured, std, model = np.array(rows).T
+    return Signature(quantity, kind, at, measured, std, model, alone)
+
+
+def _weight(run: Run, kind: Kind) -> Floats:
+    """What the residual is a multiple of, (n,); 0 for a row that is left out."""
+    match kind:
+        case "force":
+            return np.ones(run.time.size)
+        case "turn":
+            return run.coordinates["direction_of_change"]
+        case _:
+            size = run.force if kind == "gain" else run.step
+            out: Floats = np.where(np.abs(size) > SMALL * float(np.max(np.abs(run.force), initial=0.0)), size, 0.0)
+            return out
+
+
+def _bin(
+    runs: Sequence[Run],
+    over: Sequence[Floats],
+    weight: Sequence[Floats],
+    modelled: Sequence[Floats],
+    inside: Sequence[NDArray[np.bool_]],
+) -> tuple[float, float, float, float]:
+    """Middle, measured, its standard error, modelled: slopes of the residual over the weight."""
+    at = np.concatenate([x[m] for x, m in zip(over, inside, strict=True)])
+    u = np.concatenate([w[m] for w, m in zip(weight, inside, strict=True)])
+    change = np.concatenate([c[m] for c, m in zip(modelled, inside, strict=True)])
+    left = np.concatenate([run.left[m] for run, m in zip(runs, inside, strict=True)])
+    power = float(u @ u)
+    noise = float(u @ left) / power
+    model = float(u @ change) / power
+    visit = np.concatenate([_visits(m) + 1_000_000 * i for i, m in enumerate(inside)])
+    return float(at.mean()), model + noise, _std(u, left, noise, visit, runs), model
+
+
+def _visits(inside: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Number of the stretch of neighbouring rows, for the rows inside."""
+    starts = np.diff(inside.astype(np.int8), prepend=0) == 1
+    out: NDArray[np.int64] = np.cumsum(starts)[inside]
+    return out
+
+
+def _std(u: Floats, left: Floats, slope: float, visit: NDArray[np.int64], runs: Sequence[Run]) -> float:
+    """Of the slope: the larger of what neighbouring rows and what visits to the bin say of the scatter."""
+    every = np.concatenate([run.left for run in runs])
+    every = every - every.mean()
+    size = float(np.sqrt(every @ every / max(every.size - 1, 1)))
+    rho = float(np.clip(every[1:] @ every[:-1] / max(float(every @ every), 1e-300), 0.0, CORRELATED))
+    power = float(u @ u)
+    moved = u * (left - slope * u)
+    rows = float(moved @ moved) / max(1 - 1 / u.size, 0.5) if u.size > 3 else size**2 * power
+    _, index = np.unique(visit, return_inverse=True)
+    groups = np.bincount(index, weights=moved)
+    between = float(groups @ groups) * groups.size / (groups.size - 1) if groups.size > 3 else 0.0
+    return float(np.sqrt(max(rows * (1 + rho) / (1 - rho), between))) / power
+
+
+def _edges(values: Floats, quantity: str) -> Floats:
+    """Of the bins: one for each level where there are few, otherwise of equal width, on the coordinate's scale."""
+    found = values[np.isfinite(values)]
+    if found.size == 0:
+        return np.empty(0)
+    if quantity in SPREAD_OUT:
+        found = found[found > 0]
+        low, high = float(np.quantile(found, 0.002)), float(found.max())
+        return np.geomspace(low * 0.999, max(high, low * 1.01) * 1.001, BINS[quantity] + 1)
+    size = float(np.max(np.abs(found))) or 1.0
+    levels, count = np.unique(np.round(found / size, 3), return_counts=True)
+    common = levels[count >= max(1, 0.004 * found.size)] * size
+    if (
+        quantity != "time"
+        and 2 <= common.size <= LEVELS
+        and count[count >= max(1, 0.004 * found.size)].sum() > 0.8 * found.size
+    ):
+        middle = 0.5 * (common[1:] + common[:-1])
+        first, last = common[0] - 0.01 * size, common[-1] + 0.01 * size
+        return np.concatenate([[first], middle, [last]])
+    slack = 1e-9 * max(float(np.ptp(found)), 1e-9 * size)
+    return np.linspace(float(found.min()) - slack, float(found.max()) + slack, BINS.get(quantity, MOST) + 1)
+
+
+def profile(runs: Sequence[Run], quantity: str) -> Profile | None:
+    """RMS before and after over a coordinate of the runs; None where they do not have it, or it does not move."""
+    if any(quantity not in run.coordinates for run in runs):
+        return None
+    over = np.concatenate([run.coordinates[quantity] for run in runs])
+    before, left = (np.concatenate([getattr(run, name) for run in runs]) for name in ("before", "left"))
+    rows = []
+    for low, high in pairwise(_edges(over, quantity)):
+        m = (over >= low) & (over < high)
+        if m.any():
+            rows.append((over[m].mean(), np.sqrt(np.mean(before[m] ** 2)), np.sqrt(np.mean(left[m] ** 2))))
+    if len(rows) < 2:
+        return None
+    at, old, new = np.array(rows).T
+    return Profile(quantity, at, old, new)
