@@ -12,6 +12,8 @@ from identification.physics.filters import delayed, reconstructed
 from identification.recording import Floats
 
 MOST_STEPS = 25
+LEAST_REACH = 0.05
+"""sigma: a parameter that changes less within its bounds is left where it is."""
 CLOSE = 1e-4
 """Fall of chi-square at which a fit has ended; a difference of 1 is one sigma."""
 
@@ -142,7 +144,8 @@ def fit(model: Model, start: Theta, data: Data, weights: Weights, most_steps: in
         slope = J.T @ residual
         stuck = ((vector[may] <= low[may]) & (slope < 0)) | ((vector[may] >= high[may]) & (slope > 0))
         size = np.linalg.norm(J, axis=0)
-        go = ~stuck & (size > 0)
+        span = np.where(np.isfinite(high[may] - low[may]), high[may] - low[may], np.inf)
+        go = ~stuck & (size > 0) & (size * span > LEAST_REACH)
         A = J[:, go] / size[go]
         gram, right = A.T @ A, A.T @ residual
         improved = False

@@ -151,7 +151,7 @@ class Data:
     @cached_property
     def thrust_rows(self) -> tuple[Rows, ...]:
         return tuple(
-            Rows(h.sampled[r], h.count[r].astype(np.float64), np.ones(r.size), h.dt[r])
+            Rows(h.sampled[r], h.count[r].astype(np.float64), np.ones(r.size), h.count[r] * h.spacing)
             for h, r in zip(self.histories, self.rows, strict=True)
         )
 
@@ -161,7 +161,7 @@ class Data:
         for h in self.histories:
             assert h.rate_count is not None
             r = h.rate_rows
-            out.append(Rows(h.middle[r], h.rate_count[r].astype(np.float64), np.ones(r.size), h.dt[r]))
+            out.append(Rows(h.middle[r], h.rate_count[r].astype(np.float64), np.ones(r.size), h.rate_count[r] * h.rate_spacing))
         return tuple(out)
 
     @property

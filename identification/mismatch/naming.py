@@ -26,6 +26,8 @@ LIKELY = 40.0
 MOST_REFITS = 7
 INCONSTANT = 1e-3
 """p-value, after all tests of a term, below which its parameter is not the same everywhere."""
+BETTER = 0.5
+"""BIC units by which a rival must be better to take the place."""
 ROUNDS = 3
 
 
@@ -71,7 +73,7 @@ def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> State:
         for term in state.fit.model.terms:
             less = without(state, term, data)
             for rival in swaps(state, term, less, data, terms):
-                if rival.bic_loss < -1e-6 and (best is None or rival.bic_loss < best[0]):
+                if rival.bic_loss < -BETTER and (best is None or rival.bic_loss < best[0]):
                     best = (rival.bic_loss, rival.fit)
         if best is None:
             return state

@@ -19,6 +19,12 @@ COARSEST = 0.25
 FINEST_AFTER_STEP = 0.0025
 """s: motor lags of some milliseconds are as steep as this."""
 GROWTH_AFTER_STEP = 0.12
+WINDOW = 0.0015
+"""s before and after a sample that stands for its time."""
+WINDOW_ZONE = 0.1
+"""s after a change of the command in which samples have windows."""
+LEAST_WINDOWED = 0.008
+"""s between samples: where they are denser, intervals are short enough."""
 GROWTH = 0.06
 """Length of an interval per time since the last change."""
 MOVES = 0.01
@@ -170,7 +176,7 @@ def _edges(time: Floats, held: _Held, most: int) -> Floats:
     number = np.floor(wanted * shrink + 1e-6)
     edges = candidates[np.concatenate([[True], np.diff(number) > 0])]
     edges[-1] = candidates[-1]
-    return _with_steps(edges, held, spacing, most)
+    return _with_windows(_with_steps(edges, held, spacing, most), time, held, spacing, most)
 
 
 def _with_steps(edges: Floats, held: _Held, spacing: float, most: int) -> Floats:
@@ -194,6 +200,34 @@ def _with_steps(edges: Floats, held: _Held, spacing: float, most: int) -> Floats
     free[[0, -1]] = True
     out = np.union1d(edges[free], added)
     result: Floats = out[np.concatenate([[True], np.diff(out) > 1e-6])]
+    return result
+
+
+def _with_windows(edges: Floats, time: Floats, held: _Held, spacing: float, most: int) -> Floats:
+    """Shortly after every change of a command, each sample gets a short interval of its own: it is no mean over more."""
+    if not held.stepwise or spacing < LEAST_WINDOWED:
+        return edges
+    changes = held.time[1:][np.diff(held.value) != 0]
+    changes = changes[(changes > edges[0]) & (changes < edges[-1])]
+    if not changes.size or changes.size > most:
+        return edges
+    zone = max(WINDOW_ZONE, 5 * spacing)
+    last = np.searchsorted(changes, time, side="right") - 1
+    own = time[(last >= 0) & (time - changes[np.maximum(last, 0)] < zone)]
+    if own.size > most:
+        return edges
+    nearest = np.searchsorted(changes, own)
+    before = changes[np.maximum(nearest - 1, 0)]
+    after = changes[np.minimum(nearest, changes.size - 1)]
+    low = np.where((before <= own) & (own - before < WINDOW), before, own - WINDOW)
+    high = np.where((after > own) & (after - own < WINDOW), after, own + WINDOW)
+    windows = np.column_stack([low, high])
+    inside = np.searchsorted(windows[:, 0], edges, side="right") - 1
+    covered = (inside >= 0) & (edges > windows[np.maximum(inside, 0), 0]) & (edges < windows[np.maximum(inside, 0), 1])
+    covered[[0, -1]] = False
+    out = np.union1d(np.union1d(edges[~covered], windows.ravel()), changes)
+    out = out[(out >= edges[0]) & (out <= edges[-1])]
+    result: Floats = out[np.concatenate([[True], np.diff(out) > 1e-5])]
     return result
 
 
@@ -257,6 +291,8 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
         rate_sampled=rate_sampled,
         others=others,
         rate_per_driver=per_driver or 1.0,
+        spacing=float(np.median(np.diff(time))),
+        rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
         static=bool(held.stepwise and time.size <= FEW_SAMPLES * levels),
     )
 

@@ -50,6 +50,9 @@ class History:
     rotation_rate, neighbour_thrust."""
     rate_per_driver: float = 1.0
     """rev/s per unit of the driver, where both are steady; of no use without a rate."""
+    spacing: float = 1.0
+    """s between thrust samples."""
+    rate_spacing: float = 1.0
     static: bool = False
     """Levels without a course of time: nothing that moves can be seen."""
 
