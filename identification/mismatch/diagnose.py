@@ -23,10 +23,10 @@ from identification.mismatch.diagnosis import (
 from identification.mismatch.fitting import Fit, fit, raw
 from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
 from identification.mismatch.model import Data, parameters, weights
-from identification.mismatch.naming import EQUAL, Named, Rival, name, settle_forms
+from identification.mismatch.naming import EQUAL, Named, Rival, name, settle_forms, with_doubts
 from identification.mismatch.omnibus import Judged, Omnibus, locate, test
 from identification.mismatch.preparing import Refusal, history_of
-from identification.mismatch.search import Found, State, forces, search
+from identification.mismatch.search import Found, State, forces, prune, search
 from identification.mismatch.twinning import starting, unfit, with_twin
 from identification.physics.history import History
 from identification.physics.term import Term
@@ -57,7 +57,9 @@ def diagnose(
         return wrong
     rng = np.random.default_rng(seed)
     found = search(histories, rng, given=None if baseline is None else starting(baseline))
-    after = settle_forms(found.after, found.data, found.terms) if found.after.fit.model.terms else found.after
+    after = found.after
+    if after.fit.model.terms:
+        after = prune(settle_forms(after, found.data, found.terms), found.data)
     left = test(after.fit, found.data, after.weights, rng)
     answer = _answer(recordings, replace(found, after=after), left, others, rng)
     return with_twin(answer, after, found.data, recordings, baseline)
@@ -91,10 +93,10 @@ def _answer(
     rng: np.random.Generator,
 ) -> Diagnosis:
     data, before, after = found.data, found.before, found.after
-    named = name(after, data, found.terms)
+    structure = left.p_value < ALARM
+    named = with_doubts(name(after, data, found.terms), left if structure else None)
     earned = [n for n in named if not n.doubts]
     doubted = [n for n in named if n.doubts]
-    structure = left.p_value < ALARM
     unexplained = _unexplained(left, after, data, doubted) if structure or doubted else None
     verdict = _verdict(earned, unexplained)
     every = [np.ones(r.size, dtype=bool) for r in data.rows]

@@ -79,7 +79,7 @@ def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[lis
     """Predictions at the rows: thrust with tare, and rate; run by run."""
     thrust, rate = [], []
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
-        F, x = predict(model, theta, history, data.scale)
+        F, x = predict(model, theta, history, data.scale, i)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
         thrust.append(reconstructed(F, history.middle, history.sampled)[rows] + theta.tares[i])

@@ -87,7 +87,7 @@ def acting(model: Model, theta: Theta, scale: Scale) -> list[tuple[Term, tuple[f
     return sorted([(g.term, g.values, g.scale) for g in model.given] + found, key=lambda each: _place(each[0]))
 
 
-def predict(model: Model, theta: Theta, history: History, scale: Scale) -> tuple[Floats, Floats]:
+def predict(model: Model, theta: Theta, history: History, scale: Scale, run: int = 0) -> tuple[Floats, Floats]:
     """(F without tare, x) on the intervals of one run, each (M,).
 
     x is what the model itself says of the rate: a term that reads the measured rate does not count there.
@@ -104,7 +104,9 @@ def predict(model: Model, theta: Theta, history: History, scale: Scale) -> tuple
         stage = at
         if "rotation_rate" in term.needs and modelled is None:
             modelled = value
-        value = term.apply(value, Moment(history, sizes, theta.C, x if stage >= HYDRO else value), values)
+        value = term.apply(
+            value, Moment(history, sizes, theta.C, theta.tares[run], x if stage >= HYDRO else value), values
+        )
     if stage < HYDRO:
         x = value
         value = theta.C * x * np.abs(x)
@@ -161,7 +163,9 @@ class Data:
         for h in self.histories:
             assert h.rate_count is not None
             r = h.rate_rows
-            out.append(Rows(h.middle[r], h.rate_count[r].astype(np.float64), np.ones(r.size), h.rate_count[r] * h.rate_spacing))
+            out.append(
+                Rows(h.middle[r], h.rate_count[r].astype(np.float64), np.ones(r.size), h.rate_count[r] * h.rate_spacing)
+            )
         return tuple(out)
 
     @property
@@ -181,7 +185,18 @@ def scale_of(histories: Sequence[History], C: float) -> Scale:
         duration=max(float(h.edges[-1] - h.edges[0]) for h in histories),
         interval=float(min(np.median(np.sort(h.dt)[: max(h.dt.size // 4, 1)]) for h in histories)),
         flow=max(flows, default=0.0),
+        reading=max(float(np.nanmax(np.abs(h.thrust))) for h in histories),
+        noise=float(np.median([_scatter(h) for h in histories])),
     )
+
+
+def _scatter(history: History) -> float:
+    """N: standard deviation of one sample, from neighbouring rows of a level, robust."""
+    rows = history.rows
+    same = np.diff(history.level_start[rows]) == 0
+    weight = np.sqrt(1 / history.count[rows][1:] + 1 / history.count[rows][:-1])
+    steps = (np.abs(np.diff(history.thrust[rows])) / weight)[same]
+    return float(np.median(steps) / 0.6745) if steps.size > 10 else 0.0
 
 
 def parameters(model: Model, scale: Scale) -> tuple[tuple[Parameter, ...], ...]:

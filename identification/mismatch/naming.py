@@ -11,7 +11,8 @@ from scipy.stats import ncx2
 
 from identification.mismatch.fitting import Fit, bounds_of, extended, fit
 from identification.mismatch.model import Data, Theta, predict
-from identification.mismatch.omnibus import SHAPE_ERROR
+from identification.mismatch.omnibus import SHAPE_ERROR, Omnibus
+from identification.mismatch.preparing import DRIVERS
 from identification.mismatch.screening import directions, orthogonal_basis
 from identification.mismatch.search import State, refresh
 from identification.physics.term import Term
@@ -28,6 +29,9 @@ INCONSTANT = 1e-3
 """p-value, after all tests of a term, below which its parameter is not the same everywhere."""
 BETTER = 0.5
 """BIC units by which a rival must be better to take the place."""
+OWN_COORDINATE = 1e-4
+"""p-value of what is left over a term's own coordinate below which its name is not earned."""
+MANY_SHAPES = 3
 ROUNDS = 3
 
 
@@ -97,11 +101,12 @@ def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]
     if size == 0:
         return []
     rho = found.columns.T @ (change / size)
+    against = (rho < 0) & ~np.array(found.one_sided)
     rho = np.where(found.one_sided, np.maximum(rho, 0.0), np.abs(rho))
     best: dict[Term, tuple[float, tuple[float, ...]]] = {}
     for j, other in enumerate(found.terms):
         if other not in best or rho[j] > best[other][0]:
-            best[other] = (float(rho[j]), found.values[j])
+            best[other] = (float(rho[j]), mirrored(other, found.values[j], data) if against[j] else found.values[j])
     ranked = sorted(best.items(), key=lambda item: -item[1][0])
     out = []
     extra_now = len(dict(zip(now.model.terms, now.theta.terms, strict=True))[term])
@@ -116,6 +121,13 @@ def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]
         loss = new.chi2 - now.chi2 + (len(values) - extra_now) * logn
         out.append(Rival(other, new, float(loss)))
     return sorted(out, key=lambda rival: rival.bic_loss)
+
+
+def mirrored(term: Term, values: tuple[float, ...], data: Data) -> tuple[float, ...]:
+    """The amount on the other side of neutral."""
+    first = term.parameters(data.scale)[0]
+    assert first.neutral is not None
+    return (min(max(2 * first.neutral - values[0], first.low), first.high), *values[1:])
 
 
 def at_bound(term: Term, fitted: Fit, data: Data) -> bool:
@@ -182,9 +194,9 @@ def _raw_effect(now: Fit, term: Term, data: Data) -> list[Floats]:
     known = dict(zip(now.model.terms, now.theta.terms, strict=True))
     theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
     out = []
-    for h, r in zip(data.histories, data.rows, strict=True):
-        full, _ = predict(now.model, now.theta, h, data.scale)
-        less, _ = predict(smaller, theta, h, data.scale)
+    for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
+        full, _ = predict(now.model, now.theta, h, data.scale, i)
+        less, _ = predict(smaller, theta, h, data.scale, i)
         out.append((full - less)[r])
     return out
 
@@ -219,6 +231,26 @@ def name(state: State, data: Data, terms: Sequence[Term]) -> tuple[Named, ...]:
         )
         at += len(values)
     return tuple(sorted(out, key=lambda n: -n.chi2_gain))
+
+
+def with_doubts(named: Sequence[Named], left: Omnibus | None) -> tuple[Named, ...]:
+    """Doubts that only show when all terms and what is left are seen together.
+
+    Something left over a term's own coordinate: its shape is not the textbook's. Many static shapes on one curve: any
+    curve can be made of enough of them.
+    """
+    static = [n for n in named if n.term.coordinates == ("command_voltage",) or n.term.coordinates == ("thrust",)]
+    clear = {g.coordinate.quantity for g in left.groups if g.p_value < OWN_COORDINATE} if left is not None else set()
+    out = []
+    for n in named:
+        more: list[str] = []
+        own = [c for c in n.term.coordinates if c in clear or (c in DRIVERS and clear & set(DRIVERS))]
+        if own:
+            more.append(f"more is left over its own coordinate, {own[0]}")
+        if len(static) >= MANY_SHAPES and n in static:
+            more.append(f"{len(static)} shapes on one static curve make any curve")
+        out.append(replace(n, doubts=(*n.doubts, *more)))
+    return tuple(out)
 
 
 __all__ = ["Named", "Rival", "Theta", "at_bound", "bounds_of", "name", "settle_forms", "swaps"]

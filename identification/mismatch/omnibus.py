@@ -100,7 +100,7 @@ def _knots(values: Sequence[Floats], most: int) -> Floats:
 
 def coordinates(fit: Fit, data: Data) -> tuple[Coordinate, ...]:
     """All that can be looked at in these runs."""
-    parts = [predict(fit.model, fit.theta, h, data.scale) for h in data.histories]
+    parts = [predict(fit.model, fit.theta, h, data.scale, i) for i, h in enumerate(data.histories)]
     F = [p[0][r] / data.scale.thrust for p, r in zip(parts, data.rows, strict=True)]
     x = [p[1][r] / data.scale.driver for p, r in zip(parts, data.rows, strict=True)]
     hs, rows = data.histories, data.rows
@@ -291,9 +291,9 @@ def _allowance(fit: Fit, data: Data, weights: Weights, n: int) -> list[Floats]:
 
         theta = replace(fit.theta, terms=tuple(values[t] for t in smaller.terms))
         change = []
-        for h, r in zip(data.histories, data.rows, strict=True):
-            with_it, _ = predict(fit.model, fit.theta, h, data.scale)
-            without, _ = predict(smaller, theta, h, data.scale)
+        for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
+            with_it, _ = predict(fit.model, fit.theta, h, data.scale, i)
+            without, _ = predict(smaller, theta, h, data.scale, i)
             change.append((with_it - without)[r])
         moved = Weights(weights.thrust).whiten(change, [])
         basis = orthogonal_basis(fit.jacobian[:n])
@@ -323,8 +323,8 @@ def locate(judged: Judged, fit: Fit, data: Data, noise_inflation: float = 1.0) -
     n = data.size
     residual = np.concatenate(
         [
-            h.thrust[r] - predict(fit.model, fit.theta, h, data.scale)[0][r] - tare
-            for h, r, tare in zip(data.histories, data.rows, fit.theta.tares, strict=True)
+            h.thrust[r] - predict(fit.model, fit.theta, h, data.scale, i)[0][r] - fit.theta.tares[i]
+            for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True))
         ]
     )
     count = np.concatenate([h.count[r] for h, r in zip(data.histories, data.rows, strict=True)]).astype(np.float64)

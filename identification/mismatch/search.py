@@ -43,6 +43,7 @@ DYNAMIC_STAGES = {
     "time_skew",
     "load_cell_creep",
     "zero_drift",
+    "zero_offset",
 }
 """Not to be seen in a static table."""
 

@@ -30,6 +30,7 @@ from identification.physics import (
     torque_crosstalk,
     winding_resistance,
     zero_drift,
+    zero_offset,
 )
 from identification.physics.term import Term
 
@@ -59,6 +60,7 @@ CATALOGUE: tuple[Term, ...] = tuple(
         load_cell_creep.FORMS,
         load_cell_nonlinearity.FORMS,
         zero_drift.FORMS,
+        zero_offset.FORMS,
         load_cell_saturation.FORMS,
     )
 )

@@ -1,9 +1,9 @@
-"""Thrust breaks down above a rate: T (1 - k max(|x| - onset, 0))."""
+"""Thrust breaks down above a rate: T (1 - k e) or, setting in gently, T (1 - (k e)^2), e = max(|x| - onset, 0)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -13,14 +13,14 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class Cavitation:
-    """Thrust breaks down above a rate: T (1 - k max(|x| - onset, 0))."""
+    """Thrust breaks down above a rate: T (1 - k e) or, setting in gently, T (1 - (k e)^2), e = max(|x| - onset, 0)."""
 
     id: ClassVar[str] = "cavitation"
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "thrust breaks down above a rate"
     needs: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
-    form: ClassVar[str] = ""
+    form: Literal["linear", "square"] = "linear"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (
@@ -29,14 +29,21 @@ class Cavitation:
         )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return tuple((0.3 / scale.driver, share * scale.driver) for share in (0.4, 0.6, 0.75, 0.88))
+        slope = (0.3 if self.form == "linear" else 0.8) / scale.driver
+        return tuple((slope, share * scale.driver) for share in (0.4, 0.6, 0.75, 0.88))
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        out: Floats = value * np.maximum(1 - theta[0] * np.maximum(np.abs(now.x) - theta[1], 0.0), 0.0)
+        lost = theta[0] * np.maximum(np.abs(now.x) - theta[1], 0.0)
+        out: Floats = value * np.maximum(1 - (lost if self.form == "linear" else lost**2), 0.0)
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Cavitation: above {theta[1]:.3g} {scale.driver_unit} thrust breaks down, by {100 * theta[0]:.2g} % per {scale.driver_unit}."
+        lost = theta[0] * max(scale.driver - theta[1], 0.0)
+        share = lost if self.form == "linear" else lost**2
+        return (
+            f"Cavitation: above {theta[1]:.3g} {scale.driver_unit} thrust breaks down; "
+            f"{100 * share:.2g} % is lost at {scale.driver:.3g} {scale.driver_unit}."
+        )
 
 
-FORMS = (Cavitation(),)
+FORMS = (Cavitation("linear"), Cavitation("square"))

@@ -1,9 +1,9 @@
-"""Winding and magnet warm up: T (1 - h Theta), Theta' = (power - Theta)/tau, power of the copper as V^4."""
+"""Winding and magnet warm up: T (1 - h Theta), Theta' = (power - Theta)/tau, copper loss as V^4; magnets follow later."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -14,26 +14,31 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class Heating:
-    """Winding and magnet warm up: T (1 - h Theta), Theta' = (power - Theta)/tau, power of the copper as V^4."""
+    """Winding and magnet warm up: T (1 - h Theta), Theta' = (power - Theta)/tau, copper loss as V^4; magnets follow later."""
 
     id: ClassVar[str] = "heating"
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "winding and magnets warm up under load"
     needs: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[str, ...]] = ("time",)
-    form: ClassVar[str] = ""
+    form: Literal["winding", "magnet"] = "winding"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("loss", "1", 0.0, 0.95, 0.0), Parameter("time_constant", "s", 5.0, 1200.0))
+        known = (Parameter("loss", "1", 0.0, 0.95, 0.0), Parameter("time_constant", "s", 5.0, 1200.0))
+        return known if self.form == "winding" else (*known, Parameter("magnet_time_constant", "s", 5.0, 1200.0))
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return tuple((0.05, tau) for tau in (15.0, 40.0, 100.0, 300.0))
+        if self.form == "winding":
+            return tuple((0.05, tau) for tau in (15.0, 40.0, 100.0, 300.0))
+        return tuple((0.05, tau, later) for tau, later in ((30.0, 30.0), (120.0, 60.0)))
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         history = now.history
         current = history.others.get("current")
         load = (now.x / now.scale.driver) ** 4 if current is None else (current / np.nanmax(np.abs(current))) ** 2
         warm = lowpass(load, history.dt, theta[1])[1]
+        if self.form == "magnet":
+            warm = lowpass(warm, history.dt, theta[2])[1]
         out: Floats = value * np.maximum(1 - theta[0] * warm, 0.0)
         return out
 
@@ -41,4 +46,4 @@ class Heating:
         return f"Heating: at full load for long thrust falls by {100 * theta[0]:.2g} %, with a time constant of {theta[1]:.3g} s; rest between loads, or record the motor temperature."
 
 
-FORMS = (Heating(),)
+FORMS = (Heating("winding"), Heating("magnet"))

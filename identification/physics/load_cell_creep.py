@@ -1,9 +1,9 @@
-"""Viscoelastic cell: F + c lowpass(F), over tens of seconds."""
+"""Viscoelastic cell: F + c lowpass(F) over tens of seconds, with one or two time constants."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 from identification.physics.filters import lowpass
 from identification.physics.term import Moment, Parameter, Scale, Stage
@@ -12,27 +12,34 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class LoadCellCreep:
-    """Viscoelastic cell: F + c lowpass(F), over tens of seconds."""
+    """Viscoelastic cell: F + c lowpass(F) over tens of seconds, with one or two time constants."""
 
     id: ClassVar[str] = "load_cell_creep"
     stage: ClassVar[Stage] = "cell"
     physics: ClassVar[str] = "the load cell creeps under load"
     needs: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[str, ...]] = ("time_since_step", "time")
-    form: ClassVar[str] = ""
+    form: Literal["one_constant", "two_constants"] = "one_constant"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("share", "1", -0.5, 0.5, 0.0), Parameter("time_constant", "s", 1.0, 600.0))
+        known = (Parameter("share", "1", -0.5, 0.5, 0.0), Parameter("time_constant", "s", 1.0, 600.0))
+        if self.form == "one_constant":
+            return known
+        return (*known, Parameter("share_2", "1", -0.5, 0.5), Parameter("time_constant_2", "s", 1.0, 2000.0))
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return tuple((0.02, tau) for tau in (3.0, 10.0, 30.0, 100.0))
+        if self.form == "one_constant":
+            return tuple((0.02, tau) for tau in (3.0, 10.0, 30.0, 100.0))
+        return ((0.02, 8.0, 0.02, 60.0), (0.02, 20.0, 0.02, 200.0))
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * lowpass(value, now.history.dt, theta[1])[1]
+        if self.form == "two_constants":
+            out += theta[2] * lowpass(value, now.history.dt, theta[3])[1]
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return f"Load-cell creep: {100 * theta[0]:.2g} % of the load comes late, with a time constant of {theta[1]:.3g} s, and leaves late."
 
 
-FORMS = (LoadCellCreep(),)
+FORMS = (LoadCellCreep("one_constant"), LoadCellCreep("two_constants"))

@@ -6,9 +6,16 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 import numpy as np
+from scipy.special import ndtr
 
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+
+
+def _excess(z: Floats) -> Floats:
+    """Mean of max(z + e, 0) for a normal deviate e."""
+    out: Floats = z * ndtr(z) + np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
+    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,13 +30,20 @@ class LoadCellSaturation:
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("limit", "N", 0.1 * scale.thrust, 1.3 * scale.thrust, 1.3 * scale.thrust),)
+        return (Parameter("limit", "N", 0.1 * scale.reading, 1.3 * scale.reading, 1.3 * scale.reading),)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return tuple((share * scale.thrust,) for share in (0.96, 0.9, 0.8, 0.65, 0.5))
+        return tuple((share * scale.reading,) for share in (0.99, 0.95, 0.88, 0.75, 0.6))
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        out: Floats = np.clip(value, -theta[0], theta[0])
+        reading = value + now.tare
+        if now.scale.noise <= 0:
+            clipped: Floats = np.clip(reading, -theta[0], theta[0]) - now.tare
+            return clipped
+        # the mean of noisy samples that clip one by one
+        over = (reading - theta[0]) / now.scale.noise
+        under = (-theta[0] - reading) / now.scale.noise
+        out: Floats = value - now.scale.noise * (_excess(over) - _excess(under))
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

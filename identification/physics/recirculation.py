@@ -1,9 +1,9 @@
-"""The jet comes round the tunnel: T - k |x| u, u' = (x - u)/tau over tens of seconds."""
+"""The jet comes round the tunnel: T - k |x| u, u' = (j - u)/tau, j = x or as momentum theory has it sqrt(T/C)."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -14,14 +14,14 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class Recirculation:
-    """The jet comes round the tunnel: T - k |x| u, u' = (x - u)/tau over tens of seconds."""
+    """The jet comes round the tunnel: T - k |x| u, u' = (j - u)/tau, j = x or as momentum theory has it sqrt(T/C)."""
 
     id: ClassVar[str] = "recirculation"
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "the jet of the thruster comes round the tunnel"
     needs: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[str, ...]] = ("time_since_step", "time")
-    form: ClassVar[str] = ""
+    form: Literal["rate", "thrust"] = "rate"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (
@@ -33,7 +33,8 @@ class Recirculation:
         return tuple((0.05 * scale.thrust / scale.driver**2, tau) for tau in (5.0, 12.0, 30.0, 80.0))
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        u = lowpass(now.x, now.history.dt, theta[1])[1]
+        jet = now.x if self.form == "rate" else np.sign(value) * np.sqrt(np.abs(value / now.C))
+        u = lowpass(jet, now.history.dt, theta[1])[1]
         out: Floats = value - theta[0] * np.abs(now.x) * u
         return out
 
@@ -41,4 +42,4 @@ class Recirculation:
         return f"Recirculation: the jet comes round and takes up to {100 * theta[0] * scale.driver**2 / scale.thrust:.0f} % of the thrust within {theta[1]:.3g} s of one direction."
 
 
-FORMS = (Recirculation(),)
+FORMS = (Recirculation("rate"), Recirculation("thrust"))

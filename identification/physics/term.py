@@ -32,6 +32,10 @@ class Scale:
     """s, the shortest interval of the grid."""
     flow: float = 0.0
     """m/s, the largest |flow_speed|."""
+    reading: float = 0.0
+    """N, the largest |thrust| that was read, tare and all."""
+    noise: float = 0.0
+    """N, standard deviation of one thrust sample between neighbours."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,6 +56,8 @@ class Moment:
     history: History
     scale: Scale
     C: float
+    tare: float
+    """N, of this run."""
     x: Floats
     """Rate of the rotor in units of the driver: thrust is C x|x| without any term. In stage command: the driver."""
 

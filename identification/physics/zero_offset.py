@@ -1,0 +1,41 @@
+"""The zero jumps (a knock, a cable that pulls): + b from a time on. A constant offset of a run is its tare."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class ZeroOffset:
+    """The zero jumps (a knock, a cable that pulls): + b from a time on. A constant offset of a run is its tare."""
+
+    id: ClassVar[str] = "zero_offset"
+    stage: ClassVar[Stage] = "cell"
+    physics: ClassVar[str] = "the zero of the cell jumped between two tares"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("time",)
+    form: ClassVar[str] = ""
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        most = 2 * scale.reading
+        return (Parameter("offset", "N", -most, most, 0.0), Parameter("at", "s", 0.0, scale.duration))
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return tuple((0.01 * scale.thrust, share * scale.duration) for share in np.linspace(0.02, 0.98, 80))
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        edge = np.clip((now.history.edges - theta[1]) / (2e-3 * now.scale.duration) + 0.5, 0.0, 1.0)
+        out: Floats = value + theta[0] * 0.5 * (edge[1:] + edge[:-1])
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"Zero offset: the zero of the cell jumped by {theta[0]:.3g} N at {theta[1]:.4g} s; tare again, and look for what pulled."
+
+
+FORMS = (ZeroOffset(),)
