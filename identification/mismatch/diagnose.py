@@ -24,6 +24,7 @@ from identification.mismatch.fitting import Fit, fit, raw
 from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
 from identification.mismatch.model import Data, parameters, weights
 from identification.mismatch.naming import EQUAL, Named, Rival, name, settle_forms, with_doubts
+from identification.mismatch.next_experiment import propose
 from identification.mismatch.omnibus import Judged, Omnibus, locate, test
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.search import Found, State, forces, prune, search
@@ -40,11 +41,16 @@ DRIVER_NAMES = {"command_voltage": "V|V|", "motor_voltage": "V|V|", "rotation_ra
 
 
 def diagnose(
-    recordings: Sequence[Recording], holdout: Sequence[Recording] = (), seed: int = 0, baseline: Twin | None = None
+    recordings: Sequence[Recording],
+    holdout: Sequence[Recording] = (),
+    seed: int = 0,
+    baseline: Twin | None = None,
+    limits: Limits | None = None,
 ) -> Diagnosis | Refusal:
     """Everything that `rig diagnose` says, for recordings of one thruster. A Refusal says what is wrong with them.
 
     `baseline`: a twin in the place of C V|V|; its terms keep their values, findings are what lies beyond them.
+    `limits`: of the next experiment; None: what was recorded may be run again, for BUDGET s.
     """
     histories = _histories(recordings)
     if isinstance(histories, Refusal):
@@ -61,7 +67,7 @@ def diagnose(
     if after.fit.model.terms:
         after = prune(settle_forms(after, found.data, found.terms), found.data)
     left = test(after.fit, found.data, after.weights, rng)
-    answer = _answer(recordings, replace(found, after=after), left, others, rng)
+    answer = _answer(recordings, replace(found, after=after), left, others, rng, limits)
     return with_twin(answer, after, found.data, recordings, baseline)
 
 
@@ -91,6 +97,7 @@ def _answer(
     left: Omnibus,
     others: Sequence[History],
     rng: np.random.Generator,
+    limits: Limits | None,
 ) -> Diagnosis:
     data, before, after = found.data, found.before, found.after
     structure = left.p_value < ALARM
@@ -119,7 +126,7 @@ def _answer(
         heldout=HeldOutRmse(held.before, held.after, held.noise, held.what),
         chi2_per_dof=after.fit.chi2 / max(n - p, 1),
         whiteness_p=whiteness(after.fit, data),
-        next_experiment=None,
+        next_experiment=propose(after, data, earned, limits),
         curves=_curves(before, after, data),
     )
 
