@@ -28,6 +28,7 @@ from identification.mismatch.next_experiment import propose
 from identification.mismatch.omnibus import Judged, Omnibus, locate, test
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.search import Found, State, forces, prune, search
+from identification.mismatch.sweeps import Limits
 from identification.mismatch.twinning import starting, unfit, with_twin
 from identification.physics.history import History
 from identification.physics.term import Term
