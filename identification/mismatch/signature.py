@@ -47,6 +47,8 @@ SIGNATURES: Mapping[str, tuple[str, Kind]] = {
     "thruster_interaction": ("neighbour_thrust", "gain"),
 }
 """Where an effect is best seen; over the driver, as a force, when it is not here."""
+SHAPES: Mapping[str, Kind] = {"driver": "force", "time_since_step": "step", "direction": "force", "thrust": "force"}
+"""What is averaged over a coordinate where no effect says it; a share of the thrust when it is not here."""
 LEVELS = 24
 """So many values of a coordinate, at most, are levels with a bin each."""
 BINS = {"time": 24, "time_since_step": 12, "time_since_reversal": 12}
@@ -116,7 +118,8 @@ def _run(curves: Curves, recording: Recording | None, twin: Twin | None, C: floa
     full = None if recording is None else history_of(recording)
     if isinstance(full, History) and np.isin(curves.time, full.sampled).all():
         history, rows = full, np.searchsorted(full.sampled, curves.time)
-        effects = {} if twin is None else _effects(twin, full, rows)
+        known = twin is not None and all((t.effect, t.form) in TERMS for t in twin.terms)
+        effects = _effects(twin, full, rows) if twin is not None and known else {}
     else:
         history, rows, effects = _history(curves), np.arange(curves.time.size), {}
     before = history.previous[rows]
@@ -185,13 +188,26 @@ def signature(runs: Sequence[Run], finding: Finding) -> Signature | None:
     if any(quantity not in run.coordinates for run in runs):
         quantity = "time" if kind == "gain" else "driver"
     key = finding.effect, finding.form
-    alone = all(key in run.effects for run in runs) and (finding.effect, finding.form) in TERMS
-    modelled = [run.effects[key] if alone else run.before - run.left for run in runs]
+    if all(key in run.effects for run in runs):
+        return _binned(runs, quantity, kind, [run.effects[key] for run in runs], alone=True)
+    return shape(runs, quantity, kind)
+
+
+def shape(runs: Sequence[Run], quantity: str, kind: Kind | None = None) -> Signature | None:
+    """What the baseline lacks over any coordinate, and what the whole model adds to it there; None as above."""
+    if any(quantity not in run.coordinates for run in runs):
+        return None
+    chosen = kind or SHAPES.get(quantity, "gain")
+    return _binned(runs, quantity, chosen, [run.before - run.left for run in runs], alone=False)
+
+
+def _binned(
+    runs: Sequence[Run], quantity: str, kind: Kind, modelled: Sequence[Floats], *, alone: bool
+) -> Signature | None:
     over = [run.coordinates[quantity] for run in runs]
     weight = [_weight(run, kind) for run in runs]
-    edges = _edges(np.concatenate(over), quantity)
     rows = []
-    for low, high in pairwise(edges):
+    for low, high in pairwise(_edges(np.concatenate(over), quantity)):
         inside = [(x >= low) & (x < high) & (u != 0) for x, u in zip(over, weight, strict=True)]
         if any(mask.any() for mask in inside):
             rows.append(_bin(runs, over, weight, modelled, inside))

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from math import isfinite
+from math import isfinite, sqrt
 from pathlib import Path
 
-from identification.mismatch.diagnosis import Diagnosis, NextExperiment, Unexplained, Value
+from identification.mismatch.diagnosis import Diagnosis, NextExperiment, Value
 from identification.mismatch.signature import Run, runs_of
 from identification.recording import Recording
 from rig.report import page as pages
@@ -15,6 +15,7 @@ from rig.report.diagnosis_pictures import (
     before_after_pictures,
     finding_pictures,
     next_picture,
+    shape_pictures,
     unexplained_picture,
     where_pictures,
 )
@@ -49,7 +50,7 @@ def diagnosis_page(d: Diagnosis, recordings: Sequence[Recording] = ()) -> Page:
         Section("In short", sentences(_short(d))),
         where_section(d, runs),
         *what_section(d, runs),
-        *unexplained_section(d.unexplained, driver_quantity(d)),
+        *unexplained_section(d, runs),
         after_section(d),
         parameter_section(d),
         *rivals_section(d),
@@ -82,6 +83,15 @@ def _change(before: float, after: float) -> str:
     return "–" if before <= 0 else f"{100 * (1 - after / before):.2g} %".replace("-", "−")
 
 
+def beyond(error: float, noise: float) -> float:
+    """The model's own part of an RMSE, in N; noise and model error are independent.
+
+    >>> beyond(5.0, 4.0), beyond(0.3, 0.4)
+    (3.0, 0.0)
+    """
+    return sqrt(max(error**2 - noise**2, 0.0))
+
+
 def where_section(d: Diagnosis, runs: Sequence[Run]) -> Section:
     """Where the baseline fails."""
     told = [words(f"{m.statement.removesuffix('.')} ({rarity(m.p_value)}).") for m in d.mismatch]
@@ -101,30 +111,32 @@ def what_section(d: Diagnosis, runs: Sequence[Run]) -> tuple[Section, ...]:
     return (Section("What was left out", (*sentences(told), *drawn), lead),)
 
 
-def unexplained_section(u: Unexplained | None, driver: str) -> tuple[Section, ...]:
-    """What is left: where, its shape, what it resembles."""
+def unexplained_section(d: Diagnosis, runs: Sequence[Run]) -> tuple[Section, ...]:
+    """What is left: where, its shape, what it resembles, and the shapes over all that the baseline fails over."""
+    u = d.unexplained
     if u is None:
         return ()
-    picture = unexplained_picture(u, driver)
-    told = [
-        Remark(words(f"{100 * u.share:.0f} % of what remains is structure, not noise ({rarity(u.p_value)})."), "bad")
-    ]
+    left = f"{100 * u.share:.0f} % of what remains is structure, not noise ({rarity(u.p_value)})."
+    told = [Remark(left, "bad")]
     told += [Remark(words(f"Resembles {text.removesuffix('.')}."), "doubt") for text in u.resembles]
-    parts = (*sentences(told), *(() if picture is None else (picture,)))
-    return (Section("What is not explained", parts, words(u.statement)),)
+    picture = unexplained_picture(u, driver_quantity(d))
+    drawn = (*(() if picture is None else (picture,)), *shape_pictures(d, runs))
+    return (Section("What is not explained", (*sentences(told), *drawn)),)
 
 
 def after_section(d: Diagnosis) -> Section:
     """How much better it is."""
     head = ("RMSE per sample", "before / N", "after / N", "noise / N", "smaller by")
-    noise = f"{d.heldout.noise:.4g}" if isfinite(d.heldout.noise) else "–"
-    rows = tuple(
-        (name, f"{before:.4g}", f"{after:.4g}", floor, _change(before, after))
-        for name, before, after, floor in (
-            ("fitted", d.train.before, d.train.after, ""),
-            ("not fitted", d.heldout.before, d.heldout.after, noise),
+    held, known = d.heldout, isfinite(d.heldout.noise)
+    listed = [
+        ("fitted", d.train.before, d.train.after, ""),
+        ("not fitted", held.before, held.after, f"{held.noise:.4g}" if known else "–"),
+    ]
+    if known:
+        listed.append(
+            ("not fitted, noise taken out", beyond(held.before, held.noise), beyond(held.after, held.noise), "0")
         )
-    )
+    rows = tuple((name, f"{a:.4g}", f"{b:.4g}", floor, _change(a, b)) for name, a, b, floor in listed)
     white = d.whiteness_p >= WHITE
     judged = (
         Remark(words(f"Not fitted: {d.heldout.what}.")),

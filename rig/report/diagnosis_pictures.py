@@ -7,15 +7,19 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, NextExperiment, Unexplained, Where
-from identification.mismatch.signature import SPREAD_OUT, Run, profile, signature
+from identification.mismatch.signature import SPREAD_OUT, Run, Signature, profile, signature
+from identification.mismatch.signature import shape as shape_of
 from rig.report.diagnosis_words import KINDS, axis, driver_quantity, effect_name, evidence, stretch, words
 from rig.report.figures import Curve, Group, residuals
 from rig.report.figures_diagnosis import residual_size, shape, signature_over, steps_plot
 from rig.report.figures_mismatch import Panel, Region, before_after, grid_of, residual_map
+from rig.report.look import Plot
 from rig.report.page import Picture
 
 FEW = 40
 """Rows below which a run is a table of levels: no map over time, points instead."""
+TWO_SIDED = frozenset({"direction", "direction_of_change"})
+"""Coordinates of two or three values: a sentence says it all."""
 MOST_MAPS = 2
 MOST_PANELS = 3
 
@@ -97,7 +101,7 @@ def _level_picture(run: Curves, d: Diagnosis) -> Picture:
 def _located(where: Where, runs: Sequence[Run], driver: str) -> Picture | None:
     quantity = "driver" if where.quantity == driver else where.quantity
     found = profile(runs, quantity)
-    if found is None:
+    if found is None or quantity in TWO_SIDED:
         return None
     before, after = Group("before", found.at, found.before), Group("after", found.at, found.after)
     spread_out = quantity in SPREAD_OUT
@@ -120,17 +124,34 @@ def _signature(finding: Finding, runs: Sequence[Run], driver: str, *, several: b
     found = signature(runs, finding)
     if found is None:
         return None
-    y, factor = KINDS[found.kind]
-    x = axis(found.quantity, driver)
-    measured = Group("measured", found.at, factor * found.measured, 1.96 * factor * found.std)
     name = effect_name(finding.effect)
     label = name if found.alone or not several else "all findings together"
-    model = Curve(label, found.at, factor * found.modelled)
-    steps = found.at.size <= 8
-    plot = signature_over(measured, model, x, y, spread_out=found.quantity in SPREAD_OUT, steps=steps)
     what = "what the model lacks without it" if several and found.alone else "what the baseline lacks"
     caption = f"{words(finding.statement)} Points: {what}, with 95 % intervals; line: the model in the same bins."
+    plot = _signature_plot(found, label, driver)
     return Picture(f"{name[0].upper()}{name[1:]}", plot, f"{caption} {evidence(finding)}.")
+
+
+def _signature_plot(found: Signature, label: str, driver: str) -> Plot:
+    y, factor = KINDS[found.kind]
+    measured = Group("measured", found.at, factor * found.measured, 1.96 * factor * found.std)
+    model = Curve(label, found.at, factor * found.modelled)
+    spread_out = found.quantity in SPREAD_OUT
+    return signature_over(measured, model, axis(found.quantity, driver), y, spread_out=spread_out)
+
+
+def shape_pictures(d: Diagnosis, runs: Sequence[Run]) -> Iterator[Picture]:
+    """What the baseline lacks over each coordinate that it fails over, and how much of it the model has."""
+    driver = driver_quantity(d)
+    for where in (mismatch.where for mismatch in d.mismatch):
+        found = shape_of(runs, "driver" if where.quantity == driver else where.quantity)
+        if found is not None and found.at.size > 3:
+            x = axis(found.quantity, driver).split(" / ")[0]
+            plot = _signature_plot(found, "model" if d.model_terms else "baseline", driver)
+            caption = (
+                "Points: what the baseline lacks, with 95 % intervals; line: what the model adds in the same bins."
+            )
+            yield Picture(f"Left out over {x}", plot, caption)
 
 
 def unexplained_picture(u: Unexplained, driver: str) -> Picture | None:

@@ -80,7 +80,9 @@ def stretch(where: Where) -> str:
     'time since step 0.01 to 0.4 s'
     """
     unit = f" {unit_text(where.unit)}" if unit_text(where.unit) else ""
-    return words(f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}")
+    size = max(abs(where.low), abs(where.high))
+    low, high = (0.0 if abs(x) < 1e-3 * size else x for x in (where.low, where.high))
+    return words(f"{where.quantity} {low:.3g} to {high:.3g}{unit}")
 
 
 def effect_name(effect: str, form: str = "") -> str:
@@ -126,7 +128,6 @@ def value_cells(value: Value) -> tuple[str, str, str]:
 
 def evidence(finding: Finding) -> str:
     """How sure a finding is."""
-    return (
-        f"{rarity(finding.p_value)}, BIC better by {finding.bic_gain:.3g}, "
-        f"probability among its rivals {finding.probability:.2g}"
-    )
+    gain = f"{finding.bic_gain:.3g}" if abs(finding.bic_gain) < 100 else f"{finding.bic_gain:.0f}"
+    among = f"probability among its rivals {finding.probability:.2g}" if finding.rivals else "no rival comes near"
+    return f"{rarity(finding.p_value)}, BIC better by {gain}, {among}"

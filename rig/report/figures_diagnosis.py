@@ -16,8 +16,6 @@ from rig.report.look import BAND, DATA, MODEL, MUTED, NARROW, OTHER, Plot, label
 
 Stretch = tuple[float, float]
 """From, to: a part of the axis across."""
-TWO_DECADES = 30.0
-"""Ratio of the ends of a coordinate above which its scale is logarithmic, where it is wanted so."""
 
 
 def plain(value: float) -> str:
@@ -87,7 +85,7 @@ def shape(measured: Group, x: str, y: str, stretch: Stretch | None = None) -> Pl
     return Plot(draw, alt, (NARROW[0], 3.5), (9.0, 3.4))
 
 
-def signature_over(measured: Group, model: Curve, x: str, y: str, *, spread_out: bool = False, steps: bool) -> Plot:
+def signature_over(measured: Group, model: Curve, x: str, y: str, *, spread_out: bool = False) -> Plot:
     """What is left out, as measured (95 % intervals), and as the named physics has it in the same bins."""
     alt = (
         f"{y} over {x}: measured in {measured.x.size} places, and {model.label}; largest measured "
@@ -98,8 +96,7 @@ def signature_over(measured: Group, model: Curve, x: str, y: str, *, spread_out:
         axes = figure.subplots()
         _across(axes, spread_out=spread_out)
         axes.axhline(0.0, color=MUTED, linewidth=0.8)
-        marker = "s" if steps else ""
-        axes.plot(model.x, model.y, "-", marker=marker, markersize=4, color=MODEL, label=model.label, zorder=2.5)
+        axes.plot(model.x, model.y, "-s", markersize=3.5, color=MODEL, label=model.label, zorder=2.5)
         draw_groups(axes, [measured])
         _named(axes, x, y, spread_out=spread_out)
         axes.margins(y=0.1)
