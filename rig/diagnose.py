@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 import click
 
 from rig.errors import RecordingError, RigError
+from rig.next_plan import asked, limits_of, write_next
 
 if TYPE_CHECKING:  # numpy and scipy come up when a diagnosis is made, not for `rig diagnose --help`
     from identification.mismatch.diagnosis import Diagnosis
+    from identification.mismatch.sweeps import Limits
     from identification.recording import Recording
     from identification.twin import Twin
 
@@ -53,6 +55,7 @@ def diagnose_files(
     twin: Path | None = None,
     *,
     any_thruster: bool = False,
+    limits: Limits | None = None,
 ) -> Diagnosis:
     """The diagnosis of recordings of one thruster, against C V|V| or a twin; its own twin knows the files' hashes.
 
@@ -65,19 +68,23 @@ def diagnose_files(
     recordings = read(files)
     if baseline is not None and any_thruster:
         baseline = replace(baseline, thruster=recordings[0].thruster)
-    found = diagnosed(recordings, read(holdout), seed, baseline)
+    found = diagnosed(recordings, read(holdout), seed, baseline, limits)
     by_id = {r.recording_id: path for r, path in zip(recordings, files, strict=True)}
     return found if found.twin is None else replace(found, twin=stamped(found.twin, by_id))
 
 
 def diagnosed(
-    recordings: Sequence[Recording], holdout: Sequence[Recording] = (), seed: int = 0, baseline: Twin | None = None
+    recordings: Sequence[Recording],
+    holdout: Sequence[Recording] = (),
+    seed: int = 0,
+    baseline: Twin | None = None,
+    limits: Limits | None = None,
 ) -> Diagnosis:
     """As identification has it, a refusal raised as RecordingError."""
     from identification.mismatch.diagnose import diagnose
     from identification.mismatch.preparing import Refusal
 
-    found = diagnose(recordings, holdout, seed, baseline)
+    found = diagnose(recordings, holdout, seed, baseline, limits)
     if isinstance(found, Refusal):
         raise RecordingError(found.reason)
     return found
@@ -122,6 +129,9 @@ PATH = click.Path(path_type=Path)
     type=click.Path(dir_okay=False, path_type=Path),
     help="Write the fitted model here, as a twin (JSON).",
 )
+@click.option("--plan", type=PATH, help="Write the next experiment here, as a campaign; needs --campaign.")
+@click.option("--campaign", type=PATH, help="Campaign of the recordings: bench and pacing of the next experiment.")
+@click.option("--budget", type=float, metavar="S", help="Longest next experiment.  [default: 300]")
 @click.option("--seed", default=0, show_default=True, help="Of the surrogates that the false-alarm rate is judged by.")
 def diagnose_command(
     files: tuple[Path, ...],
@@ -131,6 +141,9 @@ def diagnose_command(
     json_path: Path | None,
     report: Path | None,
     save_twin: Path | None,
+    plan: Path | None,
+    campaign: Path | None,
+    budget: float | None,
     seed: int,
 ) -> None:
     """Find the physics that C V|V| leaves out of recordings of one thruster; a folder stands for its *.h5.
@@ -139,8 +152,13 @@ def diagnose_command(
     """
     try:
         held = recordings_in(holdout) if holdout else []
-        found = diagnose_files(files, held, seed, twin, any_thruster=any_thruster)
+        bench = asked(plan, campaign)
+        limits = limits_of(bench, budget)
+        found = diagnose_files(files, held, seed, twin, any_thruster=any_thruster, limits=limits)
         tell(found, json_path, report, save_twin)
+        if plan is not None and bench is not None:
+            for file in write_next(found, bench, plan):
+                click.echo(f"next experiment written to {file}; next: rig check {file}", err=str(json_path) == "-")
     except (RigError, OSError) as error:
         click.echo(f"rig diagnose: {error}", err=True)
         raise SystemExit(2) from error

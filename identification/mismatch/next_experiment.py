@@ -82,16 +82,18 @@ def rivals_of(state: State, named: Sequence[Named]) -> _Contest | None:
 
 
 def propose(state: State, data: Data, named: Sequence[Named], limits: Limits | None = None) -> NextExperiment | None:
-    """The next experiment for an answer with rivals; None when there are none, or no sweep fits the budget."""
+    """The next experiment for an answer with rivals; None when there are none.
+
+    A budget that is shorter than the shortest piece is exceeded by that one.
+    """
     contest = rivals_of(state, named)
     if contest is None:
         return None
     limits = limits or Limits()
     bench = Bench(state, data, _slew(data, limits))
     largest = _largest(data, state, limits)
-    every = [b for b in blocks(largest, _flows(data, limits)) if b.seconds + 2 * REST <= limits.budget]
-    if not every:
-        return None
+    pieces_of = blocks(largest, _flows(data, limits))
+    every = [b for b in pieces_of if b.seconds + 2 * REST <= limits.budget] or [min(pieces_of, key=lambda b: b.seconds)]
     tried = _Tried(bench, contest, tuple(every), limits.budget, data)
     return tried.answer()
 

@@ -1,0 +1,81 @@
+"""The next experiment of a diagnosis as a campaign file that `rig check` accepts and `rig run` takes."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rig.config import CampaignConfig
+from rig.errors import ConfigError, PlanError
+from rig.loading import load_campaign
+from rig.plan_file import Level, Template, template_of, write_campaign
+
+if TYPE_CHECKING:
+    from identification.mismatch.diagnosis import Diagnosis
+    from identification.mismatch.sweeps import Limits
+
+
+def asked(plan: Path | None, campaign: Path | None) -> CampaignConfig | None:
+    """The campaign whose bench is used. Raises ConfigError for a plan without one, before anything is computed."""
+    if plan is not None and campaign is None:
+        raise ConfigError("--plan needs --campaign, the campaign file of the recordings: it names bench and pacing")
+    return None if campaign is None else load_campaign(campaign)
+
+
+def limits_of(campaign: CampaignConfig | None, budget: float | None = None) -> Limits:
+    """What the bench allows: its voltage, its slew, and the thrust that its guard stands."""
+    from identification.mismatch.sweeps import BUDGET, Limits
+
+    seconds = BUDGET if budget is None else budget
+    if not seconds > 0:
+        raise PlanError(f"--budget must be above 0 s, but is {seconds:g} s")
+    if campaign is None:
+        return Limits(budget=seconds)
+    bench = campaign.bench
+    name = f"{bench.force}.thrust"
+    stands = [
+        min(abs(end) for end in (limit.min, limit.max) if end is not None)
+        for limit in bench.limits
+        if limit.channel == name and (limit.min is not None or limit.max is not None)
+    ]
+    return Limits(budget=seconds, slew=campaign.plan.slew, max_thrust=min(stands, default=None))
+
+
+def next_template(found: Diagnosis, campaign: CampaignConfig) -> Template:
+    """The campaign's bench and pacing for one thruster; no zero returns but the last, for the steps hold rests."""
+    assert found.next_experiment is not None
+    if found.thruster not in campaign.thrusters:
+        raise ConfigError(
+            f"{campaign.path}: the recordings are of thruster {found.thruster}, but the campaign has "
+            f"{', '.join(campaign.thrusters)}; give the campaign they were made with"
+        )
+    shortest = min(step.duration for step in found.next_experiment.steps)
+    template = template_of(campaign)
+    return replace(
+        template,
+        name=f"{template.name}: next experiment",
+        thrusters=(found.thruster,),
+        zero_every=0,
+        settle=min(template.settle, 0.5 * shortest),
+    )
+
+
+def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path) -> tuple[Path, ...]:
+    """Write the sweep; one file for each flow speed. Raises PlanError when there is nothing to tell apart."""
+    proposed = found.next_experiment
+    if proposed is None:
+        raise PlanError("--plan: no next experiment is needed, for no finding has a rival; nothing was written")
+    if path.resolve() == campaign.path.resolve():
+        raise ConfigError(f"{path}: this is the campaign that the plan is made from; choose another name for --plan")
+    flows = {step.flow_speed for step in proposed.steps}
+    levels = [
+        Level(step.command_voltage, step.duration, step.flow_speed if len(flows) > 1 or step.flow_speed else None)
+        for step in proposed.steps
+    ]
+    comment = (
+        "Written by `rig diagnose`.",
+        proposed.why,
+        f"probability that it decides rightly, as expected: {proposed.expected_power:.2f}",
+    )
+    return write_campaign(levels, next_template(found, campaign), path, comment)
