@@ -200,19 +200,22 @@ def _validation(trials: Sequence[Trial], left: Sequence[Floats]) -> tuple[Valida
 
 
 def start_inertia(trials: Sequence[Trial], known: Gaussian, buoyancy: Mapping[str, str]) -> float:
-    """Inertia to start a search from: the thesis's way on every trial, the mean of what comes out positive.
+    """Inertia to start a search from: the thesis's way on the first trial where it gives a positive one.
 
-    If none does: what would make the vehicle settle in a tenth of the trial.
+    If it does on none: what would make the vehicle settle in a tenth of the trial.
     """
-    ready = [found for one in trials if (found := smoothed(one)) is not None]
-    inverse = [inverse_inertia(one, known.names, known.mean, buoyancy)[0] for one in ready]
-    good = [1 / q for q in inverse if np.isfinite(q) and q > 0]
-    if good:
-        return float(np.mean(good))
+    settling = [1.0]
     k, k2 = (known[name] if name in known.names else 0.0 for name in ("k", "k2"))
-    slopes = [abs(k) + 2 * abs(k2) * float(np.abs(found.velocity).max()) for found in ready]
-    settling = [slope * SETTLING * float(np.ptp(found.trial.time)) for slope, found in zip(slopes, ready, strict=True)]
-    return max([*settling, 1.0])
+    for one in trials:
+        found = smoothed(one)
+        if found is None:
+            continue
+        inverse, _ = inverse_inertia(found, known.names, known.mean, buoyancy)
+        if np.isfinite(inverse) and inverse > 0:
+            return 1 / inverse
+        slope = abs(k) + 2 * abs(k2) * float(np.abs(found.velocity).max())
+        settling.append(slope * SETTLING * float(np.ptp(one.time)))
+    return max(settling)
 
 
 def by_derivative(

@@ -236,7 +236,7 @@ def test_comparators_refuse_nothing_to_work_on():
 def test_a_trial_that_stands_still_gives_no_inertia_by_derivative():
     vehicle = installation(EXACT)
     (recording,) = recordings_of(romeo(), [sine("surge", FRONT, 20.0)], np.random.default_rng(0))
-    one = trial(recording, vehicle, "surge")
+    one = trial(recording, vehicle, "surge", step=0.5)
     assert isinstance(one, Trial)
     idle = replace(one, force=replace(one.force, signal=0 * one.force.signal))
     q, _ = inverse_inertia(smoothed(idle), (), np.zeros(0), {})
@@ -264,7 +264,7 @@ def test_negative_drag_is_called_impossible():
     vehicle = installation(EXACT)
     (recording,) = recordings_of(romeo(), [sine("surge", FRONT, 20.0)], np.random.default_rng(0))
     known = Gaussian(("k", "k2"), np.array([-60.0, 900.0]), np.diag([0.01, 0.01]))
-    fit = output_error([trial(recording, vehicle, "surge")], known)
+    fit = output_error([trial(recording, vehicle, "surge", step=0.5)], known)
     assert any("k is negative" in s for s in fit.statements)
 
 
@@ -272,7 +272,7 @@ def test_wrong_drag_leaves_a_residual_that_is_not_white():
     vehicle = installation(EXACT)
     (recording,) = recordings_of(romeo(), [sine("surge", FRONT, 20.0)], np.random.default_rng(0))
     wrong = Gaussian(("k", "k2"), np.array([900.0, 420.0]), np.diag([1e-8, 1e-8]))
-    assert any("not white" in s for s in output_error([trial(recording, vehicle, "surge")], wrong).statements)
+    assert any("not white" in s for s in output_error([trial(recording, vehicle, "surge", step=0.5)], wrong).statements)
 
 
 def test_excess_is_left_out_when_no_scatter_of_runs_explains_it():
