@@ -80,7 +80,10 @@ def _short(d: Diagnosis) -> Iterator[Remark]:
 
 def _change(before: float, after: float) -> str:
     """How much smaller, in per cent."""
-    return "–" if before <= 0 else f"{100 * (1 - after / before):.2g} %".replace("-", "−")
+    if before <= 0:
+        return "–"
+    share = 100 * (1 - after / before)
+    return (f"{share:.0f} %" if abs(share) >= 10 else f"{share:.2g} %").replace("-", "−")
 
 
 def beyond(error: float, noise: float) -> float:
@@ -134,7 +137,7 @@ def after_section(d: Diagnosis) -> Section:
     ]
     if known:
         listed.append(
-            ("not fitted, noise taken out", beyond(held.before, held.noise), beyond(held.after, held.noise), "0")
+            ("not fitted, noise taken out", beyond(held.before, held.noise), beyond(held.after, held.noise), "")
         )
     rows = tuple((name, f"{a:.4g}", f"{b:.4g}", floor, _change(a, b)) for name, a, b, floor in listed)
     white = d.whiteness_p >= WHITE

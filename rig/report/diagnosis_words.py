@@ -46,10 +46,13 @@ _NAMES = re.compile(r"\b(" + "|".join(sorted((*UNITS, *REVEALED_BY), key=len, re
 def words(text: str) -> str:
     """A sentence of the diagnosis without underscores in names that are ours.
 
+    >>> words("within +-1 V at 20 degC")
+    'within ±1 V at 20 °C'
     >>> words("70 % lies at command_voltage -1 to 1 V, C = 0.4 N/V^2; see my_file")
     '70 % lies at command voltage −1 to 1 V, C = 0.4 N/V²; see my_file'
     """
     told = _NAMES.sub(lambda name: name[0].replace("_", " "), prose(text))
+    told = re.sub(r"\bdegC\b", "°C", told.replace("+-", "±"))
     return re.sub(r"(?<![\w.])-(?=\d)", "−", told)
 
 

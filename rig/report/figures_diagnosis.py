@@ -82,7 +82,7 @@ def shape(measured: Group, x: str, y: str, stretch: Stretch | None = None) -> Pl
         labels(axes, x, y)
         legend_above(axes)
 
-    return Plot(draw, alt, (NARROW[0], 3.5), (9.0, 3.4))
+    return Plot(draw, alt, (NARROW[0], 3.5))
 
 
 def signature_over(measured: Group, model: Curve, x: str, y: str, *, spread_out: bool = False) -> Plot:
