@@ -90,8 +90,13 @@ def diagnosed(
     return found
 
 
-def tell(found: Diagnosis, json_path: Path | None, report: Path | None, save_twin: Path | None) -> None:
-    """Twin, page and JSON where they are wanted; text for a person unless the JSON goes to standard output."""
+def tell(
+    found: Diagnosis, json_path: Path | None, report: Path | None, save_twin: Path | None, files: Iterable[Path] = ()
+) -> None:
+    """Twin, page and JSON where they are wanted; text for a person unless the JSON goes to standard output.
+
+    `files`: the recordings diagnosed; with them the page draws each effect by itself.
+    """
     from identification.mismatch.diagnosis import diagnosis_json
     from rig.diagnose_text import diagnosis_text
 
@@ -100,7 +105,7 @@ def tell(found: Diagnosis, json_path: Path | None, report: Path | None, save_twi
 
         write_twin(found.twin, save_twin)
     if report is not None:
-        import_module("rig.report.diagnosis").write(found, report)  # matplotlib: only where a page is drawn
+        import_module("rig.report.diagnosis").write(found, report, read(files))  # matplotlib: only for a page
     if json_path is not None:
         text = json.dumps(diagnosis_json(found), indent=1, allow_nan=False)
         if str(json_path) == "-":
@@ -155,7 +160,7 @@ def diagnose_command(
         bench = asked(plan, campaign)
         limits = limits_of(bench, budget)
         found = diagnose_files(files, held, seed, twin, any_thruster=any_thruster, limits=limits)
-        tell(found, json_path, report, save_twin)
+        tell(found, json_path, report, save_twin, recordings_in(files))
         if plan is not None and bench is not None:
             for file in write_next(found, bench, plan):
                 click.echo(f"next experiment written to {file}; next: rig check {file}", err=str(json_path) == "-")
