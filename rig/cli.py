@@ -35,6 +35,7 @@ COMMANDS: Final = {
     "fit": Entry("rig.fit:fit_command", "Fit tau = C V|V| to recordings."),
     "diagnose": Entry("rig.diagnose:diagnose_command", "Find, name and model the physics that C V|V| leaves out."),
     "simulate": Entry("rig.simulate:simulate_command", "The run of a plan that a twin predicts, as a recording."),
+    "compare": Entry("rig.compare:compare_command", "What a simulation leaves out relative to the real run."),
     "vehicle": Entry(
         "rig.vehicle:vehicle_command", "Identify drag, efficiency and inertia of a vehicle from its trials."
     ),
