@@ -185,17 +185,17 @@ def _effects(twin: Twin, history: History, rows: NDArray[np.intp]) -> dict[tuple
 def signature(runs: Sequence[Run], finding: Finding) -> Signature | None:
     """Of one finding; None where its coordinate does not move enough to be seen."""
     quantity, kind = SIGNATURES.get(finding.effect, ("driver", "force"))
-    if any(quantity not in run.coordinates for run in runs):
+    if not all(quantity in run.coordinates for run in runs):
         quantity = "time" if kind == "gain" else "driver"
     key = finding.effect, finding.form
-    if all(key in run.effects for run in runs):
+    if runs and all(key in run.effects for run in runs):
         return _binned(runs, quantity, kind, [run.effects[key] for run in runs], alone=True)
     return shape(runs, quantity, kind)
 
 
 def shape(runs: Sequence[Run], quantity: str, kind: Kind | None = None) -> Signature | None:
     """What the baseline lacks over any coordinate, and what the whole model adds to it there; None as above."""
-    if any(quantity not in run.coordinates for run in runs):
+    if not runs or any(quantity not in run.coordinates for run in runs):
         return None
     chosen = kind or SHAPES.get(quantity, "gain")
     return _binned(runs, quantity, chosen, [run.before - run.left for run in runs], alone=False)
@@ -297,7 +297,7 @@ def _edges(values: Floats, quantity: str) -> Floats:
 
 def profile(runs: Sequence[Run], quantity: str) -> Profile | None:
     """RMS before and after over a coordinate of the runs; None where they do not have it, or it does not move."""
-    if any(quantity not in run.coordinates for run in runs):
+    if not runs or any(quantity not in run.coordinates for run in runs):
         return None
     over = np.concatenate([run.coordinates[quantity] for run in runs])
     before, left = (np.concatenate([getattr(run, name) for run in runs]) for name in ("before", "left"))
