@@ -34,7 +34,7 @@ from identification.recording import Floats
 ALARM = 0.01
 """Family-wise false-alarm rate."""
 MOST_LINES = 4
-LOWEST = 0.5
+LOWEST = 1.0
 """Hz: below this a residual is full of steps that are repeated, not of lines."""
 PERIODS = 10
 """Least number of periods in a run."""

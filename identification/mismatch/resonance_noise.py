@@ -18,6 +18,8 @@ from identification.mismatch.spectrum import Series, clipped, finite, spacing_of
 from identification.recording import Floats
 
 MOST_BANDS = 2
+LOWEST = 0.5
+"""Hz: slower noise is what the exponential scales of the noise model are for."""
 LEAST_SAMPLES = 400
 AVERAGES = (12, 40, 120, 400)
 """Stretches of a run over which spectra are averaged."""
@@ -38,7 +40,9 @@ POINTS = 300
 """Averaged powers in one fit."""
 
 
-def find_bands(runs: Sequence[Series], most: int = MOST_BANDS) -> tuple[tuple[float, float], ...]:
+def find_bands(
+    runs: Sequence[Series], most: int = MOST_BANDS, lowest: float = LOWEST
+) -> tuple[tuple[float, float], ...]:
     """(frequency in Hz, quality) of at most `most` broad peaks of noise, the strongest first.
 
     Take lines out first (`lines.find_lines`), and leave out samples just after steps (NaN).
@@ -51,6 +55,8 @@ def find_bands(runs: Sequence[Series], most: int = MOST_BANDS) -> tuple[tuple[fl
     for f, width in _candidates(grids):
         if len(found) == most:
             break
+        if f < lowest:
+            continue
         fitted = _fitted(grids, f, width)
         if fitted is not None and all(abs(np.log(fitted[0] / g)) > 1.0 / q + 0.1 for g, q in found):
             found.append(fitted)
@@ -133,11 +139,12 @@ def _fitted(grids: Sequence[tuple[Floats, float]], f0: float, width: float) -> t
             density = density + np.exp(q[2]) / (1 + ((f - q[3]) / np.exp(q[4])) ** 2)
         return float(2 * np.sum(count * (np.log(density) + power / density)))
 
-    plain = minimize(cost, np.array([np.log(floor), 0.0]), method="L-BFGS-B")
+    plain = minimize(cost, np.array([np.log(floor), 0.0]), method="L-BFGS-B", bounds=[(None, None), (-8, 8)])
     best = None
     for factor in (0.3, 1.0, 3.0):
         start = np.array([np.log(floor), 0.0, np.log(max(float(power.max()), floor)), f0, np.log(factor * width)])
-        bounds = [(None, None), (-8, 8), (None, None), (f0 - 0.5 * reach, f0 + 0.5 * reach)]
+        level = np.log(max(float(power.max()), 1e-300))
+        bounds = [(level - 40, level + 9), (-8, 8), (level - 40, level + 9), (f0 - 0.5 * reach, f0 + 0.5 * reach)]
         widths = (np.log(0.3 * finest), np.log(2 * reach))
         now = minimize(cost, start, method="L-BFGS-B", bounds=[*bounds, widths])
         best = now if best is None or now.fun < best.fun else best

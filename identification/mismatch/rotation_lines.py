@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
+from scipy.ndimage import gaussian_filter1d
 from scipy.signal import welch
 from scipy.stats import gamma
 
@@ -24,8 +25,10 @@ HIGHEST = 400.0
 """Hz at the highest speed: blade pass of the fastest thrusters, with their harmonics."""
 LOWEST = 1.0
 """Hz at the highest speed."""
-SLOWEST = 0.5
+SLOWEST = 1.0
 """Hz: what is slower in a stretch (or its alias) is no line."""
+SMOOTH = 0.25
+"""s, standard deviation of the Gauss mean that is taken off: what a model leaves is slow, and has aliases too."""
 LEAST_GAIN = 25.0
 """In chi-square."""
 LONGEST = 8.0
@@ -94,7 +97,7 @@ class _Colour:
         spacing, _ = spacing_of(series.time)
         index = np.round((series.time - series.time[0]) / spacing).astype(np.intp)
         grid = np.zeros(int(index[-1]) + 1)
-        grid[index] = clipped(series.residual)
+        grid[index] = _quick(series)
         segment = min(max(int(LONGEST / spacing), LEAST), grid.size)
         self._rate = 1.0 / spacing
         self._f, density = welch(grid, fs=self._rate, nperseg=segment, detrend="constant")
@@ -111,6 +114,14 @@ class _Colour:
         return out
 
 
+def _quick(series: Series) -> Floats:
+    """The residual without what is slower than about 1/(4 SMOOTH)."""
+    value = clipped(series.residual)
+    spacing, _ = spacing_of(series.time)
+    out: Floats = value - gaussian_filter1d(value, SMOOTH / spacing, mode="nearest")
+    return out
+
+
 def _speed(series: Series) -> Floats:
     """Turns per s at each sample."""
     assert series.turns is not None
@@ -122,7 +133,7 @@ def _stretches(runs: Sequence[tuple[int, Series]], top: float) -> Iterator[_Stre
     for i, r in runs:
         assert r.turns is not None
         speed = _speed(r)
-        value = clipped(r.residual)
+        value = _quick(r)
         piece = np.floor((r.time - r.time[0]) / LONGEST)
         new = (np.abs(np.diff(speed)) > JUMP * top) | (np.diff(piece) > 0)
         new |= np.diff(speed > TURNING * top)
@@ -130,9 +141,8 @@ def _stretches(runs: Sequence[tuple[int, Series]], top: float) -> Iterator[_Stre
         for low, high in pairwise(edges.tolist()):
             s = slice(low, high)
             if high - low >= LEAST and speed[s].mean() > TURNING * top:
-                v = value[s] - value[s].mean()
-                if np.any(v):
-                    yield _Stretch(i, r.time[s], r.turns[s], v, float(speed[s].mean()))
+                if np.any(value[s]):
+                    yield _Stretch(i, r.time[s], r.turns[s], value[s], float(speed[s].mean()))
 
 
 def find_locked(runs: Sequence[tuple[int, Series]], alarm: float) -> Locked | None:
