@@ -220,27 +220,23 @@ def open_ends(fitted: Fit, theta: Theta, data: Data) -> Floats:
 
     A parameter that the data hardly fix is known from its bounds all the same: a quarter of their span.
     """
-    R = len(fitted.theta.tares)
-    old = np.nan_to_num(fitted.cov, nan=0.0)
-    q = old.shape[0]
-    shared = [*range(q - 3 - R), *range(q - 3, q)]
-    cov = old[np.ix_(shared, shared)]
+    R, runs = len(fitted.theta.tares), len(theta.tares)
+    q = fitted.free.size
     low, high, _ = bounds_of(fitted.model, data, fitted.theta)
-    span = (high - low)[shared]
-    cov = _within(cov, np.where(np.isfinite(span), 0.25 * span, np.inf))
-    runs = len(theta.tares)
-    out = np.zeros((len(shared) + runs, len(shared) + runs))
+    known = np.where(np.isfinite(high - low) & (high > low), 4.0 / np.maximum(high - low, 1e-300), 0.0)
+    old = np.zeros((q, q))
+    old[np.ix_(fitted.free, fitted.free)] = _inverse(fitted.jacobian, known[fitted.free])
+    shared = [*range(q - 3 - R), *range(q - 3, q)]
+    out = np.diag(np.full(q - R + runs, (TARE * data.scale.thrust) ** 2))
     keep = [*range(q - 3 - R), *range(q - 3 - R + runs, q - R + runs)]
-    out[np.ix_(keep, keep)] = cov
-    for k in range(q - 3 - R, q - 3 - R + runs):
-        out[k, k] = (TARE * data.scale.thrust) ** 2
+    out[np.ix_(keep, keep)] = old[np.ix_(shared, shared)]
     return out
 
 
-def _within(cov: Floats, sizes: Floats) -> Floats:
-    """The covariance when each parameter is also known to lie within `sizes` (standard deviations) of its value."""
-    bounded = np.flatnonzero(np.isfinite(sizes) & (sizes > 0) & (np.diag(cov) > 0))
-    gain = cov[:, bounded]
-    inner = cov[np.ix_(bounded, bounded)] + np.diag(sizes[bounded] ** 2)
-    out: Floats = cov - gain @ np.linalg.solve(inner, gain.T) if bounded.size else cov
+def _inverse(columns: Floats, known: Floats) -> Floats:
+    """Inverse of columns' columns + diag(known^2), each parameter scaled to its own size."""
+    both = np.concatenate([columns, np.diag(known)])
+    size = np.linalg.norm(both, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    out: Floats = np.linalg.pinv((both / size).T @ (both / size), hermitian=True, rcond=1e-12) / np.outer(size, size)
     return out

@@ -2,8 +2,8 @@
 
 Candidate pieces (`sweeps`) are foreseen under every rival with its fitted values. What a rival's own parameters, C and
 the zero can follow, jointly with the data in hand, does not count. Pieces are taken greedily by what they tell per
-second, until the probability that the BIC decides rightly between any two is GOOD or the budget is spent; then pieces
-that are not needed are left out again.
+second, until the probability that the BIC decides rightly between the present answer and each rival, whichever is true,
+is GOOD or the budget is spent; then pieces that are not needed are left out again.
 """
 
 from __future__ import annotations
@@ -28,6 +28,10 @@ GOOD = 0.95
 """Probability of a right decision at which a sweep is long enough."""
 FAIR = 0.5
 """Below this a pair is said to be hardly told apart."""
+PLAIN = 18.0
+"""Expected chi-square apart at which the probability of a right decision is about GOOD."""
+MOST_LONGER = 12.0
+"""Times the budget: a sweep that would have to be longer than this is none."""
 MOST_RIVALS = 4
 MOST_SHORTENED = 4
 """Blocks without which a sweep is tried."""
@@ -137,6 +141,7 @@ class _Tried:
         self.parts = _looked_at(bench, contest.fits, every)
         self.seconds = np.array([block.seconds for block in every])
         self.pairs = list(permutations(range(len(contest.fits)), 2))
+        self.decisive = np.array([0 in pair for pair in self.pairs])
 
     def answer(self) -> NextExperiment:
         chosen: list[int] = []
@@ -164,7 +169,7 @@ class _Tried:
         for k in chosen[1:]:
             assert total is not None
             total = total + self.parts[k]
-        while total is None or self._pairwise(total).min() < target:
+        while total is None or self._pairwise(total)[:, self.decisive].min() < target:
             now = 0.0 if total is None else float(_utility(self._pairwise(total), target)[0])
             each = self._pairwise(self.parts if total is None else self.parts + total)
             gains = np.where(self.seconds <= self._left(chosen), (_utility(each, target) - now) / self.seconds, -1.0)
@@ -182,10 +187,16 @@ class _Tried:
         return out
 
     def _judged(self, chosen: Sequence[int]) -> tuple[float, dict[tuple[int, int], float]]:
-        """Worst probability of a right decision, and that of each pair, of the whole sweep as it would be run."""
-        views, _ = self.bench.outlook(self.contest.fits, stretches(self._steps(chosen)))
+        """Probability of a right decision of each pair, of the whole sweep as it would be run.
+
+        And the worst between the present answer and a rival. Two rivals that are like each other make no sweep useless.
+        """
+        views = self._foreseen(chosen)
         at = {(a, b): power(views[a], views[b], self._needed(a, b, views)) for a, b in self.pairs}
-        return min(at.values()), at
+        return min(p for pair, p in at.items() if 0 in pair), at
+
+    def _foreseen(self, chosen: Sequence[int]) -> tuple[Outlook, ...]:
+        return self.bench.outlook(self.contest.fits, stretches(self._steps(chosen)))[0]
 
     def _needed(self, true: int, wrong: int, views: Sequence[Outlook]) -> float:
         """Chi-square that the sweep has to add for the wrong model to be EQUAL worse."""
@@ -214,10 +225,25 @@ class _Tried:
         says = f"separates {names[0]} from {', '.join(dict.fromkeys(names[1:]))}: {', '.join(unique)}"
         if self.driver_unit != "V":
             says += f"; the levels are in {self.driver_unit}, the recordings have no command in V"
-        weak = sorted({tuple(sorted((a, b))) for (a, b), p in at.items() if p < FAIR})
-        if weak:
-            says += "; " + "; ".join(_beyond(names[a], names[b]) for a, b in weak)
-        return says
+        return "; ".join([says, *self._beyond(chosen, at)])
+
+    def _beyond(self, chosen: Sequence[int], at: dict[tuple[int, int], float]) -> list[str]:
+        """What else it takes for the pairs that this sweep hardly tells apart."""
+        views = self._foreseen(chosen)
+        apart = distances(pieces(views, np.zeros(views[0].value.size, dtype=np.intp), 1))[0]
+        seconds = ending(self._steps(chosen), self.bench.slew)[-1]
+        out = []
+        for a, b in sorted({(min(pair), max(pair)) for pair, p in at.items() if p < FAIR}):
+            longer = seconds * PLAIN / max(min(apart[a, b], apart[b, a]), 1e-9)
+            if longer <= MOST_LONGER * self.budget:
+                takes = f"about {max(longer, seconds) / 60:.0f} min of such a sweep"
+            else:
+                takes = (
+                    f"no sweep within these limits, but {_other_means(self.contest.names[a], self.contest.names[b])}"
+                )
+            one, other = self.contest.names[a], self.contest.names[b]
+            out.append(f"to tell {one} from {other} takes {takes}" if a == 0 else f"{one} and {other} stay alike")
+        return out
 
 
 def _looked_at(bench: Bench, fits: Sequence[Fit], every: Sequence[Block]) -> Pieces:
@@ -241,8 +267,7 @@ def _looked_at(bench: Bench, fits: Sequence[Fit], every: Sequence[Block]) -> Pie
     return pieces([one_zero(view, len(runs)) for view in views], block, len(every))
 
 
-def _beyond(one: str, other: str) -> str:
+def _other_means(one: str, other: str) -> str:
     ids = [effect for name in (one, other) for effect in name.split(" with ")]
-    needed = list(dict.fromkeys(BEYOND[effect] for effect in ids if effect in BEYOND))
-    what = ", or ".join(needed) if needed else "a quieter cell, or a wider range of levels"
-    return f"no sweep within these limits is likely to tell {one} from {other}: {what} would"
+    means = list(dict.fromkeys(BEYOND[effect] for effect in ids if effect in BEYOND))
+    return ", or ".join(means) if means else "a quieter cell or larger levels"
