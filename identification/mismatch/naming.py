@@ -13,7 +13,7 @@ from identification.mismatch.fitting import Fit, bounds_of, extended, fit
 from identification.mismatch.model import Data, Theta, predict
 from identification.mismatch.omnibus import SHAPE_ERROR, Omnibus
 from identification.mismatch.preparing import DRIVERS
-from identification.mismatch.screening import directions, orthogonal_basis
+from identification.mismatch.screening import directions, orthogonal_basis, refined
 from identification.mismatch.search import State, refresh
 from identification.physics.term import Term
 from identification.recording import Floats
@@ -115,6 +115,7 @@ def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]
         if (1 - r**2) * gain > LIKELY and r < 0.9:
             break
         bigger = less.model.plus(other)
+        values = refined(less, data, state.weights, other, values)
         new = fit(bigger, extended(less.theta, less.model, other, values, bigger), data, state.weights)
         if at_bound(other, new, data):
             continue

@@ -37,6 +37,11 @@ MOST_INTERVALS = 12000
 FEW_SAMPLES = 3
 """Samples of a level, at most, that make a static table."""
 LEAST_SAMPLES = 5
+CALMED = ("flow_speed", "motor_temperature", "water_temperature")
+CALM = 4
+"""Samples on either side that are averaged."""
+LOADS = 6
+"""Columns of the supply's load."""
 FOLLOWED = ("bus_voltage", "flow_speed", "current", "torque", "motor_temperature", "water_temperature", "rotation_rate")
 """Quantities that terms and tests may look at."""
 
@@ -161,6 +166,19 @@ def _clear_of_steps(time: Floats, force: Floats, held: _Held) -> tuple[Floats, F
     return time[clear], force[clear]
 
 
+def _clear_of_jumps(recording: Recording, time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    """Without samples between two samples of the flow of which nobody knows when it changed."""
+    flow = recording.first_of("flow_speed")
+    if flow is None or np.count_nonzero(np.isfinite(flow.value)) < 3:
+        return time, force
+    good = np.isfinite(flow.value)
+    at, value = flow.time[good], flow.value[good]
+    jumps = np.flatnonzero(_jumps(value) & (np.abs(np.diff(value)) > 0.03 * np.ptp(value)))
+    gap = np.searchsorted(at, time, side="right") - 1
+    clear = ~np.isin(gap, jumps)
+    return (time[clear], force[clear]) if np.count_nonzero(clear) > 0.7 * time.size else (time, force)
+
+
 def _edges(time: Floats, held: _Held, most: int) -> Floats:
     """Edges between samples, dense after changes; big steps of the command are edges too."""
     spacing = float(np.median(np.diff(time)))
@@ -255,19 +273,26 @@ def _within(time: Floats, value: Floats, edges: Floats, mean: Floats) -> Floats:
 
 
 def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, time: Floats, force: Floats) -> History:
+    time, force = _clear_of_jumps(recording, time, force)
     mean, count, sampled = _binned(time, force, edges)
     within = _within(time, force, edges, mean)
     middle = 0.5 * (edges[1:] + edges[:-1])
     others: dict[str, Floats] = {}
+    driven = held.mean(edges)
     for quantity in FOLLOWED:
         channel = recording.first_of(quantity)
-        values = None if channel is None or channel is driver else _followed(channel, middle)
+        if channel is None or channel is driver:
+            continue
+        values = (
+            _supply(channel, held, middle, driven, np.diff(edges))
+            if quantity == "bus_voltage"
+            else _followed(channel, middle)
+        )
         if values is not None:
             others[quantity] = values
     neighbour = _neighbour(recording, middle)
     if neighbour is not None:
         others["neighbour_thrust"] = neighbour
-    driven = held.mean(edges)
     rate = rate_count = rate_sampled = None
     per_driver = 1.0
     turning = recording.first_of("rotation_rate")
@@ -298,10 +323,53 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
 
 
 def _followed(channel: Channel, at: Floats) -> Floats | None:
+    """Interpolated, its noise averaged between its jumps: noise in what explains makes effects look smaller."""
     good = np.isfinite(channel.value)
     if np.count_nonzero(good) < 2:
         return None
-    out: Floats = np.interp(at, channel.time[good], channel.value[good])
+    time, value = channel.time[good], channel.value[good]
+    out: Floats = np.interp(at, time, _calm(value) if channel.quantity in CALMED else value)
+    return out
+
+
+def _jumps(value: Floats) -> NDArray[np.bool_]:
+    """(n-1,) where neighbouring samples differ by far more than their noise."""
+    step = np.abs(np.diff(value))
+    noise = float(np.median(step)) / 0.6745
+    return step > max(6 * noise, 1e-9 * float(np.max(np.abs(value), initial=0.0)))
+
+
+def _calm(value: Floats) -> Floats:
+    """Running mean over up to CALM samples on either side, never across a jump."""
+    starts = np.concatenate([[0], np.flatnonzero(_jumps(value)) + 1, [value.size]])
+    index = np.arange(value.size)
+    which = np.searchsorted(starts, index, side="right") - 1
+    reach = np.minimum(np.minimum(index - starts[which], starts[which + 1] - 1 - index), CALM)
+    total = np.concatenate([[0.0], np.cumsum(value - value[0])])
+    out: Floats = value[0] + (total[index + reach + 1] - total[index - reach]) / (2 * reach + 1)
+    return out
+
+
+def _supply(channel: Channel, held: _Held, at: Floats, driven: Floats, dt: Floats) -> Floats | None:
+    """Supply voltage: what the load makes of it, and the slow rest, so that it is known between its samples."""
+    good = np.isfinite(channel.value)
+    if np.count_nonzero(good) < 2 * LOADS:
+        return _followed(channel, at)
+    time, value = channel.time[good], channel.value[good]
+    size = float(np.max(np.abs(driven))) or 1.0
+    index = np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)
+    then = held.value[index] if held.stepwise else np.interp(time, held.time, held.value)
+    charge = np.cumsum(np.abs(driven / size) ** 3 * dt)
+    drawn = np.interp(time, at, charge)
+
+    def columns(v: Floats, q: Floats) -> Floats:
+        u = np.abs(v) / size
+        return np.column_stack([np.ones(u.size), u, u**2, u**3, u**4, q / max(float(charge[-1]), 1e-12)])
+
+    H = columns(then, drawn)
+    theta = np.linalg.lstsq(H, value, rcond=None)[0]
+    rest = value - H @ theta
+    out: Floats = columns(driven, charge) @ theta + np.interp(at, time, _calm(rest))
     return out
 
 

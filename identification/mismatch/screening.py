@@ -80,8 +80,24 @@ def orthogonal_basis(columns: Floats) -> Floats:
     return out
 
 
-def directions(fit: Fit, data: Data, weights: Weights, terms: Sequence[Term]) -> Directions:
-    """Of all trials of all terms whose channels were recorded."""
+def refined(fit: Fit, data: Data, weights: Weights, term: Term, values: tuple[float, ...]) -> tuple[float, ...]:
+    """The best trial closely round `values`, for terms that have such."""
+    trials = term.finer(values, data.scale)
+    if not trials:
+        return values
+    found = directions(fit, data, weights, [term], trials)
+    score = np.abs(found.columns.T @ fit.residual)
+    return found.values[int(np.argmax(score))] if score.size else values
+
+
+def directions(
+    fit: Fit,
+    data: Data,
+    weights: Weights,
+    terms: Sequence[Term],
+    trials: tuple[tuple[float, ...], ...] | None = None,
+) -> Directions:
+    """Of all trials (their own, or those given) of all terms whose channels were recorded."""
     with_rate = bool(weights.rate)
     base_thrust, base_rate = raw(fit.model, fit.theta, data, with_rate=with_rate)
     used: list[Term] = []
@@ -92,7 +108,7 @@ def directions(fit: Fit, data: Data, weights: Weights, terms: Sequence[Term]) ->
     for term in terms:
         first = term.parameters(data.scale)[0]
         bigger = fit.model.plus(term)
-        for trial in term.trials(data.scale):
+        for trial in term.trials(data.scale) if trials is None else trials:
             theta = extended(fit.theta, fit.model, term, trial, bigger)
             new_thrust, new_rate = raw(bigger, theta, data, with_rate=with_rate)
             for i, (new, base) in enumerate(zip(new_thrust, base_thrust, strict=True)):

@@ -19,6 +19,7 @@ from identification.mismatch.screening import (
     directions,
     matching_pursuit,
     orthogonal_basis,
+    refined,
     screen,
 )
 from identification.physics.catalogue import CATALOGUE
@@ -127,7 +128,7 @@ def refresh(model: Model, theta: Theta, data: Data, extra: Floats | None, state:
         parts = [np.column_stack([p, e]) for p, e in zip(parts, _split(extra, data), strict=True)]
     parts = _independent(parts)
     rows = state.rows if state is not None else data.thrust_rows
-    noise = fit_noise(rows, left, parts, size, start=state.noise if state is not None else None)
+    noise = fit_noise(rows, left, parts, size)
     rate_noise = None
     if data.with_rate:
         left_rate = [h.rate[h.rate_rows] - f for h, f in zip(data.histories, rate, strict=True)]
@@ -273,6 +274,7 @@ def _best_addition(state: State, judged: Screening, data: Data) -> Fit | None:
     fits = []
     for term, values, _ in judged.best(CANDIDATES):
         bigger = state.fit.model.plus(term)
+        values = refined(state.fit, data, state.weights, term, values)
         theta = extended(state.fit.theta, state.fit.model, term, values, bigger)
         new = fit(bigger, theta, data, state.weights)
         gain = state.fit.chi2 - new.chi2

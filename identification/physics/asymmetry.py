@@ -28,6 +28,9 @@ class Asymmetry:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.95,),)
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         out: Floats = np.where(now.x < 0, theta[0] * value, value)
         return out

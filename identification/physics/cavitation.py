@@ -32,6 +32,9 @@ class Cavitation:
         slope = (0.3 if self.form == "linear" else 0.8) / scale.driver
         return tuple((slope, share * scale.driver) for share in (0.4, 0.6, 0.75, 0.88))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         lost = theta[0] * np.maximum(np.abs(now.x) - theta[1], 0.0)
         out: Floats = value * np.maximum(1 - (lost if self.form == "linear" else lost**2), 0.0)

@@ -28,6 +28,9 @@ class CommandSaturation:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((share * scale.driver,) for share in (0.97, 0.92, 0.85, 0.75, 0.6))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         out: Floats = np.clip(value, -theta[0], theta[0])
         return out

@@ -28,6 +28,9 @@ class DeadBand:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((share * scale.driver,) for share in (0.01, 0.03, 0.07, 0.15, 0.3))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         size = np.abs(value)
         if self.form == "jump":

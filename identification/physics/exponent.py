@@ -28,6 +28,9 @@ class Exponent:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((1.95,), (1.7,), (2.3,))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         size = np.abs(now.x) / now.scale.driver
         out: Floats = value * np.maximum(size, 1e-9) ** (theta[0] - 2)

@@ -32,6 +32,9 @@ class Heating:
             return tuple((0.05, tau) for tau in (15.0, 40.0, 100.0, 300.0))
         return tuple((0.05, tau, later) for tau, later in ((30.0, 30.0), (120.0, 60.0)))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         history = now.history
         current = history.others.get("current")

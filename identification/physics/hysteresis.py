@@ -27,6 +27,9 @@ class Hysteresis:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((share * scale.thrust,) for share in (0.003, 0.01, 0.04))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         return play(value, theta[0])
 

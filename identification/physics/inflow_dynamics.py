@@ -29,6 +29,9 @@ class InflowDynamics:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((0.1, tau) for tau in (0.1, 0.3, 1.0, 3.0))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         u = lowpass(now.x, now.history.dt, theta[1])[1]
         out: Floats = value + now.C * np.abs(now.x) * theta[0] * (now.x - u)

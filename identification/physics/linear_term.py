@@ -30,6 +30,9 @@ class LinearTerm:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.02 * scale.thrust / scale.driver,),)
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * now.x
         return out

@@ -32,6 +32,9 @@ class LoadCellCreep:
             return tuple((0.02, tau) for tau in (3.0, 10.0, 30.0, 100.0))
         return ((0.02, 8.0, 0.02, 60.0), (0.02, 20.0, 0.02, 200.0))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * lowpass(value, now.history.dt, theta[1])[1]
         if self.form == "two_constants":

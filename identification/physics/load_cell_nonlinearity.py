@@ -38,6 +38,9 @@ class LoadCellNonlinearity:
         power = 2 if self.form == "cubic" else 1
         return ((0.02 / scale.thrust**power,),)
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         bend = value**2 if self.form == "cubic" else np.abs(value)
         out: Floats = value * (1 + theta[0] * bend)

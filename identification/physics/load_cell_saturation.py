@@ -35,6 +35,9 @@ class LoadCellSaturation:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((share * scale.reading,) for share in (0.99, 0.95, 0.88, 0.75, 0.6))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         reading = value + now.tare
         if now.scale.noise <= 0:

@@ -29,6 +29,9 @@ class MotorLag:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((tau,) for tau in (0.005, 0.02, 0.06, 0.15, 0.4, 1.0) if tau >= 0.1 * scale.interval)
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         tau = theta[0]
         if tau <= 1e-6:

@@ -32,6 +32,9 @@ class Recirculation:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((0.05 * scale.thrust / scale.driver**2, tau) for tau in (5.0, 12.0, 30.0, 80.0))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         jet = now.x if self.form == "rate" else np.sign(value) * np.sqrt(np.abs(value / now.C))
         u = lowpass(jet, now.history.dt, theta[1])[1]

@@ -30,6 +30,9 @@ class ReversalLoss:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((0.1, tau) for tau in (0.3, 1.0, 3.0, 10.0))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         since_other, since_began, known = since_opposite(now.x, now.history.dt, TURNING * now.scale.driver)
         age = since_other if self.form == "wake" else since_began

@@ -26,6 +26,9 @@ class RotationCoupling:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.1,), (1.0,))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         measured = now.history.others["rotation_rate"] / now.history.rate_per_driver
         out: Floats = value + theta[0] * (measured - value)

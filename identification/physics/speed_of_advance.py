@@ -31,6 +31,9 @@ class SpeedOfAdvance:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.05 * scale.thrust / scale.driver / max(scale.flow, 1e-6),),)
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         out: Floats = value - theta[0] * np.abs(now.x) * now.history.others["flow_speed"]
         return out

@@ -33,6 +33,9 @@ class StandResonance:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((1.0, f, 0.15) for f in np.geomspace(0.5, max(0.25 / scale.interval, 0.6), 7))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         rung = resonant(value, now.history.dt, theta[1], theta[2])
         out: Floats = value + theta[0] * (rung - value)

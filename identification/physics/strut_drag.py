@@ -29,6 +29,9 @@ class StrutDrag:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((-0.02 * scale.thrust / max(scale.flow, 1e-6) ** 2,),)
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         flow = now.history.others["flow_speed"]
         out: Floats = value + theta[0] * flow * np.abs(flow)

@@ -28,6 +28,9 @@ class SupplySag:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.1,), (1.0,))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         bus = now.history.others["bus_voltage"]
         ratio = np.maximum(bus / np.nanmax(bus), 1e-3)

@@ -94,6 +94,9 @@ class Term(Protocol):
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         """Small but finite amounts at several inner settings, to look for it with."""
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        """Trials closely round the best one, where a fit could not find its way between them; empty for most terms."""
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         """The value of its stage (M,) with this effect in it."""
 

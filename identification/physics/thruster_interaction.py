@@ -28,6 +28,9 @@ class ThrusterInteraction:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.05,),)
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         neighbour = np.abs(now.history.others["neighbour_thrust"])
         out: Floats = value * (1 - theta[0] * neighbour / max(float(np.max(neighbour)), 1e-12))

@@ -27,6 +27,9 @@ class TimeSkew:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((d,) for d in (0.004, 0.02, 0.1, 0.4))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         return delayed(value, now.history.edges, theta[0])
 

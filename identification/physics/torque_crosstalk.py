@@ -34,6 +34,9 @@ class TorqueCrosstalk:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.01 * scale.thrust / scale.driver**2,),)
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * now.x**2
         return out

@@ -28,6 +28,9 @@ class WindingResistance:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((share / scale.driver,) for share in (0.02, 0.2, 0.8))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         loss = theta[0]
         if loss <= 0:

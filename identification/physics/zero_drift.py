@@ -36,6 +36,9 @@ class ZeroDrift:
             return ((0.01 * scale.thrust / scale.duration,),)
         return tuple((0.01 * scale.thrust, share * scale.duration) for share in (0.06, 0.2, 0.6))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         t = now.history.middle
         if self.form == "linear":

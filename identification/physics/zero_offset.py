@@ -29,6 +29,10 @@ class ZeroOffset:
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((0.01 * scale.thrust, share * scale.duration) for share in np.linspace(0.02, 0.98, 80))
 
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        step = 0.96 * scale.duration / 79
+        return tuple((values[0], values[1] + share * step) for share in np.linspace(-1.0, 1.0, 25))
+
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         edge = np.clip((now.history.edges - theta[1]) / (2e-3 * now.scale.duration) + 0.5, 0.0, 1.0)
         out: Floats = value + theta[0] * 0.5 * (edge[1:] + edge[:-1])
