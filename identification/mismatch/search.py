@@ -248,6 +248,7 @@ def search(
     terms = available(data)
     state = before = baseline(data, theta, terms, first)
     screenings = []
+    seen = {frozenset(state.fit.model.terms)}
     while True:
         ids = {t.id for t in state.fit.model.terms}
         left = [t for t in terms if t.id not in ids]
@@ -267,6 +268,9 @@ def search(
         remaining = [t for t in terms if t.id not in {u.id for u in best.model.terms}]
         state = refresh(best.model, best.theta, data, pursue(best, data, state.weights, remaining), state)
         state = prune(state, data)
+        if frozenset(state.fit.model.terms) in seen:  # what was added was dropped again
+            break
+        seen.add(frozenset(state.fit.model.terms))
     return Found(data, terms, before, state, tuple(screenings), judged)
 
 
