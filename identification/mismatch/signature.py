@@ -7,7 +7,7 @@ Everything is binned from the curves of a diagnosis. Where the recordings are at
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -78,7 +78,8 @@ class Run:
     coordinates: Mapping[str, Floats]
     """driver, time, time_since_step, time_since_reversal, previous_voltage, direction, and what else was recorded."""
     effects: Mapping[tuple[str, str], Floats] = field(default_factory=dict)
-    """(effect, form) -> N that it changes the model by; empty where the recordings were not at hand."""
+    """(effect, form) -> N that it changes the model by, beyond what C and the tares could take up; empty where the
+    recordings were not at hand."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +112,26 @@ def runs_of(diagnosis: Diagnosis, recordings: Sequence[Recording] = ()) -> tuple
     """What can be averaged. `recordings`: those diagnosed, in any order; without them there is less to see."""
     known = {r.recording_id: r for r in recordings}
     C = diagnosis.baseline["C"].value
-    return tuple(_run(curves, known.get(curves.recording_id), diagnosis.twin, C) for curves in diagnosis.curves)
+    return _beyond_constants(
+        [_run(curves, known.get(curves.recording_id), diagnosis.twin, C) for curves in diagnosis.curves]
+    )
+
+
+def _beyond_constants(runs: Sequence[Run]) -> tuple[Run, ...]:
+    """The effects less what another C and other tares would do as well: what a refit without them leaves."""
+    keys = set.intersection(*(set(run.effects) for run in runs)) if runs else set()
+    if not keys:
+        return tuple(runs)
+    which = np.concatenate([np.full(run.time.size, i) for i, run in enumerate(runs)])
+    columns = np.column_stack([np.concatenate([run.force for run in runs]), *(which == i for i in range(len(runs)))])
+    ends = np.cumsum([run.time.size for run in runs])[:-1]
+    left: list[dict[tuple[str, str], Floats]] = [{} for _ in runs]
+    for key in sorted(keys):
+        effect = np.concatenate([run.effects[key] for run in runs])
+        beyond = effect - columns @ np.linalg.lstsq(columns, effect, rcond=None)[0]
+        for out, part in zip(left, np.split(beyond, ends), strict=True):
+            out[key] = part
+    return tuple(replace(run, effects=effects) for run, effects in zip(runs, left, strict=True))
 
 
 def _run(curves: Curves, recording: Recording | None, twin: Twin | None, C: float) -> Run:

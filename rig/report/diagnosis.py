@@ -75,7 +75,18 @@ def _short(d: Diagnosis) -> Iterator[Remark]:
         yield Remark(text) if not d.model_terms else Remark(text, "good" if tone == "good" else "bad")
     if d.next_experiment is not None:
         total = sum(step.duration for step in d.next_experiment.steps)
-        yield Remark(words(f"Next: a sweep of {total:.0f} s. {d.next_experiment.why}."))
+        first = _clauses(d.next_experiment.why)[0]
+        yield Remark(f"Next: a sweep of {total:.0f} s, expected power {d.next_experiment.expected_power:.2f}. {first}")
+
+
+def _clauses(text: str) -> list[str]:
+    """A reason as sentences.
+
+    >>> _clauses("separates a from b; no sweep is likely to tell c")
+    ['Separates a from b.', 'No sweep is likely to tell c.']
+    """
+    parts = [part.strip() for part in words(text).removesuffix(".").split(";")]
+    return [f"{part[:1].upper()}{part[1:]}." for part in parts if part] or ["No reason was given."]
 
 
 def _change(before: float, after: float) -> str:
@@ -86,10 +97,10 @@ def _change(before: float, after: float) -> str:
     return (f"{share:.0f} %" if abs(share) >= 10 else f"{share:.2g} %").replace("-", "−")
 
 
-def beyond(error: float, noise: float) -> float:
+def _beyond(error: float, noise: float) -> float:
     """The model's own part of an RMSE, in N; noise and model error are independent.
 
-    >>> beyond(5.0, 4.0), beyond(0.3, 0.4)
+    >>> _beyond(5.0, 4.0), _beyond(0.3, 0.4)
     (3.0, 0.0)
     """
     return sqrt(max(error**2 - noise**2, 0.0))
@@ -135,11 +146,11 @@ def after_section(d: Diagnosis) -> Section:
         ("fitted", d.train.before, d.train.after, ""),
         ("not fitted", held.before, held.after, f"{held.noise:.4g}" if known else "–"),
     ]
+    rows: list[tuple[str, ...]] = [(name, f"{a:.4g}", f"{b:.4g}", floor, _change(a, b)) for name, a, b, floor in listed]
     if known:
-        listed.append(
-            ("not fitted, noise taken out", beyond(held.before, held.noise), beyond(held.after, held.noise), "")
-        )
-    rows = tuple((name, f"{a:.4g}", f"{b:.4g}", floor, _change(a, b)) for name, a, b, floor in listed)
+        own = [_beyond(x, held.noise) for x in (held.before, held.after)]
+        told = ["within noise" if x == 0 else f"{x:.3g}" for x in own]
+        rows.append(("not fitted, noise taken out", *told, "", _change(*own) if own[1] > 0 else ""))
     white = d.whiteness_p >= WHITE
     judged = (
         Remark(words(f"Not fitted: {d.heldout.what}.")),
@@ -149,7 +160,7 @@ def after_section(d: Diagnosis) -> Section:
             "good" if white else "doubt",
         ),
     )
-    table = Table("Baseline and model", head, rows, columns(head, head[0]))
+    table = Table("Baseline and model", head, tuple(rows), columns(head, head[0]))
     return Section("Before and after", (table, Sentences(judged), *before_after_pictures(d)))
 
 
@@ -178,7 +189,7 @@ def rivals_section(d: Diagnosis) -> tuple[Section, ...]:
         (
             effect_name(rival.effect, rival.form),
             effect_name(f.effect, f.form),
-            f"{rival.bic_loss:.1f}".replace("-", "−"),
+            f"{round(rival.bic_loss, 1) + 0.0:.1f}".replace("-", "−"),
             _odds(rival.bic_loss),
             words(rival.statement),
             told_apart(f.effect, rival.effect) or "–",
@@ -201,6 +212,8 @@ def _odds(loss: float) -> str:
     >>> _odds(2.0), _odds(20.0), _odds(-2.0)
     ('2.7 : 1', '22026 : 1', '1 : 2.7')
     """
+    if abs(loss) < 0.1:
+        return "1 : 1"
     if abs(loss) > 27:
         return "over 10⁶ : 1" if loss > 0 else "1 : over 10⁶"
     odds = 2.718281828459045 ** (0.5 * abs(loss))
@@ -219,8 +232,8 @@ def next_section(n: NextExperiment | None) -> tuple[Section, ...]:
     )
     table = Table(f"{len(rows)} steps", head, rows, frozenset(), folded=len(rows) > MOST_ROWS)
     total = sum(s.duration for s in n.steps)
-    lead = f"{n.why.removesuffix('.')}. It takes {total:.0f} s; expected power {n.expected_power:.2f}."
-    return (Section("The next experiment", (next_picture(n), table), words(lead)),)
+    told = (*_clauses(n.why), f"It takes {total:.0f} s; expected power {n.expected_power:.2f}.")
+    return (Section("The next experiment", (*sentences(told), next_picture(n), table)),)
 
 
 def notes_section(d: Diagnosis) -> tuple[Section, ...]:

@@ -10,7 +10,7 @@ from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, NextEx
 from identification.mismatch.signature import SPREAD_OUT, Run, Signature, profile, signature
 from identification.mismatch.signature import shape as shape_of
 from rig.report.diagnosis_words import KINDS, axis, driver_quantity, effect_name, evidence, stretch, words
-from rig.report.figures import Curve, Group, residuals
+from rig.report.figures import Curve, Group
 from rig.report.figures_diagnosis import residual_size, shape, signature_over, steps_plot
 from rig.report.figures_mismatch import Panel, Region, before_after, grid_of, residual_map
 from rig.report.look import Plot
@@ -39,9 +39,9 @@ def where_pictures(d: Diagnosis, runs: Sequence[Run]) -> Iterator[Picture]:
     """Maps with the located region, then the size of the residual along each located coordinate."""
     region = _region(d)
     for run in largest(d.curves, MOST_MAPS):
-        yield _level_picture(run, d) if run.time.size < FEW else _map(run, d, region)
+        yield _level_picture(run, d, region) if run.time.size < FEW else _map(run, d, region)
     driver = driver_quantity(d)
-    drawn = set()
+    drawn = {driver} if all(run.time.size < FEW for run in d.curves) else set()
     for mismatch in d.mismatch:
         found = _located(mismatch.where, runs, driver)
         if found is not None and mismatch.where.quantity not in drawn:
@@ -86,12 +86,14 @@ def _map(run: Curves, d: Diagnosis, region: Region | None) -> Picture:
     return Picture(f"Residual of the baseline{_of(run, d)}", plot, words(caption))
 
 
-def _level_picture(run: Curves, d: Diagnosis) -> Picture:
+def _level_picture(run: Curves, d: Diagnosis, region: Region | None) -> Picture:
     groups = [
         Group(name, run.driver, run.thrust - predicted)
         for name, predicted in (("before", run.baseline), ("after", run.model))
     ]
-    plot = residuals(groups, axis("driver", driver_quantity(d)), "residual / N", wide=True)
+    located = _clipped(region, run)
+    span = located.voltage if located is not None else None
+    plot = shape(groups, axis("driver", driver_quantity(d)), "residual / N", span, wide=True)
     caption = (
         f"A table of {run.time.size} levels without a course of time. Before: {d.baseline_model}; after: the model."
     )
@@ -162,7 +164,7 @@ def unexplained_picture(u: Unexplained, driver: str) -> Picture | None:
     at, mean, std = rows.T
     x = axis(u.where.quantity, driver)
     span = (u.where.low, u.where.high) if u.where.low < u.where.high else None
-    plot = shape(Group("mean residual of the model", at, mean, 1.96 * std), x, "residual / N", span)
+    plot = shape([Group("mean residual of the model", at, mean, 1.96 * std)], x, "residual / N", span)
     caption = f"Shaded: {stretch(u.where)}, where most of it lies. Bars are 95 % intervals of the mean."
     return Picture(f"What is left over {x.split(' / ')[0]}", plot, caption)
 

@@ -69,20 +69,24 @@ def residual_size(
     return Plot(draw, alt, (NARROW[0], 3.5))
 
 
-def shape(measured: Group, x: str, y: str, stretch: Stretch | None = None) -> Plot:
-    """Mean residual over a coordinate with 95 % intervals; `stretch` is shaded."""
-    top = int(np.nanargmax(np.abs(measured.y)))
-    alt = f"{y} over {x} in {measured.x.size} places: largest {measured.y[top]:.3g} near {measured.x[top]:.3g}."
+def shape(groups: Sequence[Group], x: str, y: str, stretch: Stretch | None = None, *, wide: bool = False) -> Plot:
+    """Residuals over a coordinate with their 95 % intervals; `stretch` is shaded."""
+    first = groups[0]
+    top = int(np.nanargmax(np.abs(first.y)))
+    alt = (
+        f"{y} over {x}, {', '.join(group.label for group in groups)}, in {first.x.size} places: largest "
+        f"{first.y[top]:.3g} near {first.x[top]:.3g}."
+    )
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         _shade(axes, stretch)
         axes.axhline(0.0, color=MUTED, linewidth=0.8)
-        draw_groups(axes, [measured])
+        draw_groups(axes, groups)
         labels(axes, x, y)
         legend_above(axes)
 
-    return Plot(draw, alt, (NARROW[0], 3.5))
+    return Plot(draw, alt, (NARROW[0], 3.5), (9.0, 3.4) if wide else None)
 
 
 def signature_over(measured: Group, model: Curve, x: str, y: str, *, spread_out: bool = False) -> Plot:

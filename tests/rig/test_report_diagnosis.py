@@ -109,7 +109,7 @@ def test_page_says_everything_and_is_self_contained(tmp_path):
         "a delay keeps the shape of the step",
         "expected power 0.97",
         "ab" * 32,
-        "separates motor lag from time skew",
+        "Separates motor lag from time skew",
         "temperature was not recorded",
     ):
         assert said.replace(". (p", " (p") in found.text
@@ -134,8 +134,8 @@ def test_each_section_has_its_figures():
     }
     where = page.sections[1].parts[1].plot
     assert "The region command voltage 8 to 30 V is outlined." in where.alt
-    assert cells(page, "Before and after")[2][:3] == ("not fitted, noise taken out", "4.999", "0.04583")
-    sweep = page.sections[6].parts[0].plot
+    assert cells(page, "Before and after")[2][:3] == ("not fitted, noise taken out", "5", "0.0458")
+    sweep = page.sections[6].parts[1].plot
     assert "flow" in svg(sweep)
 
 
@@ -170,7 +170,8 @@ def test_levels_without_a_course_of_time_are_points():
     V = np.linspace(-10, 10, 21)
     static = Curves("levels", np.arange(21.0), V, C * V * np.abs(V) * 0.9, C * V * np.abs(V), C * V * np.abs(V) * 0.9)
     page = diagnosis_page(answer(curves=(static,), mismatch=(HIGH,)))
-    assert titles(page)["Where C V|V| fails"][0] == "Residual level by level"
+    assert titles(page)["Where C V|V| fails"] == ["Residual level by level"]
+    assert "located here" in svg(page.sections[1].parts[1].plot)
     after = next(s for s in page.sections if s.title == "Before and after").parts[-1].plot
     assert "command voltage / V" in svg(after)
 
