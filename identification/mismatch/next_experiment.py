@@ -2,8 +2,8 @@
 
 Candidate pieces (`sweeps`) are foreseen under every rival with its fitted values. What a rival's own parameters, C and
 the zero can follow, jointly with the data in hand, does not count. Pieces are taken greedily by what they tell per
-second, until the probability that the BIC decides rightly between the present answer and each rival, whichever is true,
-is GOOD or the budget is spent; then pieces that are not needed are left out again.
+second, until the probability that the BIC decides rightly between any two that can be told apart, whichever is true, is
+GOOD or the budget is spent; then pieces that are not needed are left out again.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ GOOD = 0.95
 """Probability of a right decision at which a sweep is long enough."""
 FAIR = 0.5
 """Below this a pair is said to be hardly told apart."""
+ALIKE = 4.0
+"""Expected chi-square apart, when the budget is spread evenly over all pieces, below which two rivals stay alike."""
 PLAIN = 18.0
 """Expected chi-square apart at which the probability of a right decision is about GOOD."""
 MOST_LONGER = 12.0
@@ -141,7 +143,8 @@ class _Tried:
         self.parts = _looked_at(bench, contest.fits, every)
         self.seconds = np.array([block.seconds for block in every])
         self.pairs = list(permutations(range(len(contest.fits)), 2))
-        self.decisive = np.array([0 in pair for pair in self.pairs])
+        even = self._pairwise(self.parts.evenly(budget / float(self.seconds.sum())))[0]
+        self.decisive = np.array([0 in pair for pair in self.pairs]) | (even > ALIKE)
 
     def answer(self) -> NextExperiment:
         chosen: list[int] = []
@@ -187,13 +190,13 @@ class _Tried:
         return out
 
     def _judged(self, chosen: Sequence[int]) -> tuple[float, dict[tuple[int, int], float]]:
-        """Probability of a right decision of each pair, of the whole sweep as it would be run.
+        """Probability of a right decision of each pair, of the whole sweep as it would be run, and the worst of them.
 
-        And the worst between the present answer and a rival. Two rivals that are like each other make no sweep useless.
+        Two rivals that are like each other do not count: the sweep may still tell the answer from both.
         """
         views = self._foreseen(chosen)
         at = {(a, b): power(views[a], views[b], self._needed(a, b, views)) for a, b in self.pairs}
-        return min(p for pair, p in at.items() if 0 in pair), at
+        return min(at[pair] for pair, counts in zip(self.pairs, self.decisive, strict=True) if counts), at
 
     def _foreseen(self, chosen: Sequence[int]) -> tuple[Outlook, ...]:
         return self.bench.outlook(self.contest.fits, stretches(self._steps(chosen)))[0]

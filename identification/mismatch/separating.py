@@ -43,6 +43,14 @@ class Pieces:
             tuple(a + b for a, b in zip(self.gram, other.gram, strict=True)),
         )
 
+    def evenly(self, share: float) -> Pieces:
+        """Of all blocks together, each for `share` of its time."""
+        return Pieces(
+            share * self.apart.sum(axis=0, keepdims=True),
+            tuple(share * s.sum(axis=0, keepdims=True) for s in self.score),
+            tuple(share * g.sum(axis=0, keepdims=True) for g in self.gram),
+        )
+
     def __getitem__(self, k: int) -> Pieces:
         at = slice(k, k + 1)
         return Pieces(self.apart[at], tuple(s[at] for s in self.score), tuple(g[at] for g in self.gram))

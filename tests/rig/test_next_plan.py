@@ -1,0 +1,72 @@
+"""The next experiment as a campaign: what is written is what `rig check` accepts, and what is refused."""
+
+from dataclasses import replace
+from math import inf
+from pathlib import Path
+
+import pytest
+
+from identification.mismatch.diagnosis import Diagnosis, HeldOutRmse, NextExperiment, PlanStep, Rmse
+from rig.check import check_campaign
+from rig.cli import main
+from rig.errors import ConfigError, PlanError
+from rig.loading import load_campaign
+from rig.next_plan import asked, limits_of, write_next
+
+RIGHT = Path(__file__).parent / "wrong" / "right.toml"
+STEPS = (PlanStep(0.0, 3.0), PlanStep(15.0, 1.0), PlanStep(-15.0, 4.0), PlanStep(0.0, 3.0))
+NEXT = NextExperiment("separates exponent from linear_term", STEPS, 0.96)
+FOUND = Diagnosis(
+    *(("a",), "T1", "ambiguous", "C V|V|", {}, (), (), None, (), {}),
+    *(Rmse(1.0, 0.1), HeldOutRmse(1.0, 0.1, 0.1, "blocks"), 1.0, 0.5, NEXT),
+)
+
+
+@pytest.fixture
+def campaign():
+    return load_campaign(RIGHT)
+
+
+def test_the_sweep_is_a_campaign_that_rig_check_accepts(campaign, tmp_path):
+    (file,) = write_next(FOUND, campaign, tmp_path / "next.toml")
+    found = load_campaign(file)
+    holds = [(s.voltage, s.min_duration) for s in found.plan if s.phase == "hold"]
+    assert holds == [(s.command_voltage, s.duration) for s in STEPS]
+    assert check_campaign(file).peak_voltage == 15.0
+    assert found.thrusters == ("T1",)
+    assert "# separates exponent from linear_term" in file.read_text()
+
+
+def test_one_file_for_each_flow_speed(campaign, tmp_path):
+    moving = NextExperiment("w", (*STEPS, PlanStep(0.0, 3.0, 0.5), PlanStep(10.0, 3.0, 0.5)), 0.9)
+    files = write_next(replace(FOUND, next_experiment=moving), campaign, tmp_path / "next.toml")
+    assert [load_campaign(file).flow_speed for file in files] == [0.0, 0.5]
+
+
+def test_refusals(campaign, tmp_path):
+    with pytest.raises(PlanError, match="no finding has a rival"):
+        write_next(replace(FOUND, next_experiment=None), campaign, tmp_path / "next.toml")
+    with pytest.raises(ConfigError, match="recordings are of thruster T9"):
+        write_next(replace(FOUND, thruster="T9"), campaign, tmp_path / "next.toml")
+    with pytest.raises(ConfigError, match="choose another name"):
+        write_next(FOUND, campaign, campaign.path)
+    with pytest.raises(ConfigError, match="--plan needs --campaign"):
+        asked(tmp_path / "next.toml", None)
+    with pytest.raises(PlanError, match="--budget must be above 0 s"):
+        limits_of(None, 0.0)
+    assert not list(tmp_path.iterdir())
+
+
+def test_limits_are_the_benchs(campaign):
+    found = limits_of(asked(None, RIGHT), 120.0)
+    assert (found.budget, found.slew, found.max_thrust) == (120.0, 12.0, 300.0)
+    open_ended = replace(campaign, bench=replace(campaign.bench, limits=()))
+    assert limits_of(open_ended).max_thrust is None
+    assert limits_of(None).budget < inf
+
+
+def test_a_plan_without_a_campaign_is_refused_before_anything_is_read(tmp_path, capsys):
+    with pytest.raises(SystemExit) as left:
+        main(["diagnose", str(tmp_path / "none.h5"), "--plan", str(tmp_path / "next.toml")])
+    assert left.value.code == 2
+    assert "--plan needs --campaign" in capsys.readouterr().err
