@@ -14,6 +14,7 @@ from sim_devices.nortek import NortekOptions
 from sim_devices.tables import WorldError, build, check_known
 from sim_devices.vesc import VescOptions
 from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
+from sim_devices.world.twin import with_twin
 
 DeviceOptions = MtSicsOptions | NortekOptions | KellerOptions | VescOptions
 KINDS: dict[str, type[DeviceOptions]] = {
@@ -73,7 +74,8 @@ def load(path: Path) -> BenchSettings:
     except tomllib.TOMLDecodeError as error:
         raise WorldError(f"{path}: is not TOML: {error}") from error
     try:
-        return _from_tables(tables, path.resolve().parent)
+        folder = path.resolve().parent
+        return _from_tables(with_twin(tables, folder), folder)
     except WorldError as error:
         raise WorldError(f"{path}: {error}") from error
 

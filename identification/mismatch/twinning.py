@@ -12,14 +12,18 @@ from scipy.stats import norm
 from identification.mismatch.diagnosis import Diagnosis, Finding, Value
 from identification.mismatch.fitting import raw
 from identification.mismatch.model import Data, Given, Model, Spread, Theta, acting
-from identification.mismatch.preparing import Refusal
+from identification.mismatch.preparing import FEW_SAMPLES, Refusal
 from identification.mismatch.search import State
-from identification.physics.history import History
+from identification.physics.history import CHANGED, History
 from identification.recording import Floats, Recording
 from identification.twin import Source, Twin, TwinNoise, TwinTerm, names_of
 
 ALARM = 0.01
 """False-alarm rate of a changed thrust constant."""
+LEAST_SAMPLES = 50
+"""Of one recording with a course of time; a table of levels may have fewer."""
+ONE_LEVEL = 1e-6
+"""Share of the largest driver: levels nearer than this are one."""
 PROBE = 0.1
 """Standard deviations by which a parameter is moved for the slope of the prediction."""
 
@@ -169,6 +173,10 @@ def unfit(
             f"{other.source or other.recording_id} is of thruster {other.thruster}, the recordings to be diagnosed are "
             f"of {thruster}; hold out a recording of {thruster}"
         )
+    for recording, history in zip(recordings, histories, strict=True):
+        few = _too_little(recording.source or recording.recording_id, history)
+        if few is not None:
+            return few
     if twin is None:
         return None
     if twin.thruster != thruster:
@@ -188,6 +196,23 @@ def unfit(
                     f"the twin's {term.effect} needs {', '.join(lacking)}, which {history.recording_id} does not hold; "
                     "diagnose it without the twin"
                 )
+    return None
+
+
+def _too_little(name: str, history: History) -> Refusal | None:
+    """What a line through two points would describe without a residual is not diagnosed."""
+    samples, driven = int(history.count.sum()), history.driver[history.rows]
+    levels = 1 + int(np.count_nonzero(np.abs(np.diff(driven)) > CHANGED * history.size))
+    if samples < LEAST_SAMPLES and samples > FEW_SAMPLES * levels:
+        return Refusal(
+            f"{name} has {samples} thrust samples, at least {LEAST_SAMPLES} are needed to tell physics from noise; "
+            "record for longer"
+        )
+    if float(np.ptp(driven)) <= ONE_LEVEL * history.size:
+        return Refusal(
+            f"{name} has thrust at one level of {history.driver_quantity} only ({driven[0]:.4g}); at least two levels "
+            "are needed"
+        )
     return None
 
 

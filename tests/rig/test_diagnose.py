@@ -1,0 +1,264 @@
+"""rig diagnose, simulate and compare: what they say of good input and bad, and that a twin goes round."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from rig.cli import rig
+from rig.diagnose_text import diagnosis_text
+from rig.errors import TwinError
+from rig.hdf5 import load
+from rig.simulate import timed
+from rig.twin import read_twin, twin_json, write_twin
+
+ROOT = Path(__file__).parents[2]
+
+
+def example(name: str):
+    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+bad = example("diagnose_bad_input")
+plain = example("diagnose_plain_h5py")
+
+
+def run(*arguments: object) -> Result:
+    return CliRunner().invoke(rig, [str(a) for a in arguments])
+
+
+def dead_band(columns: dict) -> None:
+    """+-1.5 V put into the levels."""
+    start, level, *_ = columns["command"]
+    time, thrust, *named = columns["cell"]
+    volts = level[np.searchsorted(start, time, side="right") - 1]
+    acting = np.sign(volts) * np.maximum(np.abs(volts) - 1.5, 0.0)
+    columns["cell"] = (time, thrust + 0.4 * (acting * np.abs(acting) - volts * np.abs(volts)), *named)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return tmp_path_factory.mktemp("diagnose")
+
+
+@pytest.fixture(scope="module")
+def dead(folder):
+    """A recording with a dead band, its diagnosis as JSON, its twin."""
+    path, out, twin = (
+        bad.recording(folder / "dead.h5", change=dead_band),
+        folder / "dead.json",
+        folder / "dead.twin.json",
+    )
+    result = run("diagnose", path, "--json", out, "--save-twin", twin)
+    assert result.exit_code == 0, result.output
+    return path, json.loads(out.read_text()), twin, result.output
+
+
+def test_a_dead_band_is_named_with_its_width_and_the_contract_is_kept(dead):
+    _, said, _, text = dead
+    assert said["format"] == "thruster-rig-diagnosis"
+    assert said["version"] == 1
+    effects = {f["effect"]: f for f in said["findings"]}
+    assert "dead_band" in effects or "dead_band" in {r for f in said["findings"] for r in f["rivals"]}
+    if "dead_band" in effects:
+        width = effects["dead_band"]["parameters"]["half_width"]
+        assert abs(width["value"] - 1.5) < 5 * width["std"] + 0.02
+    assert said["fit"]["heldout"]["rmse_after"] < 0.7 * said["fit"]["heldout"]["rmse_before"]
+    assert {"channel", "where", "share", "p_value", "statement"} <= set(said["mismatch"][0])
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_against_its_own_twin_the_same_recording_is_adequate(dead):
+    path, _, twin, _ = dead
+    result = run("diagnose", path, "--twin", twin, "--json", "-")
+    said = json.loads(result.output)
+    assert said["verdict"] == "adequate", said["statement"]
+    assert "the twin dead.twin.json" in said["baseline"]["model"]
+    assert any("half_width" in name or "." in name for name in said["baseline"]["parameters"])
+
+
+def test_a_thruster_that_lost_thrust_is_told_from_its_twin(folder, dead):
+    _, _, twin, _ = dead
+
+    def weaker(columns: dict) -> None:
+        dead_band(columns)
+        time, thrust, *rest = columns["cell"]
+        columns["cell"] = (time, 0.95 * thrust, *rest)
+
+    said = json.loads(
+        run("diagnose", bad.recording(folder / "weak.h5", seed=4, change=weaker), "--twin", twin, "--json", "-").output
+    )
+    changed = {f["effect"]: f for f in said["findings"]}["thrust_constant"]
+    assert abs(changed["parameters"]["C"]["value"] / changed["parameters"]["before"]["value"] - 0.95) < 0.01
+
+
+def test_a_twin_file_reads_back_as_it_was_written(dead, tmp_path):
+    _, _, path, _ = dead
+    twin = read_twin(path)
+    write_twin(twin, tmp_path / "again.json")
+    assert twin_json(read_twin(tmp_path / "again.json")) == json.loads(path.read_text())
+    assert len(twin.sources[0].sha256) == 64
+    assert np.array(twin.covariance).shape == (len(twin.names),) * 2
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda t: t.update(format="other"), "its format is 'other'"),
+        (lambda t: t.update(version=2), "is later than 1"),
+        (lambda t: t.pop("C"), "C is missing"),
+        (lambda t: t.update(C="much"), "C must be a finite number, got 'much'"),
+        (lambda t: t.update(driver="wind"), "driver must be one of command_voltage"),
+        (lambda t: t["terms"][0].update(effect="gremlin"), "must be an effect of the catalogue"),
+        (lambda t: t["terms"][0].update(form="odd"), "must be a form of"),
+        (lambda t: t["terms"][0]["parameters"].clear(), "is missing"),
+        (lambda t: t["terms"][0]["parameters"].update(colour={"value": 1}), "has colour; the parameters of"),
+        (lambda t: next(iter(t["terms"][0]["parameters"].values())).update(value=1e9), "must be within"),
+        (lambda t: next(iter(t["terms"][0]["parameters"].values())).update(unit="furlong"), "unit must be"),
+        (lambda t: t["covariance"]["matrix"].pop(), "rows of"),
+        (lambda t: t["covariance"]["names"].reverse(), "in the order of C and the terms"),
+        (lambda t: t["covariance"]["matrix"][0].__setitem__(1, 1.0), "symmetric"),
+        (lambda t: t["noise"].update(scales=[1.0]), "as long as scales"),
+        (lambda t: t.update(recordings="none"), "a list of objects"),
+    ],
+)
+def test_a_broken_twin_is_one_sentence(dead, tmp_path, change, words):
+    content = json.loads(dead[2].read_text())
+    if content["noise"]["scales"] and "scales" in words:
+        content["noise"]["slow"] = [1.0, 1.0]
+    change(content)
+    path = tmp_path / "broken.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(TwinError) as error:
+        read_twin(path)
+    assert words in str(error.value)
+    assert "\n" not in str(error.value)
+
+
+def test_a_replayed_command_is_predicted_and_adequate_against_the_twin(dead, folder):
+    path, _, twin, _ = dead
+    out = folder / "replayed.h5"
+    result = run("simulate", path, "--twin", twin, "-o", out, "--noise", 7)
+    assert result.exit_code == 0, result.output
+    simulated, real = load(out), load(path)
+    assert simulated.kind == "tunnel"
+    assert "Simulated, not measured" in str(simulated.attributes["notes"])
+    difference = real.first_of("thrust").value - np.interp(
+        real.first_of("thrust").time, simulated.first_of("thrust").time, simulated.first_of("thrust").value
+    )
+    assert np.std(difference) < 0.5
+    again = run("simulate", path, "--twin", twin, "-o", out)
+    assert again.exit_code == 2
+    assert "never overwritten" in again.output
+    assert json.loads(run("diagnose", out, "--twin", twin, "--json", "-").output)["verdict"] == "adequate"
+
+
+def test_a_campaign_is_predicted_with_its_steps(dead, folder):
+    out = folder / "campaign.h5"
+    result = run("simulate", ROOT / "campaigns" / "staircase.toml", "--twin", dead[2], "-o", out)
+    assert result.exit_code == 0, result.output
+    found = load(out)
+    holds = [s for s in found.steps if s.phase == "hold"]
+    assert holds
+    twin, thrust = read_twin(dead[2]), found.first_of("thrust")
+    top = max(holds, key=lambda s: s.command_voltage)
+    _, values = thrust.window(top.t_end - 1.0, top.t_end)
+    assert values.mean() == pytest.approx(twin.C * top.command_voltage**2, rel=0.25)
+
+
+def test_ramps_and_sines_of_a_plan_become_rows():
+    from rig.plan import Step
+
+    plan = [Step(0, "ramp", 2.0, 1.0, 1.0), Step(1, "sine", 0.0, 2.0, 2.0, amplitude=3.0, frequency=0.5)]
+    rows, steps, end = timed(plan, 0.1)
+    assert end == pytest.approx(3.0)
+    assert [s.t_start for s in steps] == [0.0, 1.0]
+    assert max(v for _, v in rows) == pytest.approx(3.0)
+
+
+def test_compare_names_what_the_simulation_leaves_out(folder, dead):
+    path = dead[0]
+
+    def noiseless(columns: dict) -> None:
+        start, level, *_ = columns["command"]
+        time, _, *rest = columns["cell"]
+        volts = level[np.searchsorted(start, time, side="right") - 1]
+        columns["cell"] = (time, 0.4 * volts * np.abs(volts), *rest)
+
+    simulation = bad.recording(folder / "foreign.h5", "model 7", change=noiseless)
+    result = run("compare", simulation, path, "--json", "-")
+    assert result.exit_code == 0, result.output
+    said = json.loads(result.output)
+    named = {f["effect"] for f in said["findings"]} | {r for f in said["findings"] for r in f["rivals"]}
+    assert "dead_band" in named
+    assert "the simulation foreign.h5" in said["baseline"]["model"]
+
+
+def test_compare_refuses_another_command(folder, dead):
+    def slower(columns: dict) -> None:
+        start, level, *rest = columns["command"]
+        columns["command"] = (start, level[::-1].copy(), *rest)
+
+    result = run("compare", bad.recording(folder / "slower.h5", change=slower), dead[0])
+    assert result.exit_code == 2
+    assert "was not driven as dead.h5 was: at" in result.output
+
+
+def refused(folder: Path, *arguments: object) -> str:
+    result = run("diagnose", *arguments)
+    assert result.exit_code == 2, result.output
+    lines = result.output.strip().splitlines()
+    assert len(lines) == 1
+    return lines[0]
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (bad.without_thrust, "has no thrust channel"),
+        (bad.without_command, "nothing tells what drove the thruster"),
+        (bad.constant, "at least two levels are needed"),
+        (bad.twenty, "has 20 thrust samples, at least 50 are needed"),
+        (bad.all_nan, "has 0 finite thrust samples"),
+        (bad.other_clock, "are both on one clock?"),
+    ],
+)
+def test_a_recording_that_cannot_be_used_is_one_sentence(tmp_path, change, words):
+    assert words in refused(tmp_path, bad.recording(tmp_path / "it.h5", change=change))
+
+
+def test_files_that_are_not_what_is_asked_for(tmp_path, dead):
+    (tmp_path / "notes.h5").write_text("good weather")
+    assert "is not an HDF5 file" in refused(tmp_path, tmp_path / "notes.h5")
+    assert "is not there" in refused(tmp_path, tmp_path / "nowhere.h5")
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    assert "a folder without recordings" in refused(tmp_path, empty)
+    other = bad.recording(tmp_path / "T2.h5", "T2", 2)
+    assert "several thrusters (T1, T2)" in refused(tmp_path, dead[0], other)
+    assert "given twice" in refused(tmp_path, dead[0], dead[0])
+    assert "hold out a recording of T1" in refused(tmp_path, dead[0], "--holdout", other)
+    assert "the twin is of thruster T1" in refused(tmp_path, other, "--twin", dead[2])
+
+
+def test_nan_blocks_are_gaps(tmp_path):
+    result = run("diagnose", bad.recording(tmp_path / "gaps.h5", change=bad.nan_blocks), "--json", "-")
+    assert json.loads(result.output)["verdict"] == "adequate"
+
+
+def test_a_file_by_plain_h5py_is_diagnosed(tmp_path):
+    found = plain.diagnosed(tmp_path, 25.0, 1.5, 0.0)
+    (finding,) = found.findings
+    assert finding.effect == "dead_band"
+    assert abs(finding.parameters["half_width"].value - 1.5) < 0.05
+    shaped = replace(found, notes=("A note.",))
+    assert "- A note." in diagnosis_text(shaped)
