@@ -292,7 +292,10 @@ def _std(u: Floats, left: Floats, slope: float, visit: NDArray[np.int64], runs: 
 
 
 def _edges(values: Floats, quantity: str) -> Floats:
-    """Of the bins: one for each level where there are few, otherwise of equal width, on the coordinate's scale."""
+    """Of the bins: one for each level where there are few, otherwise of equal width on the coordinate's scale.
+
+    A driver's bins are even in the square root of its size: what small levels do is as wide as what large ones do.
+    """
     found = values[np.isfinite(values)]
     if found.size == 0:
         return np.empty(0)
@@ -311,6 +314,11 @@ def _edges(values: Floats, quantity: str) -> Floats:
         middle = 0.5 * (common[1:] + common[:-1])
         first, last = common[0] - 0.01 * size, common[-1] + 0.01 * size
         return np.concatenate([[first], middle, [last]])
+    if quantity == "driver":
+        even = np.linspace(-1.0, 1.0, MOST + 2)
+        fine = size * even * np.abs(even) * 1.001
+        used: Floats = fine[(np.r_[fine[1:], np.inf] > found.min()) & (np.r_[-np.inf, fine[:-1]] < found.max())]
+        return used
     slack = 1e-9 * max(float(np.ptp(found)), 1e-9 * size)
     return np.linspace(float(found.min()) - slack, float(found.max()) + slack, BINS.get(quantity, MOST) + 1)
 

@@ -147,7 +147,7 @@ def after_section(d: Diagnosis) -> Section:
         ("not fitted", held.before, held.after, f"{held.noise:.4g}" if known else "–"),
     ]
     rows: list[tuple[str, ...]] = [(name, f"{a:.4g}", f"{b:.4g}", floor, _change(a, b)) for name, a, b, floor in listed]
-    if known:
+    if known and max(held.before, held.after) > held.noise:
         own = [_beyond(x, held.noise) for x in (held.before, held.after)]
         told = ["within noise" if x == 0 else f"{x:.3g}" for x in own]
         rows.append(("not fitted, noise taken out", *told, "", _change(*own) if own[1] > 0 else ""))

@@ -17,9 +17,11 @@ from rig.report.look import Plot
 from rig.report.page import Picture
 
 FEW = 40
-"""Rows below which a run is a table of levels: no map over time, points instead."""
+"""Rows below which a run is a table of levels: points instead of a map over time."""
 TWO_SIDED = frozenset({"direction", "direction_of_change"})
 """Coordinates of two or three values: a sentence says it all."""
+MOST_SHARE = 1.5
+"""A larger share of a thrust or of a step is none: it is drawn in newtons."""
 MOST_MAPS = 2
 MOST_PANELS = 3
 
@@ -32,16 +34,22 @@ def largest(curves: Sequence[Curves], most: int) -> tuple[Curves, ...]:
 
 
 def _of(run: Curves, d: Diagnosis) -> str:
-    return "" if len(d.curves) == 1 else f" of {run.recording_id}"
+    ids = [c.recording_id for c in d.curves]
+    return "" if len(ids) == 1 else f", run {ids.index(run.recording_id) + 1} of {len(ids)}"
+
+
+def _is_levels(run: Curves) -> bool:
+    """A table of levels, or one sweep in one direction: over time there is no more to see than over the level."""
+    return run.time.size < FEW or bool(np.all(np.diff(run.driver) >= 0) or np.all(np.diff(run.driver) <= 0))
 
 
 def where_pictures(d: Diagnosis, runs: Sequence[Run]) -> Iterator[Picture]:
     """Maps with the located region, then the size of the residual along each located coordinate."""
     region = _region(d)
     for run in largest(d.curves, MOST_MAPS):
-        yield _level_picture(run, d, region) if run.time.size < FEW else _map(run, d, region)
+        yield _level_picture(run, d, region) if _is_levels(run) else _map(run, d, region)
     driver = driver_quantity(d)
-    drawn = {driver} if all(run.time.size < FEW for run in d.curves) else set()
+    drawn = {driver} if all(map(_is_levels, d.curves)) else set()
     for mismatch in d.mismatch:
         found = _located(mismatch.where, runs, driver)
         if found is not None and mismatch.where.quantity not in drawn:
@@ -94,9 +102,7 @@ def _level_picture(run: Curves, d: Diagnosis, region: Region | None) -> Picture:
     located = _clipped(region, run)
     span = located.voltage if located is not None else None
     plot = shape(groups, axis("driver", driver_quantity(d)), "residual / N", span, wide=True)
-    caption = (
-        f"A table of {run.time.size} levels without a course of time. Before: {d.baseline_model}; after: the model."
-    )
+    caption = f"{run.time.size} levels, each met once. Before: {d.baseline_model}; after: the model."
     return Picture(f"Residual level by level{_of(run, d)}", plot, caption)
 
 
@@ -147,6 +153,8 @@ def shape_pictures(d: Diagnosis, runs: Sequence[Run]) -> Iterator[Picture]:
     driver = driver_quantity(d)
     for where in (mismatch.where for mismatch in d.mismatch):
         found = shape_of(runs, "driver" if where.quantity == driver else where.quantity)
+        if found is not None and np.abs(found.measured).max() > MOST_SHARE:
+            found = shape_of(runs, found.quantity, "force")
         if found is not None and found.at.size > 3:
             x = axis(found.quantity, driver).split(" / ")[0]
             plot = _signature_plot(found, "model" if d.model_terms else "baseline", driver)
@@ -164,7 +172,7 @@ def unexplained_picture(u: Unexplained, driver: str) -> Picture | None:
     at, mean, std = rows.T
     x = axis(u.where.quantity, driver)
     span = (u.where.low, u.where.high) if u.where.low < u.where.high else None
-    plot = shape([Group("mean residual of the model", at, mean, 1.96 * std)], x, "residual / N", span)
+    plot = shape([Group("left by the model", at, mean, 1.96 * std)], x, "residual / N", span)
     caption = f"Shaded: {stretch(u.where)}, where most of it lies. Bars are 95 % intervals of the mean."
     return Picture(f"What is left over {x.split(' / ')[0]}", plot, caption)
 
@@ -174,7 +182,7 @@ def before_after_pictures(d: Diagnosis) -> Iterator[Picture]:
     shown = largest(d.curves, MOST_PANELS)
     driver = axis("driver", driver_quantity(d))
     for run in shown:
-        levels = run.time.size < FEW
+        levels = _is_levels(run)
         order = np.argsort(run.driver, kind="stable") if levels else np.arange(run.time.size)
         over = (run.driver if levels else run.time)[order]
         panel = Panel(run.recording_id, over, run.thrust[order], run.baseline[order], run.model[order])

@@ -40,6 +40,8 @@ KINDS: Mapping[Kind, tuple[str, float]] = {
     "step": ("left out / % of the step", 100.0),
 }
 """Label of a signature's ordinate and its factor."""
+LOST = 100.0
+"""Standard errors in units of the value from which a number is not determined."""
 _NAMES = re.compile(r"\b(" + "|".join(sorted((*UNITS, *REVEALED_BY), key=len, reverse=True)) + r")\b")
 
 
@@ -116,12 +118,16 @@ def value_cells(value: Value) -> tuple[str, str, str]:
 
     >>> value_cells(Value(0.40123, 0.0012, "N/V^2")), value_cells(Value(3.0, float("nan"), "1"))
     (('0.4012 ± 0.0012', '0.3989 to 0.4036', 'N/V²'), ('3', '–', ''))
+    >>> value_cells(Value(432.0, 376232.0, "s"))
+    ('432', 'not determined', 's')
     """
     unit = unit_text(value.unit)
     if not isfinite(value.value):
         return "–", "–", unit
     if not (isfinite(value.std) and value.std > 0):
         return f"{value.value:.4g}".replace("-", "−"), "–", unit
+    if value.std > LOST * abs(value.value) > 0:
+        return f"{value.value:.3g}".replace("-", "−"), "not determined", unit
     half = 1.96 * value.std
     shown, error, low, high = (
         digits(x, value.std).replace("-", "−") for x in (value.value, value.std, value.value - half, value.value + half)

@@ -181,7 +181,7 @@ def test_of_many_runs_the_worst_are_shown():
     runs = (*runs[:4], replace(runs[4], baseline=runs[4].baseline + 9.0))
     shown = titles(diagnosis_page(answer(curves=runs, recordings=tuple(r.recording_id for r in runs))))
     assert len(shown["Where C V|V| fails"]) == 2 + 2
-    assert shown["Where C V|V| fails"][1].endswith("run 4")
+    assert shown["Where C V|V| fails"][1].endswith(", run 5 of 5")
     assert len(shown["Before and after"]) == 3
     assert cells(diagnosis_page(answer(recordings=("a", "b"))), "Provenance")[1] == ("b", "–")
 
