@@ -47,6 +47,8 @@ SIGNATURES: Mapping[str, tuple[str, Kind]] = {
     "thruster_interaction": ("neighbour_thrust", "gain"),
 }
 """Where an effect is best seen; over the driver, as a force, when it is not here."""
+NOWHERE = frozenset({"periodic_disturbance", "channel_fault", "thrust_constant"})
+"""Effects that no coordinate of these shows: a line of a spectrum, a channel that lies, another C."""
 SHAPES: Mapping[str, Kind] = {"driver": "force", "time_since_step": "step", "direction": "force", "thrust": "force"}
 """What is averaged over a coordinate where no effect says it; a share of the thrust when it is not here."""
 LEVELS = 24
@@ -204,6 +206,8 @@ def _effects(twin: Twin, history: History, rows: NDArray[np.intp]) -> dict[tuple
 
 def signature(runs: Sequence[Run], finding: Finding) -> Signature | None:
     """Of one finding; None where its coordinate does not move enough to be seen."""
+    if finding.effect in NOWHERE:
+        return None
     quantity, kind = SIGNATURES.get(finding.effect, ("driver", "force"))
     if not all(quantity in run.coordinates for run in runs):
         quantity = "time" if kind == "gain" else "driver"

@@ -72,6 +72,7 @@ def test_nothing_to_see_is_none():
     assert signature(runs_of(diagnosis(still)), found("reversal_loss")) is None
     assert signature(runs_of(diagnosis()), found("motor_lag")) is None
     assert profile(runs_of(diagnosis(still)), "time_since_reversal") is None
+    assert signature(runs(F), found("periodic_disturbance")) is None
     one = Curves("a", T[:1], V[:1], F[:1], F[:1], F[:1])
     assert shape(runs_of(diagnosis(one)), "driver") is None
 

@@ -202,6 +202,13 @@ def test_effect_is_drawn_by_itself_where_the_recordings_are_at_hand():
     assert "and all findings together; largest" in together.sections[2].parts[0].plot.alt
 
 
+def test_finding_without_a_coordinate_is_a_sentence():
+    hum = replace(LAGS, effect="periodic_disturbance", statement="A line at 4.2 Hz.", rivals=())
+    section = next(s for s in diagnosis_page(answer(findings=(hum,))).sections if s.title == "What was left out")
+    assert section.parts[0].items == ("A line at 4.2 Hz.",)
+    assert len(section.parts) == 1
+
+
 def test_same_answer_same_bytes():
     few = answer(curves=(), mismatch=(HIGH,), findings=(), unexplained=ODD, verdict="unexplained")
     assert html(diagnosis_page(few)) == html(diagnosis_page(few))
