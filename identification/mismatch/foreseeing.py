@@ -66,12 +66,15 @@ class Bench:
     @cached_property
     def sampling(self) -> float:
         """Thrust samples per s."""
-        return _per_second([h.count[h.rows] for h in self.data.histories], [h.dt[h.rows] for h in self.data.histories])
+        return _per_second([h.count for h in self.data.histories], self._seconds)
 
     @cached_property
     def rate_sampling(self) -> float:
-        counts = [h.rate_count[h.rate_rows] for h in self.data.histories if h.rate_count is not None]
-        return _per_second(counts, [h.dt[h.rate_rows] for h in self.data.histories])
+        return _per_second([h.rate_count for h in self.data.histories if h.rate_count is not None], self._seconds)
+
+    @property
+    def _seconds(self) -> float:
+        return float(sum(h.edges[-1] - h.edges[0] for h in self.data.histories))
 
     @cached_property
     def laws(self) -> dict[str, Floats]:
@@ -142,9 +145,8 @@ def stretches(steps: Sequence[PlanStep]) -> list[list[PlanStep]]:
     return [list(part) for _, part in groupby(steps, key=lambda step: step.flow_speed)]
 
 
-def _per_second(counts: Sequence[NDArray[np.int64]], spans: Sequence[Floats]) -> float:
-    seconds = float(sum(s.sum() for s in spans))
-    return float(sum(int(c.sum()) for c in counts)) / seconds if seconds > 0 else 1.0
+def _per_second(counts: Sequence[NDArray[np.int64]], seconds: float) -> float:
+    return float(sum(int(c.sum()) for c in counts)) / seconds
 
 
 def _counts(edges: Floats, rate: float) -> NDArray[np.int64]:

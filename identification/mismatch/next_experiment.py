@@ -32,6 +32,8 @@ ALIKE = 4.0
 """Expected chi-square apart, when the budget is spread evenly over all pieces, below which two rivals stay alike."""
 PLAIN = 18.0
 """Expected chi-square apart at which the probability of a right decision is about GOOD."""
+IDLE = 0.01
+"""Of what can be gained: when the whole time that is left would give less, the sweep ends."""
 MOST_LONGER = 12.0
 """Times the budget: a sweep that would have to be longer than this is none."""
 MOST_RIVALS = 4
@@ -98,8 +100,9 @@ def propose(state: State, data: Data, named: Sequence[Named], limits: Limits | N
     limits = limits or Limits()
     bench = Bench(state, data, _slew(data, limits))
     largest = _largest(data, state, limits)
-    pieces_of = blocks(largest, _flows(data, limits))
-    every = [b for b in pieces_of if b.seconds + 2 * REST <= limits.budget] or [min(pieces_of, key=lambda b: b.seconds)]
+    known = blocks(largest, _flows(data, limits))
+    shortest = next(b for b in known if not b.name)
+    every = [b for b in known if b.seconds + 2 * REST <= limits.budget] or [shortest]
     tried = _Tried(bench, contest, tuple(every), limits.budget, data)
     return tried.answer()
 
@@ -177,7 +180,7 @@ class _Tried:
             each = self._pairwise(self.parts if total is None else self.parts + total)
             gains = np.where(self.seconds <= self._left(chosen), (_utility(each, target) - now) / self.seconds, -1.0)
             best = int(np.argmax(gains))
-            if gains[best] <= 0 and chosen:
+            if chosen and (gains[best] <= 0 or gains[best] * self._left(chosen) < IDLE):
                 break
             chosen.append(best)
             total = self.parts[best] if total is None else total + self.parts[best]

@@ -7,7 +7,9 @@ import pytest
 
 from identification.mismatch.diagnose import diagnose
 from identification.mismatch.diagnosis import PlanStep
-from identification.mismatch.foreseeing import AFTER_STEP, Outlook, ending, intervals, one_zero, stretches
+from identification.mismatch.foreseeing import AFTER_STEP, Bench, Outlook, ending, intervals, one_zero, stretches
+from identification.mismatch.preparing import history_of
+from identification.mismatch.search import search
 from identification.mismatch.separating import distances, pieces, power
 from identification.mismatch.sweeps import REST, Block, Limits, blocks, put_together, round_level
 from identification.recording import Channel, Recording
@@ -16,14 +18,14 @@ RATE, HOLD, TOP, C, NOISE = 40.0, 3.0, 20.0, 0.4, 1.2
 LEVELS = (0.0, 10.0, -10.0, 15.0, -15.0, 20.0, -20.0, 0.0)
 
 
-def recording(name, volts, seconds, flow=None, exponent=1.97, seed=0, rounds=1):
+def recording(name, volts, seconds, flow=None, exponent=1.97, seed=0, rounds=1, even=0.0, turning=False):
     """Thrust C top^2 (V/top)^p of a plan, levels reached at once, sampled between the changes."""
     rng = np.random.default_rng(seed)
     volts, seconds = np.tile(volts, rounds), np.tile(seconds, rounds)
     ends = np.cumsum(seconds)
     t = np.arange(0.0, ends[-1], 1 / RATE) + 0.5 / RATE
     V = volts[np.minimum(np.searchsorted(ends, t), volts.size - 1)]
-    F = C * TOP**2 * np.sign(V) * np.abs(V / TOP) ** exponent + 1.0 + rng.normal(0.0, NOISE, t.size)
+    F = C * TOP**2 * np.sign(V) * np.abs(V / TOP) ** exponent + even * C * V**2 + 1.0 + rng.normal(0.0, NOISE, t.size)
     starts = np.concatenate([[0.0], ends[:-1]])
     channels = [
         Channel("command", "command", "command_voltage", "V", starts, volts.astype(float)),
@@ -31,6 +33,11 @@ def recording(name, volts, seconds, flow=None, exponent=1.97, seed=0, rounds=1):
     ]
     if flow is not None:
         channels.append(Channel("flow", "flow", "flow_speed", "m/s", t, np.where(t < ends[-1] / 2, 0.0, flow)))
+    if turning:
+        channels.append(
+            Channel("n", "motor", "rotation_rate", "rev/s", t[::2], 2 * V[::2] + rng.normal(0, 0.1, t[::2].size))
+        )
+        channels.append(Channel("bus", "motor", "bus_voltage", "V", t[::2], 24.0 - (V[::2] / TOP) ** 2))
     return Recording(name, "T1", tuple(channels))
 
 
@@ -85,6 +92,34 @@ def test_a_budget_too_short_for_anything_still_gives_the_shortest_piece():
 
 def test_nothing_to_separate_nothing_proposed():
     assert diagnose([first(exponent=2.0)]).next_experiment is None
+
+
+def test_rivals_that_no_sweep_separates_are_said_so():
+    """An even difference of the two directions, and a cell that feels the torque, are one family on thrust alone."""
+    found = diagnose([first(exponent=2.0, even=0.02)]).next_experiment
+    assert found.expected_power < 0.05
+    assert "takes no sweep within these limits, but the torque channel, or dead weights on the cell" in found.why
+    assert sum(step.duration for step in found.steps) < 60.0
+
+
+def test_other_channels_are_foreseen():
+    """A rate that is a second response, and a bus voltage that sags with the power."""
+    found = search((history_of(first(turning=True)),), np.random.default_rng(0))
+    bench = Bench(found.after, found.data, 24.0)
+    assert bench.sampling == pytest.approx(RATE, rel=0.05)
+    steps = (PlanStep(0.0, 3.0), PlanStep(TOP, 3.0), PlanStep(0.0, 3.0, 0.5))
+    still, moving = bench.rehearsed(stretches(steps)).histories
+    assert still.rate_count.sum() == pytest.approx(20.0 * still.edges[-1], rel=0.1)
+    bus = still.others["bus_voltage"]
+    assert bus[still.driver == TOP].mean() == pytest.approx(23.0, abs=0.1)
+    assert bus[still.driver == 0.0].mean() == pytest.approx(24.0, abs=0.1)
+    assert moving.driver[-1] == 0.0
+    views, where = bench.outlook([found.after.fit], stretches(steps))
+    assert (
+        views[0].value.size
+        == where.shape[0]
+        == still.rows.size + moving.rows.size + sum(h.rate_rows.size for h in (still, moving))
+    )
 
 
 def test_levels_are_round():
