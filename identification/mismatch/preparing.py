@@ -156,8 +156,8 @@ def _driven(time: Floats, force: Floats, held: _Held) -> tuple[Floats, Floats]:
 def _clear_of_steps(time: Floats, force: Floats, held: _Held) -> tuple[Floats, Floats]:
     """Without samples so near to a step of the command that the clocks cannot say which level they belong to."""
     size = float(np.max(np.abs(held.value)))
-    big = np.abs(np.diff(held.value)) > STEP * size
-    steps = held.time[1:][big]
+    big = np.abs(np.diff(held.value, prepend=0.0)) > STEP * size  # the first row is a step from nothing
+    steps = held.time[big]
     if not (held.stepwise and steps.size) or time.size < 4 * steps.size:
         return time, force
     after = np.searchsorted(steps, time + JITTER_BEFORE, side="right") - 1
