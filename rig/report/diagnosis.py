@@ -7,7 +7,7 @@ from math import isfinite, sqrt
 from pathlib import Path
 
 from identification.mismatch.diagnosis import Diagnosis, NextExperiment, Value
-from identification.mismatch.signature import Run, runs_of
+from identification.mismatch.reported_runs import Run, runs_of
 from identification.recording import Recording
 from rig.report import page as pages
 from rig.report import provenance
