@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, replace
+from dataclasses import MISSING, asdict, fields, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from math import isfinite
@@ -185,12 +185,12 @@ def _term(table: Table) -> TwinTerm:
         raise table.wrong("form", f"a form of {effect} ({forms})")
     sizes = table.table("scale")
     scale = Scale(
-        driver=sizes.number("driver", 0.0),
         driver_unit=sizes.text("driver_unit"),
-        thrust=sizes.number("thrust", 0.0),
-        duration=sizes.number("duration", 0.0),
-        interval=sizes.number("interval", 0.0),
-        flow=sizes.number("flow", 0.0),
+        **{
+            f.name: sizes.number(f.name, 0.0)
+            for f in fields(Scale)
+            if f.name != "driver_unit" and (f.default is MISSING or f.name in sizes.content)
+        },
     )
     inside = table.table("parameters")
     expected = TERMS[effect, form].parameters(scale)

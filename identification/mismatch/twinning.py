@@ -24,6 +24,9 @@ LEAST_SAMPLES = 50
 """Of one recording with a course of time; a table of levels may have fewer."""
 ONE_LEVEL = 1e-6
 """Share of the largest driver: levels nearer than this are one."""
+ONE_CONSTANT = 0.02
+"""Relative: where another effect was found, C may move by this much with what that effect refers to (a highest bus
+voltage, say), and is no finding of its own."""
 PROBE = 0.1
 """Standard deviations by which a parameter is moved for the slope of the prediction."""
 
@@ -227,7 +230,9 @@ def with_twin(
     C = answer.model["C"]
     findings = tuple(_relative(f, before, known) for f in answer.findings)
     changed = changed_constant(before, state, known, C.unit)
-    if changed is not None:
+    if changed is not None and findings and abs(C.value / before.C - 1) < ONE_CONSTANT:
+        answer = replace(answer, notes=(*answer.notes, f"{changed.statement} Part of what was found may be in it."))
+    elif changed is not None:
         findings = (*findings, changed)
     was = given_values(before)
     named = ", ".join(dict.fromkeys(t.effect for t in before.terms))
