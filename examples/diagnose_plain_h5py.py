@@ -40,6 +40,7 @@ def run(rate: float, dead: float, lag: float, seed: int) -> tuple[np.ndarray, np
     rng = np.random.default_rng(seed)
     start = np.arange(0.0, 360.0, 3.0)
     level = rng.permutation(np.round(np.linspace(-48.0, 48.0, start.size), 2))
+    level[0] = 0.0  # as every run, it begins at rest
     step = 0.001
     fine = np.arange(0.0, 360.0, step)
     acting = level[np.searchsorted(start, fine, side="right") - 1]
