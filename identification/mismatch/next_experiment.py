@@ -159,7 +159,7 @@ class _Tried:
         if worst >= GOOD:
             chosen = self._shortened(chosen)
             worst, at = self._judged(chosen)
-        return NextExperiment(self._why(chosen, at), self._steps(chosen), worst)
+        return NextExperiment(self._why(chosen, at), self._steps(chosen), self._expected(at))
 
     def _steps(self, chosen: Sequence[int]) -> tuple[PlanStep, ...]:
         return put_together([self.every[k] for k in chosen], self.every)
@@ -200,6 +200,13 @@ class _Tried:
         views = self._foreseen(chosen)
         at = {(a, b): power(views[a], views[b], self._needed(a, b, views)) for a, b in self.pairs}
         return min(at[pair] for pair, counts in zip(self.pairs, self.decisive, strict=True) if counts), at
+
+    def _expected(self, at: dict[tuple[int, int], float]) -> float:
+        """Probability of a right decision against the worst rival; each model is true as probably as its BIC says."""
+        share = np.exp(-0.5 * np.maximum(self.contest.losses, 0.0))
+        counted = [pair for pair, counts in zip(self.pairs, self.decisive, strict=True) if counts]
+        worst = [min(at[pair] for pair in counted if pair[0] == true) for true in range(share.size)]
+        return float(share @ np.array(worst) / share.sum())
 
     def _foreseen(self, chosen: Sequence[int]) -> tuple[Outlook, ...]:
         return self.bench.outlook(self.contest.fits, stretches(self._steps(chosen)))[0]
