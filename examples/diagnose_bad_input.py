@@ -24,7 +24,7 @@ RIG = (sys.executable, "-c", "from rig.cli import entry; entry()", "diagnose")
 def recording(
     path: Path, thruster: str = "T1", seed: int = 1, change: Callable[[dict[str, Any]], None] | None = None
 ) -> Path:
-    """Three minutes of levels up to +-20 V at 25 Hz, as the recording format has it, with one `change` to its columns."""
+    """Three minutes of levels up to +-20 V at 25 Hz, after the recording format, with one `change` to its columns."""
     rng = np.random.default_rng(seed)
     start = np.arange(0.0, 180.0, 3.0)
     level = rng.permutation(np.linspace(-20.0, 20.0, start.size))
