@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import t as student
 
 from identification.recording import Channel, Floats, Recording
@@ -31,18 +32,18 @@ class Cells:
     size: float
     """The largest |driver|."""
     values: Mapping[str, Floats]
-    """quantity -> mean in each cell."""
+    """quantity -> mean in each cell, of channels with at least LEAST_CELLS of them."""
 
     @property
-    def block(self) -> Floats:
+    def block(self) -> NDArray[np.intp]:
         """(M,) of int: to which of BLOCKS stretches a cell belongs."""
-        out: Floats = np.arange(self.time.size) * BLOCKS // self.time.size
-        return out
+        return np.arange(self.time.size) * BLOCKS // self.time.size
 
     @property
     def both_ways(self) -> bool:
         x = self.driver
-        return min(np.count_nonzero(x > TURNING), np.count_nonzero(x < -TURNING)) >= max(3, 0.05 * x.size)
+        least = min(np.count_nonzero(x > TURNING), np.count_nonzero(x < -TURNING))
+        return bool(least >= max(3, 0.05 * x.size))
 
 
 def own(recording: Recording, quantity: str) -> Channel | None:
@@ -72,7 +73,9 @@ def cells_of(recording: Recording, skip: Mapping[str, tuple[float, float]] | Non
     for q in dict.fromkeys(c.quantity for c in recording.channels if c.quantity):
         channel = own(recording, q)
         if channel is not None and channel is not driver:
-            values[q] = _means(channel, edges, (skip or {}).get(q))
+            mean = _means(channel, edges, (skip or {}).get(q))
+            if np.count_nonzero(np.isfinite(mean)) >= LEAST_CELLS:
+                values[q] = mean
     return Cells(recording, quantity, 0.5 * (edges[1:] + edges[:-1]), x / size, size, values)
 
 
@@ -140,8 +143,9 @@ def shapes(x: Floats) -> dict[str, Floats]:
 def fitted(columns: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Coefficients and residuals (NaN where y is) of least squares."""
     good = np.isfinite(y)
-    beta, *_ = np.linalg.lstsq(columns[good], y[good], rcond=None)
-    return beta, y - columns @ beta
+    beta: Floats = np.asarray(np.linalg.lstsq(columns[good], y[good], rcond=None)[0], dtype=np.float64)
+    left: Floats = y - columns @ beta
+    return beta, left
 
 
 def explained(columns: Floats, y: Floats) -> float:
@@ -173,7 +177,7 @@ def gain(cells: Cells, columns: Floats, y: Floats, which: int) -> tuple[float, f
     Efron, The Jackknife, SIAM 1982, ch. 3.
     """
     good = np.isfinite(y)
-    blocks = [b for b in np.unique(cells.block[good])]
+    blocks = np.unique(cells.block[good]).tolist()
     whole = float(fitted(columns, y)[0][which])
     left = []
     for b in blocks:

@@ -1,8 +1,8 @@
 """Faults that one channel shows against the driver and the others: swapped, rescaled, reversed, unsigned.
 
-Static laws of a thruster: rate and motor voltage follow the driver's sign and nearly its size, thrust, torque and current
-nearly its size squared; supply, flow and temperatures do not follow its sign. Each test asks for two things: that the
-channel's own law fails, and that the law of the fault holds, both over the run's blocks and by a wide margin.
+Static laws of a thruster: rate and motor voltage follow the driver's sign and nearly its size, thrust, torque and
+current nearly its size squared; supply, flow and temperatures do not follow its sign. Each test asks for two
+things: that the channel's own law fails, and that the law of the fault holds, over the run's blocks and by far.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from identification.mismatch.fault_cells import (
     own,
     shapes,
 )
-from identification.recording import Floats, Recording
+from identification.recording import Channel, Floats, Recording
 
 LINEAR = ("rotation_rate", "motor_voltage")
 SQUARE = ("thrust", "current", "torque")
 SIGNLESS = ("bus_voltage", "flow_speed", "motor_temperature", "water_temperature")
-FOLLOWS, STRANGE = 0.9, 0.3
+FOLLOWS, STRANGE = 0.9, 0.6
 """R^2 of a channel that follows a law, and of one that does not."""
 BETTER = 0.25
 """Ratio of residual variances by which one law beats another."""
@@ -50,11 +50,16 @@ UNNAMED = 3.0
 LEAST_NAMED = 1.7
 STEADY = 0.1
 """Spread of the factor over the blocks after the change, relative to its logarithm."""
+BLURRED = 3
+"""Cells on either side of a change that are not used: they may hold rows of both sides."""
 FASTEST_FLOW = 12.0
 """m/s: more than any towing or circulating tank reaches."""
 FASTEST_TURN = 1000.0
 """rev/s: more than any propeller does; rev/min are likely."""
 UNSIGNED_SHARE = 0.3
+"""Least ratio of the slopes on both sides."""
+LEAST = 8
+"""Cells with a value."""
 
 Scaled = tuple[str, str, float, dict[str, Value]]
 
@@ -90,7 +95,11 @@ def _exchanged(cells: Cells) -> Iterator[tuple[str, str, str, float]]:
         return
     odd = shapes(cells.driver)["odd"]
     free = {q: explained(odd, cells.values[q]) for q in SIGNLESS if q in cells.values}
-    bound = {q: explained(odd, cells.values[q]) for q in (*LINEAR, *SQUARE) if q in cells.values}
+    bound = {
+        q: explained(odd, cells.values[q])
+        for q in (*LINEAR, *SQUARE)
+        if q in cells.values and not _sizes(cells, cells.values[q])
+    }
     for b, strong in free.items():
         for a, weak in bound.items():
             if strong > FOLLOWS and weak < STRANGE:
@@ -99,31 +108,61 @@ def _exchanged(cells: Cells) -> Iterator[tuple[str, str, str, float]]:
                 yield a, b, says, p * (1 + max(weak, 0.0))
 
 
+def _sizes(cells: Cells, y: Floats) -> bool:
+    """Whether it looks like the size of something that follows the driver: even in it, from about zero."""
+    if not np.isfinite(y).any() or explained(shapes(cells.driver)["even"], y) < 0.7:
+        return False
+    return bool(np.nanmin(np.abs(y)) < 0.1 * (np.nanmax(y) - np.nanmin(y)))
+
+
 def _flow(cells: Cells) -> Iterator[tuple[str, str, str, float]]:
-    """A flow too fast for water beside a channel that could be one."""
+    """A flow too fast for water, or that never falls below the largest command, beside a channel that could be one."""
     flow = cells.values.get("flow_speed")
-    if flow is None or not np.nanmedian(np.abs(flow)) > FASTEST_FLOW:
+    if flow is None or not np.isfinite(flow).any():
         return
+    least = float(np.nanmin(np.abs(flow)))
     for b in ("bus_voltage", "motor_temperature", "water_temperature"):
         y = cells.values.get(b)
-        if y is not None and np.nanmax(np.abs(y)) < min(FASTEST_FLOW, float(np.nanmin(np.abs(flow)))):
+        if y is None or not np.isfinite(y).any():
+            continue
+        most = float(np.nanmax(np.abs(y)))
+        no_bus = b == "bus_voltage" and cells.driver_quantity != "rotation_rate" and most < 0.3 * cells.size < least
+        if (least > FASTEST_FLOW and most < FASTEST_FLOW) or no_bus:
             says = f"A flow_speed of {np.nanmedian(flow):.3g} m/s is no flow, and {b} looks like one: they are swapped."
             yield "flow_speed", b, says, 0.0
 
 
 def swapped_voltages(recording: Recording) -> list[tuple[str, str, str, float]]:
-    """Command and motor voltage: a command has few exact values, a measurement hardly repeats one."""
+    """Command and motor voltage: a command rests at levels, a measurement comes steadily and hardly repeats a value."""
     command, motor = own(recording, "command_voltage"), own(recording, "motor_voltage")
-    if command is None or motor is None or min(command.time.size, motor.time.size) < 3 * BLOCKS:
+    if command is None or motor is None or min(command.time.size, motor.time.size) < LEAST:
         return []
-    fresh = [np.unique(c.value[np.isfinite(c.value)]).size / max(c.time.size, 1) for c in (command, motor)]
-    both = np.interp(motor.time, command.time, np.nan_to_num(command.value)), np.nan_to_num(motor.value)
-    if min(np.std(both[0]), np.std(both[1])) <= 0 or np.corrcoef(*both)[0, 1] < FOLLOWS:
+    if not (_steady(command) and _rests(motor)):
         return []
-    if fresh[0] < FOLLOWS or fresh[1] > 0.05:
+    held = np.nan_to_num(motor.held_at(command.time))
+    if np.std(held) <= 0 or np.corrcoef(held, np.nan_to_num(command.value))[0, 1] ** 2 < FOLLOWS:
         return []
-    says = "motor_voltage steps between exact values and command_voltage is noisy: they are swapped."
+    says = "motor_voltage rests at exact levels and command_voltage never rests: they are swapped."
     return [("command_voltage", "motor_voltage", says, 0.0)]
+
+
+def _gaps(channel: Channel) -> Floats:
+    """S between changes of its value."""
+    moved = np.diff(channel.value, prepend=np.nan) != 0
+    out: Floats = np.diff(channel.time[moved])
+    return out
+
+
+def _steady(channel: Channel) -> bool:
+    gaps = _gaps(channel)
+    return gaps.size > 0.9 * (channel.time.size - 1) > 3 * BLOCKS and float(np.max(gaps)) < 5 * float(np.median(gaps))
+
+
+def _rests(channel: Channel) -> bool:
+    """Whether its value stays for very different times, or its rows repeat it."""
+    gaps = _gaps(channel)
+    few = gaps.size < 0.5 * channel.time.size
+    return few or bool(gaps.size and np.std(gaps) > 0.3 * np.mean(gaps))
 
 
 def impossible(cells: Cells) -> Iterator[Scaled]:
@@ -189,15 +228,15 @@ def _change(cells: Cells, y: Floats) -> tuple[float, float, float, float] | None
     at = _split(X, v)
     if at is None:
         return None
-    before, after = slice(0, at), slice(at, good.size)
+    before, after = slice(0, at - BLURRED), slice(at + BLURRED, good.size)
     if min(explained(X[before], v[before]), explained(X[after], v[after])) < FOLLOWS:
         return None
     inner = np.abs(cells.driver[good]) <= np.max(np.abs(cells.driver[good][before])) + 0.02
     law = X @ np.linalg.lstsq(X[before], v[before], rcond=None)[0]
-    late = np.flatnonzero(inner)[np.flatnonzero(inner) >= at]
+    late = np.flatnonzero(inner & (np.arange(good.size) >= at + BLURRED))
     if late.size < BLOCKS or not np.any(law[late]):
         return None
-    blocks = [b for b in np.array_split(late, 8) if np.ptp(law[b]) > 0.2 * np.ptp(law)]
+    blocks = [b for b in np.array_split(late, 8) if np.ptp(law[b]) > 0.05 * np.ptp(law)]
     factors = np.array([np.polyfit(law[b], v[b], 1)[0] for b in blocks])
     if factors.size < 4 or np.any(factors <= 0):
         return None
@@ -278,9 +317,6 @@ def reversed_channels(cells: Cells, done: set[str]) -> Iterator[Scaled]:
         says = f"{q} goes against the {cells.driver_quantity}: its sign is reversed"
         says += "." if len(slopes) > 1 else ", or that of the driver: no other channel tells which."
         yield q, says, p, {"slope": Value(slope, error, "1")}
-
-
-LEAST = 8
 
 
 def between_runs(runs: Sequence[tuple[Cells, set[str]]]) -> Iterator[tuple[Cells, str, str, dict[str, Value]]]:

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.mismatch.diagnosis import Value
 from identification.mismatch.fault_cells import Cells, explained, fitted, own, shapes
@@ -112,7 +113,9 @@ def _longest(value: Floats) -> tuple[int, int]:
     return int(edges[i]), int(edges[i + 1])
 
 
-def _should_move(channel: Channel, cells: Cells, inside: Floats, at: float, value: Floats, *, whole: bool) -> bool:
+def _should_move(
+    channel: Channel, cells: Cells, inside: NDArray[np.bool_], at: float, value: Floats, *, whole: bool
+) -> bool:
     """Whether the driver tells it to be elsewhere for a good part of the stretch.
 
     At an end of its range only values on the inner side count: a clipped channel stands still there, and is right.
@@ -122,18 +125,30 @@ def _should_move(channel: Channel, cells: Cells, inside: Floats, at: float, valu
         return False
     if whole:
         return True
-    y = np.where(inside, np.nan, cells.values[str(channel.quantity)])
-    columns = shapes(cells.driver)["odd"]
+    y = np.where(inside, np.nan, cells.values.get(str(channel.quantity), np.nan))
+    if np.count_nonzero(np.isfinite(y)) < LEAST_ROWS:
+        return False
+    law, free = _law(cells, y)
+    if law is None:
+        return False
     x_outside = cells.driver[~inside]
-    if np.count_nonzero(np.isfinite(y)) < 8 or explained(columns, y) < 0.5:
-        columns = shapes(cells.driver)["even"]
-        if np.count_nonzero(np.isfinite(y)) < 8 or explained(columns, y) < 0.5:
-            return False
-    reached = (x >= x_outside.min() - 0.05) & (x <= x_outside.max() + 0.05)
-    beta, _ = fitted(columns, y)
-    off = (columns[inside] @ beta - at) / max(float(np.ptp(value)), 1e-300)
+    reached = free | ((x >= x_outside.min() - 0.05) & (x <= x_outside.max() + 0.05))
+    beta, _ = fitted(law, y)
+    off = (law[inside] @ beta - at) / max(float(np.ptp(value)), 1e-300)
     edge = 1e-6 * float(np.ptp(value))
     above = at < float(value.max()) - edge  # it could have been higher
     below = at > float(value.min()) + edge
     wrong = ((off > MOVED) & above) | ((off < -MOVED) & below)
     return bool(np.mean(wrong & reached) > OFTEN)
+
+
+def _law(cells: Cells, y: Floats) -> tuple[Floats | None, bool]:
+    """Columns of what the channel follows, and whether it holds beyond the levels seen (a law of one shape does)."""
+    known = shapes(cells.driver)
+    for name in ("linear", "quadratic"):
+        if explained(known[name], y) > 0.95:
+            return known[name], True
+    for name in ("odd", "even"):
+        if explained(known[name], y) > 0.5:
+            return known[name], False
+    return None, False

@@ -19,7 +19,6 @@ import numpy as np
 
 from identification.mismatch.diagnosis import Value
 from identification.mismatch.fault_cells import Cells, cells_of, own
-from identification.mismatch.fault_values import Stuck, missing, stuck
 from identification.mismatch.fault_tests import (
     between_runs,
     impossible,
@@ -29,6 +28,7 @@ from identification.mismatch.fault_tests import (
     swaps,
     unsigned,
 )
+from identification.mismatch.fault_values import Stuck, missing, stuck
 from identification.recording import Channel, Recording
 
 Kind = Literal["swapped", "rescaled", "reversed", "frozen", "unsigned", "nan"]
@@ -88,11 +88,12 @@ def _of_one(recording: Recording, alarm: float) -> tuple[list[Fault], Cells | No
     cells = cells_of(recording, {q: (s.start, s.end) for q, s in held.items()})
     if cells is None:
         return out, None
-    out += [Fault(name, q, "rescaled", says, p, values) for q, says, p, values in impossible(cells)]
     exchanged = [*swapped_voltages(recording), *swaps(cells)]
     exchanged = [s for s in exchanged if s[3] < alarm][:1]
     out += [Fault(name, a, "swapped", says, p, other=b) for a, b, says, p in exchanged]
     done = {q for s in exchanged for q in s[:2]}
+    absurd = [i for i in impossible(cells) if i[0] not in done]
+    out += [Fault(name, q, "rescaled", says, p, values) for q, says, p, values in absurd]
     if "command_voltage" in done:
         return out, None
     scaled = [r for r in midway(cells) if r[2] < alarm and r[0] not in done]

@@ -39,6 +39,8 @@ TURNING = 0.1
 """Share of the highest speed below which the rotor counts as at rest."""
 JUMP = 0.04
 """Share of the highest speed: a change between samples that begins a new stretch."""
+QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
+"""Of the speeds of a stretch, over which the noise is averaged."""
 SPEEDS = 12
 """Groups of speed: no single one of them may carry a line that is locked to the rotor."""
 BESIDE = (-7, -6, -5, -4, 4, 5, 6, 7)
@@ -69,7 +71,12 @@ class _Stretch:
     time: Floats
     turns: Floats
     value: Floats
-    speed: float
+    speeds: Floats
+    """Turns per s, QUANTILES of it."""
+
+    @property
+    def speed(self) -> float:
+        return float(self.speeds.mean())
 
 
 def turned(edges: Floats, speed: Floats, at: Floats) -> Floats:
@@ -104,11 +111,14 @@ class _Colour:
         density[0] = density[min(1, density.size - 1)]
         self._density = np.maximum(density, 1e-9 * float(density.max()) + 1e-300)
 
-    def out_of(self, power: Floats, f: Floats) -> Floats:
-        """Power over the noise at these frequencies (aliases folded back), 1 on average; 1 where a line is too slow."""
-        seen = np.abs(f - self._rate * np.round(f / self._rate))
-        ratio = power / np.interp(seen, self._f, self._density)
-        usual = seen > SLOWEST
+    def out_of(self, power: Floats, z: Floats, speeds: Floats) -> Floats:
+        """Power over the noise at z times these speeds (aliases folded back), 1 on average; 1 where that is slow."""
+        expected, usual = np.zeros_like(power), np.ones(power.shape, dtype=bool)
+        for speed in speeds.tolist():
+            seen = np.abs(z * speed - self._rate * np.round(z * speed / self._rate))
+            expected += np.interp(seen, self._f, self._density)
+            usual &= seen > SLOWEST
+        ratio = power / expected
         middle = float(np.median(ratio[usual])) / np.log(2) if usual.any() else 0.0
         out: Floats = np.where(usual, ratio / middle, 1.0) if middle > 0 else np.ones_like(ratio)
         return out
@@ -140,9 +150,8 @@ def _stretches(runs: Sequence[tuple[int, Series]], top: float) -> Iterator[_Stre
         edges = np.concatenate([[0], np.flatnonzero(new) + 1, [speed.size]])
         for low, high in pairwise(edges.tolist()):
             s = slice(low, high)
-            if high - low >= LEAST and speed[s].mean() > TURNING * top:
-                if np.any(value[s]):
-                    yield _Stretch(i, r.time[s], r.turns[s], value[s], float(speed[s].mean()))
+            if high - low >= LEAST and speed[s].mean() > TURNING * top and np.any(value[s]):
+                yield _Stretch(i, r.time[s], r.turns[s], value[s], np.quantile(speed[s], QUANTILES))
 
 
 def find_locked(runs: Sequence[tuple[int, Series]], alarm: float) -> Locked | None:
@@ -166,7 +175,7 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float) -> Locked | No
     for p, g in zip(parts, group, strict=True):
         window = np.hanning(p.time.size + 2)[1:-1]
         power = np.abs(transform(p.turns, p.value * window, cell, length)[keep]) ** 2
-        by_group[g] += colours[p.run].out_of(power, z * p.speed)
+        by_group[g] += colours[p.run].out_of(power, z, p.speeds)
     ratio, p_value = _peak(by_group, z, longest, alarm)
     if ratio is None:
         return None
