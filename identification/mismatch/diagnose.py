@@ -23,7 +23,7 @@ from identification.mismatch.diagnosis import (
 from identification.mismatch.fitting import Fit, fit, raw
 from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
 from identification.mismatch.model import Data, parameters, weights
-from identification.mismatch.naming import EQUAL, Named, Rival, name, settle_forms, with_doubts
+from identification.mismatch.naming import EQUAL, Named, Rival, Standing, name, settle_forms, with_doubts
 from identification.mismatch.next_experiment import propose
 from identification.mismatch.omnibus import Judged, Omnibus, locate, test
 from identification.mismatch.preparing import Refusal, history_of
@@ -64,11 +64,13 @@ def diagnose(
         return wrong
     rng = np.random.default_rng(seed)
     found = search(histories, rng, given=None if baseline is None else starting(baseline))
-    after = found.after
+    after, standing = found.after, None
     if after.fit.model.terms:
-        after = prune(settle_forms(after, found.data, found.terms), found.data)
+        settled, standing = settle_forms(after, found.data, found.terms)
+        after = prune(settled, found.data)
+        standing = standing if after is settled else None
     left = test(after.fit, found.data, after.weights, rng)
-    answer = _answer(recordings, replace(found, after=after), left, others, rng, limits)
+    answer = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing)
     return with_twin(answer, after, found.data, recordings, baseline)
 
 
@@ -99,10 +101,11 @@ def _answer(
     others: Sequence[History],
     rng: np.random.Generator,
     limits: Limits | None,
+    standing: dict[Term, Standing] | None,
 ) -> Diagnosis:
     data, before, after = found.data, found.before, found.after
     structure = left.p_value < ALARM
-    named = with_doubts(name(after, data, found.terms), left if structure else None)
+    named = with_doubts(name(after, data, found.terms, standing), left if structure else None)
     earned = [n for n in named if not n.doubts]
     doubted = [n for n in named if n.doubts]
     unexplained = _unexplained(left, after, data, doubted) if structure or doubted else None
@@ -219,6 +222,9 @@ def _unexplained(left: Omnibus, after: State, data: Data, doubted: Sequence[Name
     if not left.groups:
         return None
     judged = left.groups[0]
+    if left.p_value >= ALARM:  # nothing beyond noise is left: the doubt itself is the place
+        own = {c for n in doubted for c in n.term.coordinates}
+        judged = next((g for g in left.groups if g.coordinate.quantity in own), judged)
     where, share, table = _where(judged, after.fit, data)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in doubted)
     says = f"Something is left that no term of the catalogue carries: {_says(where, share, judged.coordinate.what)}"

@@ -14,6 +14,8 @@ from identification.recording import Floats
 MOST_STEPS = 25
 LEAST_REACH = 0.05
 """sigma: a parameter that changes less within its bounds is left where it is."""
+SLOW_FALLS = 3.0
+"""Further falls of the last size that a fit may be short of what is hoped for."""
 CLOSE = 1e-4
 """Fall of chi-square at which a fit has ended; a difference of 1 is one sigma."""
 
@@ -128,8 +130,18 @@ def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: 
     return weights.whiten(stacked, stacked_rate)
 
 
-def fit(model: Model, start: Theta, data: Data, weights: Weights, most_steps: int = MOST_STEPS) -> Fit:
-    """Least squares of the whitened residual within the bounds."""
+def fit(
+    model: Model,
+    start: Theta,
+    data: Data,
+    weights: Weights,
+    most_steps: int = MOST_STEPS,
+    hopeless: float = np.inf,
+) -> Fit:
+    """Least squares of the whitened residual within the bounds.
+
+    Ends early once chi-square is above `hopeless` and falls too slowly to get there.
+    """
     low, high, _ = bounds_of(model, data, start)
     theta = start.with_vector(np.clip(start.vector, low, high))
     may = np.ones(theta.vector.size, dtype=bool)
@@ -164,6 +176,8 @@ def fit(model: Model, start: Theta, data: Data, weights: Weights, most_steps: in
         if not improved:
             break
         theta, residual = trial, new
+        if chi2 - (1 + SLOW_FALLS) * fall > hopeless:
+            break
         damping = max(damping / 10, 1e-9)
         J = columns_of(model, theta, data, weights, may)
         if fall < CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1)):

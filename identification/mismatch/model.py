@@ -18,6 +18,8 @@ ORDER = {term: i for i, term in enumerate(sorted(CATALOGUE, key=lambda t: STAGES
 """Stage by stage, and in the order of the catalogue within one."""
 
 HYDRO = STAGES.index("hydro")
+CELL = STAGES.index("cell")
+MOST_REMEMBERED = 48
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -87,6 +89,12 @@ def acting(model: Model, theta: Theta, scale: Scale) -> list[tuple[Term, tuple[f
     return sorted([(g.term, g.values, g.scale) for g in model.given] + found, key=lambda each: _place(each[0]))
 
 
+def _remember(history: History, key: object, value: Floats) -> None:
+    history.memo[key] = value
+    if len(history.memo) > MOST_REMEMBERED:
+        history.memo.popitem(last=False)
+
+
 def predict(model: Model, theta: Theta, history: History, scale: Scale, run: int = 0) -> tuple[Floats, Floats]:
     """(F without tare, x) on the intervals of one run, each (M,).
 
@@ -96,17 +104,26 @@ def predict(model: Model, theta: Theta, history: History, scale: Scale, run: int
     modelled = None
     x = value
     stage = 0
+    key: object = scale
     for term, values, sizes in acting(model, theta, scale):
         at = STAGES.index(term.stage)
         if stage < HYDRO <= at:
             x = value
             value = theta.C * x * np.abs(x)
+            key = (key, theta.C)
+        if stage < CELL <= at:
+            key = (key, theta.tares[run])
         stage = at
         if "rotation_rate" in term.needs and modelled is None:
             modelled = value
-        value = term.apply(
-            value, Moment(history, sizes, theta.C, theta.tares[run], x if stage >= HYDRO else value), values
-        )
+        key = (key, term, values)
+        known = history.memo.get(key)
+        if known is None:
+            moment = Moment(history, sizes, theta.C, theta.tares[run], x if stage >= HYDRO else value)
+            value = term.apply(value, moment, values)
+            _remember(history, key, value)
+        else:
+            value = known
     if stage < HYDRO:
         x = value
         value = theta.C * x * np.abs(x)

@@ -11,10 +11,10 @@ from scipy.stats import ncx2
 
 from identification.mismatch.fitting import Fit, bounds_of, extended, fit
 from identification.mismatch.model import Data, Theta, predict
-from identification.mismatch.omnibus import SHAPE_ERROR, Omnibus
+from identification.mismatch.omnibus import Omnibus
 from identification.mismatch.preparing import DRIVERS
 from identification.mismatch.screening import directions, orthogonal_basis, refined
-from identification.mismatch.search import State, refresh
+from identification.mismatch.search import STATIC, State, refresh
 from identification.physics.term import Term
 from identification.recording import Floats
 
@@ -24,7 +24,12 @@ EQUAL = 4.0
 """BIC units: nearer than this two answers are equally good."""
 LIKELY = 40.0
 """Chi-square that a rival may lose by the tangent alone and is still refitted: its inner parameters may move."""
+RIVAL_STEPS = 15
 MOST_REFITS = 7
+SAME = 0.1
+"""Parts of a run whose parameters differ by less count as the same."""
+OWN_SHARE = 0.01
+"""Of what a term explains: less than this left over its own coordinate is the fault of the textbook, not of the name."""
 INCONSTANT = 1e-3
 """p-value, after all tests of a term, below which its parameter is not the same everywhere."""
 BETTER = 0.5
@@ -43,6 +48,10 @@ class Rival:
     fit: Fit
     bic_loss: float
     """By how much its BIC is worse."""
+
+
+Standing = tuple[Fit, list[Rival]]
+"""The fit without a term, and the rivals in its place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,19 +79,21 @@ def without(state: State, term: Term, data: Data) -> Fit:
     return fit(smaller, theta, data, state.weights)
 
 
-def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> State:
-    """Exchange a term for a rival wherever that makes the BIC smaller."""
+def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> tuple[State, dict[Term, Standing] | None]:
+    """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end, if known."""
     for _ in range(ROUNDS):
         best: tuple[float, Fit] | None = None
+        standing: dict[Term, Standing] = {}
         for term in state.fit.model.terms:
             less = without(state, term, data)
-            for rival in swaps(state, term, less, data, terms):
+            standing[term] = (less, swaps(state, term, less, data, terms))
+            for rival in standing[term][1]:
                 if rival.bic_loss < -BETTER and (best is None or rival.bic_loss < best[0]):
                     best = (rival.bic_loss, rival.fit)
         if best is None:
-            return state
+            return state, standing
         state = refresh(best[1].model, best[1].theta, data, None, state)
-    return state
+    return state, None
 
 
 def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> list[Rival]:
@@ -116,10 +127,12 @@ def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]
             break
         bigger = less.model.plus(other)
         values = refined(less, data, state.weights, other, values)
-        new = fit(bigger, extended(less.theta, less.model, other, values, bigger), data, state.weights)
+        extra = (len(values) - extra_now) * logn
+        begun = extended(less.theta, less.model, other, values, bigger)
+        new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - extra)
         if at_bound(other, new, data):
             continue
-        loss = new.chi2 - now.chi2 + (len(values) - extra_now) * logn
+        loss = new.chi2 - now.chi2 + extra
         out.append(Rival(other, new, float(loss)))
     return sorted(out, key=lambda rival: rival.bic_loss)
 
@@ -184,7 +197,7 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
         if size < 1e-3 * float(np.linalg.norm(column)) or size < 0.3:
             continue
         score = float(rest @ state.fit.residual[:n]) / size
-        p = float(ncx2.sf(score**2, 1, (SHAPE_ERROR * 2 * size) ** 2))
+        p = float(ncx2.sf(score**2, 1, (SAME * size) ** 2))
         if p * len(splits) * many < INCONSTANT:
             out.append(f"its parameter is not the same {what} ({abs(score) / size * 100:.0f} % apart)")
     return tuple(out)
@@ -202,7 +215,9 @@ def _raw_effect(now: Fit, term: Term, data: Data) -> list[Floats]:
     return out
 
 
-def name(state: State, data: Data, terms: Sequence[Term]) -> tuple[Named, ...]:
+def name(
+    state: State, data: Data, terms: Sequence[Term], standing: dict[Term, Standing] | None = None
+) -> tuple[Named, ...]:
     """Every term of the model with its rivals and doubts, the largest gain first."""
     out = []
     logn = float(np.log(max(state.fit.residual.size, 2)))
@@ -210,9 +225,13 @@ def name(state: State, data: Data, terms: Sequence[Term]) -> tuple[Named, ...]:
     std = state.fit.std
     many = max(len(state.fit.model.terms), 1)
     for term, values in zip(state.fit.model.terms, state.fit.theta.terms, strict=True):
-        less = without(state, term, data)
+        if standing is not None and term in standing:
+            less, others = standing[term]
+        else:
+            less = without(state, term, data)
+            others = swaps(state, term, less, data, terms)
         gain = less.chi2 - state.fit.chi2
-        close = [r for r in swaps(state, term, less, data, terms) if r.bic_loss < NEAR and r.term.id != term.id]
+        close = [r for r in others if r.bic_loss < NEAR and r.term.id != term.id]
         unique: dict[str, Rival] = {}
         for r in close:
             unique.setdefault(r.term.id, r)
@@ -240,12 +259,13 @@ def with_doubts(named: Sequence[Named], left: Omnibus | None) -> tuple[Named, ..
     Something left over a term's own coordinate: its shape is not the textbook's. Many static shapes on one curve: any
     curve can be made of enough of them.
     """
-    static = [n for n in named if n.term.coordinates == ("command_voltage",) or n.term.coordinates == ("thrust",)]
-    clear = {g.coordinate.quantity for g in left.groups if g.p_value < OWN_COORDINATE} if left is not None else set()
+    static = [n for n in named if set(n.term.coordinates) <= set(STATIC)]
+    clear = {g.coordinate.quantity: g for g in left.groups if g.p_value < OWN_COORDINATE} if left is not None else {}
     out = []
     for n in named:
         more: list[str] = []
-        own = [c for c in n.term.coordinates if c in clear or (c in DRIVERS and clear & set(DRIVERS))]
+        names = {d for c in n.term.coordinates for d in (DRIVERS if c in STATIC else (c,))}
+        own = [q for q, g in clear.items() if q in names and g.statistic - g.dof > OWN_SHARE * n.chi2_gain]
         if own:
             more.append(f"more is left over its own coordinate, {own[0]}")
         if len(static) >= MANY_SHAPES and n in static:

@@ -190,8 +190,10 @@ def fit_noise(
     variance = float(np.mean(total**2)) or 1.0
     weight = np.concatenate([r.count for r in runs])
     if total.size < FEW_ROWS:
-        used = max(total.size - columns[0].shape[1], 1)
-        return Noise(float(np.sum(total**2 * weight) / used) or 1e-300, 0.0)
+        X = np.concatenate(columns) * np.sqrt(weight)[:, None]
+        y = total * np.sqrt(weight)
+        left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0] if X.shape[1] else y
+        return Noise(float(np.sum(left**2) / max(total.size - X.shape[1], 1)) or 1e-300, 0.0)
     F2 = float(np.mean(np.concatenate(sizes) ** 2)) or 1.0
     if start is None or start.bands != bands:
         scales = time_scales(runs)[: MOST_SCALES - 2 * len(bands)]

@@ -159,10 +159,11 @@ def matching_pursuit(columns: Floats, residual: Floats, least: float, most: int)
     score = columns.T @ left
     size = np.ones(columns.shape[1])
     for _ in range(most):
-        sigma = float(np.sqrt(np.mean(left**2)))
         z = np.where(size > 1e-2, np.abs(score) / np.maximum(size, 1e-12), 0.0)
         j = int(np.argmax(z)) if z.size else 0
-        if not z.size or z[j] < least * sigma:
+        rest = float(left @ left) - float(z[j] ** 2) if z.size else 0.0
+        # Student's t of the direction: what it takes is not held against it
+        if not z.size or z[j] ** 2 * max(residual.size - len(chosen) - 1, 1) < least**2 * max(rest, 0.0):
             break
         chosen.append(j)
         q = columns[:, j] - taken @ (taken.T @ columns[:, j])

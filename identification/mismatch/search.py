@@ -33,6 +33,10 @@ CLOCKS = 0.002
 """s: clocks of two devices are not trusted to agree better."""
 CANDIDATES = 5
 MOST_TERMS = 6
+STATIC = ("command_voltage", "thrust")
+"""Coordinates of the static curve."""
+MOST_STATIC = 2
+"""Shapes on the static curve: any curve can be made of more."""
 DYNAMIC_STAGES = {
     "motor_lag",
     "inflow_dynamics",
@@ -252,6 +256,8 @@ def search(
     while True:
         ids = {t.id for t in state.fit.model.terms}
         left = [t for t in terms if t.id not in ids]
+        if sum(set(t.coordinates) <= set(STATIC) for t in state.fit.model.terms) >= MOST_STATIC:
+            left = [t for t in left if not set(t.coordinates) <= set(STATIC)]
         found = directions(state.fit, data, state.weights, left)
         judged = screen(state.fit, found, rng, ALARM)
         screenings.append(judged)

@@ -6,8 +6,9 @@ some thousand of them and a motor lag is still seen. Values are means over the i
 
 from __future__ import annotations
 
+from collections import OrderedDict
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -53,6 +54,8 @@ class History:
     spacing: float = 1.0
     """s between thrust samples."""
     rate_spacing: float = 1.0
+    memo: OrderedDict[object, Floats] = field(default_factory=OrderedDict, repr=False)
+    """Values behind the first terms of models predicted lately: a fit moves one parameter at a time."""
     static: bool = False
     """Levels without a course of time: nothing that moves can be seen."""
 

@@ -28,8 +28,8 @@ class LoadCellNonlinearity:
             Parameter(
                 "coefficient",
                 "1/N" if power == 1 else "1/N^2",
-                -0.4 / scale.thrust**power,
-                2.0 / scale.thrust**power,
+                -0.15 / scale.thrust**power,
+                0.15 / scale.thrust**power,
                 0.0,
             ),
         )

@@ -25,8 +25,8 @@ class TorqueCrosstalk:
             Parameter(
                 "coefficient",
                 f"N/{scale.driver_unit}^2",
-                -0.5 * scale.thrust / scale.driver**2,
-                0.5 * scale.thrust / scale.driver**2,
+                -0.1 * scale.thrust / scale.driver**2,
+                0.1 * scale.thrust / scale.driver**2,
                 0.0,
             ),
         )
