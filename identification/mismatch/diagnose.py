@@ -20,8 +20,11 @@ from identification.mismatch.diagnosis import (
     Verdict,
     Where,
 )
+from identification.mismatch.faults import Fault, find_faults, repaired
 from identification.mismatch.fitting import Fit, fit, raw
+from identification.mismatch.full_rate import look
 from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
+from identification.mismatch.lines import Line
 from identification.mismatch.model import Data, parameters, weights
 from identification.mismatch.naming import EQUAL, Named, Rival, Standing, name, settle_forms, with_doubts
 from identification.mismatch.next_experiment import propose
@@ -38,6 +41,7 @@ from identification.twin import Twin
 ALARM = 0.01
 """False-alarm rate of the omnibus tests, family-wise."""
 MOST_PLACES = 3
+LEAST_P = 1e-300
 DRIVER_NAMES = {"command_voltage": "V|V|", "motor_voltage": "V|V|", "rotation_rate": "n|n|"}
 
 
@@ -63,14 +67,25 @@ def diagnose(
     if wrong is not None:
         return wrong
     rng = np.random.default_rng(seed)
-    found = search(histories, rng, given=None if baseline is None else starting(baseline))
+    faults, histories = _faulty(recordings, histories)
+    if isinstance(histories, Refusal):
+        return histories
+    given = None if baseline is None else starting(baseline)
+    found = search(histories, rng, given=given)
+    seen = look(found.after.fit, found.data, histories)
+    lines: tuple[Line, ...] = ()
+    if seen is not None:
+        lines = seen.lines
+        found = search(seen.histories, rng, given=given, bands=seen.bands)
     after, standing = found.after, None
     if after.fit.model.terms:
         settled, standing = settle_forms(after, found.data, found.terms)
         after = prune(settled, found.data)
         standing = standing if after is settled else None
     left = test(after.fit, found.data, after.weights, rng)
-    answer = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing)
+    measured = replace(found.data, histories=histories)
+    answer = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
+    answer = _with_channels(answer, lines, faults)
     return with_twin(answer, after, found.data, recordings, baseline)
 
 
@@ -102,6 +117,7 @@ def _answer(
     rng: np.random.Generator,
     limits: Limits | None,
     standing: dict[Term, Standing] | None,
+    measured: Data,
 ) -> Diagnosis:
     data, before, after = found.data, found.before, found.after
     structure = left.p_value < ALARM
@@ -111,7 +127,7 @@ def _answer(
     unexplained = _unexplained(left, after, data, doubted) if structure or doubted else None
     verdict = _verdict(earned, unexplained)
     every = [np.ones(r.size, dtype=bool) for r in data.rows]
-    held = by_runs(before, after, data, others) if others else by_blocks(before, after, data)
+    held = by_runs(before, after, data, others) if others else by_blocks(before, after, data, measured)
     n, p = after.fit.residual.size, int(after.fit.free.sum())
     return Diagnosis(
         recordings=tuple(r.recording_id for r in recordings),
@@ -125,12 +141,13 @@ def _answer(
         model_terms=tuple(t.id for t in after.fit.model.terms),
         model=_values(after.fit, data),
         train=Rmse(
-            rmse(before.fit.model, before.fit.theta, data, every), rmse(after.fit.model, after.fit.theta, data, every)
+            rmse(before.fit.model, before.fit.theta, measured, every),
+            rmse(after.fit.model, after.fit.theta, data, every),
         ),
         heldout=HeldOutRmse(held.before, held.after, held.noise, held.what),
         chi2_per_dof=after.fit.chi2 / max(n - p, 1),
         whiteness_p=whiteness(after.fit, data),
-        next_experiment=propose(after, data, earned, limits),
+        next_experiment=propose(after, data, earned, limits) if _equals(earned) else None,
         curves=_curves(before, after, data),
     )
 
@@ -140,9 +157,58 @@ def _verdict(earned: Sequence[Named], unexplained: Unexplained | None) -> Verdic
         return "unexplained"
     if not earned:
         return "adequate"
-    if any(r.bic_loss < EQUAL for n in earned for r in n.rivals):
-        return "ambiguous"
-    return "explained"
+    return "ambiguous" if _equals(earned) else "explained"
+
+
+def _equals(earned: Sequence[Named]) -> bool:
+    """Whether some answer has a rival that does as well."""
+    return any(r.bic_loss < EQUAL for n in earned for r in n.rivals)
+
+
+def _faulty(
+    recordings: Sequence[Recording], histories: tuple[History, ...]
+) -> tuple[tuple[Fault, ...], tuple[History, ...] | Refusal]:
+    """Channel faults come first: what they make of the recordings, and the histories with grave ones put right."""
+    faults = find_faults(recordings)
+    if not any(f.grave and f.repairable for f in faults):
+        return faults, histories
+    mended = []
+    for recording in recordings:
+        for fault in faults:
+            if fault.recording_id == recording.recording_id and fault.grave and fault.repairable:
+                recording = repaired(recording, fault)
+        mended.append(recording)
+    return faults, _histories(mended)
+
+
+def _with_channels(answer: Diagnosis, lines: Sequence[Line], faults: Sequence[Fault]) -> Diagnosis:
+    """The answer with periodic disturbances and channel faults among its findings, faults first."""
+    grave = [f for f in faults if f.kind != "nan"]
+    found = (*map(_fault_finding, grave), *answer.findings, *map(_line_finding, lines))
+    notes = [f"{f.recording_id}: {f.statement}" for f in faults if f.kind == "nan"]
+    notes += [f"for the model this was put right: {f.statement}" for f in grave if f.grave and f.repairable]
+    verdict = "explained" if answer.verdict == "adequate" and found else answer.verdict
+    terms = (*answer.model_terms, *("periodic_disturbance" for _ in lines))
+    return replace(answer, verdict=verdict, findings=found, notes=(*answer.notes, *notes), model_terms=terms)
+
+
+def _fault_finding(fault: Fault) -> Finding:
+    values = {k: Value(v.value, v.std, v.unit) for k, v in fault.parameters.items()}
+    p = max(fault.p_value, LEAST_P)
+    return Finding("channel_fault", fault.kind, fault.statement, values, p, -2 * float(np.log(p)), 1.0, ())
+
+
+def _line_finding(line: Line) -> Finding:
+    values = {
+        "amplitude": Value(line.amplitude, line.amplitude_std, "N"),
+        "frequency": Value(line.frequency, line.frequency_std, "Hz"),
+    }
+    if line.ratio is not None and line.ratio_std is not None:
+        values["periods_per_turn"] = Value(line.ratio, line.ratio_std, "1")
+    if line.phase is not None and line.phase_std is not None:
+        values["phase"] = Value(line.phase, line.phase_std, "rad")
+    p = max(line.p_value, LEAST_P)
+    return Finding("periodic_disturbance", line.kind, line.statement, values, p, line.gain, 1.0, ())
 
 
 def _values(fitted: Fit, data: Data) -> dict[str, Value]:

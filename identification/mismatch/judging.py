@@ -80,15 +80,18 @@ def refitted(state: State, data: Data, keep: Sequence[Floats]) -> Fit:
     return fit(state.fit.model, state.fit.theta, part, w)
 
 
-def by_blocks(before: State, after: State, data: Data) -> HeldOut:
-    """Parameters of both models without every fourth block, judged on those blocks."""
+def by_blocks(before: State, after: State, data: Data, measured: Data) -> HeldOut:
+    """Parameters of both models without every fourth block, judged on those blocks.
+
+    `measured`: the same runs with the periodic disturbances still in them, for the model before.
+    """
     keep = [blocks(h) for h in data.histories]
     back = [~k for k in keep]
-    old, new = refitted(before, data, keep), refitted(after, data, keep)
+    old, new = refitted(before, measured, keep), refitted(after, data, keep)
     noise = noise_rms(after.noise, new.model, new.theta, data, back)
     held = "levels" if data.histories[0].static else "blocks of time"
     what = f"every fourth of the {held}, {sum(int(b.sum()) for b in back)} rows; terms were chosen on all of them"
-    return HeldOut(rmse(old.model, old.theta, data, back), rmse(new.model, new.theta, data, back), noise, what)
+    return HeldOut(rmse(old.model, old.theta, measured, back), rmse(new.model, new.theta, data, back), noise, what)
 
 
 def by_runs(before: State, after: State, data: Data, others: Sequence[History]) -> HeldOut:

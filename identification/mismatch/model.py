@@ -150,6 +150,8 @@ class Data:
     keep: tuple[Floats, ...] | None = None
     """Per run (n,) of bool: thrust rows that are fitted; None for all."""
     with_rate: bool = False
+    bands: tuple[tuple[float, float], ...] = ()
+    """(Hz, quality) of broad peaks of the noise."""
     most_shift: float = 0.0
     """s, bound of the nuisance shift; 0 where nothing moves."""
     spread: Spread | None = None

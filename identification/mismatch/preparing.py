@@ -311,6 +311,8 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
         count=count,
         sampled=sampled,
         within=within,
+        sample_time=time[(time >= edges[0]) & (time < edges[-1])],
+        sample_thrust=force[(time >= edges[0]) & (time < edges[-1])],
         rate=rate,
         rate_count=rate_count,
         rate_sampled=rate_sampled,

@@ -132,7 +132,7 @@ def refresh(model: Model, theta: Theta, data: Data, extra: Floats | None, state:
         parts = [np.column_stack([p, e]) for p, e in zip(parts, _split(extra, data), strict=True)]
     parts = _independent(parts)
     rows = state.rows if state is not None else data.thrust_rows
-    noise = fit_noise(rows, left, parts, size)
+    noise = fit_noise(rows, left, parts, size, data.bands)
     rate_noise = None
     if data.with_rate:
         left_rate = [h.rate[h.rate_rows] - f for h, f in zip(data.histories, rate, strict=True)]
@@ -242,6 +242,7 @@ def search(
     rng: np.random.Generator,
     trace: list[str] | None = None,
     given: Callable[[Data, Theta], tuple[Data, Theta, Model]] | None = None,
+    bands: tuple[tuple[float, float], ...] = (),
 ) -> Found:
     """Forward: screen, fit the best few, keep the best, refresh the noise; until nothing passes. Then prune.
 
@@ -249,6 +250,7 @@ def search(
     """
     data, theta = start(histories)
     data, theta, first = given(data, theta) if given is not None else (data, theta, Model())
+    data = replace(data, bands=bands)
     terms = available(data)
     state = before = baseline(data, theta, terms, first)
     screenings = []

@@ -54,6 +54,9 @@ class History:
     spacing: float = 1.0
     """s between thrust samples."""
     rate_spacing: float = 1.0
+    sample_time: Floats = field(default_factory=lambda: np.empty(0), repr=False)
+    """(N,) s, every thrust sample that is in an interval."""
+    sample_thrust: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     memo: OrderedDict[object, Floats] = field(default_factory=OrderedDict, repr=False)
     """Values behind the first terms of models predicted lately: a fit moves one parameter at a time."""
     static: bool = False

@@ -1,0 +1,94 @@
+"""The residual at the recording's own samples: lines in it are taken out, broad peaks are told to the noise model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from identification.mismatch.fitting import Fit
+from identification.mismatch.lines import Line, find_lines
+from identification.mismatch.model import Data, predict
+from identification.mismatch.resonance_noise import find_bands
+from identification.mismatch.rotation_lines import turned
+from identification.mismatch.spectrum import Series
+from identification.physics.filters import delayed, reconstructed
+from identification.physics.history import History
+from identification.recording import Floats
+
+UNSETTLED = 0.4
+"""s after a step in which a residual is no noise."""
+MOST_BANDS = 1
+FEW_SAMPLES = 400
+
+
+@dataclass(frozen=True, eq=False)
+class Cleaned:
+    """What was found at full rate."""
+
+    lines: tuple[Line, ...]
+    bands: tuple[tuple[float, float], ...]
+    histories: tuple[History, ...]
+    """Without the lines."""
+
+
+def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
+    """Measured minus predicted at every sample that the intervals hold; turns from the rate, or from the model."""
+    out = []
+    for i, h in enumerate(data.histories):
+        F, x = predict(fitted.model, fitted.theta, h, data.scale, i)
+        if fitted.theta.shift:
+            F = delayed(F, h.edges, fitted.theta.shift)
+        index = _interval(h, h.sample_time)
+        straight = reconstructed(F, h.middle, h.middle + 0.5 * h.dt)
+        slope = (straight - F) / (0.5 * h.dt)
+        at = F[index] + slope[index] * (h.sample_time - h.middle[index])
+        residual = h.sample_thrust - at - fitted.theta.tares[i]
+        speed = h.others.get("rotation_rate", x)
+        out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time)))
+    return tuple(out)
+
+
+def look(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned | None:
+    """Lines and bands of what this fit leaves; None when there are neither."""
+    series = series_of(fitted, data)
+    if all(s.time.size < FEW_SAMPLES for s in series):
+        return None
+    has_rate = all("rotation_rate" in h.others for h in data.histories)
+    unit: Literal["rev", "V s"] = "rev" if has_rate else "V s"
+    lines = find_lines(series, turns_unit=unit)
+    still = []
+    for i, (s, h) in enumerate(zip(series, data.histories, strict=True)):
+        left = s.residual.copy()
+        for line in lines:
+            left -= line.at(s.time, s.turns, i)
+        left[h.since_step[_interval(h, s.time)] < UNSETTLED] = np.nan
+        still.append(replace(s, residual=left))
+    bands = find_bands(still, most=MOST_BANDS)
+    if not lines and not bands:
+        return None
+    cleaned = tuple(
+        _without(h, [line.at(s.time, s.turns, i) for line in lines])
+        for i, (h, s) in enumerate(zip(originals, series, strict=True))
+    )
+    return Cleaned(lines, bands, cleaned)
+
+
+def _interval(history: History, time: Floats) -> np.ndarray:
+    index = np.searchsorted(history.edges, time, side="right") - 1
+    return np.clip(index, 0, history.driver.size - 1)
+
+
+def _without(history: History, lines: Sequence[Floats]) -> History:
+    """The history of the same samples less the lines."""
+    if not lines:
+        return history
+    value = history.sample_thrust - np.sum(lines, axis=0)
+    index = _interval(history, history.sample_time)
+    M = history.driver.size
+    some = np.maximum(history.count, 1)
+    mean = np.where(history.count > 0, np.bincount(index, weights=value, minlength=M) / some, np.nan)
+    within = np.bincount(index, weights=(value - mean[index]) ** 2, minlength=M)
+    return replace(history, thrust=mean, within=within, sample_thrust=value)
