@@ -19,13 +19,12 @@ import numpy as np
 
 from identification.mismatch.diagnosis import Value
 from identification.mismatch.fault_cells import Cells, cells_of, own
+from identification.mismatch.fault_swaps import swapped_voltages, swaps
 from identification.mismatch.fault_tests import (
     between_runs,
     impossible,
     midway,
     reversed_channels,
-    swapped_voltages,
-    swaps,
     unsigned,
 )
 from identification.mismatch.fault_values import Stuck, missing, stuck
