@@ -1,0 +1,471 @@
+"""Every textbook form: absent at its neutral amount, seen at its trials, bounded, told in one sentence; and the
+filters behind them against solvers that know nothing of them."""
+
+import re
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from runs_on_intervals import history, moment, scale, uneven
+from scipy.integrate import solve_ivp
+from scipy.signal import lfilter
+
+from identification.mismatch.model import Model, Theta, predict
+from identification.physics import filters
+from identification.physics.catalogue import CATALOGUE
+from identification.physics.term import STAGES
+
+H = history()
+S = scale(H)
+NAMES = [f"{t.id}-{t.form}" if t.form else t.id for t in CATALOGUE]
+every_term = pytest.mark.parametrize("term", CATALOGUE, ids=NAMES)
+
+
+def term(name, form=""):
+    return next(t for t in CATALOGUE if t.id == name and form in (t.form, ""))
+
+
+def neutral(term):
+    """Amounts that take the effect away; inner parameters from the first trial."""
+    first = term.trials(S)[0]
+    out = [p.neutral if p.neutral is not None else v for p, v in zip(term.parameters(S), first, strict=True)]
+    names = [p.name for p in term.parameters(S)]
+    if "share_2" in names:  # the second amount of a creep with two constants
+        out[names.index("share_2")] = 0.0
+    return tuple(out)
+
+
+def predicted(terms, thetas, h=H, s=S, C=0.5, tare=0.0):
+    return predict(Model(tuple(terms)), Theta(C, tuple(thetas), (tare,)), h, s)
+
+
+def base(h=H, C=0.5):
+    return C * h.driver * np.abs(h.driver)
+
+
+def with_driver(driver, dt):
+    h = history(driver.size)
+    edges = np.concatenate([[0.0], np.cumsum(dt)])
+    return replace(h, edges=edges, driver=driver, sampled=0.5 * (edges[1:] + edges[:-1]))
+
+
+# ---------------------------------------------------------------- what all terms have in common
+
+
+@every_term
+def test_a_neutral_amount_changes_nothing(term):
+    F, _ = predicted([term], [neutral(term)])
+    assert base() == pytest.approx(F, abs=1e-9 * S.thrust)
+
+
+@every_term
+def test_each_trial_is_seen_and_within_bounds(term):
+    known = term.parameters(S)
+    assert known[0].neutral is not None
+    assert term.trials(S)
+    for trial in term.trials(S):
+        assert len(trial) == len(known)
+        for p, value in zip(known, trial, strict=True):
+            assert p.low < p.high
+            assert p.low <= value <= p.high, p.name
+            assert p.neutral is None or p.low <= p.neutral <= p.high
+        assert trial[0] != known[0].neutral
+        F, _ = predicted([term], [trial])
+        assert np.all(np.isfinite(F))
+        if not (term.id == "dead_band" and trial[0] < 1.0):  # no level of this run is so small
+            assert np.max(np.abs(F - base())) > 3e-5 * S.thrust
+
+
+@every_term
+def test_the_prediction_moves_continuously_with_every_parameter(term):
+    """A fit by slopes needs it: a small step of a parameter is a small step of the prediction, twice as far twice as
+    much (or it passed a kink)."""
+    for trial in term.trials(S)[:2]:
+        middle, _ = predicted([term], [trial])
+        for j, p in enumerate(term.parameters(S)):
+            moved = []
+            for step in (1e-7, 1e-5):
+                at = list(trial)
+                at[j] += step * (p.high - p.low) * (1 if trial[j] < 0.5 * (p.low + p.high) else -1)
+                moved.append(np.linalg.norm(predicted([term], [tuple(at)])[0] - middle))
+            assert moved[0] < 0.05 * moved[1] + 1e-9 * S.thrust
+
+
+@every_term
+def test_bounds_hold_nothing_that_is_not_finite(term):
+    known = term.parameters(S)
+    for corner in ([p.low for p in known], [p.high for p in known]):
+        F, x = predicted([term], [tuple(corner)])
+        assert np.all(np.isfinite(F))
+        assert np.all(np.isfinite(x))
+
+
+@every_term
+def test_nothing_depends_on_one_bench_s_volts_and_newtons(term):
+    """The same shape of run at 7 times the volts and 1/30 of the newtons: the same relative change."""
+    other = history(volts=7.0, newtons=1 / 30, flow=3.0)
+    s = scale(other, volts=7.0, newtons=1 / 30, flow=3.0)
+    C = 0.5 / 30 / 49
+    for mine, theirs in zip(term.trials(S), term.trials(s), strict=True):
+        here, _ = predicted([term], [mine], tare=1.0)
+        there, _ = predicted([term], [theirs], other, s, C, tare=1 / 30)
+        assert 30 * there == pytest.approx(here, abs=1e-8 * S.thrust)
+
+
+@every_term
+def test_the_statement_is_one_sentence_with_its_number(term):
+    for trial in term.trials(S):
+        says = term.statement(trial, S)
+        assert re.match(r"[A-Z][a-z-]+( [a-z-]+)*: ", says)
+        assert says.endswith(".")
+        assert not re.search(r"\.\s", says), "more than one sentence"
+        assert re.search(r"\d", says)
+        assert not re.search(r"\b(nan|inf)\b", says)
+    elsewhere = tuple(0.3 * p.low + 0.7 * p.high for p in term.parameters(S))
+    assert term.statement(elsewhere, S) != term.statement(term.trials(S)[0], S)
+
+
+@every_term
+def test_it_says_what_it_is_and_what_it_needs(term):
+    assert term.stage in STAGES
+    assert term.physics
+    assert term.physics[0].islower()
+    assert term.coordinates
+    assert set(term.needs) <= set(H.others)
+    bare = replace(H, others={k: v for k, v in H.others.items() if k not in term.needs})
+    if term.needs:
+        with pytest.raises(KeyError):
+            predicted([term], [term.trials(S)[-1]], bare)
+    else:
+        predicted([term], [term.trials(S)[-1]], replace(H, others={}))
+
+
+def test_ids_and_forms_are_unique():
+    assert len({(t.id, t.form) for t in CATALOGUE}) == len(CATALOGUE)
+    assert len({t.id for t in CATALOGUE}) == 26
+
+
+@every_term
+def test_finer_trials_surround_the_best_one(term):
+    for trial in term.trials(S)[::10]:
+        for values in term.finer(trial, S):
+            assert values[0] == trial[0]
+        finer = np.array(term.finer(trial, S))
+        if finer.size:
+            coarse = np.diff(sorted({t[1] for t in term.trials(S)}))
+            assert finer[:, 1].min() < trial[1] < finer[:, 1].max()
+            assert np.ptp(finer[:, 1]) >= 1.9 * coarse.max()  # no place between two trials is missed
+            assert np.diff(finer[:, 1]).max() < 0.2 * coarse.min()
+
+
+def test_only_a_jump_of_the_zero_has_finer_trials():
+    assert {t.id for t in CATALOGUE if t.finer(t.trials(S)[0], S)} == {"zero_offset"}
+
+
+# ---------------------------------------------------------------- filters against independent solvers
+
+
+def integrated(slope, y0, u, dt, seen=0):
+    """Ends (M, k) and means (M,) of component `seen` of y' = slope(y, u), u constant in each interval."""
+    y, ends, means = np.append(y0, 0.0), [], []
+    for value, width in zip(u, dt, strict=True):
+        y[-1] = 0.0
+        found = solve_ivp(lambda _t, z, v=value: [*slope(z[:-1], v), z[seen]], (0.0, width), y, rtol=1e-10, atol=1e-12)
+        y = found.y[:, -1].copy()
+        ends.append(y[:-1].copy())
+        means.append(y[-1] / width)
+    return np.array(ends), np.array(means)
+
+
+def steps(n, seed=3, low=0.004, high=0.25):
+    rng = np.random.default_rng(seed)
+    return np.repeat(rng.uniform(-10, 10, n // 5), 5), uneven(rng, n // 5 * 5, low, high)
+
+
+@pytest.mark.parametrize("tau", [0.002, 0.1, 3.0, 300.0])
+def test_lowpass_is_the_first_order_equation(tau):
+    u, dt = steps(60)
+    end, mean = filters.lowpass(u, dt, tau, start=2.0)
+    ends, means = integrated(lambda y, v: [(v - y[0]) / tau], [2.0], u, dt)
+    assert end == pytest.approx(ends[:, 0], abs=1e-7)
+    assert mean == pytest.approx(means, abs=1e-7)
+
+
+def test_lowpass_on_an_even_grid_is_a_recursive_filter():
+    u = np.random.default_rng(4).standard_normal(5000)
+    a = np.exp(-0.02 / 0.7)
+    end, _ = filters.lowpass(u, np.full(u.size, 0.02), 0.7)
+    assert end == pytest.approx(lfilter([1 - a], [1, -a], u), abs=1e-12)
+
+
+@pytest.mark.parametrize(("quadratic", "linear"), [(0.5, 0.0), (0.05, 3.0), (5.0, 0.2)])
+def test_lag_is_the_rotor_equation(quadratic, linear):
+    """Intervals short against the lag, as preparing lays them after a step."""
+    fastest = quadratic * 20 + linear
+    u, dt = steps(100, low=0.05 / fastest, high=0.3 / fastest)
+    mean = filters.lag(u, dt, quadratic, linear, start=-3.0)
+    _, means = integrated(
+        lambda y, v: [quadratic * (v * abs(v) - y[0] * abs(y[0])) + linear * (v - y[0])], [-3.0], u, dt
+    )
+    assert mean == pytest.approx(means, abs=0.02)  # of 10: the mean rate within an interval stands for the rate
+
+
+def test_lag_ends_at_its_command_and_stays_at_rest():
+    u = np.full(50, 6.0)
+    assert filters.lag(u, np.full(50, 1.0), 2.0, 0.0)[-1] == pytest.approx(6.0)
+    assert filters.lag(np.zeros(50), np.full(50, 1.0), 2.0, 0.0).tolist() == [0.0] * 50
+
+
+@pytest.mark.parametrize(("frequency", "damping"), [(0.5, 0.02), (3.0, 0.3), (12.0, 0.9)])
+def test_resonant_is_a_mass_on_a_spring(frequency, damping):
+    u, dt = steps(50)
+    w = 2 * np.pi * frequency
+    mean = filters.resonant(u, dt, frequency, damping)
+    _, means = integrated(lambda y, v: [y[1], w**2 * (v - y[0]) - 2 * damping * w * y[1]], [0.0, 0.0], u, dt)
+    assert mean == pytest.approx(means, abs=1e-6)
+
+
+@pytest.mark.parametrize("delay", [-7.3, -0.21, 0.0, 0.0013, 0.4, 100.0])
+def test_delayed_is_the_overlap_of_shifted_intervals(delay):
+    value, dt = steps(40)
+    edges = 5.0 + np.concatenate([[0.0], np.cumsum(dt)])
+    moved = edges + delay
+    moved[0], moved[-1] = -1e9, 1e9  # held constant outside
+    expected = []
+    for a, b in pairwise(edges):
+        shared = np.maximum(np.minimum(b, moved[1:]) - np.maximum(a, moved[:-1]), 0.0)
+        expected.append(shared @ value / (b - a))
+    assert filters.delayed(value, edges, delay) == pytest.approx(np.array(expected), abs=1e-9)
+
+
+@pytest.mark.parametrize("width", [0.0, 0.7, 6.0, 50.0])
+def test_play_is_moved_only_by_its_edges(width):
+    u = np.random.default_rng(5).uniform(-10, 10, 300)
+    y, expected = 0.0, []
+    for v in u:
+        if v - y > width:
+            y = v - width
+        elif y - v > width:
+            y = v + width
+        expected.append(y)
+    got = filters.play(u, width)
+    assert got == pytest.approx(np.array(expected), abs=1e-12)
+    assert np.all(np.abs(got - u) <= width + 1e-12)
+    assert np.array_equal(filters.play(np.repeat(u, 3), width), np.repeat(got, 3)), "play has no time of its own"
+
+
+def opposite_by_hand(x, dt, turning):
+    """One interval after the other, as the words say it."""
+    out, t = [], 0.0
+    sign = ended = began = 0
+    other_end = {1: None, -1: None}
+    for value, width in zip(x, dt, strict=True):
+        now = 1 if value > turning else -1 if value < -turning else 0
+        if now and now != sign:
+            sign, began = now, t
+        ended = other_end[-sign] if sign else None
+        out.append((t + width / 2 - ended, t + width / 2 - began) if ended is not None else None)
+        t += width
+        if now:
+            other_end[now] = t
+    return out
+
+
+def test_since_opposite_counts_from_the_last_turn_the_other_way():
+    rng = np.random.default_rng(6)
+    x = np.repeat(rng.choice([-5.0, -0.1, 0.0, 0.1, 4.0], 80), 4)
+    x[:12] = 0.0
+    dt = uneven(rng, x.size)
+    since, began, known = filters.since_opposite(x, dt, 0.24)
+    expected = opposite_by_hand(x, dt, 0.24)
+    assert known.tolist() == [e is not None for e in expected]
+    assert 0 < known.sum() < known.size
+    for i in np.flatnonzero(known):
+        assert (since[i], began[i]) == pytest.approx(expected[i], abs=1e-9)
+
+
+def test_a_run_in_one_direction_has_no_opposite():
+    assert not filters.since_opposite(np.array([0.0, 1.0, 2.0, 0.0]), np.ones(4), 0.1)[2].any()
+
+
+def test_reconstructed_is_exact_on_a_line_and_flat_at_steps_and_peaks():
+    rng = np.random.default_rng(7)
+    edges = np.concatenate([[0.0], np.cumsum(uneven(rng, 60))])
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    at = edges[:-1] + rng.uniform(0, 1, 60) * np.diff(edges)
+    line = filters.reconstructed(3 * middle - 1, middle, at)
+    assert line[1:-1] == pytest.approx(3 * at[1:-1] - 1)
+    level = np.where(middle > middle[30], 5.0, 1.0)
+    assert np.array_equal(filters.reconstructed(level, middle, at), level)
+    peak = -np.abs(middle - middle[30])
+    assert filters.reconstructed(peak, middle, at)[30] == peak[30]
+    bent = filters.reconstructed(middle**2, middle, at)  # never beyond what both neighbours allow
+    flat = np.minimum(np.diff(middle**2)[:-1] / np.diff(middle)[:-1], np.diff(middle**2)[1:] / np.diff(middle)[1:])
+    assert bent[1:-1] == pytest.approx(middle[1:-1] ** 2 + flat * (at - middle)[1:-1])
+
+
+def test_integral_is_held_constant_outside():
+    edges = np.array([1.0, 2.0, 4.0])
+    found = filters.integral(np.array([2.0, 3.0]), edges, np.array([-1.0, 1.0, 1.5, 4.0, 6.0]))
+    assert found.tolist() == [-4.0, 0.0, 1.0, 8.0, 14.0]
+
+
+# ---------------------------------------------------------------- forms against their formula
+
+
+def test_winding_resistance_solves_the_motor_balance():
+    V = np.linspace(-12, 12, 49)
+    e = term("winding_resistance").apply(V, moment(H, S), (0.05,))
+    assert np.sign(V) * (np.abs(e) + 0.05 * e**2) == pytest.approx(V)
+
+
+def test_dead_bands():
+    V = np.array([-12.0, -2.0, -1.0, 0.0, 0.5, 1.5, 3.0])
+    m = moment(H, S)
+    assert term("dead_band", "shrink").apply(V, m, (1.2,)).tolist() == pytest.approx([-10.8, -0.8, 0, 0, 0, 0.3, 1.8])
+    assert term("dead_band", "jump").apply(V, m, (1.2,)).tolist() == pytest.approx([-12, -2, 0, 0, 0, 1.5, 3])
+
+
+def test_static_forms_of_the_propeller():
+    x = np.array([-12.0, -6.0, 6.0, 12.0])
+    m = moment(H, S, x=x)
+    T = 0.5 * x * np.abs(x)
+    assert term("asymmetry").apply(T, m, (0.8,)) == pytest.approx([-57.6, -14.4, 18.0, 72.0])
+    assert term("exponent").apply(T, m, (3.0,)) == pytest.approx([-72.0, -9.0, 9.0, 72.0])
+    assert term("linear_term").apply(T, m, (0.5,)) == pytest.approx([-78.0, -21.0, 21.0, 78.0])
+    assert term("cavitation", "linear").apply(T, m, (0.1, 7.0)) == pytest.approx([-36.0, -18.0, 18.0, 36.0])
+    assert term("cavitation", "square").apply(T, m, (0.1, 7.0)) == pytest.approx([-54.0, -18.0, 18.0, 54.0])
+    assert term("cavitation", "linear").apply(T, m, (0.6, 7.0))[0] == 0.0, "thrust never changes sign"
+    assert term("torque_crosstalk").apply(T, m, (0.01,)) == pytest.approx([-70.56, -17.64, 18.36, 73.44])
+    assert term("command_saturation").apply(x, m, (8.0,)).tolist() == [-8, -6, 6, 8]
+    assert term("load_cell_nonlinearity", "quadratic").apply(T, m, (1e-3,))[[0, 3]] == pytest.approx([-77.184, 77.184])
+    assert term("load_cell_nonlinearity", "cubic").apply(T, m, (1e-5,))[[0, 3]] == pytest.approx([-75.73248, 75.73248])
+
+
+def test_forms_that_read_another_channel():
+    m = moment(H, S)
+    T, x = base(), H.driver
+    U = H.others["flow_speed"]
+    assert term("speed_of_advance").apply(T, m, (0.4,)) == pytest.approx(T - 0.4 * np.abs(x) * U)
+    assert term("strut_drag").apply(T, m, (-3.0,)) == pytest.approx(T - 3.0 * U * np.abs(U))
+    on = H.others["neighbour_thrust"] > 0
+    assert term("thruster_interaction").apply(T, m, (0.2,)) == pytest.approx(np.where(on, 0.8 * T, T))
+    assert term("rotation_coupling").apply(x, m, (1.0,)) == pytest.approx(H.others["rotation_rate"] / 2.0)
+    ratio = H.others["bus_voltage"] / H.others["bus_voltage"].max()
+    assert term("supply_sag").apply(x, m, (1.0,)) == pytest.approx(x * ratio)
+    heated = replace(H, others={"current": np.where(np.arange(H.driver.size) < 200, 8.0, 0.0)})
+    warm = term("heating", "winding").apply(np.ones(400), moment(heated, S), (0.3, 5.0))
+    t = H.edges[200]
+    assert warm[200:] == pytest.approx(1 - 0.3 * (1 - np.exp(-t / 5)) * np.exp(-(H.middle[200:] - t) / 5), abs=1e-3)
+
+
+def test_memories_end_where_the_formula_says():
+    x = np.full(4000, 12.0)
+    h = with_driver(x, np.full(4000, 0.25))
+    m = moment(h, S)
+    T = np.full(4000, 72.0)
+    assert term("heating", "winding").apply(T, m, (0.3, 40.0))[-1] == pytest.approx(0.7 * 72)
+    twice = term("heating", "magnet").apply(T, m, (0.3, 40.0, 40.0))
+    s = h.middle / 40
+    assert twice == pytest.approx(72 * (1 - 0.3 * (1 - (1 + s) * np.exp(-s))), abs=0.01)
+    rate = term("recirculation", "rate").apply(T, m, (0.05, 20.0))
+    assert rate == pytest.approx(72 - 0.05 * 144 * (1 - np.exp(-h.middle / 20)), abs=1e-3)
+    assert term("recirculation", "thrust").apply(T, m, (0.05, 20.0)) == pytest.approx(rate)
+    less = term("recirculation", "thrust").apply(0.25 * T, m, (0.05, 20.0))
+    assert less[-1] == pytest.approx(18.0 - 0.05 * 12 * 6)
+    over = term("inflow_dynamics").apply(T, m, (0.4, 2.0))
+    assert over == pytest.approx(72 * (1 + 0.4 * np.exp(-h.middle / 2)), abs=0.03)
+    creep = term("load_cell_creep", "two_constants").apply(T, m, (0.1, 5.0, -0.02, 100.0))
+    late = 1 + 0.1 * (1 - np.exp(-h.middle / 5)) - 0.02 * (1 - np.exp(-h.middle / 100))
+    assert creep == pytest.approx(72 * late, abs=1e-2)
+    assert term("zero_drift", "linear").apply(T, m, (0.01,)) == pytest.approx(72 + 0.01 * h.middle)
+    drift = term("zero_drift", "exponential").apply(T, m, (3.0, 50.0))
+    assert drift == pytest.approx(75 - 3 * np.exp(-h.middle / 50))
+    jump = term("zero_offset").apply(T, m, (2.0, 500.0))
+    assert jump[h.middle < 499].tolist() == [72.0] * int(np.sum(h.middle < 499))
+    assert jump[h.middle > 501].tolist() == [74.0] * int(np.sum(h.middle > 501))
+
+
+def test_the_rotor_follows_its_equation():
+    u, dt = steps(60, seed=8, high=0.05)
+    h = with_driver(u, dt)
+    m = moment(h, S)
+    start = u[0]
+    _, first = integrated(lambda y, v: [(v - y[0]) / 0.2], [start], u, dt)
+    assert term("motor_lag", "first_order").apply(u, m, (0.2,)) == pytest.approx(first, abs=1e-6)
+    # near full rate V - x closes with the time constant: x' = (V|V| - x|x|) / (2 tau V_full)
+    _, second = integrated(lambda y, v: [(v * abs(v) - y[0] * abs(y[0])) / (2 * 0.2 * S.driver)], [start], u, dt)
+    assert term("motor_lag", "quadratic").apply(u, m, (0.2,)) == pytest.approx(second, abs=0.02)
+
+
+def test_the_wake_is_met_after_a_change_of_direction_only():
+    x = np.repeat([0.0, 12.0, 0.0, 12.0, -12.0], 40)
+    h = with_driver(x, np.full(200, 0.05))
+    m = moment(h, S)
+    T = np.full(200, 10.0)
+    wake = term("reversal_loss", "wake").apply(T, m, (0.5, 1.0))
+    assert wake[:160].tolist() == [10.0] * 160
+    assert wake[160:] == pytest.approx(10 * (1 - 0.5 * np.exp(-(h.middle[160:] - 8.0))))
+    rested = with_driver(np.repeat([12.0, 0.0, -12.0], 40), np.full(120, 0.05))
+    wake, step = (
+        term("reversal_loss", form).apply(np.full(120, 10.0), moment(rested, S), (0.5, 1.0))
+        for form in ("wake", "step")
+    )
+    assert wake[80] == pytest.approx(10 * (1 - 0.5 * np.exp(-2.025)))
+    assert step[80] == pytest.approx(10 * (1 - 0.5 * np.exp(-0.025)))
+
+
+def test_stand_forms_use_their_filters():
+    T = base()
+    m = moment(H, S)
+    assert np.array_equal(term("hysteresis").apply(T, m, (2.0,)), filters.play(T, 2.0))
+    rung = filters.resonant(T, H.dt, 3.0, 0.1)
+    assert term("stand_resonance").apply(T, m, (0.5, 3.0, 0.1)) == pytest.approx(0.5 * (T + rung))
+    assert term("time_skew").apply(T, m, (0.3,)) == pytest.approx(filters.delayed(T, H.edges, 0.3))
+
+
+def test_a_clipping_cell_shows_the_mean_of_samples_that_clip_one_by_one():
+    """Monte Carlo of noisy samples round the limit, tare and all."""
+    value = np.linspace(-110.0, 110.0, 41)
+    s = replace(S, noise=4.0)
+    got = term("load_cell_saturation").apply(value, moment(H, s, tare=7.0), (90.0,))
+    noise = 4.0 * np.random.default_rng(9).standard_normal((41, 40_000))
+    expected = np.clip(value[:, None] + 7.0 + noise, -90.0, 90.0).mean(axis=1) - 7.0
+    assert got == pytest.approx(expected, abs=5 * 4.0 / 200)
+    assert not np.allclose(got, np.clip(value + 7.0, -90.0, 90.0) - 7.0, atol=0.5), "the bend at the limit is rounded"
+    hard = term("load_cell_saturation").apply(value, moment(H, replace(S, noise=0.0), tare=7.0), (90.0,))
+    assert hard == pytest.approx(np.clip(value + 7.0, -90.0, 90.0) - 7.0)
+
+
+# ---------------------------------------------------------------- the chain of stages
+
+
+def test_terms_act_in_the_order_of_the_bench():
+    clip, uneven_blade, linear = term("command_saturation"), term("asymmetry"), term("load_cell_nonlinearity")
+    F, x = predicted(Model().plus(linear).plus(uneven_blade).plus(clip).terms, [(8.0,), (0.5,), (1e-3,)])
+    volts = np.clip(H.driver, -8, 8)
+    T = np.where(volts < 0, 0.5, 1.0) * 0.5 * volts * np.abs(volts)
+    assert x == pytest.approx(volts)
+    assert pytest.approx(T * (1 + 1e-3 * np.abs(T))) == F
+
+
+def test_a_term_that_reads_the_measured_rate_does_not_explain_that_rate():
+    F, x = predicted([term("rotation_coupling")], [(1.0,)])
+    assert np.array_equal(x, H.driver)
+    n = H.others["rotation_rate"] / 2.0
+    assert pytest.approx(0.5 * n * np.abs(n)) == F
+
+
+def test_what_is_remembered_is_what_is_computed():
+    fresh, old = history(), history()
+    lag, clip = term("motor_lag"), term("load_cell_saturation")
+    for C, tau, limit, tare in [
+        (0.5, 0.1, 60.0, 0.0),
+        (0.5, 0.1, 50.0, 3.0),
+        (0.6, 0.1, 50.0, 3.0),
+        (0.5, 0.1, 60.0, 0.0),
+    ]:
+        again, _ = predicted([lag, clip], [(tau,), (limit,)], old, S, C, tare)
+        first, _ = predicted([lag, clip], [(tau,), (limit,)], replace(fresh, memo=type(fresh.memo)()), S, C, tare)
+        assert np.array_equal(again, first)
