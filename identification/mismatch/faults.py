@@ -91,13 +91,13 @@ def _of_one(recording: Recording, alarm: float) -> tuple[list[Fault], Cells | No
     exchanged = [s for s in exchanged if s[3] < alarm][:1]
     out += [Fault(name, a, "swapped", says, p, other=b) for a, b, says, p in exchanged]
     done = {q for s in exchanged for q in s[:2]}
-    absurd = [i for i in impossible(cells) if i[0] not in done]
-    out += [Fault(name, q, "rescaled", says, p, values) for q, says, p, values in absurd]
     if "command_voltage" in done:
         return out, None
     scaled = [r for r in midway(cells) if r[2] < alarm and r[0] not in done]
     out += [Fault(name, q, "rescaled", says, p, values) for q, says, p, values in scaled]
     done |= {r[0] for r in scaled}
+    absurd = [i for i in impossible(cells) if i[0] not in done]
+    out += [Fault(name, q, "rescaled", says, p, values) for q, says, p, values in absurd]
     signless = [u for u in unsigned(cells) if u[2] < alarm and u[0] not in done]
     out += [Fault(name, q, "unsigned", says, p, grave=q != "current") for q, says, p in signless]
     done |= {u[0] for u in signless}

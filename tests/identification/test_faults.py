@@ -126,6 +126,11 @@ FAULTY: dict[str, tuple[str, str, Callable[[Recording], Recording]]] = {
         "thrust",
         lambda r: changed(r, "thrust", lambda c: np.where(c.time > 60, c.value / 9.80665, c.value)),
     ),
+    "rate in rpm from half way": (
+        "rescaled",
+        "rotation_rate",
+        lambda r: changed(r, "rotation_rate", lambda c: np.where(c.time > 60, 60 * c.value, c.value)),
+    ),
     "thrust frozen": (
         "frozen",
         "thrust",
