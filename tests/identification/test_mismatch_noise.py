@@ -1,0 +1,268 @@
+"""Noise of the diagnosis: the fast factorisation is the dense one, the likelihood is the textbook's, and variances
+that were put in come out."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.mismatch.noise import OUTLIER, Noise, Rows, Whitener, _cost, fit_noise, with_outliers
+
+MIXED = Noise(0.04, 0.0009, (0.15, 4.0), (0.05, 0.3), ((3.0, 4.0),), (0.2,))
+SLOW = Noise(0.04, 0.0009, (0.15, 4.0), (0.05, 0.3))
+BAND = Noise(0.04, 0.0009, (), (), ((3.0, 4.0), (0.4, 1.5)), (0.2, 0.1))
+WHITE = Noise(0.04, 0.0009)
+
+
+def rows(n=200, seed=1, most=6, spacing=0.01):
+    """Rows of one to `most` samples at uneven times, some with outliers."""
+    rng = np.random.default_rng(seed)
+    count = rng.integers(1, most + 1, n).astype(float)
+    width = count * spacing
+    time = np.cumsum(width + rng.exponential(0.05, n)) - 0.5 * width
+    extra = np.where(rng.random(n) < 0.05, 9.0, 1.0)
+    return Rows(time, count, extra, width)
+
+
+def kernel(noise, lag):
+    """(components, ...) correlation functions at `lag` s, each 1 at 0."""
+    lag = np.abs(lag)
+    out = [np.exp(-lag / T) for T in noise.scales]
+    for f, Q in noise.bands:  # damped harmonic oscillator
+        w = 2 * np.pi * f
+        root = np.sqrt(1 - 1 / (4 * Q**2))
+        out.append(np.exp(-w * lag / (2 * Q)) * (np.cos(w * root * lag) + np.sin(w * root * lag) / (2 * Q * root)))
+    return np.array(out)
+
+
+def dense(noise, r, size):
+    """Covariance of the rows, element by element: the mean of a row has its own variance, and all rows as seen from
+    elsewhere are shrunk by the same factor."""
+    parts = kernel(noise, r.time[:, None] - r.time[None, :]) if noise.scales or noise.bands else np.zeros((0, 1, 1))
+    variances = [*noise.slow, *noise.band]
+    out = np.diag((noise.white + noise.proportional * size**2) * r.extra / r.count)
+    gain = noise.gains(r)
+    for j, v in enumerate(variances):
+        out = out + v * parts[j] * np.outer(gain[:, j], gain[:, j])
+    return out
+
+
+def sizes(n, seed=2):
+    return np.random.default_rng(seed).uniform(0.0, 30.0, n)
+
+
+@pytest.mark.parametrize("noise", [WHITE, SLOW, BAND, MIXED], ids=["white", "slow", "band", "all"])
+def test_whitening_is_the_inverse_of_the_dense_cholesky_factor(noise):
+    r, size = rows(), sizes(200)
+    K = dense(noise, r, size)
+    columns = np.random.default_rng(3).standard_normal((200, 4))
+    fast = Whitener(noise, r, size)
+    slow = np.linalg.solve(np.linalg.cholesky(K), columns)
+    assert fast.whiten(columns) == pytest.approx(slow, abs=1e-9 * np.abs(slow).max())
+    assert fast.whiten(columns[:, 1]) == pytest.approx(slow[:, 1], abs=1e-9 * np.abs(slow).max())
+    assert fast.log_det == pytest.approx(np.linalg.slogdet(K)[1], abs=1e-8)
+
+
+@pytest.mark.parametrize("m", [1, 2, 7, 40])
+def test_the_mean_of_correlated_samples_has_the_variance_of_the_double_sum(m):
+    r = Rows(np.array([1.0]), np.array([float(m)]), np.ones(1), np.array([0.01 * m]))
+    lag = 0.01 * np.subtract.outer(np.arange(m), np.arange(m))
+    slow = kernel(SLOW, lag).mean(axis=(1, 2))
+    assert SLOW.gains(r)[0] ** 2 == pytest.approx(slow, rel=1e-9)
+    # bands: the cosine of the oscillator, without its small sine
+    for (f, Q), gain in zip(BAND.bands, BAND.gains(r)[0], strict=True):
+        cosine = np.exp(-np.pi * f / Q * np.abs(lag)) * np.cos(2 * np.pi * f * lag)
+        assert gain**2 == pytest.approx(cosine.mean(), rel=1e-9)
+
+
+def test_white_noise_of_a_mean_falls_with_its_samples():
+    r = rows()
+    z = Whitener(WHITE, r, np.zeros(200)).whiten(np.ones(200))
+    assert z == pytest.approx(np.sqrt(r.count / (0.04 * r.extra)))
+
+
+def test_means_of_simulated_samples_are_white_when_whitened():
+    """Samples at 100 Hz of white and slow noise, binned into rows of uneven length."""
+    rng = np.random.default_rng(4)
+    noise = Noise(0.3, 0.0, (0.5,), (1.0,))
+    n, a = 40_000, np.exp(-0.01 / 0.5)
+    e = rng.standard_normal(n) * np.sqrt(1 - a**2)
+    slow = np.empty(n)
+    now = rng.standard_normal()
+    for i in range(n):
+        now = a * now + e[i]
+        slow[i] = now
+    y = slow + np.sqrt(0.3) * rng.standard_normal(n)
+    count = rng.integers(1, 15, 5000)
+    count = count[np.cumsum(count) <= n]
+    edges = np.concatenate([[0], np.cumsum(count)])
+    mean = np.add.reduceat(y, edges[:-1])[: count.size] / count
+    mean[-1] = y[edges[-2] : edges[-1]].mean()
+    time = 0.01 * 0.5 * (edges[1:] + edges[:-1] - 1)
+    z = Whitener(noise, Rows(time, count.astype(float), np.ones(count.size), 0.01 * count), np.zeros(count.size))
+    white = z.whiten(mean)
+    # rows as wide as a quarter of the time constant: the covariance is a little off, and to the safe side
+    assert 0.85 < np.std(white) < 1.0 + 3 / np.sqrt(2 * count.size)
+    for lag in (1, 2, 5, 20):
+        assert abs(np.mean(white[lag:] * white[:-lag])) < 0.12
+    narrow = np.std(white[count <= 3])
+    assert narrow == pytest.approx(1.0, abs=0.06)
+
+
+# ---------------------------------------------------------------- restricted likelihood
+
+
+def two_runs(p=3, n=120):
+    rng = np.random.default_rng(5)
+    runs = [rows(n, 6), rows(n - 30, 7)]
+    return (
+        runs,
+        [rng.standard_normal(r.time.size) for r in runs],
+        [rng.standard_normal((r.time.size, p)) for r in runs],
+        [sizes(r.time.size, 8) for r in runs],
+    )
+
+
+@pytest.mark.parametrize(
+    "noise", [SLOW, BAND, replace(MIXED, scales=(0.15,), slow=(0.05,))], ids=["slow", "band", "all"]
+)
+@pytest.mark.parametrize("p", [0, 3])
+def test_the_restricted_likelihood_and_its_slope(noise, p):
+    """Patterson and Thompson's formula by dense algebra; its slope by finite differences."""
+    runs, residuals, columns, size = two_runs(p)
+
+    def by_definition(values):
+        now = noise.with_variances(values)
+        n = sum(r.time.size for r in runs)
+        K, at = np.zeros((n, n)), 0
+        for r, s in zip(runs, size, strict=True):
+            K[at : at + r.time.size, at : at + r.time.size] = dense(now, r, s)
+            at += r.time.size
+        y, X = np.concatenate(residuals), np.concatenate(columns)
+        inner = X.T @ np.linalg.solve(K, X)
+        left = y - X @ np.linalg.solve(inner, X.T @ np.linalg.solve(K, y)) if p else y
+        inner_det = np.linalg.slogdet(inner)[1] if p else 0.0
+        return 0.5 * (np.linalg.slogdet(K)[1] + inner_det + left @ np.linalg.solve(K, left))
+
+    v = noise.variances
+    value, slope = _cost(noise, runs, residuals, columns, size)
+    assert value == pytest.approx(by_definition(v), rel=1e-8)
+    for j in range(v.size):
+        step = np.zeros(v.size)
+        step[j] = 1e-4 * v[j]
+        expected = (by_definition(v + step) - by_definition(v - step)) / (2e-4 * v[j])
+        assert slope[j] == pytest.approx(expected, rel=1e-4, abs=1e-3)
+
+
+# ---------------------------------------------------------------- variances that were put in
+
+
+def simulated(noise, n=1500, seed=9, most=4, size=None):
+    """Residuals drawn from the law itself."""
+    r = replace(rows(n, seed, most), extra=np.ones(n))
+    s = np.zeros(n) if size is None else size
+    return r, np.linalg.cholesky(dense(noise, r, s)) @ np.random.default_rng(seed + 1).standard_normal(n)
+
+
+def fitted(r, y, size=None, columns=None, **how):
+    columns = np.ones((y.size, 1)) if columns is None else columns
+    return fit_noise([r], [y], [columns], [np.zeros(y.size) if size is None else size], **how)
+
+
+def test_white_noise_is_found_white():
+    """A scale shorter than the rows' spacing is as good as white: what counts is what the rows are given."""
+    r, y = simulated(Noise(0.09, 0.0))
+    found = fitted(r, y)
+    K = dense(found, r, np.zeros(y.size))
+    assert np.mean(np.diag(K) * r.count) == pytest.approx(0.09, rel=0.1)
+    assert np.max(np.abs(np.mean(K - np.diag(np.diag(K)), axis=0))) < 0.02 * 0.09
+    z = Whitener(found, r, np.zeros(y.size)).whiten(y)
+    assert np.mean(z**2) == pytest.approx(1.0, abs=0.1)
+
+
+def test_slow_noise_is_found_beside_white():
+    r, y = simulated(Noise(0.04, 0.0, (1.0,), (0.25,)), n=2000)
+    found = fitted(r, y)
+    assert found.white == pytest.approx(0.04, rel=0.12)
+    assert sum(found.slow) == pytest.approx(0.25, rel=0.4)
+    centre = np.exp(np.dot(found.slow, np.log(found.scales)) / sum(found.slow))
+    assert 0.3 < centre < 3.0
+    z = Whitener(found, r, np.zeros(y.size)).whiten(y)
+    assert np.mean(z**2) == pytest.approx(1.0, abs=0.1)
+    assert abs(np.mean(z[1:] * z[:-1])) < 0.1
+
+
+def test_noise_in_proportion_to_the_force_is_found():
+    size = np.tile([0.0, 30.0], 750)
+    r, y = simulated(Noise(0.04, 0.0004), size=size)
+    found = fitted(r, y, size)
+    assert found.proportional == pytest.approx(0.0004, rel=0.2)
+    at_rest = np.diag(dense(found, r, np.zeros(size.size)))  # any share of it may be on the shortest scale
+    assert np.mean(at_rest * r.count) == pytest.approx(0.04, rel=0.2)
+
+
+def test_a_band_is_found():
+    r, y = simulated(Noise(0.04, 0.0, (), (), ((3.0, 5.0),), (0.3,)), most=1)
+    found = fitted(r, y, bands=((3.0, 5.0),))
+    assert found.bands == ((3.0, 5.0),)
+    assert found.band[0] == pytest.approx(0.3, rel=0.25)
+    assert found.white == pytest.approx(0.04, rel=0.35)
+    again = fitted(r, y, bands=((3.0, 5.0),), start=found)
+    assert again.variances == pytest.approx(found.variances, rel=0.05, abs=1e-3)
+
+
+def test_columns_that_were_fitted_do_not_make_the_noise_look_smaller():
+    """60 columns on 150 rows take 40 % of the sum of squares; restricted likelihood gives it back."""
+    ratio = []
+    for seed in range(6):
+        r, y = simulated(Noise(0.09, 0.0), n=150, seed=seed, most=1)
+        X = np.random.default_rng(seed).standard_normal((150, 60))
+        left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0]
+        found = fitted(r, left, columns=X)
+        ratio.append((found.white + sum(found.slow)) / 0.09)
+    assert np.mean(ratio) == pytest.approx(1.0, abs=0.15)
+
+
+def test_few_rows_are_white_by_the_unbiased_estimate():
+    ratio = []
+    for seed in range(40):
+        r, y = simulated(Noise(0.09, 0.0), n=30, seed=seed)
+        X = np.random.default_rng(seed).standard_normal((30, 10))
+        found = fitted(r, y, columns=X)
+        assert (found.proportional, found.slow) == (0.0, ())
+        ratio.append(found.white / 0.09)
+    assert np.mean(ratio) == pytest.approx(1.0, abs=3 * np.sqrt(2 / 20 / 40))
+
+
+def test_a_second_run_shares_the_variances():
+    first, second = simulated(Noise(0.04, 0.0), seed=11, n=600), simulated(Noise(0.16, 0.0), seed=12, n=600)
+    found = fit_noise([first[0], second[0]], [first[1], second[1]], [np.ones((600, 1))] * 2, [np.zeros(600)] * 2)
+    assert found.white == pytest.approx(0.10, rel=0.12)
+
+
+@pytest.mark.parametrize("n", [20, 400])
+def test_no_noise_at_all_is_no_error(n):
+    r = rows(n)
+    found = fit_noise([r], [np.zeros(n)], [np.ones((n, 1))], [np.zeros(n)])
+    assert np.all(np.isfinite(found.variances))
+    assert np.all(np.isfinite(Whitener(found, r, np.zeros(n)).whiten(np.zeros(n))))
+
+
+def test_a_short_run_has_one_slow_scale_at_most():
+    r = Rows(np.linspace(0, 0.5, 120), np.ones(120), np.ones(120), np.full(120, 0.1))
+    y = np.random.default_rng(13).standard_normal(120)
+    assert len(fitted(r, y).scales) <= 1
+
+
+def test_outliers_get_a_variance_of_their_own_size():
+    r = replace(rows(), extra=np.ones(200))
+    y = 0.2 * np.random.default_rng(14).standard_normal(200) / np.sqrt(r.count)
+    y[50] = 0.2 * 9.0 / np.sqrt(r.count[50])
+    y[80] = -0.2 * 40.0 / np.sqrt(r.count[80])
+    law = Noise(0.04, 0.0)
+    z = Whitener(law, r, np.zeros(200)).whiten(y)
+    better = with_outliers(r, z)
+    assert np.flatnonzero(better.extra > 1).tolist() == [50, 80]
+    again = Whitener(law, better, np.zeros(200)).whiten(y)
+    assert np.abs(again[[50, 80]]) == pytest.approx(OUTLIER / 2)
+    assert np.delete(again, [50, 80]) == pytest.approx(np.delete(z, [50, 80]))
