@@ -274,7 +274,7 @@ def _places(found: Found, rng: np.random.Generator) -> tuple[Mismatch, ...]:
     seen = test(found.before.fit, found.data, found.before.weights, rng)
     if seen.p_value >= ALARM and not found.after.fit.model.terms:
         return ()
-    out = []
+    out: list[Mismatch] = []
     for judged in seen.groups[:MOST_PLACES]:
         if out and judged.p_value > ALARM / 10:
             break

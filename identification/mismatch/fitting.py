@@ -82,11 +82,16 @@ def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[lis
     thrust, rate = [], []
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
+        prompt = not any(term.stage == "rotor" for term in model.terms)
+        if prompt:
+            F = F + 2 * theta.C * np.abs(x) * history.lead
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
         thrust.append(reconstructed(F, history.middle, history.sampled)[rows] + theta.tares[i])
         if with_rate:
             assert history.rate_sampled is not None
+            if prompt:
+                x = x + history.rate_lead
             if theta.rate_shift:
                 x = delayed(x, history.edges, theta.rate_shift)
             rate.append(theta.k * reconstructed(x, history.middle, history.rate_sampled)[history.rate_rows])
@@ -96,7 +101,7 @@ def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[lis
 def residual_of(model: Model, theta: Theta, data: Data, weights: Weights) -> Floats:
     thrust, rate = raw(model, theta, data, with_rate=bool(weights.rate))
     left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
-    left_rate = [h.rate[h.rate_rows] - f for h, f in zip(data.histories, rate, strict=False)] if weights.rate else []
+    left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=False)] if weights.rate else []
     return weights.whiten(left, left_rate)
 
 

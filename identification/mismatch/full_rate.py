@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.mismatch.fitting import Fit
 from identification.mismatch.lines import Line, find_lines
@@ -76,7 +77,7 @@ def look(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned | Non
     return Cleaned(lines, bands, cleaned)
 
 
-def _interval(history: History, time: Floats) -> np.ndarray:
+def _interval(history: History, time: Floats) -> NDArray[np.intp]:
     index = np.searchsorted(history.edges, time, side="right") - 1
     return np.clip(index, 0, history.driver.size - 1)
 
@@ -90,5 +91,5 @@ def _without(history: History, lines: Sequence[Floats]) -> History:
     M = history.driver.size
     some = np.maximum(history.count, 1)
     mean = np.where(history.count > 0, np.bincount(index, weights=value, minlength=M) / some, np.nan)
-    within = np.bincount(index, weights=(value - mean[index]) ** 2, minlength=M)
+    within = np.asarray(np.bincount(index, weights=(value - mean[index]) ** 2, minlength=M), dtype=np.float64)
     return replace(history, thrust=mean, within=within, sample_thrust=value)

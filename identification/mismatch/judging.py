@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.stats import chi2 as chi2_law
 
 from identification.mismatch.fitting import Fit, fit, raw
@@ -39,18 +40,18 @@ class HeldOut:
     what: str
 
 
-def blocks(history: History) -> Floats:
+def blocks(history: History) -> NDArray[np.bool_]:
     """(n,) of bool at the thrust rows: which are fitted. Every fourth block of time (or level) is kept back."""
     t = history.sampled[history.rows]
     if history.static:
-        return np.arange(t.size) % KEPT_BACK != KEPT_BACK - 2
+        return np.asarray(np.arange(t.size) % KEPT_BACK != KEPT_BACK - 2)
     span = float(t[-1] - t[0])
     length = max(span / BLOCKS_PER_RUN, min(LEAST_BLOCK, span / 8))
     index = np.floor((t - t[0]) / length).astype(int)
-    return index % KEPT_BACK != KEPT_BACK - 2
+    return np.asarray(index % KEPT_BACK != KEPT_BACK - 2)
 
 
-def rmse(model: Model, theta: Theta, data: Data, which: Sequence[Floats]) -> float:
+def rmse(model: Model, theta: Theta, data: Data, which: Sequence[NDArray[np.bool_]]) -> float:
     """Per sample, N, over the rows in `which`: scatter within a row is in it."""
     thrust, _ = raw(model, theta, data, with_rate=False)
     total = samples = 0.0
@@ -61,7 +62,7 @@ def rmse(model: Model, theta: Theta, data: Data, which: Sequence[Floats]) -> flo
     return float(np.sqrt(total / samples)) if samples else float("nan")
 
 
-def noise_rms(noise: Noise, model: Model, theta: Theta, data: Data, which: Sequence[Floats]) -> float:
+def noise_rms(noise: Noise, model: Model, theta: Theta, data: Data, which: Sequence[NDArray[np.bool_]]) -> float:
     """What the estimated noise alone gives per sample, N."""
     size = forces(model, theta, data)
     total = samples = 0.0
@@ -73,7 +74,7 @@ def noise_rms(noise: Noise, model: Model, theta: Theta, data: Data, which: Seque
     return float(np.sqrt(total / samples)) if samples else float("nan")
 
 
-def refitted(state: State, data: Data, keep: Sequence[Floats]) -> Fit:
+def refitted(state: State, data: Data, keep: Sequence[NDArray[np.bool_]]) -> Fit:
     """Parameters of the same model from a part of the rows, with the same noise."""
     part = replace(data, keep=tuple(keep))
     w = weights(part, state.noise, forces(state.fit.model, state.fit.theta, part), state.rate_noise)

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.mismatch.noise import Noise, Rows, Whitener
 from identification.physics.catalogue import CATALOGUE
@@ -147,7 +148,7 @@ class Data:
 
     histories: tuple[History, ...]
     scale: Scale
-    keep: tuple[Floats, ...] | None = None
+    keep: tuple[NDArray[np.bool_], ...] | None = None
     """Per run (n,) of bool: thrust rows that are fitted; None for all."""
     with_rate: bool = False
     bands: tuple[tuple[float, float], ...] = ()
@@ -158,7 +159,7 @@ class Data:
     """How uncertain the baseline's own prediction is, where a twin gives it."""
 
     @cached_property
-    def rows(self) -> tuple[Floats, ...]:
+    def rows(self) -> tuple[NDArray[np.intp], ...]:
         """Indices of thrust rows, run by run."""
         every = tuple(h.rows for h in self.histories)
         if self.keep is None:
@@ -172,7 +173,7 @@ class Data:
     @cached_property
     def thrust_rows(self) -> tuple[Rows, ...]:
         return tuple(
-            Rows(h.sampled[r], h.count[r].astype(np.float64), np.ones(r.size), h.count[r] * h.spacing)
+            Rows(h.sampled[r], n := h.count[r].astype(np.float64), np.ones(r.size), h.spacing * n)
             for h, r in zip(self.histories, self.rows, strict=True)
         )
 
@@ -182,9 +183,8 @@ class Data:
         for h in self.histories:
             assert h.rate_count is not None
             r = h.rate_rows
-            out.append(
-                Rows(h.middle[r], h.rate_count[r].astype(np.float64), np.ones(r.size), h.rate_count[r] * h.rate_spacing)
-            )
+            n = h.rate_count[r].astype(np.float64)
+            out.append(Rows(h.middle[r], n, np.ones(r.size), h.rate_spacing * n))
         return tuple(out)
 
     @property

@@ -19,6 +19,7 @@ from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.screening import orthogonal_basis, quiet, surrogate_scores
 from identification.physics.filters import lowpass
 from identification.physics.history import History
+from identification.physics.rotation_coupling import slip as measured_slip
 from identification.recording import Floats
 
 SHAPE_ERROR = 0.03
@@ -95,7 +96,8 @@ def _knots(values: Sequence[Floats], most: int) -> Floats:
             return main
     found: Floats = np.unique(np.quantile(every, np.linspace(0, 1, most)))
     keep = np.concatenate([[True], np.diff(found) > 1e-6 * size])
-    return found[keep]
+    out: Floats = found[keep]
+    return out
 
 
 def coordinates(fit: Fit, data: Data) -> tuple[Coordinate, ...]:
@@ -217,7 +219,7 @@ def coordinates(fit: Fit, data: Data) -> tuple[Coordinate, ...]:
     if all(h.rate is not None for h in hs):
         slip = []
         for h, r, (_, rate) in zip(hs, rows, parts, strict=True):
-            gap = (h.others["rotation_rate"] / (fit.theta.k or 1.0) - rate)[r] / data.scale.driver
+            gap = measured_slip(h, rate, fit.theta.k or 1.0)[r] / data.scale.driver
             slip.append(gap)
         out.append(
             Coordinate(
@@ -339,7 +341,7 @@ def locate(judged: Judged, fit: Fit, data: Data, noise_inflation: float = 1.0) -
     error = noise_inflation * np.sqrt(spread / np.maximum(rows, 1))
     power = np.bincount(index, weights=count * residual**2, minlength=k)
     full = rows > 0
-    low, high, share = _stretch(edges, power, full)
+    low, high, share = _stretch(edges, np.asarray(power, dtype=np.float64))
     center = 0.5 * (edges[1:] + edges[:-1])
     table = tuple((float(center[i]), float(mean[i]), float(error[i])) for i in np.flatnonzero(full))
     return Place(c.quantity, c.unit, low, high, share, judged.p_value, table, c.what)
@@ -358,7 +360,7 @@ def _bins(covariate: Floats) -> Floats:
     return found
 
 
-def _stretch(edges: Floats, power: Floats, full: np.ndarray) -> tuple[float, float, float]:
+def _stretch(edges: Floats, power: Floats) -> tuple[float, float, float]:
     """The shortest run of bins that holds 70 % of the power, or the whole."""
     total = float(power.sum())
     if total <= 0:
@@ -369,6 +371,5 @@ def _stretch(edges: Floats, power: Floats, full: np.ndarray) -> tuple[float, flo
         j = int(np.searchsorted(cumulative, cumulative[i] + 0.7 * total))
         if j <= power.size and edges[j] - edges[i] < edges[best[1]] - edges[best[0]]:
             best = (i, j)
-    del full
     share = float((cumulative[best[1]] - cumulative[best[0]]) / total)
     return float(edges[best[0]]), float(edges[best[1]]), share

@@ -34,6 +34,8 @@ STEP = 0.02
 JITTER_BEFORE, JITTER_AFTER = 0.002, 0.003
 """s round a step within which a sample may belong to either level: time stamps are not better."""
 MOST_INTERVALS = 12000
+LEAST_DWELL = 0.5
+"""s of a level in a static table."""
 FEW_SAMPLES = 3
 """Samples of a level, at most, that make a static table."""
 LEAST_SAMPLES = 5
@@ -268,8 +270,8 @@ def _within(time: Floats, value: Floats, edges: Floats, mean: Floats) -> Floats:
     index = np.searchsorted(edges, time, side="right") - 1
     inside = (index >= 0) & (index < mean.size)
     index = index[inside]
-    out: Floats = np.bincount(index, weights=(value[inside] - mean[index]) ** 2, minlength=mean.size)
-    return out
+    squares = (value[inside] - mean[index]) ** 2
+    return np.asarray(np.bincount(index, weights=squares, minlength=mean.size), dtype=np.float64)
 
 
 def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, time: Floats, force: Floats) -> History:
@@ -294,14 +296,15 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
     if neighbour is not None:
         others["neighbour_thrust"] = neighbour
     rate = rate_count = rate_sampled = None
+    turning_time = np.empty(0)
     per_driver = 1.0
     turning = recording.first_of("rotation_rate")
     if "rotation_rate" in others and turning is not None:
         good = np.isfinite(turning.value)
+        turning_time = turning.time[good]
         rate, rate_count, rate_sampled = _binned(turning.time[good], turning.value[good], edges)
         power = float(driven @ driven)
         per_driver = float(driven @ others["rotation_rate"]) / power if power > 0 else 1.0
-    levels = 1 + int(np.count_nonzero(np.abs(np.diff(held.value)) > 0))
     return History(
         recording_id=recording.recording_id,
         driver_quantity=held.quantity,
@@ -311,6 +314,8 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
         count=count,
         sampled=sampled,
         within=within,
+        lead=_lead(held, time, edges, driven, count),
+        rate_lead=np.zeros(1) if rate_count is None else _lead(held, turning_time, edges, driven, rate_count),
         sample_time=time[(time >= edges[0]) & (time < edges[-1])],
         sample_thrust=force[(time >= edges[0]) & (time < edges[-1])],
         rate=rate,
@@ -320,8 +325,27 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
         rate_per_driver=per_driver or 1.0,
         spacing=float(np.median(np.diff(time))),
         rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
-        static=bool(held.stepwise and time.size <= FEW_SAMPLES * levels),
+        static=_is_table(held, time.size),
     )
+
+
+def _lead(held: _Held, time: Floats, edges: Floats, driven: Floats, count: NDArray[np.int64]) -> Floats:
+    """Command at the samples less its mean over their interval, where it ticks on; 0 at steps and for measured drivers."""
+    if not held.stepwise:
+        return np.zeros(1)
+    now = held.value[np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)]
+    mean, _, _ = _binned(time, now, edges)
+    lead = np.where(count > 0, mean - driven, 0.0)
+    out: Floats = np.where(np.abs(lead) < STEP * float(np.max(np.abs(driven))), lead, 0.0)
+    return out
+
+
+def _is_table(held: _Held, samples: int) -> bool:
+    """Levels held for long with hardly a sample each: a table of levels, not a course of time."""
+    changes = held.time[np.concatenate([[True], np.diff(held.value) != 0])]
+    if not held.stepwise or changes.size < 2 or samples > FEW_SAMPLES * changes.size:
+        return False
+    return float(np.median(np.diff(changes))) >= LEAST_DWELL
 
 
 def _followed(channel: Channel, at: Floats) -> Floats | None:

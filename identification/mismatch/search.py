@@ -29,7 +29,7 @@ from identification.recording import Floats
 
 ALARM = 0.01
 """Family-wise false-alarm rate of the search."""
-CLOCKS = 0.002
+CLOCKS = 0.001
 """s: clocks of two devices are not trusted to agree better."""
 CANDIDATES = 5
 MOST_TERMS = 6
@@ -135,7 +135,7 @@ def refresh(model: Model, theta: Theta, data: Data, extra: Floats | None, state:
     noise = fit_noise(rows, left, parts, size, data.bands)
     rate_noise = None
     if data.with_rate:
-        left_rate = [h.rate[h.rate_rows] - f for h, f in zip(data.histories, rate, strict=True)]
+        left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=True)]
         at = [f[:, None] for f in rate]
         rate_noise = fit_noise(
             data.rate_rows,

@@ -54,6 +54,9 @@ class History:
     spacing: float = 1.0
     """s between thrust samples."""
     rate_spacing: float = 1.0
+    lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
+    """(M,) or (1,): driver at the samples less its mean over the interval; ticks of a command may keep step with them."""
+    rate_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     sample_time: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     """(N,) s, every thrust sample that is in an interval."""
     sample_thrust: Floats = field(default_factory=lambda: np.empty(0), repr=False)
@@ -85,6 +88,11 @@ class History:
     def rate_rows(self) -> NDArray[np.intp]:
         """Intervals with a measured rotation rate."""
         return np.flatnonzero(np.isfinite(self.rate)) if self.rate is not None else np.empty(0, dtype=np.intp)
+
+    @property
+    def rates(self) -> Floats:
+        """(m,) rev/s, at `rate_rows`."""
+        return np.empty(0) if self.rate is None else np.asarray(self.rate[self.rate_rows], dtype=np.float64)
 
     @cached_property
     def size(self) -> float:
