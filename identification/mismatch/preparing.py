@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,6 +58,7 @@ class Refusal:
 def history_of(recording: Recording, most_intervals: int = MOST_INTERVALS) -> History | Refusal:
     """The run on at most about `most_intervals` intervals."""
     name = recording.source or recording.recording_id
+    recording = _own_first(recording)
     thrust = recording.first_of("thrust")
     if thrust is None:
         return Refusal(f"{name} has no thrust channel (quantity thrust): there is no response to explain")
@@ -77,6 +78,12 @@ def history_of(recording: Recording, most_intervals: int = MOST_INTERVALS) -> Hi
         return Refusal(f"{name}: almost every thrust sample coincides with a change of the driver")
     edges = _edges(time, held, most_intervals)
     return _filled(recording, driver, held, edges, time, force)
+
+
+def _own_first(recording: Recording) -> Recording:
+    """A neighbour's channels behind those of the thruster itself, whichever were written first."""
+    own = sorted(recording.channels, key=lambda c: c.thruster not in (None, "", recording.thruster))
+    return replace(recording, channels=tuple(own))
 
 
 def _distinct(time: Floats, value: Floats) -> tuple[Floats, Floats]:
@@ -303,8 +310,9 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
         good = np.isfinite(turning.value)
         turning_time = turning.time[good]
         rate, rate_count, rate_sampled = _binned(turning.time[good], turning.value[good], edges)
-        power = float(driven @ driven)
-        per_driver = float(driven @ others["rotation_rate"]) / power if power > 0 else 1.0
+        weighted = driven * np.diff(edges)
+        power = float(weighted @ driven)
+        per_driver = float(weighted @ others["rotation_rate"]) / power if power > 0 else 1.0
     return History(
         recording_id=recording.recording_id,
         driver_quantity=held.quantity,
