@@ -1,0 +1,127 @@
+"""docs/physics: a page for every effect, its parameters as in the class, its example running."""
+
+from __future__ import annotations
+
+import doctest
+import re
+from pathlib import Path
+
+import pytest
+
+from identification.physics.catalogue import CATALOGUE
+from identification.physics.term import Scale, Term
+
+ROOT = Path(__file__).parents[1]
+PAGES = ROOT / "docs" / "physics"
+WITHOUT_CLASS = ("periodic_disturbance", "channel_fault")
+"""Found by identification.mismatch.lines and faults."""
+IDS = (*dict.fromkeys(t.id for t in CATALOGUE), *WITHOUT_CLASS)
+SECTIONS = (
+    "Formula",
+    "Source",
+    "Sweep that reveals it",
+    "Confused with",
+    "When the channel is not recorded",
+    "Example",
+)
+SCALE = Scale(
+    driver=17.0, driver_unit="V", thrust=131.0, duration=611.0, interval=0.013, flow=0.7, reading=139.0, noise=0.1
+)
+SIZES = {
+    "V_max": SCALE.driver,
+    "T_max": SCALE.thrust,
+    "U_max": SCALE.flow,
+    "duration": SCALE.duration,
+    "interval": SCALE.interval,
+    "reading": SCALE.reading,
+}
+
+
+def page(effect: str) -> str:
+    return (PAGES / f"{effect}.md").read_text(encoding="utf-8")
+
+
+def sections(effect: str) -> dict[str, str]:
+    parts = re.split(r"^## (.+)$", page(effect), flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def cells(line: str) -> list[str]:
+    return [c.strip() for c in re.split(r"(?<!\\)\|", line)[1:-1]]
+
+
+def size(expression: str) -> float:
+    """Value of a bound such as `-0.1 T_max / V_max^2`."""
+    value, over = -1.0 if expression.startswith("-") else 1.0, False
+    for word in expression.lstrip("-").split():
+        if word == "/":
+            over = True
+            continue
+        name, _, power = word.partition("^")
+        number = (SIZES[name] if name in SIZES else float(name)) ** int(power or 1)
+        value, over = value / number if over else value * number, False
+    return value
+
+
+def rows_of(term: Term) -> list[list[str]]:
+    """Lines of the parameter table that speak of this form."""
+    lines = [cells(line) for line in sections(term.id)["Formula"].splitlines() if line.startswith("|")]
+    return [row for row in lines[2:] if row[0] in ("both", term.form)]
+
+
+def test_bounds_are_read() -> None:
+    assert size("0.6 V_max") == pytest.approx(0.6 * 17)
+    assert size("-0.1 T_max / V_max^2") == pytest.approx(-0.1 * 131 / 17**2)
+    assert size("3 T_max / V_max / U_max") == pytest.approx(3 * 131 / 17 / 0.7)
+
+
+def test_one_page_for_each_effect_and_no_other() -> None:
+    assert {p.stem for p in PAGES.glob("*.md")} == {*IDS, "README"}
+
+
+@pytest.mark.parametrize("effect", IDS)
+def test_a_page_says_all_that_a_page_says(effect: str) -> None:
+    text = page(effect)
+    assert text.startswith(f"# `{effect}`\n")
+    assert re.search(r"^\*\*Left out:\*\* \S.*\.$", text, re.MULTILINE)
+    found = sections(effect)
+    assert tuple(found) == SECTIONS
+    assert all(body.strip() for body in found.values())
+    assert found["Source"].lstrip().startswith("- ")
+    assert sum(line.startswith("| ") for line in found["Confused with"].splitlines()) >= 3
+    for link in re.findall(r"\]\(([^)]+)\)", text):
+        assert (PAGES / link).exists(), link
+
+
+@pytest.mark.parametrize("term", CATALOGUE, ids=lambda t: f"{t.id}-{t.form}")
+def test_parameters_are_those_of_the_class(term: Term) -> None:
+    formula = sections(term.id)["Formula"]
+    assert f"`{term.stage}`" in formula
+    assert not term.form or f"`{term.form}`" in formula
+    rows = rows_of(term)
+    parameters = term.parameters(SCALE)
+    assert [row[1].strip("`") for row in rows] == [p.name for p in parameters]
+    for row, p in zip(rows, parameters, strict=True):
+        assert row[2] == p.unit
+        assert size(row[3].strip("`")) == pytest.approx(p.low)
+        assert size(row[4].strip("`")) == pytest.approx(p.high)
+        if p.neutral is not None:
+            assert size(row[5]) == pytest.approx(p.neutral)
+
+
+@pytest.mark.parametrize("effect", IDS)
+def test_the_example_runs(effect: str) -> None:
+    found = doctest.testfile(str(PAGES / f"{effect}.md"), module_relative=False, optionflags=doctest.FAIL_FAST)
+    assert found.attempted > 3
+    assert found.failed == 0
+
+
+def test_the_index_has_every_effect_as_its_class_has_it() -> None:
+    lines = [cells(line) for line in (PAGES / "README.md").read_text(encoding="utf-8").splitlines()]
+    listed = {row[0]: row for row in lines if row and row[0].startswith("[")}
+    assert set(listed) == {f"[{i}]({i}.md)" for i in IDS}
+    for term in CATALOGUE:
+        row = listed[f"[{term.id}]({term.id}.md)"]
+        assert row[1] == f"`{term.stage}`"
+        assert row[2] == term.physics
+        assert row[4] == (", ".join(f"`{n}`" for n in term.needs) or "-")
