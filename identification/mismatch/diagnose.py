@@ -28,7 +28,7 @@ from identification.mismatch.lines import Line
 from identification.mismatch.model import Data, parameters, weights
 from identification.mismatch.naming import EQUAL, Named, Rival, Standing, name, settle_forms, with_doubts
 from identification.mismatch.next_experiment import propose
-from identification.mismatch.omnibus import Judged, Omnibus, locate, test
+from identification.mismatch.omnibus import Judged, Omnibus, judge_left, locate
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.search import Found, State, forces, prune, search
 from identification.mismatch.sweeps import Limits
@@ -82,7 +82,7 @@ def diagnose(
         settled, standing = settle_forms(after, found.data, found.terms)
         after = prune(settled, found.data)
         standing = standing if after is settled else None
-    left = test(after.fit, found.data, after.weights, rng)
+    left = judge_left(after.fit, found.data, after.weights, rng)
     measured = replace(found.data, histories=histories)
     answer = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
     answer = _with_channels(answer, lines, faults)
@@ -174,10 +174,11 @@ def _faulty(
         return faults, histories
     mended = []
     for recording in recordings:
+        right = recording
         for fault in faults:
             if fault.recording_id == recording.recording_id and fault.grave and fault.repairable:
-                recording = repaired(recording, fault)
-        mended.append(recording)
+                right = repaired(right, fault)
+        mended.append(right)
     return faults, _histories(mended)
 
 
@@ -266,12 +267,13 @@ def _where(judged: Judged, fitted: Fit, data: Data) -> tuple[Where, float, tuple
 
 def _says(where: Where, share: float, what: str) -> str:
     unit = "" if where.unit == "1" else f" {where.unit}"
-    return f"{100 * share:.0f} % of the residual lies at {where.quantity} {where.low:.3g} to {where.high:.3g}{unit}: {what}."
+    place = f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
+    return f"{100 * share:.0f} % of the residual lies at {place}: {what}."
 
 
 def _places(found: Found, rng: np.random.Generator) -> tuple[Mismatch, ...]:
     """Where the baseline fails, the clearest coordinates first."""
-    seen = test(found.before.fit, found.data, found.before.weights, rng)
+    seen = judge_left(found.before.fit, found.data, found.before.weights, rng)
     if seen.p_value >= ALARM and not found.after.fit.model.terms:
         return ()
     out: list[Mismatch] = []

@@ -14,7 +14,6 @@ from identification.mismatch.model import Data, Model, Theta, weights
 from identification.mismatch.noise import Noise
 from identification.mismatch.search import State, forces
 from identification.physics.history import History
-from identification.recording import Floats
 
 KEPT_BACK = 4
 """One block of so many is not fitted."""
@@ -124,9 +123,9 @@ def whiteness(fitted: Fit, data: Data) -> float:
     """p-value of Ljung and Box over LAGS lags of the whitened thrust residual, run by run."""
     ends = np.cumsum([r.size for r in data.rows])
     statistic, dof = 0.0, 0
-    for e in np.split(fitted.residual[: ends[-1]], ends[:-1]):
-        n, lags = e.size, min(LAGS, e.size // 5)
-        e = np.clip(e - e.mean(), -4, 4)
+    for part in np.split(fitted.residual[: ends[-1]], ends[:-1]):
+        n, lags = part.size, min(LAGS, part.size // 5)
+        e = np.clip(part - part.mean(), -4, 4)
         power = float(e @ e)
         for k in range(1, lags + 1):
             statistic += n * (n + 2) * (float(e[k:] @ e[:-k]) / power) ** 2 / (n - k) if power > 0 else 0.0

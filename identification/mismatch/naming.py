@@ -9,8 +9,8 @@ import numpy as np
 from scipy.stats import chi2 as chi2_law
 from scipy.stats import ncx2
 
-from identification.mismatch.fitting import Fit, bounds_of, extended, fit
-from identification.mismatch.model import Data, Theta, predict
+from identification.mismatch.fitting import Fit, extended, fit, raw
+from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.omnibus import Omnibus
 from identification.mismatch.preparing import DRIVERS
 from identification.mismatch.screening import directions, orthogonal_basis, refined
@@ -29,7 +29,7 @@ MOST_REFITS = 7
 SAME = 0.1
 """Parts of a run whose parameters differ by less count as the same."""
 OWN_SHARE = 0.01
-"""Of what a term explains: less than this left over its own coordinate is the fault of the textbook, not of the name."""
+"""Of what a term explains: less than this left over its own coordinate is the textbook's fault, not the name's."""
 INCONSTANT = 1e-3
 """p-value, after all tests of a term, below which its parameter is not the same everywhere."""
 BETTER = 0.5
@@ -80,7 +80,7 @@ def without(state: State, term: Term, data: Data) -> Fit:
 
 
 def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> tuple[State, dict[Term, Standing] | None]:
-    """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end, if known."""
+    """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end."""
     for _ in range(ROUNDS):
         best: tuple[float, Fit] | None = None
         standing: dict[Term, Standing] = {}
@@ -126,9 +126,9 @@ def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]
         if (1 - r**2) * gain > LIKELY and r < 0.9:
             break
         bigger = less.model.plus(other)
-        values = refined(less, data, state.weights, other, values)
+        begin = refined(less, data, state.weights, other, values)
         extra = (len(values) - extra_now) * logn
-        begun = extended(less.theta, less.model, other, values, bigger)
+        begun = extended(less.theta, less.model, other, begin, bigger)
         new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - extra)
         if at_bound(other, new, data):
             continue
@@ -156,8 +156,6 @@ def at_bound(term: Term, fitted: Fit, data: Data) -> bool:
 
 def _effect(now: Fit, term: Term, data: Data, state: State) -> Floats:
     """(n,) whitened change that the term makes at its fitted values; the rate's rows with it."""
-    from identification.mismatch.fitting import raw
-
     with_rate = bool(state.weights.rate)
     smaller = now.model.without(term)
     known = dict(zip(now.model.terms, now.theta.terms, strict=True))
@@ -187,8 +185,6 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
     }
     if len(driver) > 1:
         splits["in all runs"] = [np.full(v.size, i >= len(driver) / 2) for i, v in enumerate(driver)]
-    from identification.mismatch.model import Weights
-
     weights = Weights(state.weights.thrust)
     for what, masks in splits.items():
         column = weights.whiten([c * m for c, m in zip(change, masks, strict=True)], [])
@@ -272,6 +268,3 @@ def with_doubts(named: Sequence[Named], left: Omnibus | None) -> tuple[Named, ..
             more.append(f"{len(static)} shapes on one static curve make any curve")
         out.append(replace(n, doubts=(*n.doubts, *more)))
     return tuple(out)
-
-
-__all__ = ["Named", "Rival", "Theta", "at_bound", "bounds_of", "name", "settle_forms", "swaps"]

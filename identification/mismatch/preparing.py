@@ -231,7 +231,7 @@ def _with_steps(edges: Floats, held: _Held, spacing: float, most: int) -> Floats
 
 
 def _with_windows(edges: Floats, time: Floats, held: _Held, spacing: float, most: int) -> Floats:
-    """Shortly after every change of a command, each sample gets a short interval of its own: it is no mean over more."""
+    """Shortly after every change of a command, each sample gets a short interval of its own."""
     if not held.stepwise or spacing < LEAST_WINDOWED:
         return edges
     changes = held.time[1:][np.diff(held.value) != 0]
@@ -338,7 +338,7 @@ def _filled(recording: Recording, driver: Channel, held: _Held, edges: Floats, t
 
 
 def _lead(held: _Held, time: Floats, edges: Floats, driven: Floats, count: NDArray[np.int64]) -> Floats:
-    """Command at the samples less its mean over their interval, where it ticks on; 0 at steps and for measured drivers."""
+    """Command at the samples less its mean over their interval where it ticks; 0 at steps and for measured drivers."""
     if not held.stepwise:
         return np.zeros(1)
     now = held.value[np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)]

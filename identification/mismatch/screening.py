@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import norm
 
 from identification.mismatch.fitting import Fit, extended, raw
 from identification.mismatch.model import Data, Weights
@@ -209,8 +210,6 @@ def _p_value(largest: float, null: Floats, normal: Floats) -> float:
             found.append(float(share))
             continue
         # tail of the normal maximum: as of one normal deviate, times the number of independent ones it acts like
-        from scipy.stats import norm
-
         at = max(float(np.quantile(draws, 0.95)), 1e-6)
         many = 0.05 / max(norm.sf(at), 1e-300)
         found.append(float(min(many * norm.sf(largest), share)))

@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
+from identification.mismatch.coordinates import coordinates
 from identification.mismatch.fitting import Fit, bounds_of, columns_of, extended, fit, raw
 from identification.mismatch.model import Data, Model, Theta, Weights, scale_of, weights
 from identification.mismatch.noise import Noise, Rows, fit_noise, with_outliers
-from identification.mismatch.omnibus import coordinates
 from identification.mismatch.screening import (
     MOST_PLAIN,
     PLAIN,
@@ -265,7 +265,7 @@ def search(
         screenings.append(judged)
         if trace is not None:
             trace.append(
-                f"{[t.id for t in state.fit.model.terms]} largest {judged.largest:.1f} threshold {judged.threshold:.2f} "
+                f"{[t.id for t in state.fit.model.terms]} largest {judged.largest:.1f} of {judged.threshold:.2f} "
                 + str([(t.id, t.form, round(z, 1)) for t, _, z in judged.best(6)])
             )
         if judged.largest <= judged.threshold or len(ids) >= MOST_TERMS:
@@ -286,8 +286,8 @@ def _best_addition(state: State, judged: Screening, data: Data) -> Fit | None:
     fits = []
     for term, values, _ in judged.best(CANDIDATES):
         bigger = state.fit.model.plus(term)
-        values = refined(state.fit, data, state.weights, term, values)
-        theta = extended(state.fit.theta, state.fit.model, term, values, bigger)
+        begin = refined(state.fit, data, state.weights, term, values)
+        theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
         new = fit(bigger, theta, data, state.weights)
         gain = state.fit.chi2 - new.chi2
         fits.append((gain - len(values) * np.log(new.residual.size), new))

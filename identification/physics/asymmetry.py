@@ -36,7 +36,10 @@ class Asymmetry:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Asymmetry: in reverse the thruster gives {theta[0]:.3g} of its forward thrust at the same voltage; use C+ and C-."
+        return (
+            f"Asymmetry: in reverse the thruster gives {theta[0]:.3g} "
+            "of its forward thrust at the same voltage; use C+ and C-."
+        )
 
 
 FORMS = (Asymmetry(),)

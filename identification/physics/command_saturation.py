@@ -36,7 +36,10 @@ class CommandSaturation:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Command saturation: the drive gives no more than {theta[0]:.3g} {scale.driver_unit}; higher commands change nothing."
+        return (
+            f"Command saturation: the drive gives no more than {theta[0]:.3g} "
+            f"{scale.driver_unit}; higher commands change nothing."
+        )
 
 
 FORMS = (CommandSaturation(),)

@@ -1,4 +1,4 @@
-"""Winding and magnet warm up: T (1 - h Theta), Theta' = (power - Theta)/tau, copper loss as V^4; magnets follow later."""
+"""Winding and magnet warm up: T (1 - h Theta), Theta' = (power - Theta)/tau, power as V^4; magnets follow later."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class Heating:
-    """Winding and magnet warm up: T (1 - h Theta), Theta' = (power - Theta)/tau, copper loss as V^4; magnets follow later."""
+    """Winding and magnet warm up: T (1 - h Theta), Theta' = (power - Theta)/tau, power as V^4; magnets follow later."""
 
     id: ClassVar[str] = "heating"
     stage: ClassVar[Stage] = "hydro"
@@ -46,7 +46,10 @@ class Heating:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Heating: at full load for long thrust falls by {100 * theta[0]:.2g} %, with a time constant of {theta[1]:.3g} s; rest between loads, or record the motor temperature."
+        return (
+            f"Heating: at full load for long thrust falls by {100 * theta[0]:.2g} %, with a time "
+            f"constant of {theta[1]:.3g} s; rest between loads, or record the motor temperature."
+        )
 
 
 FORMS = (Heating("winding"), Heating("magnet"))

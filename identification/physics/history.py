@@ -55,7 +55,7 @@ class History:
     """s between thrust samples."""
     rate_spacing: float = 1.0
     lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
-    """(M,) or (1,): driver at the samples less its mean over the interval; ticks of a command may keep step with them."""
+    """(M,) or (1,): driver at the samples less its mean over the interval: ticks may keep step with samples."""
     rate_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     sample_time: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     """(N,) s, every thrust sample that is in an interval."""

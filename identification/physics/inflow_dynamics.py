@@ -38,7 +38,10 @@ class InflowDynamics:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Inflow dynamics: after a step thrust overshoots by {100 * theta[0]:.0f} %, until the water has followed (time constant {theta[1]:.2g} s)."
+        return (
+            f"Inflow dynamics: after a step thrust overshoots by {100 * theta[0]:.0f} "
+            f"%, until the water has followed (time constant {theta[1]:.2g} s)."
+        )
 
 
 FORMS = (InflowDynamics(),)

@@ -42,7 +42,10 @@ class LoadCellCreep:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Load-cell creep: {100 * theta[0]:.2g} % of the load comes late, with a time constant of {theta[1]:.3g} s, and leaves late."
+        return (
+            f"Load-cell creep: {100 * theta[0]:.2g} % of the load comes late, "
+            f"with a time constant of {theta[1]:.3g} s, and leaves late."
+        )
 
 
 FORMS = (LoadCellCreep("one_constant"), LoadCellCreep("two_constants"))

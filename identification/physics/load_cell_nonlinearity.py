@@ -48,7 +48,10 @@ class LoadCellNonlinearity:
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         power = 2 if self.form == "cubic" else 1
-        return f"Load-cell non-linearity: at {scale.thrust:.3g} N the cell shows {100 * theta[0] * scale.thrust**power:+.2g} %; check it with dead weights."
+        return (
+            f"Load-cell non-linearity: at {scale.thrust:.3g} N the cell shows "
+            f"{100 * theta[0] * scale.thrust**power:+.2g} %; check it with dead weights."
+        )
 
 
 FORMS = (

@@ -42,7 +42,10 @@ class Recirculation:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Recirculation: the jet comes round and takes up to {100 * theta[0] * scale.driver**2 / scale.thrust:.0f} % of the thrust within {theta[1]:.3g} s of one direction."
+        return (
+            f"Recirculation: the jet comes round and takes up to {100 * theta[0] * scale.driver**2 / scale.thrust:.0f} "
+            f"% of the thrust within {theta[1]:.3g} s of one direction."
+        )
 
 
 FORMS = (Recirculation("rate"), Recirculation("thrust"))

@@ -1,4 +1,4 @@
-"""The wake met at a sign change: T (1 - r e^(-t/tau)); t since the reversal, or since it last turned the other way."""
+"""The wake met at a sign change: T (1 - r e^(-t/tau)); t since the reversal, or since it turned the other way."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class ReversalLoss:
-    """The wake met at a sign change: T (1 - r e^(-t/tau)); t since the reversal, or since it last turned the other way."""
+    """The wake met at a sign change: T (1 - r e^(-t/tau)); t since the reversal, or since it turned the other way."""
 
     id: ClassVar[str] = "reversal_loss"
     stage: ClassVar[Stage] = "hydro"
@@ -41,7 +41,10 @@ class ReversalLoss:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Reversal loss: after a change of direction {100 * theta[0]:.0f} % of the thrust is missing, for some {theta[1]:.2g} s."
+        return (
+            f"Reversal loss: after a change of direction {100 * theta[0]:.0f} "
+            f"% of the thrust is missing, for some {theta[1]:.2g} s."
+        )
 
 
 FORMS = (

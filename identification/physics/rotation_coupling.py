@@ -69,7 +69,10 @@ class RotationCoupling:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Rotation coupling: thrust follows the measured rotation rate (share {theta[0]:.2f}), which the command alone does not give; model it in n."
+        return (
+            "Rotation coupling: thrust follows the measured rotation rate (share "
+            f"{theta[0]:.2f}), which the command alone does not give; model it in n."
+        )
 
 
 FORMS = (RotationCoupling(),)

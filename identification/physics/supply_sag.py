@@ -38,7 +38,10 @@ class SupplySag:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Supply sag: the thruster sees the command times (bus voltage / its highest)^{theta[0]:.2f}; keep the supply up, or correct by the recorded bus voltage."
+        return (
+            "Supply sag: the thruster sees the command times (bus voltage / its "
+            f"highest)^{theta[0]:.2f}; keep the supply up, or correct by the recorded bus voltage."
+        )
 
 
 FORMS = (SupplySag(),)

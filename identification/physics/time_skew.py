@@ -34,7 +34,10 @@ class TimeSkew:
         return delayed(value, now.history.edges, theta[0])
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Time skew: the force arrives {1000 * abs(theta[0]):.3g} ms {'after' if theta[0] > 0 else 'before'} the command that causes it."
+        return (
+            f"Time skew: the force arrives {1000 * abs(theta[0]):.3g} ms "
+            f"{'after' if theta[0] > 0 else 'before'} the command that causes it."
+        )
 
 
 FORMS = (TimeSkew(),)

@@ -42,7 +42,10 @@ class TorqueCrosstalk:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Torque cross-talk: the cell shows {theta[0]:.3g} N/{scale.driver_unit}^2 of the same sign in both directions; check its mounting with dead weights."
+        return (
+            f"Torque cross-talk: the cell shows {theta[0]:.3g} N/{scale.driver_unit}^2 "
+            "of the same sign in both directions; check its mounting with dead weights."
+        )
 
 
 FORMS = (TorqueCrosstalk(),)

@@ -40,7 +40,10 @@ class WindingResistance:
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         e = 2 / (1 + (1 + 4 * theta[0] * scale.driver) ** 0.5)
-        return f"Winding resistance: of {scale.driver:.3g} {scale.driver_unit} only {100 * e:.0f} % turns the motor; the rest is lost in the winding, as the current grows."
+        return (
+            f"Winding resistance: of {scale.driver:.3g} {scale.driver_unit} only {100 * e:.0f} "
+            "% turns the motor; the rest is lost in the winding, as the current grows."
+        )
 
 
 FORMS = (WindingResistance(),)

@@ -49,7 +49,10 @@ class ZeroDrift:
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         if self.form == "linear":
             return f"Zero drift: the zero moves by {60 * theta[0]:.3g} N a minute, at rest too; tare more often."
-        return f"Zero drift: the zero moves by {theta[0]:.3g} N with a time constant of {theta[1]:.3g} s, at rest too; let the amplifier warm up."
+        return (
+            f"Zero drift: the zero moves by {theta[0]:.3g} N with a time constant "
+            f"of {theta[1]:.3g} s, at rest too; let the amplifier warm up."
+        )
 
 
 FORMS = (

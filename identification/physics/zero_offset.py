@@ -39,7 +39,10 @@ class ZeroOffset:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Zero offset: the zero of the cell jumped by {theta[0]:.3g} N at {theta[1]:.4g} s; tare again, and look for what pulled."
+        return (
+            f"Zero offset: the zero of the cell jumped by {theta[0]:.3g} "
+            f"N at {theta[1]:.4g} s; tare again, and look for what pulled."
+        )
 
 
 FORMS = (ZeroOffset(),)
