@@ -116,6 +116,12 @@ def test_the_example_runs(effect: str) -> None:
     assert found.failed == 0
 
 
+def test_the_example_of_the_how_to_runs() -> None:
+    found = doctest.testfile(str(ROOT / "docs" / "howto" / "add-a-physics-term.md"), module_relative=False)
+    assert found.attempted > 3
+    assert found.failed == 0
+
+
 def test_the_index_has_every_effect_as_its_class_has_it() -> None:
     lines = [cells(line) for line in (PAGES / "README.md").read_text(encoding="utf-8").splitlines()]
     listed = {row[0]: row for row in lines if row and row[0].startswith("[")}
