@@ -1,4 +1,4 @@
-"""The command is a fraction of a supply that moves: V_eff = V (V_bus / V_nom)^k."""
+"""The command is a fraction of a supply that moves: V_eff = V (V_bus / V_ref)^k, V_ref the highest of the run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class SupplySag:
-    """The command is a fraction of a supply that moves: V_eff = V (V_bus / V_nom)^k."""
+    """The command is a fraction of a supply that moves: V_eff = V (V_bus / V_ref)^k, V_ref the highest of the run."""
 
     id: ClassVar[str] = "supply_sag"
     stage: ClassVar[Stage] = "command"

@@ -1,4 +1,4 @@
-"""A neighbour runs: T (1 - e |T_j| / T_full)."""
+"""A neighbour runs: T (1 - e |T_j| / max |T_j|), the largest of the run."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class ThrusterInteraction:
-    """A neighbour runs: T (1 - e |T_j| / T_full)."""
+    """A neighbour runs: T (1 - e |T_j| / max |T_j|), the largest of the run."""
 
     id: ClassVar[str] = "thruster_interaction"
     stage: ClassVar[Stage] = "hydro"

@@ -1,4 +1,4 @@
-"""The cell feels the torque: + c x^2 (even in the direction), or + c times the measured torque."""
+"""The cell feels the torque: + c x^2, even in the direction; its odd part can not be told from C."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class TorqueCrosstalk:
-    """The cell feels the torque: + c x^2 (even in the direction), or + c times the measured torque."""
+    """The cell feels the torque: + c x^2, even in the direction; its odd part can not be told from C."""
 
     id: ClassVar[str] = "torque_crosstalk"
     stage: ClassVar[Stage] = "stand"
