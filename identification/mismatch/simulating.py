@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.signal import lfilter
 
+from identification.mismatch.channels import neighbour_at
 from identification.mismatch.model import Model, Theta, predict
 from identification.mismatch.preparing import FOLLOWED, Refusal
-from identification.mismatch.preparing import _neighbour as neighbour_at
 from identification.mismatch.twinning import given
 from identification.physics.history import History
 from identification.physics.term import Scale

@@ -1,0 +1,79 @@
+"""Channels that explain, on the intervals of a run: their noise is averaged, or effects would look smaller."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.mismatch.grid import Held
+from identification.recording import Channel, Floats, Recording
+
+CALMED = ("flow_speed", "motor_temperature", "water_temperature")
+CALM = 4
+"""Samples on either side that are averaged."""
+LOADS = 6
+"""Columns of the supply's load."""
+
+
+def followed(channel: Channel, at: Floats) -> Floats | None:
+    """Interpolated, its noise averaged between its jumps: noise in what explains makes effects look smaller."""
+    good = np.isfinite(channel.value)
+    if np.count_nonzero(good) < 2:
+        return None
+    time, value = channel.time[good], channel.value[good]
+    out: Floats = np.interp(at, time, _calm(value) if channel.quantity in CALMED else value)
+    return out
+
+
+def jumps(value: Floats) -> NDArray[np.bool_]:
+    """(n-1,) where neighbouring samples differ by far more than their noise."""
+    step = np.abs(np.diff(value))
+    noise = float(np.median(step)) / 0.6745
+    return step > max(6 * noise, 1e-9 * float(np.max(np.abs(value), initial=0.0)))
+
+
+def _calm(value: Floats) -> Floats:
+    """Running mean over up to CALM samples on either side, never across a jump."""
+    starts = np.concatenate([[0], np.flatnonzero(jumps(value)) + 1, [value.size]])
+    index = np.arange(value.size)
+    which = np.searchsorted(starts, index, side="right") - 1
+    reach = np.minimum(np.minimum(index - starts[which], starts[which + 1] - 1 - index), CALM)
+    total = np.concatenate([[0.0], np.cumsum(value - value[0])])
+    out: Floats = value[0] + (total[index + reach + 1] - total[index - reach]) / (2 * reach + 1)
+    return out
+
+
+def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats) -> Floats | None:
+    """Supply voltage: what the load makes of it, and the slow rest, so that it is known between its samples."""
+    good = np.isfinite(channel.value)
+    if np.count_nonzero(good) < 2 * LOADS:
+        return followed(channel, at)
+    time, value = channel.time[good], channel.value[good]
+    size = float(np.max(np.abs(driven))) or 1.0
+    index = np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)
+    then = held.value[index] if held.stepwise else np.interp(time, held.time, held.value)
+    charge = np.cumsum(np.abs(driven / size) ** 3 * dt)
+    drawn = np.interp(time, at, charge)
+
+    def columns(v: Floats, q: Floats) -> Floats:
+        u = np.abs(v) / size
+        return np.column_stack([np.ones(u.size), u, u**2, u**3, u**4, q / max(float(charge[-1]), 1e-12)])
+
+    H = columns(then, drawn)
+    theta = np.linalg.lstsq(H, value, rcond=None)[0]
+    rest = value - H @ theta
+    out: Floats = columns(driven, charge) @ theta + np.interp(at, time, _calm(rest))
+    return out
+
+
+def neighbour_at(recording: Recording, at: Floats) -> Floats | None:
+    """Thrust of another thruster, or its command squared, where one was recorded beside this one."""
+    for quantity in ("thrust", "command_voltage"):
+        for channel in recording.all_of(quantity):
+            if channel.thruster not in (None, "", recording.thruster):
+                if quantity == "thrust":
+                    return followed(channel, at)
+                value = channel.held_at(at)
+                out: Floats = np.where(np.isfinite(value), value * np.abs(value), 0.0)
+                return out
+    return None

@@ -1,0 +1,149 @@
+"""Intervals of one run: short where the command changes, growing with the time since then, cut at its steps."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.recording import Channel, Floats
+
+FINEST = 0.01
+"""s, the shortest interval."""
+COARSEST = 0.25
+"""s, the longest one while levels are held."""
+FINEST_AFTER_STEP = 0.0025
+"""s: motor lags of some milliseconds are as steep as this."""
+GROWTH_AFTER_STEP = 0.12
+WINDOW = 0.0015
+"""s before and after a sample that stands for its time."""
+WINDOW_ZONE = 0.1
+"""s after a change of the command in which samples have windows."""
+LEAST_WINDOWED = 0.008
+"""s between samples: where they are denser, intervals are short enough."""
+GROWTH = 0.06
+"""Length of an interval per time since the last change."""
+MOVES = 0.01
+"""Share of the largest driver that counts as a change."""
+STEP = 0.02
+"""Share of the largest driver: a change of a command that is a step."""
+
+
+def distinct(time: Floats, value: Floats) -> tuple[Floats, Floats]:
+    """Samples that share one time become their mean."""
+    if time.size < 2 or np.all(np.diff(time) > 0):
+        return time, value
+    unique, index = np.unique(time, return_inverse=True)
+    mean: Floats = np.bincount(index, weights=value) / np.bincount(index)
+    return unique, mean
+
+
+class Held:
+    """The driver as a function of time: constant between rows of a command, a straight line between measurements."""
+
+    def __init__(self, channel: Channel, end: float) -> None:
+        good = np.isfinite(channel.value)
+        self.time, self.value = distinct(channel.time[good], channel.value[good])
+        self.quantity = str(channel.quantity)
+        self.stepwise = channel.quantity == "command_voltage"
+        last = max(end, float(self.time[-1]))
+        knots = np.append(self.time, last + 1.0)
+        if self.stepwise:
+            area = self.value * np.diff(knots)
+        else:
+            padded = np.append(self.value, self.value[-1])
+            area = 0.5 * (padded[1:] + padded[:-1]) * np.diff(knots)
+        self._knots, self._area = knots, np.concatenate([[0.0], np.cumsum(area)])
+
+    def mean(self, edges: Floats) -> Floats:
+        """(M,) mean over each interval. A command before its first row is 0."""
+        total = np.interp(edges, self._knots, self._area)
+        if not self.stepwise:
+            index = np.clip(np.searchsorted(self._knots, edges, side="right") - 1, 0, self.time.size - 1)
+            padded = np.append(self.value, self.value[-1])
+            span = self._knots[index + 1] - self._knots[index]
+            part = np.clip(edges - self._knots[index], 0.0, span)
+            slope = (padded[index + 1] - padded[index]) / span
+            total = self._area[index] + padded[index] * part + 0.5 * slope * part**2
+        out: Floats = np.diff(total) / np.diff(edges)
+        return out
+
+    def changes(self) -> Floats:
+        """Times at which it has moved by MOVES of its size since the last such time."""
+        step = MOVES * float(np.max(np.abs(self.value)))
+        index, last = [0], self.value[0]
+        if self.value.size < 200_000:
+            for i, v in enumerate(self.value.tolist()):
+                if abs(v - last) > step:
+                    index.append(i)
+                    last = v
+        out: Floats = self.time[np.array(index, dtype=np.intp)]
+        return out
+
+
+def edges_of(time: Floats, held: Held, most: int) -> Floats:
+    """Edges between samples, dense after changes; big steps of the command are edges too."""
+    spacing = float(np.median(np.diff(time)))
+    between = 0.5 * (time[1:] + time[:-1])
+    candidates = np.concatenate([[time[0] - 0.5 * spacing], between, [time[-1] + 0.5 * spacing]])
+    changes = held.changes()
+    index = np.searchsorted(changes, candidates, side="right") - 1
+    since = np.where(index >= 0, candidates - changes[np.maximum(index, 0)], COARSEST / GROWTH)
+    finest = max(FINEST, spacing)
+    width = np.clip(GROWTH * since, finest, max(COARSEST, finest))
+    wanted = np.concatenate([[0.0], np.cumsum(np.diff(candidates) / width[1:])])
+    shrink = min(1.0, most / max(float(wanted[-1]), 1.0))
+    number = np.floor(wanted * shrink + 1e-6)
+    edges = candidates[np.concatenate([[True], np.diff(number) > 0])]
+    edges[-1] = candidates[-1]
+    return _with_windows(_with_steps(edges, held, spacing, most), time, held, spacing, most)
+
+
+def _with_steps(edges: Floats, held: Held, spacing: float, most: int) -> Floats:
+    """Each step of a command is an edge, followed by intervals that begin at FINEST_AFTER_STEP and grow."""
+    size = float(np.max(np.abs(held.value)))
+    steps = held.time[1:][np.abs(np.diff(held.value)) > STEP * size]
+    steps = steps[(steps > edges[0]) & (steps < edges[-1])]
+    if not (held.stepwise and steps.size):
+        return edges
+    after = [0.0]
+    while (width := max(FINEST_AFTER_STEP, GROWTH_AFTER_STEP * after[-1])) < spacing:
+        after.append(after[-1] + width)
+    if steps.size * len(after) > most:
+        after = [0.0]
+    gap = np.diff(np.append(steps, edges[-1]))
+    added = (steps[:, None] + np.array(after)[None, :])[np.array(after)[None, :] < gap[:, None] - 1e-4]
+    last = np.searchsorted(steps, edges, side="right") - 1
+    since = np.where(last >= 0, edges - steps[np.maximum(last, 0)], np.inf)
+    until = np.where(last + 1 < steps.size, steps[np.minimum(last + 1, steps.size - 1)] - edges, np.inf)
+    free = (since > after[-1] + 0.3 * spacing) & (until > min(0.3 * spacing, FINEST_AFTER_STEP))
+    free[[0, -1]] = True
+    out = np.union1d(edges[free], added)
+    result: Floats = out[np.concatenate([[True], np.diff(out) > 1e-6])]
+    return result
+
+
+def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most: int) -> Floats:
+    """Shortly after every change of a command, each sample gets a short interval of its own."""
+    if not held.stepwise or spacing < LEAST_WINDOWED:
+        return edges
+    changes = held.time[1:][np.diff(held.value) != 0]
+    changes = changes[(changes > edges[0]) & (changes < edges[-1])]
+    if not changes.size or changes.size > most:
+        return edges
+    zone = max(WINDOW_ZONE, 5 * spacing)
+    last = np.searchsorted(changes, time, side="right") - 1
+    own = time[(last >= 0) & (time - changes[np.maximum(last, 0)] < zone)]
+    if own.size > most:
+        return edges
+    nearest = np.searchsorted(changes, own)
+    before = changes[np.maximum(nearest - 1, 0)]
+    after = changes[np.minimum(nearest, changes.size - 1)]
+    low = np.where((before <= own) & (own - before < WINDOW), before, own - WINDOW)
+    high = np.where((after > own) & (after - own < WINDOW), after, own + WINDOW)
+    windows = np.column_stack([low, high])
+    inside = np.searchsorted(windows[:, 0], edges, side="right") - 1
+    covered = (inside >= 0) & (edges > windows[np.maximum(inside, 0), 0]) & (edges < windows[np.maximum(inside, 0), 1])
+    covered[[0, -1]] = False
+    out = np.union1d(np.union1d(edges[~covered], windows.ravel()), changes)
+    out = out[(out >= edges[0]) & (out <= edges[-1])]
+    result: Floats = out[np.concatenate([[True], np.diff(out) > 1e-5])]
+    return result
