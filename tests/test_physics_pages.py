@@ -100,7 +100,7 @@ def test_parameters_are_those_of_the_class(term: Term) -> None:
     assert not term.form or f"`{term.form}`" in formula
     rows = rows_of(term)
     parameters = term.parameters(SCALE)
-    assert [row[1].strip("`") for row in rows] == [p.name for p in parameters]
+    assert [row[1].split("`")[1] for row in rows] == [p.name for p in parameters]
     for row, p in zip(rows, parameters, strict=True):
         assert row[2] == p.unit
         assert size(row[3].strip("`")) == pytest.approx(p.low)
