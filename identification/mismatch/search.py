@@ -81,6 +81,8 @@ def available(data: Data) -> tuple[Term, ...]:
             continue
         if term.id == "speed_of_advance" and data.scale.flow <= 0:
             continue
+        if (term.id, term.form) == ("supply_sag", "discharge") and (static or "bus_voltage" in have):
+            continue  # a proxy
         out.append(term)
     del command
     return tuple(out)

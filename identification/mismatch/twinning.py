@@ -176,6 +176,11 @@ def unfit(
             f"{other.source or other.recording_id} is of thruster {other.thruster}, the recordings to be diagnosed are "
             f"of {thruster}; hold out a recording of {thruster}"
         )
+    twice = next((r for r in holdout if any(r.recording_id == q.recording_id for q in recordings)), None)
+    if twice is not None:
+        return Refusal(
+            f"{twice.source or twice.recording_id} is both to be diagnosed and held out; hold out another recording"
+        )
     for recording, history in zip(recordings, histories, strict=True):
         few = _too_little(recording.source or recording.recording_id, history)
         if few is not None:

@@ -24,8 +24,9 @@ class Heating:
     form: Literal["winding", "magnet"] = "winding"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        known = (Parameter("loss", "1", 0.0, 0.95, 0.0), Parameter("time_constant", "s", 5.0, 1200.0))
-        return known if self.form == "winding" else (*known, Parameter("magnet_time_constant", "s", 5.0, 1200.0))
+        slowest = max(60.0, 0.7 * scale.duration)  # slower ones are a trend that any cause may have
+        known = (Parameter("loss", "1", 0.0, 0.95, 0.0), Parameter("time_constant", "s", 5.0, slowest))
+        return known if self.form == "winding" else (*known, Parameter("magnet_time_constant", "s", 5.0, slowest))
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         if self.form == "winding":

@@ -26,7 +26,7 @@ class Recirculation:
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (
             Parameter("coefficient", f"N/{scale.driver_unit}^2", 0.0, 0.9 * scale.thrust / scale.driver**2, 0.0),
-            Parameter("time_constant", "s", 3.0, 300.0),
+            Parameter("time_constant", "s", 3.0, max(30.0, min(300.0, 0.5 * scale.duration))),
         )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:

@@ -44,4 +44,36 @@ class SupplySag:
         )
 
 
-FORMS = (SupplySag(),)
+@dataclass(frozen=True, slots=True)
+class Discharge:
+    """The proxy where no bus voltage was recorded: V_eff = V (1 - d q), q the energy drawn so far, |V|^3 over time."""
+
+    id: ClassVar[str] = "supply_sag"
+    stage: ClassVar[Stage] = "command"
+    physics: ClassVar[str] = "the supply falls as it is drawn on"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("time",)
+    form: ClassVar[str] = "discharge"
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("drop", "1", 0.0, 2.0, 0.0),)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ((0.05,),)
+
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        drawn = np.cumsum(np.abs(now.history.driver / now.scale.driver) ** 3 * now.history.dt) / now.scale.duration
+        out: Floats = value * np.maximum(1 - theta[0] * drawn, 1e-3)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return (
+            f"Supply sag: the voltage falls as the supply is drawn on, by {100 * theta[0]:.2g} % for "
+            f"{scale.duration:.3g} s at full power; energy drawn stands for the bus voltage: record it."
+        )
+
+
+FORMS = (SupplySag(), Discharge())
