@@ -1,0 +1,375 @@
+"""Recordings in, diagnosis out: the right name, the right place, and nothing where nothing is."""
+
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from diagnosed_runs import NOISE, TOP, C, dead_band, levels, run, table
+
+from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosis import Diagnosis, Where, diagnosis_json
+from identification.mismatch.preparing import Refusal
+from identification.recording import Channel, Recording
+from sim_devices import concealed
+from tests.concealed.recordings import recordings
+
+
+def diagnosed(*runs, **how):
+    found = diagnose(runs, **how)
+    assert isinstance(found, Diagnosis), found
+    return found
+
+
+def effects(found):
+    return {f.effect for f in found.findings}
+
+
+def value(found, effect, name):
+    (finding,) = [f for f in found.findings if f.effect == effect]
+    return finding.parameters[name]
+
+
+def within(estimate, true, sigmas=4.0, rel=0.0):
+    assert abs(estimate.value - true) < sigmas * estimate.std + rel * abs(true), (estimate, true)
+    assert 0 < estimate.std < 0.3 * abs(true)
+
+
+# ---------------------------------------------------------------- concealed by the simulated bench
+
+
+CONCEALED = [
+    # effect, seed, plan, noise, (parameter of the finding, of the truth); seen by an oracle at 60 sigma
+    ("dead_band", 2, "staircase", "mixed", ("half_width", "half_width")),
+    ("motor_lag", 2, "staircase", "mixed", ("time_constant", "time_constant")),
+    ("zero_offset", 1, "interleaved", "white", ("offset", "offset")),
+    ("load_cell_saturation", 3, "random", "white", ("limit", "limit")),
+    ("strut_drag", 1, "interleaved", "white", ("coefficient", "coefficient")),
+    ("reversal_loss", 1, "interleaved", "white", ("loss", "loss")),
+    ("heating", 3, "random", "white", None),
+    ("load_cell_creep", 2, "staircase", "mixed", None),
+    ("rotation_coupling", 3, "random", "white", None),
+    ("supply_sag", 1, "interleaved", "white", None),
+]
+
+
+@pytest.mark.parametrize(("effect", "seed", "plan", "noise", "compared"), CONCEALED, ids=[c[0] for c in CONCEALED])
+def test_what_the_bench_conceals_is_named(effect, seed, plan, noise, compared):
+    rng = np.random.default_rng(seed)
+    case = concealed.case(rng, [effect], 60.0, plan=plan, noise=noise, sampling=30.0, duration=240.0)
+    found = diagnosed(*recordings(case))
+    assert found.verdict == "explained"
+    assert effects(found) == {effect}
+    assert found.heldout.after < 0.97 * found.heldout.before
+    assert found.heldout.after == pytest.approx(found.heldout.noise, rel=0.15)
+    assert found.chi2_per_dof == pytest.approx(1.0, abs=0.1)
+    assert found.unexplained is None
+    assert found.mismatch
+    (finding,) = found.findings
+    assert finding.bic_gain > 100
+    assert finding.p_value < 1e-12
+    assert finding.probability > 0.9
+    if compared:
+        theirs = concealed.truth(case)["effects"][0]["parameters"][compared[1]]
+        within(finding.parameters[compared[0]], theirs, rel=0.02)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_nothing_is_found_where_nothing_is(seed):
+    kind, noise = concealed.PLAN_KINDS[seed % 6], ("white", "mixed", "resonant", "heavy_tailed")[seed % 4]
+    rng = np.random.default_rng(100 + seed)
+    found = diagnosed(*recordings(concealed.case(rng, plan=kind, noise=noise, sampling=30.0, duration=150.0)))
+    assert found.verdict == "adequate"
+    assert (found.findings, found.mismatch, found.unexplained, found.next_experiment) == ((), (), None, None)
+    assert found.model == found.baseline
+    assert found.statement.startswith("Nothing is missing: C V|V|")
+
+
+def test_zero_offset_on_sines_is_not_lost_in_slow_noise():
+    """Ramps and sines, whose commands tick as fast as samples come, were once taken for tables of levels."""
+    rng = np.random.default_rng(1)
+    case = concealed.case(rng, ["zero_offset"], 60.0, plan="sine", noise="white", sampling=20.0, duration=150.0)
+    assert effects(diagnosed(*recordings(case))) == {"zero_offset"}
+
+
+# ---------------------------------------------------------------- one effect, two effects, several runs
+
+
+@pytest.fixture(scope="module")
+def dead():
+    return diagnosed(run(volts=dead_band(1.5)))
+
+
+def test_a_dead_band_is_measured(dead):
+    assert dead.verdict == "explained"
+    assert effects(dead) == {"dead_band"}
+    within(value(dead, "dead_band", "half_width"), 1.5)
+    assert dead.model_terms == ("dead_band",)
+    within(dead.model["C"], C)
+    within(dead.model["tare"], 1.5)
+    assert abs(dead.baseline["C"].value - C) > 20 * dead.model["C"].std, "without the term C is wrong"
+    assert "1.5 V" in dead.statement
+    assert dead.train.after == pytest.approx(NOISE, rel=0.05)
+    assert dead.whiteness_p > 1e-3
+    for place in dead.mismatch:
+        assert place.channel == "thrust"
+        assert 0 < place.share <= 1
+        assert place.where.low < place.where.high
+        assert place.where.quantity in place.statement
+    (curve,) = dead.curves
+    assert np.std(curve.thrust - curve.baseline) > 5 * np.std(curve.thrust - curve.model)
+
+
+def test_the_same_seed_gives_the_same_answer(dead):
+    assert diagnosis_json(diagnosed(run(volts=dead_band(1.5)))) == diagnosis_json(dead)
+
+
+def test_two_effects_are_both_named():
+    found = diagnosed(run(lambda t, V, F: F + 2.0 * (t > 80), volts=dead_band(1.5)))
+    assert found.verdict == "explained"
+    assert effects(found) == {"dead_band", "zero_offset"}
+    within(value(found, "dead_band", "half_width"), 1.5)
+    within(value(found, "zero_offset", "offset"), 2.0)
+    assert value(found, "zero_offset", "at").value == pytest.approx(80.0, abs=0.2)
+
+
+def test_each_run_has_a_tare_of_its_own():
+    one, two = run(seed=1, seconds=90.0, tare=5.0), run(seed=2, seconds=90.0, tare=-3.0)
+    found = diagnosed(one, two)
+    assert found.verdict == "adequate"
+    assert found.recordings == (one.recording_id, two.recording_id)
+    within(found.model[f"tare[{one.recording_id}]"], 5.0)
+    within(found.model[f"tare[{two.recording_id}]"], -3.0)
+    assert "tare" not in found.model
+
+
+def test_a_parameter_that_differs_from_run_to_run_earns_no_name():
+    found = diagnosed(run(seed=1, seconds=90.0, volts=dead_band(0.4)), run(seed=2, seconds=90.0, volts=dead_band(1.4)))
+    assert found.verdict == "unexplained"
+    assert "dead_band" not in effects(found)
+    assert found.heldout.after > 2 * found.heldout.noise
+
+
+def test_held_out_runs_judge_both_models():
+    kept = run(seed=3, volts=dead_band(1.5), tare=-4.0, seconds=90.0)
+    found = diagnosed(run(volts=dead_band(1.5)), holdout=[kept])
+    assert kept.recording_id in found.heldout.what
+    assert found.heldout.before > 4 * found.heldout.after
+    assert found.heldout.after == pytest.approx(NOISE, rel=0.1)
+    other = diagnosed(run(volts=dead_band(1.5)), holdout=[run(seed=3, seconds=90.0)])
+    assert other.heldout.after > 3 * other.heldout.noise, "a run without the effect is not described by it"
+
+
+def test_blocks_kept_back_say_what_they_are(dead):
+    assert "every fourth of the blocks of time" in dead.heldout.what
+    assert dead.heldout.after == pytest.approx(NOISE, rel=0.1)
+
+
+# ---------------------------------------------------------------- ambiguous, unexplained
+
+
+@pytest.fixture(scope="module")
+def uneven():
+    return diagnosed(run(lambda _t, V, F: np.where(V < 0, 0.93, 1.0) * F))
+
+
+def test_asymmetry_and_torque_cannot_be_told_apart(uneven):
+    """At levels of one sign each both are a factor."""
+    assert uneven.verdict == "ambiguous"
+    (finding,) = uneven.findings
+    assert {finding.effect, *(r.effect for r in finding.rivals)} == {"asymmetry", "torque_crosstalk"}
+    assert finding.probability == pytest.approx(0.5, abs=0.05)
+    (rival,) = finding.rivals
+    assert abs(rival.bic_loss) < 1.0
+    known = {finding.effect: finding.parameters, rival.effect: rival.parameters}
+    within(known["asymmetry"]["ratio"], 0.93)
+    assert known["torque_crosstalk"]["coefficient"].value == pytest.approx(0.5 * C * 0.07, rel=0.1)
+    assert uneven.next_experiment is not None
+    assert {"asymmetry", "torque_crosstalk"} <= set(uneven.next_experiment.why.replace(":", " ").split())
+    assert "cannot tell" in uneven.statement
+    assert 0.0 <= uneven.next_experiment.expected_power <= 1.0
+
+
+@pytest.fixture(scope="module")
+def bump():
+    """15 % less at +8 V only: no term of the catalogue."""
+    return diagnosed(run(lambda _t, V, F: F * (1 - 0.15 * ((V > 7) & (V < 9)))))
+
+
+def test_a_bump_at_one_level_is_located(bump):
+    found = bump
+    assert found.verdict == "unexplained"
+    assert found.findings == ()
+    first = found.mismatch[0]
+    assert first.where.quantity == "command_voltage"
+    assert (first.where.low, first.where.high) == pytest.approx((7.0, 9.0))
+    left = found.unexplained
+    assert left.where.quantity == "command_voltage"
+    assert left.where.low <= 7.0 < 9.0 <= left.where.high
+    assert left.p_value < 1e-6
+    shape = {round(at): mean for at, mean, _ in left.shape}
+    assert shape[8] == min(shape.values())
+    assert "no term of the catalogue" in found.statement
+
+
+def test_a_gain_that_comes_and_goes_is_located_in_time():
+    found = diagnosed(run(lambda t, _V, F: F * (1 + 0.02 * np.sin(2 * np.pi * t / 40)), seconds=120.0, rate=20.0))
+    assert found.verdict == "unexplained"
+    assert found.mismatch[0].where.quantity == "time"
+    assert found.unexplained.where.quantity == "time"
+
+
+def test_doubts_say_why_a_name_is_not_earned():
+    """A dead band that doubles half-way."""
+
+    def grown(t, V, _F):
+        V = np.sign(V) * np.maximum(np.abs(V) - np.where(t < 75, 0.5, 1.0), 0.0)
+        return C * V * np.abs(V)
+
+    found = diagnosed(run(grown, rate=20.0))
+    assert found.verdict == "unexplained"
+    assert effects(found) == set()
+    assert any("not the same in both halves" in text for text in found.unexplained.resembles)
+    assert found.heldout.after < 0.5 * found.heldout.before, "the fit is better all the same"
+
+
+# ---------------------------------------------------------------- other kinds of recording
+
+
+def test_a_table_of_levels():
+    clean = diagnosed(table(lambda v: C * v * np.abs(v)))
+    assert clean.verdict == "adequate"
+    assert "every fourth of the levels" in clean.heldout.what
+    bent = diagnosed(table(lambda v: np.sign(v) * np.abs(v) ** 1.7))
+    assert effects(bent) == {"exponent"}
+    within(value(bent, "exponent", "exponent"), 1.7)
+    assert bent.heldout.after < 0.1 * bent.heldout.before
+
+
+def rotation(seed, seconds, k=2.0, noise=0.01):
+    start, level = levels(seed, seconds)
+    t = np.arange(0.01, seconds - 0.5, 0.1)
+    V = level[np.maximum(np.searchsorted(start, t, side="right") - 1, 0)]
+    n = k * V + noise * np.random.default_rng([seed, 3]).standard_normal(t.size)
+    return Channel("rotation_rate", "motor", "rotation_rate", "rev/s", t, n)
+
+
+def test_thrust_by_the_measured_rate_alone():
+    def wave(t):
+        return 24 * 2 / np.pi * np.arcsin(np.sin(2 * np.pi * t / 20))  # rev/s
+
+    t, s = np.arange(0, 100, 0.1), np.arange(0.005, 99.9, 1 / 30)
+    F = 0.125 * wave(s) * np.abs(wave(s)) + 1.0 + NOISE * np.random.default_rng(1).standard_normal(s.size)
+    measured = (
+        Channel("rotation_rate", "motor", "rotation_rate", "rev/s", t, wave(t)),
+        Channel("thrust", "cell", "thrust", "N", s, F),
+    )
+    found = diagnosed(Recording("waves", "T1", measured))
+    assert found.verdict == "adequate"
+    assert found.baseline_model == "C n|n|"
+    within(found.model["C"], 0.125, rel=1e-3)
+    assert found.model["C"].unit == "N s^2/rev^2"
+
+
+def test_a_rate_beside_the_command_is_a_response_too():
+    found = diagnosed(run(seconds=100.0, extra=(rotation(0, 100.0),)))
+    assert found.verdict == "adequate"
+    assert found.model["C"].value == pytest.approx(C, rel=1e-3)
+
+
+# ---------------------------------------------------------------- refusals
+
+
+def refused(*runs, **how):
+    found = diagnose(runs, **how)
+    assert isinstance(found, Refusal)
+    return found.reason
+
+
+def test_what_cannot_be_diagnosed_together_is_refused():
+    a, b = run(seconds=60.0), run(seed=1, seconds=60.0)
+    t3 = run(seed=1, seconds=60.0, thruster="T3")
+    assert refused() == "no recording was given"
+    assert refused(a, t3) == "recordings of several thrusters (T1, T3); diagnose one at a time"
+    assert refused(a, b, a) == "the same recording was given twice"
+    assert "hold out a recording of T1" in refused(a, holdout=[t3])
+    by_rate = replace(run(seed=1, extra=(rotation(1, 100.0),)), recording_id="rate")
+    by_rate = replace(by_rate, channels=by_rate.channels[1:])
+    assert "driven by different quantities" in refused(a, by_rate)
+    silent = replace(b, channels=b.channels[:1])
+    assert "run-1.h5 has no thrust channel" in refused(a, silent)
+    assert "run-1.h5 has no thrust channel" in refused(a, holdout=[silent])
+    short = replace(
+        a, channels=(a.channels[0], Channel("thrust", "cell", "thrust", "N", np.arange(8) / 2, np.arange(8.0)))
+    )
+    assert "8 thrust samples" in refused(short)
+
+
+def test_what_was_fitted_is_not_held_out():
+    a = run(seconds=60.0)
+    assert "held out" in refused(a, holdout=[a])
+
+
+# ---------------------------------------------------------------- the contract
+
+
+def no_nan(node):
+    if isinstance(node, dict):
+        return all(map(no_nan, node.values()))
+    if isinstance(node, list):
+        return all(map(no_nan, node))
+    return node is None or isinstance(node, bool | str | int) or bool(np.isfinite(node))
+
+
+@pytest.mark.parametrize("which", ["dead", "uneven"])
+def test_the_json_holds_what_the_contract_promises(which, request):
+    told = json.loads(json.dumps(diagnosis_json(request.getfixturevalue(which)), allow_nan=False))
+    assert no_nan(told)
+    assert (told["format"], told["version"]) == ("thruster-rig-diagnosis", 1)
+    assert told.keys() >= {
+        *("recordings", "thruster", "verdict", "statement", "baseline", "mismatch", "findings", "unexplained"),
+        *("model", "fit", "next_experiment", "notes"),
+    }
+    assert told["verdict"] in ("adequate", "explained", "ambiguous", "unexplained")
+    assert told["baseline"]["model"] == "C V|V|"
+    assert told["baseline"]["parameters"]["C"].keys() == {"value", "std", "unit"}
+    for place in told["mismatch"]:
+        assert place.keys() >= {"channel", "where", "share", "p_value", "statement"}
+        assert place["where"].keys() >= {"quantity", "from", "to"}
+    (finding,) = told["findings"]
+    assert finding.keys() >= {
+        *("effect", "statement", "parameters", "p_value", "bic_gain", "probability", "rivals"),
+    }
+    assert all(p.keys() == {"value", "std", "unit"} for p in finding["parameters"].values())
+    assert all(isinstance(rival, str) for rival in finding["rivals"])
+    assert [r["effect"] for r in finding["rival_details"]] == finding["rivals"]
+    assert told["fit"].keys() >= {"train", "heldout", "chi2_per_dof", "whiteness_p"}
+    assert told["fit"]["train"].keys() >= {"rmse_before", "rmse_after"}
+    assert told["fit"]["heldout"].keys() >= {"rmse_before", "rmse_after", "noise", "what"}
+    if told["verdict"] == "ambiguous":
+        steps = told["next_experiment"]["steps"]
+        assert steps
+        assert all(abs(s["command_voltage"]) <= TOP and s["duration"] > 0 for s in steps)
+        assert 0 <= told["next_experiment"]["expected_power"] <= 1
+
+
+def test_numbers_that_are_not_finite_become_null(dead):
+    strange = replace(
+        dead,
+        whiteness_p=float("nan"),
+        chi2_per_dof=float("inf"),
+        mismatch=(replace(dead.mismatch[0], where=Where("time", -np.inf, 3.0, "s")),),
+    )
+    told = diagnosis_json(strange)
+    assert told["fit"]["whiteness_p"] is None
+    assert told["fit"]["chi2_per_dof"] is None
+    assert told["mismatch"][0]["where"] == {"quantity": "time", "from": None, "to": 3.0, "unit": "s"}
+    json.dumps(told, allow_nan=False)
+
+
+def test_unexplained_is_told_with_its_table(bump):
+    told = json.loads(json.dumps(diagnosis_json(bump), allow_nan=False))
+    left = told["unexplained"]
+    assert left.keys() >= {"where", "share", "p_value", "shape", "statement", "resembles"}
+    assert all(row.keys() == {"at", "residual", "std"} for row in left["shape"])
+    assert 0 < left["share"] <= 1
