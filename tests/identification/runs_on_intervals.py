@@ -14,7 +14,7 @@ def uneven(rng, n, low=0.004, high=0.25):
 def history(n=400, volts=1.0, newtons=1.0, seed=1, flow=1.0):
     """Levels of both signs with rests, ramps between some of them; everything recorded. Sizes times `volts` etc."""
     rng = np.random.default_rng(seed)
-    dt = uneven(rng, n)
+    dt = uneven(rng, n, high=6.0)  # some minutes: slow effects are looked for too
     levels = np.repeat(rng.choice((-12.0, -9.0, -5.0, -1.0, 0.0, 2.0, 6.0, 8.0, 12.0), n // 8), 8)
     levels[1::16] *= 0.5  # some levels are reached in two steps
     driver = volts * np.concatenate([levels, np.zeros(n - levels.size)])
