@@ -82,20 +82,24 @@ def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[lis
     thrust, rate = [], []
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
-        prompt = not any(term.stage == "rotor" for term in model.terms)
-        if prompt:
-            F = F + 2 * theta.C * np.abs(x) * history.lead
+        prompt = _promptness(model, theta, history.tick)
+        F = F + prompt * 2 * theta.C * np.abs(x) * history.lead
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
         thrust.append(reconstructed(F, history.middle, history.sampled)[rows] + theta.tares[i])
         if with_rate:
             assert history.rate_sampled is not None
-            if prompt:
-                x = x + history.rate_lead
+            x = x + prompt * history.rate_lead
             if theta.rate_shift:
                 x = delayed(x, history.edges, theta.rate_shift)
             rate.append(theta.k * reconstructed(x, history.middle, history.rate_sampled)[history.rate_rows])
     return thrust, rate
+
+
+def _promptness(model: Model, theta: Theta, tick: float) -> float:
+    """How far a tick of the command shows within itself: wholly without a lag, not at all with one of many ticks."""
+    lags = [v[0] for term, v in zip(model.terms, theta.terms, strict=True) if term.id == "motor_lag"]
+    return float(np.exp(-2 * sum(lags) / tick)) if lags else 1.0
 
 
 def residual_of(model: Model, theta: Theta, data: Data, weights: Weights) -> Floats:

@@ -37,7 +37,7 @@ STATIC = ("command_voltage", "thrust")
 """Coordinates of the static curve."""
 MOST_STATIC = 2
 """Shapes on the static curve: any curve can be made of more."""
-DYNAMIC_STAGES = {
+MOVING = {
     "motor_lag",
     "inflow_dynamics",
     "recirculation",
@@ -72,10 +72,9 @@ def available(data: Data) -> tuple[Term, ...]:
     """Terms of the catalogue whose channels were recorded in every run."""
     have = set.intersection(*(set(h.others) for h in data.histories))
     static = any(h.static for h in data.histories)
-    command = data.histories[0].driver_quantity == "command_voltage"
     out = []
     for term in CATALOGUE:
-        if not set(term.needs) <= have or (static and term.id in DYNAMIC_STAGES):
+        if not set(term.needs) <= have or (static and term.id in MOVING):
             continue
         if data.histories[0].driver_quantity == "rotation_rate" and term.stage in ("command", "rotor"):
             continue
@@ -84,7 +83,6 @@ def available(data: Data) -> tuple[Term, ...]:
         if (term.id, term.form) == ("supply_sag", "discharge") and (static or "bus_voltage" in have):
             continue  # a proxy
         out.append(term)
-    del command
     return tuple(out)
 
 

@@ -30,8 +30,8 @@ class Heating:
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         if self.form == "winding":
-            return tuple((0.05, tau) for tau in (15.0, 40.0, 100.0, 300.0))
-        return tuple((0.05, tau, later) for tau, later in ((30.0, 30.0), (120.0, 60.0)))
+            return tuple((0.05, tau) for tau in (15.0, 40.0, 100.0, 300.0) if tau < 0.7 * scale.duration)
+        return tuple((0.05, tau, later) for tau, later in ((30.0, 30.0), (120.0, 60.0)) if tau < 0.7 * scale.duration)
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()

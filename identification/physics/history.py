@@ -56,6 +56,8 @@ class History:
     rate_spacing: float = 1.0
     lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     """(M,) or (1,): driver at the samples less its mean over the interval: ticks may keep step with samples."""
+    tick: float = 1.0
+    """s between changes of the command where it ticks on."""
     rate_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     sample_time: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     """(N,) s, every thrust sample that is in an interval."""

@@ -22,8 +22,6 @@ class MotorLag:
     form: Literal["first_order", "quadratic"] = "first_order"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        if self.form == "quadratic":
-            return (Parameter("time_constant", "s", 0.0, 10.0, 0.0),)
         return (Parameter("time_constant", "s", 0.0, 10.0, 0.0),)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:

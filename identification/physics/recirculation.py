@@ -30,7 +30,9 @@ class Recirculation:
         )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return tuple((0.05 * scale.thrust / scale.driver**2, tau) for tau in (5.0, 12.0, 30.0, 80.0))
+        slowest = self.parameters(scale)[1].high
+        taus = [tau for tau in (5.0, 12.0, 30.0, 80.0) if tau <= slowest]
+        return tuple((0.05 * scale.thrust / scale.driver**2, tau) for tau in taus)
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()

@@ -34,8 +34,10 @@ class ZeroOffset:
         return tuple((values[0], values[1] + share * step) for share in np.linspace(-1.0, 1.0, 25))
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        edge = np.clip((now.history.edges - theta[1]) / (2e-3 * now.scale.duration) + 0.5, 0.0, 1.0)
-        out: Floats = value + theta[0] * 0.5 * (edge[1:] + edge[:-1])
+        ramp = 2e-3 * now.scale.duration
+        edges = (now.history.edges - theta[1]) / ramp
+        area = np.where(np.abs(edges) < 0.5, 0.5 * (edges + 0.5) ** 2, np.maximum(edges, 0.0))
+        out: Floats = value + theta[0] * np.diff(area) * ramp / now.history.dt
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
