@@ -277,6 +277,36 @@ def test_a_rate_beside_the_command_is_a_response_too():
     assert found.model["C"].value == pytest.approx(C, rel=1e-3)
 
 
+# ---------------------------------------------------------------- channel faults and lines
+
+
+@pytest.mark.parametrize("lie", ["rescaled", "reversed"])
+def test_a_channel_that_lies_is_the_finding_and_its_repair_is_told(lie):
+    rng = np.random.default_rng(3)
+    case = concealed.case(rng, lie=lie, sampling=30.0, duration=120.0, noise="white", plan="interleaved")
+    found = diagnosed(*recordings(case))
+    assert [(f.effect, f.form) for f in found.findings] == [("channel_fault", lie)]
+    assert found.verdict == "explained"
+    assert case.fault["channel"] in found.findings[0].statement
+    assert any("put right" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("form", ["frequency", "blades"])
+def test_a_periodic_disturbance_is_a_finding_with_its_frequency(form):
+    rng = np.random.default_rng(3)
+    how = {"forms": [form], "channels": ["rotation_rate"], "noise": "white", "plan": "interleaved"}
+    case = concealed.case(rng, ["periodic_disturbance"], 60.0, sampling=60.0, duration=120.0, **how)
+    found = diagnosed(*recordings(case))
+    assert effects(found) == {"periodic_disturbance"}
+    assert "periodic_disturbance" in found.model_terms
+    line, true = found.findings[0].parameters, case.effects[0].parameters
+    assert line["amplitude"].value == pytest.approx(true["amplitude"], rel=0.2)
+    if form == "blades":
+        assert line["periods_per_turn"].value == pytest.approx(true["blades"], rel=1e-3)
+    else:
+        assert line["frequency"].value == pytest.approx(true["frequency"], rel=1e-4)
+
+
 # ---------------------------------------------------------------- refusals
 
 
