@@ -82,7 +82,7 @@ def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[lis
     thrust, rate = [], []
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
-        prompt = _promptness(model, theta, history.tick)
+        prompt = promptness(model, theta, history.tick)
         F = F + prompt * 2 * theta.C * np.abs(x) * history.lead
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
@@ -96,7 +96,7 @@ def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[lis
     return thrust, rate
 
 
-def _promptness(model: Model, theta: Theta, tick: float) -> float:
+def promptness(model: Model, theta: Theta, tick: float) -> float:
     """How far a tick of the command shows within itself: wholly without a lag, not at all with one of many ticks."""
     lags = [v[0] for term, v in zip(model.terms, theta.terms, strict=True) if term.id == "motor_lag"]
     return float(np.exp(-2 * sum(lags) / tick)) if lags else 1.0

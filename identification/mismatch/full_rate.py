@@ -9,13 +9,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.fitting import Fit
+from identification.mismatch.fitting import Fit, promptness
 from identification.mismatch.lines import Line, find_lines
 from identification.mismatch.model import Data, predict
 from identification.mismatch.resonance_noise import find_bands
 from identification.mismatch.rotation_lines import turned
 from identification.mismatch.spectrum import Series
-from identification.physics.filters import delayed, reconstructed
+from identification.physics.filters import delayed, within_intervals
 from identification.physics.history import History
 from identification.recording import Floats
 
@@ -42,10 +42,9 @@ def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
         F, x = predict(fitted.model, fitted.theta, h, data.scale, i)
         if fitted.theta.shift:
             F = delayed(F, h.edges, fitted.theta.shift)
-        index = _interval(h, h.sample_time)
-        straight = reconstructed(F, h.middle, h.middle + 0.5 * h.dt)
-        slope = (straight - F) / (0.5 * h.dt)
-        at = F[index] + slope[index] * (h.sample_time - h.middle[index])
+        at = within_intervals(F, h.edges, h.sample_time)
+        rate = np.abs(within_intervals(x, h.edges, h.sample_time))
+        at += promptness(fitted.model, fitted.theta, h.tick) * 2 * fitted.theta.C * rate * h.sample_lead
         residual = h.sample_thrust - at - fitted.theta.tares[i]
         speed = h.others.get("rotation_rate", x)
         out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time)))

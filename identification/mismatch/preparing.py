@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from identification.mismatch.channels import followed, jumps, neighbour_at, supply
 from identification.mismatch.grid import STEP, Held, distinct, edges_of
-from identification.physics.filters import reconstructed
+from identification.physics.filters import reconstructed, within_intervals
 from identification.physics.history import History
 from identification.recording import Channel, Floats, Recording
 
@@ -179,6 +179,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         count=count,
         sampled=sampled,
         within=within,
+        sample_lead=_sample_lead(held, time[(time >= edges[0]) & (time < edges[-1])], edges, driven),
         tick=max(float(np.median(np.diff(held.time))), 1e-6) if held.time.size > 1 else 1.0,
         lead=_lead(held, time, edges, driven, count),
         rate_lead=np.zeros(1) if rate_count is None else _lead(held, turning_time, edges, driven, rate_count),
@@ -202,6 +203,16 @@ def _lead(held: Held, time: Floats, edges: Floats, driven: Floats, count: NDArra
     now = held.value[np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)]
     mean, _, sampled = _binned(time, now, edges)
     lead = np.where(count > 0, mean - reconstructed(driven, 0.5 * (edges[1:] + edges[:-1]), sampled), 0.0)
+    out: Floats = np.where(np.abs(lead) < STEP * float(np.max(np.abs(driven))), lead, 0.0)
+    return out
+
+
+def _sample_lead(held: Held, time: Floats, edges: Floats, driven: Floats) -> Floats:
+    """As _lead, sample by sample."""
+    if not held.stepwise:
+        return np.zeros(1)
+    now = held.value[np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)]
+    lead = now - within_intervals(driven, edges, time)
     out: Floats = np.where(np.abs(lead) < STEP * float(np.max(np.abs(driven))), lead, 0.0)
     return out
 

@@ -33,6 +33,7 @@ CLOCKS = 0.001
 """s: clocks of two devices are not trusted to agree better."""
 CANDIDATES = 5
 MOST_TERMS = 6
+NOISE_ROUNDS = 5
 STATIC = ("command_voltage", "thrust")
 """Coordinates of the static curve."""
 MOST_STATIC = 2
@@ -213,12 +214,22 @@ def raw_directions(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
 
 
 def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> State:
-    """C V|V|, what is given and tares, with the noise that remains when all that any term can see is taken out."""
+    """C V|V|, what is given and tares, with the noise that remains when what is plainly no noise is taken out.
+
+    The noise is first all that is left; what stands out of even that is taken out, and so on: slow noise has many
+    shapes by chance, and taken out at once they would make it look smaller than it is.
+    """
     unit = _unweighted(data)
     first = fit(model, theta, data, unit)
-    state = refresh(model, first.theta, data, pursue(first, data, unit, terms), None)
-    again = pursue(state.fit, data, state.weights, terms)
-    return refresh(model, state.fit.theta, data, again, state)
+    state = refresh(model, first.theta, data, None, None)
+    taken = 0
+    for _ in range(NOISE_ROUNDS):
+        plain = pursue(state.fit, data, state.weights, terms)
+        if plain.shape[1] <= taken:
+            break
+        taken = plain.shape[1]
+        state = refresh(model, state.fit.theta, data, plain, state)
+    return state
 
 
 @dataclass(frozen=True, eq=False)

@@ -61,6 +61,8 @@ class History:
     rate_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     sample_time: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     """(N,) s, every thrust sample that is in an interval."""
+    sample_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
+    """(N,) or (1,): as `lead`, at each sample."""
     sample_thrust: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     memo: OrderedDict[object, Floats] = field(default_factory=OrderedDict, repr=False)
     """Values behind the first terms of models predicted lately: a fit moves one parameter at a time."""

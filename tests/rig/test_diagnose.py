@@ -328,6 +328,7 @@ def test_every_term_of_the_catalogue_that_the_world_knows_builds_its_effect():
             left.append((effect, form))
     assert set(left) <= {
         ("supply_sag", ""),
+        ("supply_sag", "discharge"),
         ("rotation_coupling", ""),
         ("thruster_interaction", ""),
         ("reversal_loss", "step"),
