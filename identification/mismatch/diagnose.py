@@ -21,21 +21,21 @@ from identification.mismatch.diagnosis import (
     Where,
 )
 from identification.mismatch.faults import Fault, find_faults, repaired
-from identification.mismatch.fitting import Fit, fit, raw
+from identification.mismatch.fitting import Fit, raw
 from identification.mismatch.full_rate import look
 from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
 from identification.mismatch.lines import Line
-from identification.mismatch.model import Data, parameters, weights
+from identification.mismatch.model import Data, parameters
 from identification.mismatch.naming import EQUAL, Named, Rival, Standing, name, settle_forms, with_doubts
 from identification.mismatch.next_experiment import propose
 from identification.mismatch.omnibus import Judged, Omnibus, judge_left, locate
 from identification.mismatch.preparing import Refusal, history_of
-from identification.mismatch.search import Found, State, forces, prune, search
+from identification.mismatch.search import Found, State, prune, search
 from identification.mismatch.sweeps import Limits
 from identification.mismatch.twinning import starting, unfit, with_twin
 from identification.physics.history import History
 from identification.physics.term import Term
-from identification.recording import Floats, Recording
+from identification.recording import Recording
 from identification.twin import Twin
 
 ALARM = 0.01
@@ -308,6 +308,3 @@ def _curves(before: State, after: State, data: Data) -> tuple[Curves, ...]:
         Curves(h.recording_id, h.sampled[r], h.driver[r], y, a, b)
         for h, r, y, a, b in zip(data.histories, data.rows, data.thrust, old, new, strict=True)
     )
-
-
-__all__ = ["Floats", "diagnose", "fit", "forces", "weights"]

@@ -270,57 +270,44 @@ def _cost(
     for (c, a, U, V, d, W, S), rows, r, X, size in zip(factored, runs, residuals, columns, sizes, strict=True):
         left = r - X @ beta if p else r
         Y = np.ascontiguousarray(np.column_stack([left, np.linalg.solve(lower, X.T).T]) if p else left[:, None])
-        n, J = U.shape
-        k = Y.shape[1]
-        Z, F = backprop.solve_lower_fwd(rows.time, c, U, W, Y, np.empty_like(Y), np.empty((n, J, k)))
+        Z, ba, bU = _backwards(rows.time, c, a, U, V, d, W, S, Y)
         value += 0.5 * float(np.sum(np.log(d))) + 0.5 * float(np.sum(Z[:, 0] ** 2 / d))
-        bZ = np.ascontiguousarray(Z / d[:, None])
-        _, _, bU1, bW, _ = backprop.solve_lower_rev(
-            rows.time,
-            c,
-            U,
-            W,
-            Y,
-            Z,
-            F,
-            bZ,
-            np.zeros(n),
-            np.zeros(J),
-            np.zeros((n, J)),
-            np.zeros((n, J)),
-            np.zeros((n, k)),
-        )
-        bd = 0.5 / d - 0.5 * np.sum(Z**2, axis=1) / d**2
-        _, _, ba, bU2, _ = backprop.factor_rev(
-            rows.time,
-            c,
-            a,
-            U,
-            V,
-            d,
-            W,
-            S,
-            bd,
-            np.ascontiguousarray(bW),
-            np.zeros(n),
-            np.zeros(J),
-            np.zeros(n),
-            np.zeros((n, J)),
-            np.zeros((n, J)),
-        )
-        bU = bU1 + bU2
-        gain2 = noise.gains(rows) ** 2
-        per_count = rows.extra / rows.count
-        slope[0] += float(ba @ per_count)
-        slope[1] += float(ba @ (per_count * size**2))
-        Jr = len(noise.slow)
-        for j in range(Jr):
-            slope[2 + j] += float(ba @ gain2[:, j]) + float(bU[:, j] @ U[:, j]) / max(noise.slow[j], 1e-300)
-        for b, value_b in enumerate(noise.band):
-            at = Jr + 2 * b
-            moved = float(np.sum(bU[:, at] * U[:, at]) + np.sum(bU[:, at + 1] * U[:, at + 1])) / max(value_b, 1e-300)
-            slope[2 + Jr + b] += float(ba @ gain2[:, Jr + b]) + moved
+        slope += _over_variances(noise, rows, size, U, ba, bU)
     return value, slope
+
+
+def _backwards(
+    time: Floats, c: Floats, a: Floats, U: Floats, V: Floats, d: Floats, W: Floats, S: Floats, Y: Floats
+) -> tuple[Floats, Floats, Floats]:
+    """(Z, slope over a, slope over U) of half of log det K + sum of y' K^-1 y over the columns y of Y."""
+    n, J = U.shape
+    k = Y.shape[1]
+
+    def none(*shape: int) -> Floats:
+        return np.zeros(shape)  # celerite2 adds to what it is given
+
+    Z, F = backprop.solve_lower_fwd(time, c, U, W, Y, np.empty_like(Y), np.empty((n, J, k)))
+    bZ = np.ascontiguousarray(Z / d[:, None])
+    solved = backprop.solve_lower_rev(time, c, U, W, Y, Z, F, bZ, none(n), none(J), none(n, J), none(n, J), none(n, k))
+    bd = 0.5 / d - 0.5 * np.sum(Z**2, axis=1) / d**2
+    bW = np.ascontiguousarray(solved[3])
+    factored = backprop.factor_rev(time, c, a, U, V, d, W, S, bd, bW, none(n), none(J), none(n), none(n, J), none(n, J))
+    return Z, factored[2], solved[2] + factored[3]
+
+
+def _over_variances(noise: Noise, rows: Rows, size: Floats, U: Floats, ba: Floats, bU: Floats) -> Floats:
+    """Slope over each variance of the noise, from those over celerite's a and U."""
+    gain2 = noise.gains(rows) ** 2
+    per_count = rows.extra / rows.count
+    slope = [float(ba @ per_count), float(ba @ (per_count * size**2))]
+    Jr = len(noise.slow)
+    for j in range(Jr):
+        slope.append(float(ba @ gain2[:, j]) + float(bU[:, j] @ U[:, j]) / max(noise.slow[j], 1e-300))
+    for b, value_b in enumerate(noise.band):
+        at = Jr + 2 * b
+        moved = float(np.sum(bU[:, at] * U[:, at]) + np.sum(bU[:, at + 1] * U[:, at + 1])) / max(value_b, 1e-300)
+        slope.append(float(ba @ gain2[:, Jr + b]) + moved)
+    return np.array(slope)
 
 
 def with_outliers(rows: Rows, whitened: Floats) -> Rows:

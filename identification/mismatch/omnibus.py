@@ -123,7 +123,7 @@ class Place:
     what: str
 
 
-def locate(judged: Judged, fit: Fit, data: Data, noise_inflation: float = 1.0) -> Place:
+def locate(judged: Judged, fit: Fit, data: Data) -> Place:
     """The stretch of the coordinate that holds most of it."""
     c = judged.coordinate
     covariate = np.concatenate(c.covariate)
@@ -141,7 +141,7 @@ def locate(judged: Judged, fit: Fit, data: Data, noise_inflation: float = 1.0) -
     mean = np.bincount(index, weights=count * residual, minlength=k) / np.maximum(weight, 1e-300)
     rows = np.bincount(index, minlength=k)
     spread = np.bincount(index, weights=count * (residual - mean[index]) ** 2, minlength=k) / np.maximum(weight, 1e-300)
-    error = noise_inflation * np.sqrt(spread / np.maximum(rows, 1))
+    error = np.sqrt(spread / np.maximum(rows, 1))
     power = np.bincount(index, weights=count * residual**2, minlength=k)
     full = rows > 0
     low, high, share = _stretch(edges, np.asarray(power, dtype=np.float64))

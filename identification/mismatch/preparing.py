@@ -142,23 +142,9 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
     time, force = _clear_of_jumps(recording, time, force)
     mean, count, sampled = _binned(time, force, edges)
     within = _within(time, force, edges, mean)
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    others: dict[str, Floats] = {}
     driven = held.mean(edges)
-    for quantity in FOLLOWED:
-        channel = recording.first_of(quantity)
-        if channel is None or channel is driver:
-            continue
-        values = (
-            supply(channel, held, middle, driven, np.diff(edges))
-            if quantity == "bus_voltage"
-            else followed(channel, middle)
-        )
-        if values is not None:
-            others[quantity] = values
-    neighbour = neighbour_at(recording, middle)
-    if neighbour is not None:
-        others["neighbour_thrust"] = neighbour
+    others = _explaining(recording, driver, held, edges, driven)
+    inside = (time >= edges[0]) & (time < edges[-1])
     rate = rate_count = rate_sampled = None
     turning_time = np.empty(0)
     per_driver = 1.0
@@ -179,12 +165,12 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         count=count,
         sampled=sampled,
         within=within,
-        sample_lead=_sample_lead(held, time[(time >= edges[0]) & (time < edges[-1])], edges, driven),
+        sample_lead=_sample_lead(held, time[inside], edges, driven),
         tick=max(float(np.median(np.diff(held.time))), 1e-6) if held.time.size > 1 else 1.0,
         lead=_lead(held, time, edges, driven, count),
         rate_lead=np.zeros(1) if rate_count is None else _lead(held, turning_time, edges, driven, rate_count),
-        sample_time=time[(time >= edges[0]) & (time < edges[-1])],
-        sample_thrust=force[(time >= edges[0]) & (time < edges[-1])],
+        sample_time=time[inside],
+        sample_thrust=force[inside],
         rate=rate,
         rate_count=rate_count,
         rate_sampled=rate_sampled,
@@ -194,6 +180,27 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
         static=_is_table(held, time.size),
     )
+
+
+def _explaining(recording: Recording, driver: Channel, held: Held, edges: Floats, driven: Floats) -> dict[str, Floats]:
+    """Quantity -> (M,) of what terms and tests may look at beside the driver."""
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    out: dict[str, Floats] = {}
+    for quantity in FOLLOWED:
+        channel = recording.first_of(quantity)
+        if channel is None or channel is driver:
+            continue
+        values = (
+            supply(channel, held, middle, driven, np.diff(edges))
+            if quantity == "bus_voltage"
+            else followed(channel, middle)
+        )
+        if values is not None:
+            out[quantity] = values
+    neighbour = neighbour_at(recording, middle)
+    if neighbour is not None:
+        out["neighbour_thrust"] = neighbour
+    return out
 
 
 def _lead(held: Held, time: Floats, edges: Floats, driven: Floats, count: NDArray[np.int64]) -> Floats:

@@ -11,7 +11,7 @@ from scipy.stats import chi2 as chi2_law
 from identification.mismatch.coordinates import coordinates
 from identification.mismatch.fitting import Fit, bounds_of, columns_of, extended, fit, raw
 from identification.mismatch.model import Data, Model, Theta, Weights, scale_of, weights
-from identification.mismatch.noise import Noise, Rows, fit_noise, with_outliers
+from identification.mismatch.noise import Noise, Rows, fit_noise
 from identification.mismatch.screening import (
     MOST_PLAIN,
     PLAIN,
@@ -324,6 +324,3 @@ def prune(state: State, data: Data) -> State:
             break
         state = refresh(less.model, less.theta, data, None, state)
     return state
-
-
-__all__ = ["Found", "State", "search", "with_outliers"]
