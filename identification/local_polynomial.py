@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -102,29 +103,53 @@ def local_fits(time: Floats, y: Floats, windows: Windows, order: int, wanted: tu
     """Polynomial of `order` in each window of y (n,) at times (n,); `wanted`: degrees whose coefficients to return."""
     k, c = windows.centre.size, len(wanted)
     out = LocalFits(np.empty((k, c)), np.empty((k, c, c)), np.empty((k, 2)), np.empty(k))
-    if is_even(time):
+    if is_even(time) and time[-1] > time[0]:
+        step = float(time[-1] - time[0]) / (time.size - 1)
         for group in _shapes(time, windows):
-            first, left, right = windows.centre[group[0]], windows.left[group[0]], windows.right[group[0]]
-            u = (time[first - left : first + right + 1] - time[first])[None]
-            some = _write(out, group, int(left), u, coefficient_rows(u, order), wanted)
+            left, right = int(windows.left[group[0]]), int(windows.right[group[0]])
+            some = _write_even(out, group, left, _even_shape(left, right, order), step, wanted)
             start = windows.centre[group] - left
             piece = y[start.min() : start.max() + left + right + 1]
-            for j, row in enumerate(some[0]):
+            for j, row in enumerate(some):
                 out.value[group, j] = np.correlate(piece, row, "valid")[start - start.min()]
         return out
     for part, u, at in _batches(time, windows):
-        some = _write(out, part, int(windows.left[part[0]]), u, coefficient_rows(u, order), wanted)
+        rows = coefficient_rows(u, order)
+        some = rows[:, list(wanted)]
+        out.cov[part] = some @ some.transpose(0, 2, 1)
+        out.moment[part] = _moments(rows, u)
+        out.leverage[part] = rows[:, 0, int(windows.left[part[0]])]
         out.value[part] = np.einsum("bcn,bn->bc", some, y[at])
     return out
 
 
-def _write(out: LocalFits, part: Indices, left: int, u: Floats, rows: Floats, wanted: tuple[int, ...]) -> Floats:
-    """What does not depend on the data; returns the wanted rows (B, c, N)."""
-    some: Floats = rows[:, list(wanted)]
-    degree = rows.shape[1]
-    out.cov[part] = some @ some.transpose(0, 2, 1)
-    out.moment[part] = np.stack([np.sum(rows[:, 1] * u ** (degree + d), axis=1) for d in (0, 1)], axis=1)
-    out.leverage[part] = rows[:, 0, left]
+def _moments(rows: Floats, u: Floats) -> Floats:
+    """(B, 2) what the first-order rows make of the two powers above the order."""
+    order = rows.shape[1] - 1
+    return np.stack([np.sum(rows[:, 1] * u ** (order + d), axis=1) for d in (1, 2)], axis=1)
+
+
+@lru_cache(maxsize=4096)
+def _even_shape(left: int, right: int, order: int) -> tuple[Floats, Floats]:
+    """Rows (order + 1, N) and moments (2,) of a window of even steps of 1 s: computed once for each shape."""
+    u = np.arange(-left, right + 1, dtype=float)[None]
+    rows = coefficient_rows(u, order)
+    shape = rows[0], _moments(rows, u)[0]
+    for array in shape:
+        array.flags.writeable = False
+    return shape
+
+
+def _write_even(
+    out: LocalFits, part: Indices, left: int, shape: tuple[Floats, Floats], step: float, wanted: tuple[int, ...]
+) -> Floats:
+    """What does not depend on the data, a shape scaled to `step` seconds; returns the wanted rows (c, N)."""
+    rows, moment = shape
+    order = rows.shape[0] - 1
+    some: Floats = rows[list(wanted)] / step ** np.array(wanted, dtype=float)[:, None]
+    out.cov[part] = some @ some.T
+    out.moment[part] = moment * step ** np.array([order, order + 1.0])
+    out.leverage[part] = rows[0, left]
     return some
 
 
