@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -51,11 +51,13 @@ def diagnose(
     seed: int = 0,
     baseline: Twin | None = None,
     limits: Limits | None = None,
+    without: Collection[str] = (),
 ) -> Diagnosis | Refusal:
     """Everything that `rig diagnose` says, for recordings of one thruster. A Refusal says what is wrong with them.
 
     `baseline`: a twin in the place of C V|V|; its terms keep their values, findings are what lies beyond them.
     `limits`: of the next experiment; None: what was recorded may be run again, for BUDGET s.
+    `without`: ids of effects taken out of the catalogue (what does the tool say of a physics that it does not know?).
     """
     histories = _histories(recordings)
     if isinstance(histories, Refusal):
@@ -71,12 +73,12 @@ def diagnose(
     if isinstance(histories, Refusal):
         return histories
     given = None if baseline is None else starting(baseline)
-    found = search(histories, rng, given=given)
+    found = search(histories, rng, given=given, without=without)
     seen = look(found.after.fit, found.data, histories)
     lines: tuple[Line, ...] = ()
     if seen is not None:
         lines = seen.lines
-        found = search(seen.histories, rng, given=given, bands=seen.bands)
+        found = search(seen.histories, rng, given=given, bands=seen.bands, without=without)
     after, standing = found.after, None
     if after.fit.model.terms:
         settled, standing = settle_forms(after, found.data, found.terms)

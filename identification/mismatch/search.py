@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -69,13 +69,13 @@ class State:
         return self.fit.deviance + int(self.fit.free.sum()) * float(np.log(max(self.fit.residual.size, 2)))
 
 
-def available(data: Data) -> tuple[Term, ...]:
-    """Terms of the catalogue whose channels were recorded in every run."""
+def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
+    """Terms of the catalogue whose channels were recorded in every run, but for the effects `without`."""
     have = set.intersection(*(set(h.others) for h in data.histories))
     static = any(h.static for h in data.histories)
     out = []
     for term in CATALOGUE:
-        if not set(term.needs) <= have or (static and term.id in MOVING):
+        if term.id in without or not set(term.needs) <= have or (static and term.id in MOVING):
             continue
         if data.histories[0].driver_quantity == "rotation_rate" and term.stage in ("command", "rotor"):
             continue
@@ -254,15 +254,16 @@ def search(
     trace: list[str] | None = None,
     given: Callable[[Data, Theta], tuple[Data, Theta, Model]] | None = None,
     bands: tuple[tuple[float, float], ...] = (),
+    without: Collection[str] = (),
 ) -> Found:
     """Forward: screen, fit the best few, keep the best, refresh the noise; until nothing passes. Then prune.
 
-    `given` puts the baseline of a twin in the place of C V|V|.
+    `given` puts the baseline of a twin in the place of C V|V|; effects `without` are taken out of the catalogue.
     """
     data, theta = start(histories)
     data, theta, first = given(data, theta) if given is not None else (data, theta, Model())
     data = replace(data, bands=bands)
-    terms = available(data)
+    terms = available(data, without)
     state = before = baseline(data, theta, terms, first)
     screenings = []
     seen = {frozenset(state.fit.model.terms)}
