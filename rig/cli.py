@@ -34,6 +34,7 @@ COMMANDS: Final = {
     "design": Entry("rig.design:design_command", "Best levels, order and dwells for the time in the tunnel."),
     "fit": Entry("rig.fit:fit_command", "Fit tau = C V|V| to recordings."),
     "diagnose": Entry("rig.diagnose:diagnose_command", "Find, name and model the physics that C V|V| leaves out."),
+    "settle": Entry("rig.settle:settle_command", "Run the next experiment and diagnose again until one answer stands."),
     "simulate": Entry("rig.simulate:simulate_command", "The run of a plan that a twin predicts, as a recording."),
     "compare": Entry("rig.compare:compare_command", "What a simulation leaves out relative to the real run."),
     "vehicle": Entry(

@@ -73,8 +73,8 @@ class Prepared:
     remarks: tuple[str, ...]
 
 
-def seconds(text: str) -> float:
-    """`600`, `600s`, `10min` or `1h` in s. Raises PlanError.
+def seconds(text: str, option: str = "--time") -> float:
+    """`600`, `600s`, `10min` or `1h` in s, as given to `option`. Raises PlanError.
 
     >>> seconds("10min"), seconds("90")
     (600.0, 90.0)
@@ -85,8 +85,8 @@ def seconds(text: str) -> float:
     except ValueError:
         value = None
     if value is None:
-        raise PlanError(f"--time must be a time such as 600, 10min or 1h, but is {text!r}")
-    require_above_zero("--time", value, "s")
+        raise PlanError(f"{option} must be a time such as 600, 10min or 1h, but is {text!r}")
+    require_above_zero(option, value, "s")
     return value
 
 

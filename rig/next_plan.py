@@ -23,8 +23,10 @@ def asked(plan: Path | None, campaign: Path | None) -> CampaignConfig | None:
     return None if campaign is None else load_campaign(campaign)
 
 
-def limits_of(campaign: CampaignConfig | None, budget: float | None = None) -> Limits:
-    """What the bench allows: its voltage, its slew, and the thrust that its guard stands."""
+def limits_of(
+    campaign: CampaignConfig | None, budget: float | None = None, flow_speeds: tuple[float, ...] | None = None
+) -> Limits:
+    """What the bench allows: its voltage, its slew, and the thrust that its guard stands; `flow_speeds`: see Limits."""
     from identification.mismatch.sweeps import BUDGET, Limits
 
     seconds = BUDGET if budget is None else budget
@@ -39,11 +41,20 @@ def limits_of(campaign: CampaignConfig | None, budget: float | None = None) -> L
         for limit in bench.limits
         if limit.channel == name and (limit.min is not None or limit.max is not None)
     ]
-    return Limits(budget=seconds, slew=campaign.plan.slew, max_thrust=min(stands, default=None))
+    return Limits(
+        max_voltage=bench.max_voltage,
+        budget=seconds,
+        flow_speeds=flow_speeds,
+        slew=campaign.plan.slew,
+        max_thrust=min(stands, default=None),
+    )
 
 
-def next_template(found: Diagnosis, campaign: CampaignConfig) -> Template:
-    """The campaign's bench and pacing for one thruster; no zero returns but the last, for the steps hold rests."""
+def next_template(found: Diagnosis, campaign: CampaignConfig, *, attended: bool = False) -> Template:
+    """The campaign's bench and pacing for one thruster; no zero returns but the last, for the steps hold rests.
+
+    `attended`: the run stops when its front end is gone, whatever the campaign allows.
+    """
     assert found.next_experiment is not None
     if found.thruster not in campaign.thrusters:
         raise ConfigError(
@@ -58,10 +69,11 @@ def next_template(found: Diagnosis, campaign: CampaignConfig) -> Template:
         thrusters=(found.thruster,),
         zero_every=0,
         settle=min(template.settle, 0.5 * shortest),
+        unattended=template.unattended and not attended,
     )
 
 
-def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path) -> tuple[Path, ...]:
+def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path, *, attended: bool = False) -> tuple[Path, ...]:
     """Write the sweep; one file for each flow speed. Raises PlanError when there is nothing to tell apart."""
     proposed = found.next_experiment
     if proposed is None:
@@ -74,8 +86,8 @@ def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path) -> tuple[
         for step in proposed.steps
     ]
     comment = (
-        "Written by `rig diagnose`.",
+        f"Written by `rig {'settle' if attended else 'diagnose'}`.",
         proposed.why,
         f"probability that it decides rightly, as expected: {proposed.expected_power:.2f}",
     )
-    return write_campaign(levels, next_template(found, campaign), path, comment)
+    return write_campaign(levels, next_template(found, campaign, attended=attended), path, comment)

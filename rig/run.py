@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
@@ -19,6 +20,9 @@ from rig.headless import Headless, check_alive, operator_terminal
 from rig.link import Peer, connect
 from rig.messages import Request, Snapshot
 from rig.runs import Run, find_run, live_runs
+
+if TYPE_CHECKING:
+    from rig.config import CampaignConfig
 
 START_TIMEOUT = 15.0
 """s for a controller process to open its socket (imports included)."""
@@ -39,25 +43,34 @@ LOG_NAME = "controller.log"
 @click.option("--thruster", "thrusters", multiple=True, help="Only this thruster of the campaign; may be repeated.")
 def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: tuple[str, ...]) -> int:
     """Run CAMPAIGN on its bench: console, recording, table of the fits."""
+    config = require_runnable(campaign, thrusters, headless=headless)
+    if not headless and not sys.stdout.isatty():
+        raise RigError("rig run opens the console, which needs a terminal; use --headless where there is none")
+    front = progress_bar(start=True) if headless else console_screen()
+    return run_campaign(campaign, campaign_folder(output or config.output, config.name), thrusters, front)
+
+
+def require_runnable(campaign: Path, thrusters: tuple[str, ...], *, headless: bool) -> CampaignConfig:
+    """The campaign, checked as `rig check` does, and that somebody can mount the thrusters. Raises RigError."""
     from rig.check import check_campaign  # a second of scipy that `rig stop` does not need
 
-    report = check_campaign(campaign)
-    config = report.campaign
+    config = check_campaign(campaign).campaign
     unknown = [name for name in thrusters if name not in config.thrusters]
     if unknown:
         raise RigError(
             f"{campaign}: --thruster {unknown[0]} is not in the campaign; it has {', '.join(config.thrusters)}"
         )
-    if not headless and not sys.stdout.isatty():
-        raise RigError("rig run opens the console, which needs a terminal; use --headless where there is none")
     chosen = thrusters or config.thrusters
     if headless and not config.bench.mount.command and len(chosen) > 1 and not sys.stdin.isatty():
         raise RigError(
             f"{campaign}: {len(chosen)} thrusters, and nobody at this terminal to put the next one on the bench; "
             "give the bench a [mount] command or run one thruster at a time with --thruster"
         )
-    front = progress_bar(start=True) if headless else console_screen()
-    folder = campaign_folder(output or config.output, config.name)
+    return config
+
+
+def run_campaign(campaign: Path, folder: Path, thrusters: tuple[str, ...], front: FrontEnd) -> int:
+    """Start a controller in `folder` and attend it to its end; the exit status."""
     run, _process = start_controller(campaign, folder, thrusters)
     return follow(run, front)
 

@@ -108,7 +108,7 @@ def propose(state: State, data: Data, named: Sequence[Named], limits: Limits | N
 
 
 def _largest(data: Data, state: State, limits: Limits) -> float:
-    largest = limits.max_voltage if limits.max_voltage is not None else data.scale.driver
+    largest = data.scale.driver if limits.max_voltage is None else min(limits.max_voltage, data.scale.driver)
     C = abs(state.fit.theta.C)
     if limits.max_thrust is not None and C > 0:
         largest = min(largest, float(np.sqrt(limits.max_thrust / C)))

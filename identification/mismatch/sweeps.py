@@ -29,7 +29,7 @@ class Limits:
     """Of the bench. What is None is taken from the recordings: what was run once can be run again."""
 
     max_voltage: float | None = None
-    """Largest |command|, V; None: the largest that was recorded."""
+    """Largest |command|, V; nothing beyond the largest that was recorded is proposed either way."""
     budget: float = BUDGET
     """s of the whole sweep."""
     flow_speeds: tuple[float, ...] | None = None

@@ -1,0 +1,242 @@
+"""`rig settle FILE...`: run the next experiment and diagnose again until one answer stands or the time is spent."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import shlex
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rig.config import CampaignConfig
+from rig.design_ask import seconds
+from rig.diagnose import diagnose_files, recordings_in, tell
+from rig.errors import ConfigError, RigError
+from rig.loading import load_bench, load_campaign
+from rig.next_plan import limits_of, write_next
+from rig.plan import TareConfig
+from rig.plan_file import Level, Template, write_campaign
+from rig.run import campaign_folder, progress_bar, require_runnable, run_campaign
+
+if TYPE_CHECKING:
+    from identification.mismatch.diagnosis import Diagnosis
+    from identification.mismatch.settle import Course, End
+
+OPENING = 8.0
+"""s that a run takes beside its plan: ports, preflight, mounting, closing the file; seen on the simulated bench."""
+FLOW_PATIENCE = 300.0
+"""s that a command may take to bring the water to its speed."""
+
+SetFlow = Callable[[float], None]
+"""Brings the water to a speed in m/s. Raises RigError."""
+
+
+@dataclass
+class Settling:
+    """The bench as the loop sees it: it diagnoses what there is, and runs what it is told."""
+
+    campaign: CampaignConfig
+    folder: Path
+    files: list[Path]
+    budget: float
+    """s"""
+    seed: int = 0
+    set_flow: SetFlow | None = None
+    """None: nobody sets the flow, so still water is all that is proposed."""
+    say: Callable[[str], None] = click.echo
+    begun: float = field(default_factory=time.monotonic)
+    thinking: float = 0.0
+    """s of the longest diagnosis so far."""
+
+    def settle(self) -> tuple[Diagnosis, Course, End]:
+        """Until one answer stands. Raises RigError for input that cannot be used; an aborted run is an end."""
+        from identification.mismatch.settle import Course, End, belief, next_step, opening_line, round_line
+
+        found = self._diagnosed(0.0)
+        course = Course(self.budget, belief(found), self._spent())
+        self.say(opening_line(course))
+        while True:
+            plans = self._written(found, len(course.rounds) + 1)
+            step = next_step(course, self._needs(plans))
+            if isinstance(step, End):
+                return found, course, step
+            began = time.monotonic()
+            try:
+                self.files += self._run(plans)
+            except RigError as error:
+                return found, course, End("aborted", f"{course.now.says}; the run was aborted: {error}")
+            on_bench = time.monotonic() - began
+            found = self._diagnosed(self._spent())
+            course = course.after(on_bench, self._spent(), found)
+            self.say(round_line(course))
+
+    def _spent(self) -> float:
+        return time.monotonic() - self.begun
+
+    def _diagnosed(self, spent: float) -> Diagnosis:
+        from identification.mismatch.settle import allowance
+
+        began = time.monotonic()
+        room = allowance(self.budget - spent, fixed_cost(self.campaign) + self.thinking)
+        limits = limits_of(self.campaign, room, () if self.set_flow is None else None)
+        found = diagnose_files(self.files, seed=self.seed, limits=limits)
+        self.thinking = max(self.thinking, time.monotonic() - began)
+        return found
+
+    def _written(self, found: Diagnosis, number: int) -> tuple[Path, ...]:
+        """The plans of the next experiment: one for each flow speed, none when there is no experiment."""
+        if found.next_experiment is None:
+            return ()
+        if not found.baseline_model.endswith("V|V|"):
+            raise ConfigError(
+                f"{self.files[0]}: the recordings hold no command in V ({found.baseline_model}), so the rig cannot run "
+                "what they ask for; expected recordings with command_voltage"
+            )
+        return write_next(found, self.campaign, self.folder / f"round-{number}.toml", attended=True)
+
+    def _needs(self, plans: Sequence[Path]) -> float:
+        """S until the plans are run and diagnosed. Checks each as `rig check` does."""
+        from rig.check import check_campaign
+
+        return sum(check_campaign(plan).run.expected + OPENING for plan in plans) + self.thinking
+
+    def _run(self, plans: Sequence[Path]) -> list[Path]:
+        """The recordings of the plans, each run as `rig run --headless` runs it. Raises RigError when one is aborted.
+
+        What the run prints goes to standard error: standard output is the answer's.
+        """
+        made: list[Path] = []
+        for plan in plans:
+            config = require_runnable(plan, (), headless=True)
+            if config.flow_speed is not None and self.set_flow is not None:
+                self.set_flow(config.flow_speed)
+            folder = self.folder / plan.stem
+            folder.mkdir()
+            with contextlib.redirect_stdout(sys.stderr):
+                status = run_campaign(plan, folder, (), progress_bar(start=True))
+            if status:
+                raise RigError(f"{folder} holds what was recorded and why it ended")
+            made += sorted(folder.glob("*.h5"))
+        return made
+
+
+def fixed_cost(campaign: CampaignConfig) -> float:
+    """S of a run beside its sweep: opening, watchdog proof, both tares and the rest before the last."""
+    from rig.sequencer import settings_for
+
+    proof = settings_for(campaign, "").proof
+    return OPENING + 2 * campaign.tare.duration + campaign.plan.rest + (proof.expected if proof else 0.0)
+
+
+def bench_alone(bench: Path, thruster: str, folder: Path) -> CampaignConfig:
+    """A campaign of the bench with the tare and the pacing that are the defaults. Raises ConfigError."""
+    config = load_bench(bench)
+    template = Template("settle", bench, (thruster,), folder, config.slew, TareConfig(), notes="rig settle --bench")
+    (file,) = write_campaign([Level(0.0, 3.0)], template, folder / "bench-alone.toml", ("Bench and pacing only.",))
+    return load_campaign(file)
+
+
+def by_hand(speed: float) -> None:
+    """An operator sets the flow."""
+    click.prompt(f"set the flow to {speed:g} m/s, then press Enter", default="", show_default=False, err=True)
+
+
+def by_command(command: str) -> SetFlow:
+    """A command sets it; `{speed}` in it stands for m/s."""
+
+    def set_flow(speed: float) -> None:
+        words = [word.replace("{speed}", f"{speed:g}") for word in shlex.split(command)]
+        try:
+            done = subprocess.run(words, capture_output=True, text=True, timeout=FLOW_PATIENCE, check=False)
+        except (OSError, subprocess.TimeoutExpired) as error:
+            raise RigError(f"--flow: {words} could not set {speed:g} m/s: {error}") from error
+        if done.returncode:
+            said = (done.stderr or done.stdout).strip()[-500:]
+            raise RigError(f"--flow: {words} ended with status {done.returncode}: {said}")
+
+    return set_flow
+
+
+def _settling(
+    files: Sequence[Path], campaign: Path | None, bench: Path | None, output: Path | None, budget: str, seed: int
+) -> Settling:
+    """Everything known wrong is said here, before anything is computed or opened."""
+    from rig.hdf5 import load
+
+    if (campaign is None) == (bench is None):
+        raise ConfigError("give either --campaign FILE (bench, pacing and tare) or --bench FILE (the rest by default)")
+    time_left = seconds(budget, "--budget")
+    paths = recordings_in(files, "rig settle")
+    given = None if campaign is None else load_campaign(campaign)
+    if given is None and output is None:
+        raise ConfigError("--bench needs --output, the folder for the recordings: there is no campaign that names one")
+    thruster = load(paths[0]).thruster
+    where = output if output is not None or given is None else given.output
+    assert where is not None
+    folder = campaign_folder(where, f"settle {thruster}")
+    if given is None:
+        assert bench is not None
+        given = bench_alone(bench, thruster, folder)
+    return Settling(given, folder, paths, time_left, seed)
+
+
+PATH = click.Path(path_type=Path)
+
+
+@click.command("settle")
+@click.argument("files", nargs=-1, required=True, type=PATH)
+@click.option("--campaign", type=PATH, help="Campaign of the recordings: bench, pacing and tare of what is run.")
+@click.option("--bench", type=PATH, help="Bench alone, where there is no campaign; needs --output.")
+@click.option("--budget", default="20min", show_default=True, help="Time for everything, such as 600, 10min or 1h.")
+@click.option("--output", type=PATH, help="Folder for what is recorded (default: the campaign's).")
+@click.option(
+    "--json", "json_path", type=PATH, help="Write the last diagnosis and the way to it; - is standard output."
+)
+@click.option(
+    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
+)
+@click.option("--flow", "flow", metavar="COMMAND", help="Command that sets the water's speed; {speed} is m/s.")
+@click.option("--seed", default=0, show_default=True, help="Of the surrogates that the false-alarm rate is judged by.")
+def settle_command(
+    files: tuple[Path, ...],
+    campaign: Path | None,
+    bench: Path | None,
+    budget: str,
+    output: Path | None,
+    json_path: Path | None,
+    report: Path | None,
+    flow: str | None,
+    seed: int,
+) -> int:
+    """Diagnose recordings of one thruster; while two answers are equally good, run what separates them.
+
+    THE PROPELLER TURNS when a sweep is run, with the guards of `rig run --headless`. Exit status 0 for an honest
+    verdict, 1 when a run was aborted, 2 for input that cannot be used.
+    """
+    from identification.mismatch.diagnosis import diagnosis_json
+    from identification.mismatch.settle import course_json
+
+    alone = str(json_path) == "-"
+    settling = _settling(files, campaign, bench, output, budget, seed)
+    settling.set_flow = by_command(flow) if flow else by_hand if sys.stdin.isatty() else None
+    settling.say = lambda text: click.echo(text, err=alone)
+    found, course, end = settling.settle()
+    settling.say(f"{end.reason.replace('_', ' ')}: {end.says}")
+    settling.say(f"plans and recordings: {settling.folder}")
+    if json_path is not None:
+        answer = {**diagnosis_json(found), "settling": course_json(course, end)}
+        text = json.dumps(answer, indent=1, allow_nan=False)
+        if alone:
+            click.echo(text)
+        else:
+            json_path.write_text(text + "\n", encoding="utf-8")
+    with contextlib.redirect_stdout(sys.stderr) if alone else contextlib.nullcontext():
+        tell(found, None, report, None, settling.files)
+    return 1 if end.reason == "aborted" else 0
