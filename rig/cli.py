@@ -37,6 +37,7 @@ COMMANDS: Final = {
     "settle": Entry("rig.settle:settle_command", "Run the next experiment and diagnose again until one answer stands."),
     "simulate": Entry("rig.simulate:simulate_command", "The run of a plan that a twin predicts, as a recording."),
     "compare": Entry("rig.compare:compare_command", "What a simulation leaves out relative to the real run."),
+    "prove": Entry("rig.prove:prove_command", "Prove the diagnosis on recordings with concealed physics."),
     "vehicle": Entry(
         "rig.vehicle:vehicle_command", "Identify drag, efficiency and inertia of a vehicle from its trials."
     ),

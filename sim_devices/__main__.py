@@ -9,12 +9,13 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FrameType
-from typing import NoReturn
+from typing import NoReturn, TextIO
 
 import click
 import numpy as np
 
 from sim_devices.bench import Bench, start
+from sim_devices.concealed.sealing import KINDS, conceal
 from sim_devices.ports import ask
 from sim_devices.process import running
 from sim_devices.settings import load
@@ -117,6 +118,29 @@ def vehicle(settings: Path, out: Path, seed: int | None) -> None:
                 status = status or rig(["import", str(log), "--output", str(out / group / f"{name}.h5")])
     (out / "truth.json").write_text(json.dumps(truth(hull), indent=1) + "\n", encoding="utf-8")
     raise SystemExit(status)
+
+
+@main.command("concealable")
+def concealable() -> None:
+    """What `conceal` can be asked for, as JSON: effects, their forms, lies about channels, kinds of noise."""
+    click.echo(json.dumps(KINDS, indent=1))
+
+
+@main.command("conceal")
+@click.argument("spec", type=click.File(encoding="utf-8"))
+@click.argument("out", type=FILE)
+def conceal_cases(spec: TextIO, out: Path) -> None:
+    """Recordings in which effects are concealed, and apart from them the sealed truth, into folder OUT.
+
+    SPEC holds one JSON object a line, - is standard input; the token of each is printed when its case is complete.
+    """
+    try:
+        for line in filter(str.strip, iter(spec.readline, "")):
+            asked = json.loads(line)
+            conceal(asked, out)
+            click.echo(asked["token"])
+    except (WorldError, ValueError) as error:
+        fail(str(error))
 
 
 @main.command("compare")

@@ -98,7 +98,9 @@ def _bare(
     made, start, smooth = [], 0.0, bool(named & NEEDS_SLEW)
     for _ in range(runs):
         flow = (
-            _flow(rng, scale.flow, long, reversed_too=bool(named & NEEDS_REVERSED_FLOW)) if with_flow else ((0.0, 0.0),)
+            flow_steps(rng, scale.flow, long, reversed_too=bool(named & NEEDS_REVERSED_FLOW))
+            if with_flow
+            else ((0.0, 0.0),)
         )
         tare = full * float(rng.uniform(-0.02, 0.02))
         made.append(
@@ -158,7 +160,7 @@ def _thruster(rng: Rng, s: Scale) -> Thruster:
     )
 
 
-def _flow(rng: Rng, top: float, duration: float, *, reversed_too: bool) -> tuple[tuple[float, float], ...]:
+def flow_steps(rng: Rng, top: float, duration: float, *, reversed_too: bool) -> tuple[tuple[float, float], ...]:
     """Steps of the tunnel, begun at rest; about one in three back at rest."""
     times = np.sort(rng.uniform(0.0, duration, int(rng.integers(5, 12))))
     low = -top if reversed_too else 0.0

@@ -1,0 +1,160 @@
+"""What the proof asks: jobs (one case of the world each) with orders (one diagnosis each), cells interleaved. Pure.
+
+>>> world = Kinds(("dead_band", "fouling"), {"dead_band": ("shrink", "jump")}, ("swapped",), ("white",))
+>>> [job.id for job in design(world, frozenset({"dead_band", "heating"}), 1) if "plain" in job.id or "other" in job.id]
+['plain/dead_band/0', 'outside/fouling/0']
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from hashlib import sha256
+from itertools import chain
+from typing import Any, Final
+
+import numpy as np
+
+STRENGTHS: Final = {"faint": 8.0, "clear": 15.0, "plain": 40.0}
+"""d': the sigma at which an oracle sees the effect that knows it, its shape and the noise."""
+ORACLE: Final = 2.326348
+"""d' that an oracle which knows the effect sees in half the runs at a false-alarm rate of 1 % (one-sided)."""
+WITHIN: Final = 1.5
+"""Times the oracle's: the faintest strength at which an effect is to be named in half the runs."""
+LADDER: Final = {"power_2.3": ORACLE, "power_3.5": WITHIN * ORACLE, "power_5": 5.0}
+"""d' of the cells below faint, for that strength."""
+PAIR_STRENGTH: Final = 20.0
+PAIRS_PER_SEED = 10
+CLEAN_PER_SEED = 50
+"""Clean runs of all kinds of noise together: 20 seeds are 1,000 runs."""
+
+NOT_REMOVABLE: Final = frozenset({"periodic_disturbance"})
+"""Found by a search for lines, which is no term of the catalogue."""
+
+
+@dataclass(frozen=True, slots=True)
+class Kinds:
+    """What the world can conceal: `python -m sim_devices concealable`."""
+
+    effects: tuple[str, ...]
+    forms: Mapping[str, tuple[str, ...]]
+    lies: tuple[str, ...]
+    noise: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """One diagnosis of a case, with effects taken out of the catalogue."""
+
+    id: str
+    """cell/label/number"""
+    without: tuple[str, ...] = ()
+
+    @property
+    def cell(self) -> str:
+        return self.id.split("/")[0]
+
+    @property
+    def label(self) -> str:
+        return self.id.split("/")[1]
+
+    @property
+    def tag(self) -> str:
+        """For file names; tells nothing of what was concealed when nothing was taken out."""
+        return "-".join(("without", *self.without)) if self.without else "whole"
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """One case and what is asked of it. `id` decides the seed, so a case is the same in every proof."""
+
+    id: str
+    spec: Mapping[str, Any]
+    """What is not left to chance, as `sim_devices conceal` reads it."""
+    orders: tuple[Order, ...]
+
+    @property
+    def token(self) -> str:
+        return sha256(self.id.encode()).hexdigest()[:16]
+
+    @property
+    def seed(self) -> list[int]:
+        digest = sha256(f"seed of {self.id}".encode()).digest()
+        return [int.from_bytes(digest[i : i + 4], "big") for i in range(0, 16, 4)]
+
+    def asked(self) -> dict[str, Any]:
+        """The line that the world reads."""
+        return {"token": self.token, "seed": self.seed, **self.spec}
+
+
+def design(world: Kinds, catalogue: Collection[str], seeds: int, only: Sequence[str] = ()) -> list[Job]:
+    """All jobs, so ordered that a proof that is broken off has all cells evenly.
+
+    `catalogue`: ids that the diagnosis can name; `seeds` per cell; `only`: patterns of cell/label (`plain/*`), some of
+    the orders.
+    """
+    rows = chain(_alone(world, catalogue, seeds), _open(world, catalogue, seeds), _others(world, catalogue, seeds))
+    found = []
+    for place, job in rows:
+        orders = tuple(order for order in job.orders if matches(order.id, only))
+        if orders:
+            found.append((place, job.id, Job(job.id, job.spec, orders)))
+    return [job for _, _, job in sorted(found, key=lambda row: row[:2])]
+
+
+def matches(order: str, only: Sequence[str]) -> bool:
+    """Whether an order's id is asked for.
+
+    >>> matches("plain/heating/3", ["plain"]), matches("plain/heating/3", ["*/dead_band"]), matches("clean/white/0", [])
+    (True, False, True)
+    """
+    return not only or any(fnmatchcase(order, p) or fnmatchcase(order, f"{p.rstrip('/')}/*") for p in only)
+
+
+def _many(cell: str, label: str, count: int, spec: Mapping[str, Any]) -> Iterator[tuple[float, Job]]:
+    """`count` jobs with their places in the order: evenly over 0..1, each cell with a start of its own."""
+    first = int(sha256(f"{cell}/{label}".encode()).hexdigest()[:8], 16) / 16**8
+    for number in range(count):
+        name = f"{cell}/{label}/{number}"
+        yield (number + first) / count, Job(name, spec, (Order(name),))
+
+
+def _alone(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tuple[float, Job]]:
+    """One effect of the catalogue, at each strength; at plain strength once more with it taken out."""
+    known = [effect for effect in world.effects if effect in catalogue]
+    for cell, strength in {**LADDER, **STRENGTHS}.items():
+        for effect in known:
+            spec: dict[str, Any] = {"effects": [effect], "strength": strength}
+            if cell == "plain":
+                spec["rivals"] = [other for other in known if other != effect]
+            for place, job in _many(cell, effect, seeds, spec):
+                orders = job.orders
+                if cell == "plain" and effect not in NOT_REMOVABLE:
+                    orders += (Order(f"removed/{job.id.split('/', 1)[1]}", (effect,)),)
+                yield place, Job(job.id, spec, orders)
+    for lie in world.lies:
+        yield from _many("fault", lie, seeds, {"lie": lie})
+
+
+def _open(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tuple[float, Job]]:
+    """Effects outside the catalogue."""
+    rivals = [effect for effect in world.effects if effect in catalogue]
+    for effect in world.effects:
+        if effect not in catalogue:
+            spec = {"effects": [effect], "strength": STRENGTHS["plain"], "rivals": rivals}
+            yield from _many("outside", effect, seeds, spec)
+
+
+def _others(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tuple[float, Job]]:
+    """Pairs, textbook forms, clean recordings."""
+    known = [effect for effect in world.effects if effect in catalogue]
+    for effect, forms in world.forms.items():
+        for form in forms if effect in catalogue else ():
+            spec = {"effects": [effect], "strength": STRENGTHS["plain"], "forms": [form]}
+            yield from _many("form", f"{effect}:{form}", seeds, spec)
+    for place, job in _many("pair", "any", PAIRS_PER_SEED * seeds if len(known) > 1 else 0, {}):
+        two = np.random.default_rng(job.seed).choice(known, 2, replace=False).tolist()
+        yield place, Job(job.id, {"effects": two, "strength": PAIR_STRENGTH}, job.orders)
+    for kind in world.noise:
+        yield from _many("clean", kind, -(-CLEAN_PER_SEED * seeds // len(world.noise)), {"noise": kind})

@@ -1,0 +1,255 @@
+"""From scores to the figures of the proof, beside their goals. Pure; `tables` is what the JSON holds."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterable, Sequence
+from typing import Any, Final
+
+import numpy as np
+
+from rig.blind.design import LADDER, ORACLE, PAIR_STRENGTH, STRENGTHS, WITHIN
+from rig.blind.rates import Goal, Rate, of_rate, rate
+from rig.blind.scoring import OPEN_CELLS, TELLABLE, Score
+
+LARGE: Final = 9.9
+
+
+def cell(scores: Iterable[Score], *names: str) -> list[Score]:
+    return [s for s in scores if s.order.cell in names]
+
+
+def goals(scores: Sequence[Score]) -> list[Goal]:
+    """The goals of the proof, in its order."""
+    alone, counted = cell(scores, *STRENGTHS), [s for s in cell(scores, *OPEN_CELLS) if s.counted]
+    clean = cell(scores, "clear"), cell(scores, "plain")
+    found = [
+        of_rate("faint: right or among stated rivals", rate(s.right for s in cell(scores, "faint")), least=0.92),
+        of_rate("clear: right or among stated rivals", rate(s.right for s in clean[0]), least=0.97),
+        of_rate("clear: right alone", rate(s.alone for s in clean[0]), least=0.90),
+        of_rate("plain: right or among stated rivals", rate(s.right for s in clean[1]), least=0.99),
+        of_rate("plain: right alone", rate(s.alone for s in clean[1]), least=0.95),
+        of_rate("wrong names, one effect", rate(s.wrong for s in alone), most=0.01),
+        of_rate(f"pairs at {PAIR_STRENGTH:g}: both right", rate(s.right for s in cell(scores, "pair")), least=0.92),
+        of_rate("textbook forms at plain: right", rate(s.right for s in cell(scores, "form")), least=0.90),
+        of_rate("open world: unexplained, right place", rate(s.outcome == "located" for s in counted), least=0.90),
+        of_rate("open world: a wrong name instead", rate(s.outcome == "wrong name" for s in counted), most=0.05),
+    ]
+    return [*found, *_alarms(scores), *_errors(scores), *_coverage(scores), *_power(scores)]
+
+
+def _alarms(scores: Sequence[Score]) -> list[Goal]:
+    clean = cell(scores, "clean")
+    kinds = dict.fromkeys(s.order.label for s in clean)
+    return [
+        of_rate("false alarms, clean recordings", rate(not s.right for s in clean), 0.003, 0.02),
+        *(
+            of_rate(f"false alarms, {kind} noise", rate(not s.right for s in clean if s.order.label == kind), most=0.03)
+            for kind in kinds
+        ),
+    ]
+
+
+def ratios(scores: Iterable[Score], of: Callable[[Any], float]) -> np.ndarray[Any, np.dtype[np.float64]]:
+    """Held-out figures of the runs with one effect or two, by the whole catalogue."""
+    kept = (s for s in cell(scores, *STRENGTHS, "pair", "form") if s.held_out is not None)
+    return np.array([of(s.held_out) for s in kept])
+
+
+def _errors(scores: Sequence[Score]) -> list[Goal]:
+    model = ratios(scores, lambda h: h.model)
+    found = []
+    for what, share, most in (("median", 0.5, 1.05), ("95 % of runs", 0.95, 1.3)):
+        value = float(np.quantile(model, share)) if model.size else float("nan")
+        name = f"held-out error over that of the true model, {what}"
+        found.append(Goal(name, 0.0, most, value, value, value, model.size, percent=False))
+    return found
+
+
+def _coverage(scores: Sequence[Score]) -> list[Goal]:
+    covers = rate(i.covers for s in cell(scores, *STRENGTHS) for i in s.intervals)
+    return [of_rate("coverage of the 95 % intervals of effects' parameters", covers, 0.93, 0.97)]
+
+
+def _power(scores: Sequence[Score]) -> list[Goal]:
+    found = [d for _, d in half_named(scores)]
+    within = rate(d <= WITHIN * ORACLE for d in found)
+    return [of_rate(f"effects named in half the runs at {WITHIN:g} times the oracle's strength", within, least=1.0)]
+
+
+def named_by_strength(scores: Iterable[Score]) -> dict[str, dict[float, Rate]]:
+    """Effect -> strength -> rate of runs in which it is among findings and rivals."""
+    strengths = {**LADDER, **STRENGTHS}
+    found: dict[str, dict[float, list[bool]]] = {}
+    for s in cell(scores, *strengths):
+        found.setdefault(s.order.label, {}).setdefault(strengths[s.order.cell], []).append(s.right)
+    return {e: {d: rate(by[d]) for d in sorted(by)} for e, by in sorted(found.items())}
+
+
+def half_named(scores: Iterable[Score]) -> list[tuple[str, float]]:
+    """Effects whose fainter strengths were tried, and the d' that is named in half the runs."""
+    return [
+        (effect, half({d: r.value for d, r in by.items()}))
+        for effect, by in named_by_strength(scores).items()
+        if min(by) <= WITHIN * ORACLE
+    ]
+
+
+def half(rates: dict[float, float]) -> float:
+    """Where a rate that does not fall crosses one half: a straight line over log d' between two strengths.
+
+    The lowest strength where it is above half from the start, infinite where it never gets there.
+
+    >>> half({2.0: 0.0, 8.0: 1.0}), half({3.5: 0.9}), half({8.0: 0.2})
+    (4.0, 3.5, inf)
+    """
+    strengths = sorted(rates)
+    level = np.maximum.accumulate([rates[d] for d in strengths])
+    above = np.flatnonzero(level >= 0.5)
+    if not above.size:
+        return float("inf")
+    i = int(above[0])
+    if i == 0:
+        return strengths[0]
+    share = (0.5 - level[i - 1]) / (level[i] - level[i - 1])
+    low, high = np.log(strengths[i - 1]), np.log(strengths[i])
+    return round(float(np.exp(low + share * (high - low))), 6)
+
+
+def confusion(scores: Iterable[Score], *names: str) -> dict[str, dict[str, int]]:
+    """Truth -> answer -> count."""
+    found: dict[str, Counter[str]] = {}
+    for s in cell(scores, *names):
+        found.setdefault(s.order.label, Counter())[s.answer] += 1
+    return {truth: dict(found[truth].most_common()) for truth in sorted(found)}
+
+
+def worst(scores: Iterable[Score], most: int = 60) -> list[dict[str, Any]]:
+    """Cells with the most failures first: what was said in each."""
+    by: dict[tuple[str, str], list[Score]] = {}
+    for s in scores:
+        by.setdefault((s.order.cell, s.order.label), []).append(s)
+    rows = []
+    for (name, label), group in by.items():
+        bad = [s for s in group if not s.good]
+        if bad:
+            told = [said(s) for s in bad]
+            rows.append({"cell": name, "label": label, "n": len(group), "failures": len(bad), "said": told})
+    return sorted(rows, key=lambda row: (-row["failures"], row["cell"], row["label"]))[:most]
+
+
+def said(s: Score) -> dict[str, Any]:
+    """One case in short."""
+    return {
+        "id": s.order.id,
+        "truth": list(s.truth),
+        "verdict": s.said,
+        "named": list(s.named),
+        "rivals": list(s.rivals),
+        "place": s.place,
+        "resembles": list(s.resembles),
+        "nearest": None if s.near is None else [s.near.rival, round(s.near.left, 1)],
+        "noise": s.noise,
+        "statement": s.statement,
+        "seconds": round(s.seconds, 1),
+    }
+
+
+def twins(scores: Iterable[Score]) -> list[dict[str, Any]]:
+    """Effects that nobody can tell from a neighbour in some recordings; what the whole catalogue says of the same.
+
+    `rivals_stated`: of the same recordings diagnosed by the whole catalogue, in how many is the neighbour beside the
+    effect, as finding or rival.
+    """
+    every = list(scores)
+    whole = {s.order.id.split("/", 1)[1]: s for s in cell(every, "plain")}
+    groups: dict[tuple[str, str], list[Score]] = {}
+    for s in cell(every, *OPEN_CELLS):
+        if s.near is not None and not s.counted:
+            groups.setdefault((s.order.label, s.near.rival), []).append(s)
+    rows = []
+    for (effect, rival), group in sorted(groups.items()):
+        pairs = [(s, whole.get(s.order.id.split("/", 1)[1])) for s in group]
+        stated = [rival in {*w.named, *w.rivals} for s, w in pairs if w is not None and s.order.cell == "removed"]
+        left = sorted(s.near.left for s in group if s.near is not None)
+        rows.append(
+            {
+                "effect": effect,
+                "twin": rival,
+                "runs": len(group),
+                "left": [round(left[0], 1), round(left[-1], 1)],
+                "rivals_stated": rate(stated).json(),
+                "said_instead": dict(Counter(n for s in group for n in (s.named or (s.said,))).most_common()),
+            }
+        )
+    return rows
+
+
+def open_world(scores: Iterable[Score]) -> list[dict[str, Any]]:
+    """Each effect outside the catalogue: what was said instead, where it can be told from its neighbours."""
+    groups: dict[tuple[str, str], list[Score]] = {}
+    for s in cell(scores, *OPEN_CELLS):
+        groups.setdefault((s.order.cell, s.order.label), []).append(s)
+    rows = []
+    for (name, effect), group in sorted(groups.items()):
+        counted = [s for s in group if s.counted]
+        rows.append(
+            {
+                "cell": name,
+                "effect": effect,
+                "runs": len(group),
+                "counted": len(counted),
+                "outcomes": dict(Counter(s.outcome for s in counted)),
+                "names": dict(Counter(n for s in counted if s.outcome == "wrong name" for n in s.named).most_common()),
+                "places": dict(Counter(s.place for s in counted if s.place).most_common()),
+            }
+        )
+    return rows
+
+
+def coverage(scores: Iterable[Score]) -> list[dict[str, Any]]:
+    """Parameter by parameter."""
+    found: dict[tuple[str, str], list[Any]] = {}
+    for s in cell(scores, *STRENGTHS):
+        for i in s.intervals:
+            found.setdefault((i.effect, i.parameter), []).append(i)
+    return [
+        {
+            "effect": effect,
+            "parameter": name,
+            **rate(i.covers for i in group).json(),
+            "median_z": float(np.clip(np.median([i.z for i in group]), -LARGE, LARGE)),
+        }
+        for (effect, name), group in sorted(found.items())
+    ]
+
+
+def tables(scores: Sequence[Score], seeds: int, versions: Sequence[str], undrawn: Sequence[str]) -> dict[str, Any]:
+    """All of it, for `--json`."""
+    quantiles = (0.05, 0.5, 0.95)
+    held = {name: ratios(scores, lambda h, name=name: getattr(h, name)) for name in ("model", "baseline", "left")}
+    seconds = np.array([s.seconds for s in scores]) if scores else np.zeros(1)
+    return {
+        "format": "thruster-rig-proof",
+        "version": 1,
+        "seeds": seeds,
+        "answers": len(scores),
+        "failed": [said(s) for s in scores if s.failed],
+        "diagnosis_versions": list(versions),
+        "not_drawn": list(undrawn),
+        "tellable": TELLABLE,
+        "goals": [
+            {"what": g.what, "goal": g.wanted, "value": g.value if g.n else None, "n": g.n, "met": g.met}
+            | ({"low": g.low, "high": g.high} if g.percent else {})
+            for g in goals(scores)
+        ],
+        "confusion": {name: confusion(scores, name) for name in (*STRENGTHS, "form", "fault", "clean")},
+        "power": {e: {str(d): r.json() for d, r in by.items()} for e, by in named_by_strength(scores).items()},
+        "half_named": {e: d if np.isfinite(d) else None for e, d in half_named(scores)},
+        "open_world": open_world(scores),
+        "twins": twins(scores),
+        "coverage": coverage(scores),
+        "held_out": {name: {str(q): float(np.quantile(v, q)) for q in quantiles} for name, v in held.items() if v.size},
+        "seconds": {str(q): float(np.quantile(seconds, q)) for q in (0.5, 0.95, 1.0)},
+        "worst": worst(scores),
+    }

@@ -1,0 +1,201 @@
+"""One answer beside its truth. Pure: tables as they are in the files, arrays of the other run.
+
+    right      each concealed effect is among the findings or their stated rivals; of a clean run: `adequate`
+    alone      the findings are exactly what was concealed and the verdict is `explained`
+    wrong      something is named, and of what was concealed nothing is among findings and rivals
+
+Where the physics is outside the catalogue, or was taken out of it, the outcome counts: `located` (unexplained, in the
+right place), `misplaced` (unexplained, elsewhere), `wrong name` (findings without `unexplained`), `missed` (adequate).
+A diagnosis that crashed, refused or ran out of time has failed: it is never right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from identification.recording import Floats
+from rig.blind.design import Order
+from rig.blind.meaning import true_values
+from rig.blind.places import PLACES
+
+Table = Mapping[str, Any]
+
+OPEN_CELLS: Final = ("outside", "removed")
+TELLABLE: Final = 8.0
+"""sigma that the best neighbour must leave to an oracle; below, nobody can tell it from that recording."""
+COVERED: Final = 1.959964
+"""Standard errors of a 95 % interval."""
+
+
+@dataclass(frozen=True, slots=True)
+class Near:
+    """The nearest neighbour in the catalogue, and the sigma that it leaves of the effect."""
+
+    rival: str
+    left: float
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    """Errors in another run, one constant fitted to each."""
+
+    model: float
+    """RMS of measured less predicted, over that of the true model."""
+    baseline: float
+    """The same of the baseline."""
+    left: float
+    """RMS of the model's own error over that of the baseline's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A parameter that means the same in the world and in the catalogue."""
+
+    effect: str
+    parameter: str
+    z: float
+    """(estimate - truth) / stated standard error; infinite where none is stated."""
+
+    @property
+    def covers(self) -> bool:
+        return abs(self.z) <= COVERED
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What one order came to."""
+
+    order: Order
+    truth: tuple[str, ...]
+    said: str
+    """The verdict, or what went wrong."""
+    named: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()
+    place: str = ""
+    resembles: tuple[str, ...] = ()
+    statement: str = ""
+    failed: bool = False
+    near: Near | None = None
+    held_out: HeldOut | None = None
+    intervals: tuple[Interval, ...] = ()
+    seconds: float = 0.0
+    noise: str = ""
+
+    @property
+    def right(self) -> bool:
+        if self.failed:
+            return False
+        return set(self.truth) <= {*self.named, *self.rivals} if self.truth else self.said == "adequate"
+
+    @property
+    def alone(self) -> bool:
+        wanted = "explained" if self.truth else "adequate"
+        return not self.failed and self.said == wanted and set(self.named) == set(self.truth)
+
+    @property
+    def wrong(self) -> bool:
+        return bool(self.named) and not set(self.truth) & {*self.named, *self.rivals}
+
+    @property
+    def counted(self) -> bool:
+        """In the open world: whether this effect can be told from its nearest neighbour at all."""
+        return self.near is None or self.near.left >= TELLABLE
+
+    @property
+    def outcome(self) -> str:
+        """Of the open world."""
+        if self.failed:
+            return "failed"
+        if self.said == "unexplained":
+            return "located" if self.place in PLACES[self.truth[0]] else "misplaced"
+        return "wrong name" if self.named else "missed"
+
+    @property
+    def good(self) -> bool:
+        """As it should be, by the measure of its cell."""
+        if self.order.cell in OPEN_CELLS:
+            return self.outcome == "located" or not self.counted
+        return self.right
+
+    @property
+    def answer(self) -> str:
+        """One word for a confusion matrix."""
+        if self.failed:
+            return "failed"
+        if self.right and self.truth:
+            return self.truth[0]
+        return self.said if self.said == "unexplained" or not self.named else self.named[0]
+
+
+def scored(
+    order: Order,
+    truth: Table,
+    answer: Table,
+    thrust: tuple[Floats, Floats] | None = None,
+    predicted: Mapping[str, Floats] | None = None,
+) -> Score:
+    """`thrust`: true and measured of the other run, `predicted`: by model and baseline; None where there is none."""
+    hidden = concealed(truth)
+    if answer["error"]:
+        return Score(
+            order, hidden, answer["error"], failed=True, seconds=answer["seconds"], noise=str(truth["noise_kind"])
+        )
+    found = answer["diagnosis"]
+    findings, unexplained = found["findings"], found["unexplained"]
+    twins = truth.get("twins") or [None]
+    return Score(
+        order=order,
+        truth=hidden,
+        said=found["verdict"],
+        named=tuple(dict.fromkeys(f["effect"] for f in findings)),
+        rivals=tuple(dict.fromkeys(r for f in findings for r in f["rivals"])),
+        place=unexplained["where"]["quantity"] if unexplained else "",
+        resembles=tuple(unexplained["resembles"]) if unexplained else (),
+        statement=found["statement"],
+        near=Near(twins[0]["rival"], twins[0]["left"]) if twins[0] else None,
+        held_out=held_out(*thrust, predicted) if thrust and predicted else None,
+        intervals=intervals(findings, truth) if len(hidden) == 1 else (),
+        seconds=answer["seconds"],
+        noise=truth["noise_kind"],
+    )
+
+
+def concealed(truth: Table) -> tuple[str, ...]:
+    """Ids of what is hidden in a case."""
+    lie = ("channel_fault",) if truth["fault"] else ()
+    return (*(effect["effect"] for effect in truth["effects"]), *lie)
+
+
+def held_out(true: Floats, measured: Floats, predicted: Mapping[str, Floats]) -> HeldOut:
+    """Errors of the model and of the baseline, `model` and `baseline` (n,) N, in the other run.
+
+    >>> t = np.array([0.0, 1.0, 0.0, 1.0])
+    >>> held_out(t, t + [0.1, 0.1, -0.1, -0.1], {"model": t + 5.0, "baseline": 0.0 * t})
+    HeldOut(model=1.0, baseline=5.099019513592785, left=0.0)
+    """
+    noise = float(np.std(measured - true))
+    model, baseline = (predicted[name] for name in ("model", "baseline"))
+    own = float(np.std(baseline - true))
+    return HeldOut(
+        float(np.std(measured - model)) / noise,
+        float(np.std(measured - baseline)) / noise,
+        float(np.std(model - true)) / own if own > 0.0 else 0.0,
+    )
+
+
+def intervals(findings: list[Table], truth: Table) -> tuple[Interval, ...]:
+    """Of the right findings' parameters that mean the same on both sides."""
+    found = []
+    for finding in findings:
+        for name, value in true_values(finding["effect"], finding["form"], truth).items():
+            told = finding["parameters"].get(name)
+            if told is not None and told["value"] is not None:
+                std = told["std"] or 0.0
+                found.append(
+                    Interval(finding["effect"], name, (told["value"] - value) / std if std > 0.0 else float("inf"))
+                )
+    return tuple(found)

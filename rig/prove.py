@@ -1,0 +1,201 @@
+"""`rig prove`: the blind proof of the diagnosis, end to end."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from rig.blind.collecting import Collected
+    from rig.blind.design import Job
+    from rig.blind.store import Store
+
+STORE = Path("build/prove")
+EVERY = 25
+"""Jobs between two lines of a log file."""
+
+
+def designed(seeds: int, only: Sequence[str]) -> list[Job]:
+    """The jobs of a proof of everything that the world conceals. Raises ProofError when nothing is asked."""
+    from identification.physics.catalogue import CATALOGUE
+    from rig.blind.design import NOT_REMOVABLE, design
+    from rig.blind.lanes import concealable
+    from rig.blind.store import ProofError
+
+    jobs = design(concealable(), {term.id for term in CATALOGUE} | NOT_REMOVABLE, seeds, only)
+    if not jobs:
+        raise ProofError(
+            f"no case is called {', '.join(only)}; expected cell/effect, as plain/heating, clean, removed/*"
+        )
+    return jobs
+
+
+def run(store: Store, jobs: Sequence[Job], lanes: int, limit: float, *, renew: bool, keep: bool) -> None:
+    """Do what is not done yet. Raises ProofError."""
+    from rig.blind.lanes import Lane, carry_out
+    from rig.blind.store import version_of_diagnosis
+
+    code = version_of_diagnosis()
+    pending = [job for job in jobs if store.pending(job, code if renew else "")]
+    if not pending:
+        return
+    working = [Lane(store, str(i), limit, code, keep) for i in range(min(lanes, len(pending)))]
+    with shown(len(pending)) as told:
+        carry_out(pending, working, renew, told)
+
+
+@contextmanager
+def shown(count: int) -> Iterator[Callable[[Job], None]]:
+    """A progress bar on a terminal, a line now and then elsewhere."""
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    console = Console(stderr=True)
+    done = 0
+
+    def tell(job: Job) -> None:
+        nonlocal done
+        done += 1
+        if console.is_terminal:
+            bar.update(task, advance=1, description=job.id)
+        elif done % EVERY == 0 or done == count:
+            click.echo(f"{done} of {count} cases", err=True)
+
+    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+        task = bar.add_task("the world wakes", total=count)
+        yield tell
+
+
+def summary(found: Collected) -> str:
+    """The goals, as a person reads them in a terminal."""
+    from rig.blind.figures import goals
+
+    sign = {"yes": "ok    ", "no": "MISSED", "open": "open  "}
+    rows = [
+        f"{sign[g.met]}  {g.what}: {g.measured}"
+        + (f" ({g.interval})" if g.interval else "")
+        + f", n = {g.n}, goal {g.wanted}"
+        for g in goals(found.scores)
+    ]
+    failed = sum(s.failed for s in found.scores)
+    tail = f"{len(found.scores)} answers, {failed} of them crashed, refused or overdue; {found.missing} still to come"
+    return "\n".join([*rows, f"{tail}; {len(found.undrawn)} cases could not be drawn"])
+
+
+def one_case(name: str, limit: float, *, verbose: bool) -> str:
+    """Make and answer one order anew, and tell truth and answer. Raises ProofError."""
+    from rig.blind.collecting import collected
+    from rig.blind.store import Store
+
+    store = Store(STORE.with_name("prove-case"))
+    number = name.rsplit("/", 1)[-1]
+    jobs = designed(int(number) + 1 if number.isdigit() else 1, [name])
+    for job in jobs:
+        for order in job.orders:
+            (store.answers / job.token / f"{order.tag}.json").unlink(missing_ok=True)
+    run(store, jobs, 1, limit, renew=True, keep=True)
+    return "\n\n".join(_told(store, job, verbose=verbose) for job in jobs) or str(collected(store, jobs))
+
+
+def _told(store: Store, job: Job, *, verbose: bool) -> str:
+    from rig.blind.collecting import collected
+    from rig.blind.figures import said
+
+    truth = store.truth(job)
+    assert truth is not None
+    if truth["error"]:
+        return f"{job.id}: {truth['error']}"
+    rows = [job.id, f"recordings: {store.opened / job.token} (rig.blind.reading.recordings reads them)"]
+    short = {name: truth[name] for name in ("effects", "fault", "noise_kind", "plan", "rate", "channels")}
+    rows.append(f"truth: {json.dumps(truth if verbose else short)}")
+    for order, score in zip(job.orders, collected(store, [job]).scores, strict=True):
+        verdict = f"right: {score.right}, alone: {score.alone}, wrong: {score.wrong}, outcome: {score.outcome}"
+        rows += [f"{order.id}: {json.dumps(said(score))}", verdict]
+        answer = store.answer(job, order)
+        if verbose or score.failed:
+            rows.append(json.dumps(answer, indent=1))
+    return "\n".join(rows)
+
+
+@click.command("prove")
+@click.option("--seeds", type=click.IntRange(min=1), default=20, show_default=True, help="Cases of each cell.")
+@click.option(
+    "--only", multiple=True, metavar="CELL/EFFECT", help="Only these cells, as plain/heating, removed, */dead_band."
+)
+@click.option("--jobs", "lanes", type=click.IntRange(min=1), help="Cases at a time.  [default: one per core]")
+@click.option(
+    "--store",
+    type=click.Path(file_okay=False, path_type=Path),
+    default=STORE,
+    show_default=True,
+    help="Folder of truths and answers; a proof that was broken off goes on there.",
+)
+@click.option(
+    "--limit",
+    type=float,
+    default=300.0,
+    show_default=True,
+    metavar="S",
+    help="Longest diagnosis; a longer one has failed.",
+)
+@click.option("--renew", is_flag=True, help="Answer again what another version of the diagnosis answered.")
+@click.option("--keep", is_flag=True, help="Keep the recordings (some 5 MB each).")
+@click.option("--no-run", is_flag=True, help="Only tell what is in the store.")
+@click.option("--case", metavar="CELL/EFFECT/NUMBER", help="Make and answer this one case, print truth and answer.")
+@click.option("--verbose", is_flag=True, help="With --case: everything.")
+@click.option(
+    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
+)
+@click.option("--json", "json_path", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
+def prove_command(
+    seeds: int,
+    only: tuple[str, ...],
+    lanes: int | None,
+    store: Path,
+    limit: float,
+    renew: bool,
+    keep: bool,
+    no_run: bool,
+    case: str | None,
+    verbose: bool,
+    report: Path | None,
+    json_path: Path | None,
+) -> None:
+    """Prove the diagnosis on recordings in which the simulated world concealed physics.
+
+    Exit status 0 whatever the figures are, 2 when the proof cannot be run.
+    """
+    from rig.blind.collecting import collected
+    from rig.blind.figures import tables
+    from rig.blind.store import Store
+
+    try:
+        if case is not None:
+            click.echo(one_case(case, limit, verbose=verbose))
+            return
+        kept, jobs = Store(store), designed(seeds, only)
+        if not no_run:
+            run(kept, jobs, lanes or os.cpu_count() or 1, limit, renew=renew, keep=keep)
+        found = collected(kept, jobs)
+        click.echo(summary(found))
+        figures = tables(found.scores, seeds, found.versions, found.undrawn)
+        if json_path is not None:
+            json_path.parent.mkdir(parents=True, exist_ok=True)
+            json_path.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+        if report is not None:
+            from rig.report.page import write
+            from rig.report.proof import proof_page
+
+            write(proof_page(found, figures), report)
+    except (RigError, OSError) as error:
+        click.echo(f"rig prove: {error}", err=True)
+        raise SystemExit(2) from error

@@ -1,0 +1,98 @@
+"""Cases on disc: recordings that anybody may open, and beside them, in a folder of its own, the sealed truth.
+
+    OUT/open/<token>/0.npz, 1.npz ...   one recording each: `about` (JSON text), `time0`, `value0`, `time1` ...
+    OUT/open/<token>/drive.npz          another run without its thrust, for a prediction at the times `at`
+    OUT/sealed/<token>.json             what was concealed; `error` where no such case could be drawn
+    OUT/sealed/<token>.npz              `thrust` and `measured` of that other run at the times `at`
+
+A case is asked for by a table: `token` (its name, which should tell nothing), `seed` (integers), and what is not to be
+left to chance: `effects`, `strength`, `forms`, `noise`, `plan`, `lie`, `runs`, `sampling`, `duration` as of
+`concealed.case`; `rivals`: names whose likeness to the first effect goes into the seal (`concealed.twins`).
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sim_devices.concealed.another import another
+from sim_devices.concealed.draw import NOISE_KINDS
+from sim_devices.concealed.draw import case as drawn
+from sim_devices.concealed.faults import KINDS as LIES
+from sim_devices.concealed.oracle import OutOfReach
+from sim_devices.concealed.records import Rows, rows, truth
+from sim_devices.concealed.rivals import twins
+from sim_devices.concealed.shapes import FORMS, SHAPES
+from sim_devices.tables import WorldError
+
+KINDS: Mapping[str, Any] = {
+    "effects": list(SHAPES),
+    "forms": {effect: list(forms) for effect, forms in FORMS.items()},
+    "lies": list(LIES),
+    "noise": list(NOISE_KINDS),
+}
+"""What may be asked for."""
+CHOSEN = ("effects", "strength", "forms", "noise", "plan", "lie", "runs", "sampling", "duration")
+KNOWN = frozenset({"token", "seed", "rivals", *CHOSEN})
+NEAREST = 5
+"""Twins that go into the seal."""
+
+
+def conceal(asked: Mapping[str, Any], out: Path) -> None:
+    """Make one case. A folder that is there is written anew. Raises WorldError for a table that cannot be read."""
+    unknown = sorted(set(asked) - KNOWN)
+    if unknown or not {"token", "seed"} <= set(asked):
+        raise WorldError(f"case: expected token, seed and some of {', '.join(sorted(KNOWN))}; got {sorted(asked)}")
+    token, seed = str(asked["token"]), list(asked["seed"])
+    sealed = out / "sealed"
+    sealed.mkdir(parents=True, exist_ok=True)
+    chosen = {name: asked[name] for name in CHOSEN if name in asked}
+    try:
+        case = drawn(np.random.default_rng(seed), **chosen)
+    except OutOfReach as error:
+        _write_json(sealed / f"{token}.json", {"asked": dict(asked), "error": str(error)})
+        return
+    except (TypeError, ValueError) as error:
+        raise WorldError(f"case {token}: {error}") from error
+    folder = out / "open" / token
+    folder.mkdir(parents=True, exist_ok=True)
+    for i, found in enumerate(rows(case)):
+        _write_rows(folder / f"{i}.npz", found)
+    told = truth(case) | {"asked": dict(asked), "thruster": asdict(case.thruster), "error": None}
+    if asked.get("rivals") and case.effects:
+        near = twins(case, case.effects[0].effect, list(asked["rivals"]), np.random.default_rng([*seed, 1]))
+        told["twins"] = [asdict(twin) for twin in near[:NEAREST]]
+    if case.fault is None:
+        other = another(case, np.random.default_rng([*seed, 2]))
+        _write_rows(folder / "drive.npz", other.drive, at=other.at)
+        exact, seen = other.thrust.astype(np.float32), other.measured.astype(np.float32)
+        np.savez_compressed(sealed / f"{token}.npz", thrust=exact, measured=seen)
+    _write_json(sealed / f"{token}.json", told)  # last: a seal stands for a case that is complete
+
+
+def _write_rows(path: Path, found: Rows, **more: np.ndarray[Any, np.dtype[np.float64]]) -> None:
+    about = {
+        "recording_id": found.recording_id,
+        "thruster": found.thruster,
+        "columns": [
+            {"stream": c.stream, "name": c.name, "quantity": c.quantity, "unit": c.unit, "thruster": c.thruster}
+            for c in found.columns
+        ],
+        "steps": [asdict(step) for step in found.steps],
+        "duration": found.duration,
+    }
+    arrays = {f"time{i}": c.time for i, c in enumerate(found.columns)}
+    arrays |= {f"value{i}": c.value for i, c in enumerate(found.columns)}
+    np.savez(path, about=np.array(json.dumps(about)), **arrays, **more)
+
+
+def _write_json(path: Path, table: Mapping[str, Any]) -> None:
+    """Whole or not at all."""
+    part = path.with_name(path.name + ".part")
+    part.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    part.replace(path)
