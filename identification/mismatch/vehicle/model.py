@@ -1,0 +1,279 @@
+"""The baseline with terms added: its parameters, and a prediction with its slopes over every one of them.
+
+Baseline of one axis: m v' = -k2 |v| v + sum over thrusters of arm x thrust. Parameters are k2; m where it is not stated
+(or stated with an uncertainty); a factor of each thruster's model where that is uncertain; and per run the velocity and
+the position at its start, which are nuisance. Where neither mass nor thrust is known, forces are per kg: m is 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.mismatch.vehicle.motion import Motion, from_start, left_over, linearised, moved, observed, solved
+from identification.mismatch.vehicle.runs import Prepared, Run
+from identification.physics.term import Parameter
+from identification.physics.vehicle.term import STAGES, Body, VehicleTerm
+from identification.recording import Floats
+
+DIFFERENCE = 1e-5
+"""Of a parameter's size: step of the differences over the forces (the motion's slopes are exact)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """What is known of parameters beforehand: rows of a least-squares problem. (q, p) and (q,)."""
+
+    rows: Floats
+    right: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class VehicleModel:
+    """Terms in any order; they act in that of their stages."""
+
+    terms: tuple[VehicleTerm, ...] = ()
+
+    def ordered(self) -> tuple[VehicleTerm, ...]:
+        return tuple(sorted(self.terms, key=lambda t: STAGES.index(t.stage)))
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """Where each parameter stands in theta: baseline, terms, then two numbers for the start of each run."""
+
+    model: VehicleModel
+    base: tuple[Parameter, ...]
+    parts: tuple[tuple[Parameter, ...], ...]
+    """Parameters of each term."""
+    runs: int
+
+    @property
+    def first_of(self) -> tuple[int, ...]:
+        """Index of the first parameter of each term."""
+        ends = np.cumsum([len(self.base), *map(len, self.parts)])
+        return tuple(int(e) for e in ends[:-1])
+
+    @property
+    def starts(self) -> int:
+        """Index of the first run's velocity."""
+        return len(self.base) + sum(map(len, self.parts))
+
+    @property
+    def size(self) -> int:
+        return self.starts + 2 * self.runs
+
+    def of(self, i: int, theta: Floats) -> tuple[float, ...]:
+        """Values of term i."""
+        begin = self.first_of[i]
+        return tuple(float(v) for v in theta[begin : begin + len(self.parts[i])])
+
+    def bounds(self) -> tuple[Floats, Floats]:
+        inside = [*self.base, *(p for part in self.parts for p in part)]
+        low = [p.low for p in inside] + [-np.inf] * (2 * self.runs)
+        high = [p.high for p in inside] + [np.inf] * (2 * self.runs)
+        return np.array(low), np.array(high)
+
+
+def layout_of(model: VehicleModel, data: Prepared) -> Layout:
+    scale = data.scale
+    mass = _typical_mass(data)
+    base = [Parameter("k2", scale.over(f"({scale.speed_unit})^2"), 0.0, 1e3 * scale.force / scale.speed**2)]
+    if not scale.per_kg and (data.mass is None or data.mass.std > 0):
+        base.append(Parameter("m", scale.mass_unit, 1e-3 * mass, 1e3 * mass))
+    values = data.installation.coefficients
+    for thruster, at in zip(data.installation.thrusters, _coefficients(data), strict=True):
+        if any(data.installation.cov[i, i] > 0 for i in at):
+            base.append(Parameter(f"C[{thruster.name}]", "1", 0.0, 1e3 if np.any(values[list(at)] != 0) else 1.0))
+    parts = tuple(term.parameters(scale) for term in model.terms)
+    return Layout(model, tuple(base), parts, len(data.runs))
+
+
+def _coefficients(data: Prepared) -> tuple[tuple[int, ...], ...]:
+    return data.runs[0].basis
+
+
+def _typical_mass(data: Prepared) -> float:
+    """kg: what the largest force brings to the largest speed within a twentieth of the longest run."""
+    if data.mass is not None:
+        return data.mass.value
+    scale = data.scale
+    return scale.force / scale.speed * 0.05 * scale.duration
+
+
+def known(layout: Layout, data: Prepared) -> Known:
+    """Stated mass and the calibration of the thrusters, with its covariance, as rows for theta."""
+    names = [p.name for p in layout.base]
+    rows, right = [], []
+    if data.mass is not None and "m" in names:
+        row = np.zeros(layout.size)
+        row[names.index("m")] = 1 / data.mass.std
+        rows.append(row)
+        right.append(data.mass.value / data.mass.std)
+    factors = [i for i, name in enumerate(names) if name.startswith("C[")]
+    if factors and data.scale.thrust_known:
+        lead = _leading(data, [names[i] for i in factors])
+        values = data.installation.coefficients[lead]
+        cov = data.installation.cov[np.ix_(lead, lead)] / np.outer(values, values)
+        root = np.linalg.inv(np.linalg.cholesky(cov + 1e-18 * np.eye(len(lead))))
+        for line in root:
+            row = np.zeros(layout.size)
+            row[factors] = line
+            rows.append(row)
+            right.append(float(line.sum()))
+    return Known(np.array(rows).reshape(-1, layout.size), np.array(right))
+
+
+def _leading(data: Prepared, names: Sequence[str]) -> list[int]:
+    """Index of the largest coefficient of each of these thrusters: its relative error stands for all of them."""
+    out = []
+    for thruster, at in zip(data.installation.thrusters, _coefficients(data), strict=True):
+        if f"C[{thruster.name}]" in names:
+            out.append(max(at, key=lambda i: abs(data.installation.coefficients[i])))
+    return out
+
+
+def begin(layout: Layout, data: Prepared) -> Floats:
+    """Where a fit may start: half of the largest force is drag at the largest speed; runs start as measured."""
+    theta = np.zeros(layout.size)
+    scale = data.scale
+    guess = {"k2": 0.5 * scale.force / scale.speed**2, "m": _typical_mass(data)}
+    for i, p in enumerate(layout.base):
+        theta[i] = guess.get(p.name, 1.0)
+    for i, part in enumerate(layout.parts):
+        theta[layout.first_of[i] : layout.first_of[i] + len(part)] = [p.neutral or 0.0 for p in part]
+    for j, run in enumerate(data.runs):
+        n = min(5, run.time.size)
+        slope, level = np.polyfit(run.time[:n] - run.start, run.response[:n], 1)
+        theta[layout.starts + 2 * j :][:2] = (level, 0.0) if run.quantity == "speed" else (slope, level)
+    return theta
+
+
+def push_of(layout: Layout, theta: Floats, run: Run) -> Floats:
+    """(g,) N on the axis, the mean over each step."""
+    volts = run.moment.volts
+    ordered = layout.model.ordered()
+    values = {id(term): layout.of(i, theta) for i, term in enumerate(layout.model.terms)}
+    for term in ordered:
+        if term.stage == "command":
+            volts = term.on_volts(volts, run.moment, values[id(term)])
+    thrust = _thrust(layout, theta, run, volts)
+    for term in ordered:
+        if term.stage == "thrust":
+            thrust = term.on_thrust(thrust, run.moment, values[id(term)])
+    out: Floats = run.arms @ thrust.mean(axis=2)
+    return out
+
+
+def _thrust(layout: Layout, theta: Floats, run: Run, volts: Floats) -> Floats:
+    """(T, g, S) N of each thruster alone."""
+    names = {p.name: i for i, p in enumerate(layout.base)}
+    out = np.empty(volts.shape)
+    for t, thruster in enumerate(run.installation.thrusters):
+        factor = theta[names[f"C[{thruster.name}]"]] if f"C[{thruster.name}]" in names else 1.0
+        one = thruster.coefficients @ thruster.basis(volts[t].ravel())
+        out[t] = factor * one.reshape(volts[t].shape)
+    return out
+
+
+def body_of(layout: Layout, theta: Floats, run: Run, data: Prepared) -> Body:
+    names = {p.name: i for i, p in enumerate(layout.base)}
+    mass = 1.0 if data.scale.per_kg else theta[names["m"]] if "m" in names else data.mass.value if data.mass else 1.0
+    body = Body(mass=float(mass), quadratic=float(theta[names["k2"]]))
+    for i, term in enumerate(layout.model.terms):
+        if term.stage == "body":
+            body = term.on_body(body, run.moment, layout.of(i, theta))
+    return body
+
+
+def origin_of(run: Run) -> float:
+    """m, where the line comes from: the surface for a depth, otherwise where the run began."""
+    return 0.0 if run.moment.scale.axis == "heave" or run.quantity == "speed" else float(run.response[0])
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """One run as the model has it, and what its parameters change."""
+
+    motion: Motion
+    response: Floats
+    """(n,)"""
+    slopes: Floats
+    """(n, p) over theta."""
+
+
+def predict(layout: Layout, theta: Floats, data: Prepared, j: int, guess: Motion | None, slopes: bool) -> Prediction:
+    """Run j. `guess`: a motion nearby, if one is at hand. Without `slopes` those are empty."""
+    run = data.runs[j]
+    body, push = body_of(layout, theta, run, data), push_of(layout, theta, run)
+    v0, x0 = theta[layout.starts + 2 * j :][:2]
+    motion = moved(body, push, run.moment.step, v0, x0, origin_of(run), None if guess is None else guess.v)
+    response = observed(run, motion.v, motion.x)
+    if not slopes:
+        return Prediction(motion, response, np.empty((run.time.size, 0)))
+    H = np.zeros((run.time.size, layout.size))
+    H[:, : layout.starts] = respond(layout, theta, data, j, motion, _added_forces(layout, theta, data, j, motion))
+    here = linearised(body, motion, run.moment.step, origin_of(run))
+    dv, dx = from_start(here)
+    H[:, layout.starts + 2 * j :][:, :2] = observed(run, np.vstack([[1.0, 0.0], dv]), np.vstack([[0.0, 1.0], dx]))
+    return Prediction(motion, response, H)
+
+
+def respond(layout: Layout, theta: Floats, data: Prepared, j: int, motion: Motion, forces: Floats) -> Floats:
+    """(n, q): what small forces (g, q) on the vehicle, beside those there are, change of what is measured in run j."""
+    run = data.runs[j]
+    here = linearised(body_of(layout, theta, run, data), motion, run.moment.step, origin_of(run))
+    dv, dx = solved(here, forces)
+    still = np.zeros((1, forces.shape[1]))
+    return observed(run, np.vstack([still, dv]), np.vstack([still, dx]))
+
+
+def _added_forces(layout: Layout, theta: Floats, data: Prepared, j: int, motion: Motion) -> Floats:
+    """(g, starts): slope over each parameter of the force that the motion as it is would need more."""
+    run = data.runs[j]
+    low, high = layout.bounds()
+    out = np.empty((run.steps, layout.starts))
+    push, body = push_of(layout, theta, run), body_of(layout, theta, run, data)
+    base = -left_over(body, push, motion, run.moment.step, origin_of(run))
+    for i in range(layout.starts):
+        size = DIFFERENCE * max(abs(theta[i]), 1e-2 * min(high[i] - low[i], 1e3 * max(abs(theta[i]), 1e-3)))
+        d = size if theta[i] + size <= high[i] else -size
+        moved_theta = theta.copy()
+        moved_theta[i] += d
+        moved_push = push_of(layout, moved_theta, run) if _pushes(layout, i) else push
+        moved_body = body_of(layout, moved_theta, run, data)
+        out[:, i] = (-left_over(moved_body, moved_push, motion, run.moment.step, origin_of(run)) - base) / d
+    return out
+
+
+def _pushes(layout: Layout, i: int) -> bool:
+    """Whether parameter i enters through the thrusters."""
+    if i < len(layout.base):
+        return layout.base[i].name.startswith("C[")
+    at = max(k for k, first in enumerate(layout.first_of) if first <= i and layout.parts[k])
+    return layout.model.terms[at].stage != "body"
+
+
+def with_term(layout: Layout, data: Prepared, theta: Floats, term: VehicleTerm, values: Sequence[float]) -> tuple[Layout, Floats]:
+    """The same model and parameters with one term more."""
+    new = layout_of(VehicleModel((*layout.model.terms, term)), data)
+    return new, np.concatenate([theta[: layout.starts], values, theta[layout.starts :]])
+
+
+def without_term(layout: Layout, data: Prepared, theta: Floats, index: int) -> tuple[Layout, Floats]:
+    terms = layout.model.terms
+    new = layout_of(VehicleModel((*terms[:index], *terms[index + 1 :])), data)
+    begin_at, count = layout.first_of[index], len(layout.parts[index])
+    return new, np.delete(theta, range(begin_at, begin_at + count))
+
+
+def on_other_runs(layout: Layout, data: Prepared, theta: Floats) -> tuple[Layout, Floats]:
+    """The same model for other runs: their starts as measured, everything else as it is."""
+    new = replace(layout, runs=len(data.runs))
+    start = begin(new, data)
+    start[: new.starts] = theta[: layout.starts]
+    return new, start
+
+
