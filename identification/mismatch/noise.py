@@ -11,7 +11,7 @@ not make the noise look smaller than it is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from celerite2 import backprop, driver
@@ -30,6 +30,8 @@ OUTLIER = 4.0
 """Whitened residuals beyond this get a variance of their own size."""
 LEAST_SHARE = 1e-12
 """Variances are kept above this share of the residual's."""
+MOST_REMEMBERED = 8
+"""Sets of scales and bands whose matrices are kept with the rows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +46,22 @@ class Rows:
     """(n,) variance factor of the white part, above 1 for outliers."""
     width: Floats
     """(n,) s over which the samples of a row are spread."""
+    memo: dict[object, Shape] = field(default_factory=dict, init=False, repr=False)
+    """(scales, bands) -> the matrices of the noise on these rows at unit variances."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Shape:
+    """What the covariance on some rows has of the scales and bands alone: all variances are factors of it."""
+
+    c: Floats
+    """(J,) 1/s, celerite's decay of each column."""
+    gain2: Floats
+    """(n, components) variance that the mean over a row leaves of each."""
+    U: Floats
+    """(n, J) at unit variances."""
+    V: Floats
+    """(n, J)."""
 
 
 @dataclass(frozen=True)
@@ -77,17 +95,34 @@ class Noise:
     def correlated(self, rows: Rows, size: Floats) -> tuple[Floats, Floats, Floats, Floats]:
         """c, a, U, V of celerite's matrices for rows at which the force is `size` (n,)."""
         diag = (self.white + self.proportional * size**2) * rows.extra / rows.count
-        ac, bc, cc, dc = self._oscillators()
-        ar, cr = np.array(self.slow), 1 / np.array(self.scales) if self.scales else np.empty(0)
+        shape = self.shape(rows)
+        spread = np.array([*self.slow, *self.band])
+        a = diag + shape.gain2 @ spread if spread.size else diag
+        columns = np.repeat(spread, [1] * len(self.slow) + [2] * len(self.band))
+        return shape.c, a, shape.U * columns, shape.V
+
+    def shape(self, rows: Rows) -> Shape:
+        """As a search for variances asks for it again and again."""
+        key = (self.scales, self.bands)
+        known = rows.memo.get(key)
+        if known is None:
+            if len(rows.memo) >= MOST_REMEMBERED:
+                rows.memo.clear()
+            known = rows.memo[key] = self._shape(rows)
+        return known
+
+    def _shape(self, rows: Rows) -> Shape:
+        unit = replace(self, slow=(1.0,) * len(self.scales), band=(1.0,) * len(self.bands))
+        ac, bc, cc, dc = unit._oscillators()
+        ar, cr = np.array(unit.slow), 1 / np.array(self.scales) if self.scales else np.empty(0)
         n, J = rows.time.size, ar.size + 2 * ac.size
-        c = np.concatenate([cr, np.repeat(cc, 2)])
         _, U, V = driver.get_celerite_matrices(
-            ar, ac, bc, dc, rows.time, diag, np.empty(n), np.empty((n, J)), np.empty((n, J))
+            ar, ac, bc, dc, rows.time, np.zeros(n), np.empty(n), np.empty((n, J)), np.empty((n, J))
         )
         gain = self.gains(rows)
-        a = diag + gain**2 @ np.array([*self.slow, *self.band]) if J else diag
         wide = np.repeat(gain, [1] * ar.size + [2] * ac.size, axis=1)
-        return c, a, np.ascontiguousarray(U * wide), np.ascontiguousarray(V * wide)
+        c = np.concatenate([cr, np.repeat(cc, 2)])
+        return Shape(c, gain**2, np.ascontiguousarray(U * wide), np.ascontiguousarray(V * wide))
 
     def gains(self, rows: Rows) -> Floats:
         """(n, components): what the mean of a row's samples leaves of each, as a factor of its standard deviation."""
@@ -265,14 +300,15 @@ def _cost(
     value, slope = 0.0, np.zeros(2 + len(noise.slow) + len(noise.band))
     if p:
         lower = np.linalg.cholesky(gram + 1e-12 * np.diag(np.diag(gram) + 1e-300))
-        beta = np.linalg.solve(lower.T, np.linalg.solve(lower, moment))
+        over = np.linalg.inv(lower)
+        beta = over.T @ (over @ moment)
         value += float(np.sum(np.log(np.diag(lower))))
     for (c, a, U, V, d, W, S), rows, r, X, size in zip(factored, runs, residuals, columns, sizes, strict=True):
         left = r - X @ beta if p else r
-        Y = np.ascontiguousarray(np.column_stack([left, np.linalg.solve(lower, X.T).T]) if p else left[:, None])
+        Y = np.ascontiguousarray(np.column_stack([left, X @ over.T]) if p else left[:, None])
         Z, ba, bU = _backwards(rows.time, c, a, U, V, d, W, S, Y)
         value += 0.5 * float(np.sum(np.log(d))) + 0.5 * float(np.sum(Z[:, 0] ** 2 / d))
-        slope += _over_variances(noise, rows, size, U, ba, bU)
+        slope += _over_variances(noise, rows, size, ba, bU)
     return value, slope
 
 
@@ -295,18 +331,15 @@ def _backwards(
     return Z, factored[2], solved[2] + factored[3]
 
 
-def _over_variances(noise: Noise, rows: Rows, size: Floats, U: Floats, ba: Floats, bU: Floats) -> Floats:
+def _over_variances(noise: Noise, rows: Rows, size: Floats, ba: Floats, bU: Floats) -> Floats:
     """Slope over each variance of the noise, from those over celerite's a and U."""
-    gain2 = noise.gains(rows) ** 2
+    shape = noise.shape(rows)
     per_count = rows.extra / rows.count
     slope = [float(ba @ per_count), float(ba @ (per_count * size**2))]
-    Jr = len(noise.slow)
-    for j in range(Jr):
-        slope.append(float(ba @ gain2[:, j]) + float(bU[:, j] @ U[:, j]) / max(noise.slow[j], 1e-300))
-    for b, value_b in enumerate(noise.band):
-        at = Jr + 2 * b
-        moved = float(np.sum(bU[:, at] * U[:, at]) + np.sum(bU[:, at + 1] * U[:, at + 1])) / max(value_b, 1e-300)
-        slope.append(float(ba @ gain2[:, Jr + b]) + moved)
+    moved = np.sum(bU * shape.U, axis=0)  # U is linear in the variances
+    J = len(noise.slow)
+    by_band = moved[J:].reshape(-1, 2).sum(axis=1)
+    slope.extend(ba @ shape.gain2 + np.concatenate([moved[:J], by_band]))
     return np.array(slope)
 
 

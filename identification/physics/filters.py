@@ -11,15 +11,17 @@ from identification.recording import Floats
 LAG_ITERATIONS = 8
 LAG_CLOSE = 1e-7
 """Relative change of the rate at which the quadratic lag has converged."""
+LEAST_MOVE = 1e-12
+"""Share of the largest value: means over intervals of a level differ by rounding."""
 
 
 def recursion(keep: Floats, push: Floats, start: float) -> Floats:
     """y_k = keep_k y_{k-1} + push_k, y_{-1} = start; (M,), by one banded triangular solve."""
     push = push.copy()
     push[0] += keep[0] * start
-    banded = np.ones((2, keep.size))
-    banded[1, :-1] = -keep[1:]
-    solved, info = dtbtrs(banded, push[:, None], uplo="L")
+    banded = np.empty((2, keep.size), order="F")  # as LAPACK wants it: not copied; the unit diagonal is not read
+    np.negative(keep[1:], out=banded[1, :-1])
+    solved, info = dtbtrs(banded, push[:, None], uplo="L", diag="U", overwrite_b=1)
     if info != 0:
         raise ValueError(f"recursion: banded solve failed with {info}")
     out: Floats = solved[:, 0]
@@ -34,10 +36,10 @@ def lowpass(u: Floats, dt: Floats, tau: float, start: float = 0.0) -> tuple[Floa
     ([0.6321, 0.8647], [0.3679, 0.7675])
     """
     share = dt / tau
-    keep = np.exp(-share)
-    end = recursion(keep, (1 - keep) * u, start)
+    lost = -np.expm1(-share)
+    end = recursion(1 - lost, lost * u, start)
     before = np.concatenate([[start], end[:-1]])
-    mean = u + (before - u) * -np.expm1(-share) / share
+    mean = u + (before - u) * (lost / share)
     return end, mean
 
 
@@ -47,15 +49,16 @@ def lag(w: Floats, dt: Floats, quadratic: float, linear: float, start: float = 0
     The right side is lambda(n) (w - n) with lambda > 0; the linear recursion is solved again and again with the lambda
     of the last answer.
     """
-    size = float(np.max(np.abs(w), initial=0.0)) or 1.0
+    much = np.abs(w)
+    size = float(np.max(much, initial=0.0)) or 1.0
     end = w.copy()
+    before = np.empty_like(w)
+    before[0] = start
     decay = np.zeros_like(w)
     for _ in range(LAG_ITERATIONS):
-        before = np.concatenate([[start], end[:-1]])
+        before[1:] = end[:-1]
         n = 0.5 * (before + end)
-        gap = w - n
-        safe = np.where(np.abs(gap) > 1e-9 * size, gap, 1.0)
-        slope = np.where(np.abs(gap) > 1e-9 * size, (w * np.abs(w) - n * np.abs(n)) / safe, 2 * np.abs(w))
+        slope = _secant(w, much, n)
         decay = (quadratic * slope + linear) * dt
         keep = np.exp(-decay)
         new = recursion(keep, (1 - keep) * w, start)
@@ -63,9 +66,20 @@ def lag(w: Floats, dt: Floats, quadratic: float, linear: float, start: float = 0
         end = new
         if moved < LAG_CLOSE * size:
             break
-    before = np.concatenate([[start], end[:-1]])
+    before[1:] = end[:-1]
     decay = np.maximum(decay, 1e-12)
     out: Floats = w + (before - w) * -np.expm1(-decay) / decay
+    return out
+
+
+def _secant(w: Floats, much: Floats, n: Floats) -> Floats:
+    """(w|w| - n|n|)/(w - n) without a difference of likes; `much` is |w|.
+
+    |w| + |n| where both turn one way, (w^2 + n^2)/(|w| + |n|) where they do not.
+    """
+    both = much + np.abs(n)
+    against = np.minimum(w * n, 0.0)
+    out: Floats = both + 2 * against / np.maximum(both, 1e-300)
     return out
 
 
@@ -73,8 +87,9 @@ def integral(value: Floats, edges: Floats, at: Floats) -> Floats:
     """Integral of an interval-wise constant from the first edge to `at`; held constant outside."""
     total = np.concatenate([[0.0], np.cumsum(value * np.diff(edges))])
     out: Floats = np.interp(at, edges, total)
-    out += np.where(at < edges[0], (at - edges[0]) * value[0], 0.0)
-    out += np.where(at > edges[-1], (at - edges[-1]) * value[-1], 0.0)
+    early, late = at < edges[0], at > edges[-1]
+    out[early] += (at[early] - edges[0]) * value[0]
+    out[late] += (at[late] - edges[-1]) * value[-1]
     return out
 
 
@@ -89,10 +104,11 @@ def reconstructed(mean: Floats, middle: Floats, at: Floats) -> Floats:
 
     Where the slopes differ in sign (a step, an extremum) the mean itself (van Leer's limiter, minmod).
     """
-    slope = np.diff(mean) / np.diff(middle)
-    left, right = np.concatenate([[0.0], slope]), np.concatenate([slope, [0.0]])
-    both = np.where(left * right > 0, np.where(np.abs(left) < np.abs(right), left, right), 0.0)
-    out: Floats = mean + both * (at - middle)
+    slope = (mean[1:] - mean[:-1]) / (middle[1:] - middle[:-1])
+    left, right = slope[:-1], slope[1:]
+    least = np.copysign(np.minimum(np.abs(left), np.abs(right)), left)
+    out: Floats = mean.copy()
+    out[1:-1] += np.where(left * right > 0, least, 0.0) * (at - middle)[1:-1]
     return out
 
 
@@ -123,9 +139,9 @@ def resonant(value: Floats, dt: Floats, frequency: float, damping: float) -> Flo
 
 
 def _complex_recursion(keep: NDArray[np.complex128], push: NDArray[np.complex128]) -> NDArray[np.complex128]:
-    banded = np.ones((2, keep.size), dtype=np.complex128)
-    banded[1, :-1] = -keep[1:]
-    solved, info = ztbtrs(banded, push[:, None], uplo="L")
+    banded = np.empty((2, keep.size), dtype=np.complex128, order="F")
+    np.negative(keep[1:], out=banded[1, :-1])
+    solved, info = ztbtrs(banded, push[:, None], uplo="L", diag="U")
     if info != 0:
         raise ValueError(f"recursion: banded solve failed with {info}")
     out: NDArray[np.complex128] = solved[:, 0]
@@ -133,12 +149,22 @@ def _complex_recursion(keep: NDArray[np.complex128], push: NDArray[np.complex128
 
 
 def play(value: Floats, width: float) -> Floats:
-    """Play operator y = min(max(y, value - width), value + width), from y = 0."""
-    y, out = 0.0, []
-    for low, high in zip((value - width).tolist(), (value + width).tolist(), strict=True):
-        y = low if y < low else min(y, high)
-        out.append(y)
-    return np.array(out, dtype=np.float64)
+    """Play operator y = min(max(y, value - width), value + width), from y = 0.
+
+    While the value goes one way, y depends on where it was at the last turn only: one step of Python for each turn.
+    """
+    rise = np.diff(value)
+    rise = np.where(np.abs(rise) > LEAST_MOVE * float(np.max(np.abs(value))), np.sign(rise), 0.0)
+    moving = np.flatnonzero(rise)
+    turns = moving[1:][rise[moving[1:]] != rise[moving[:-1]]]
+    begins = np.concatenate([[0], turns])
+    y, known = 0.0, []
+    for v in value[begins].tolist():
+        y = min(max(y, v - width), v + width)
+        known.append(y)
+    last = np.repeat(known, np.diff(np.append(begins, value.size - 1)))  # y at the last turn, from the second value on
+    out: Floats = np.clip(np.concatenate([known[:1], last]), value - width, value + width)
+    return out
 
 
 def since_opposite(x: Floats, dt: Floats, turning: float) -> tuple[Floats, Floats, NDArray[np.bool_]]:
