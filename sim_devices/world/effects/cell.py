@@ -102,7 +102,7 @@ class PeriodicDisturbance:
 
 @dataclass(slots=True)
 class ZeroDrift:
-    """Cell or amplifier warms: + amplitude (1 - e^(-t/time_constant)) + rate t."""
+    """Cell or amplifier warms: + amplitude (1 - e^(-t/time_constant)) + rate t, t counted from `start` on."""
 
     stage: ClassVar[Stage] = "cell"
     amplitude: float = 0.0
@@ -111,15 +111,19 @@ class ZeroDrift:
     """s."""
     rate: float = 0.0
     """N/s."""
+    start: float = 0.0
+    """s of world time."""
 
     def __post_init__(self) -> None:
         require_positive(time_constant=self.time_constant)
 
     def apply(self, value: float, s: State, _dt: float) -> float:
-        return value + self.amplitude * (1.0 - exp(-s.t / self.time_constant)) + self.rate * s.t
+        t = max(s.t - self.start, 0.0)
+        return value + self.amplitude * (1.0 - exp(-t / self.time_constant)) + self.rate * t
 
     def over(self, value: Floats, h: History) -> Floats:
-        return np.asarray(value + self.amplitude * (1.0 - np.exp(-h.t / self.time_constant)) + self.rate * h.t)
+        t = np.maximum(h.t - self.start, 0.0)
+        return np.asarray(value + self.amplitude * (1.0 - np.exp(-t / self.time_constant)) + self.rate * t)
 
 
 @dataclass(slots=True)

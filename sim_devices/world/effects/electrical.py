@@ -39,7 +39,7 @@ class CommandSaturation:
 class SupplySag:
     """The command is a fraction of a supply that moves: V_eff = V (V_bus / V_nom)^exponent.
 
-    V_bus = V_nom - source_resistance * I_in - discharge * charge drawn.
+    V_bus = V_nom - source_resistance * I_in - discharge * charge drawn, from `start` on.
     """
 
     stage: ClassVar[Stage] = "command"
@@ -48,19 +48,23 @@ class SupplySag:
     discharge: float = 0.0
     """V/(A.s)."""
     exponent: float = 1.0
+    start: float = 0.0
+    """s of world time: until then the supply is stiff."""
     charge: float = field(init=False, default=0.0)
-    """A.s drawn so far."""
+    """A.s drawn since `start`."""
 
     def apply(self, value: float, s: State, dt: float) -> float:
-        self.charge += s.input_current * dt
-        sagged = s.nominal_bus - self.source_resistance * s.input_current - self.discharge * self.charge
+        current = s.input_current if s.t >= self.start else 0.0
+        self.charge += current * dt
+        sagged = s.nominal_bus - self.source_resistance * current - self.discharge * self.charge
         s.bus_voltage += (sagged - s.bus_voltage) * min(dt / OUTPUT_CAPACITOR, 1.0)
         return float(value * (max(s.bus_voltage, 0.0) / s.nominal_bus) ** self.exponent)
 
     def over(self, value: Floats, h: History) -> Floats:
         """`h.input_current` is that of the pass before: the sweep passes here until it stands still."""
-        charge = np.cumsum(h.input_current) * h.dt
-        sagged = h.nominal_bus - self.source_resistance * h.input_current - self.discharge * charge
+        current = np.where(h.t >= self.start, h.input_current, 0.0)
+        charge = np.cumsum(current) * h.dt
+        sagged = h.nominal_bus - self.source_resistance * current - self.discharge * charge
         h.bus_voltage = h.nominal_bus + low_pass(sagged - h.nominal_bus, OUTPUT_CAPACITOR, h.dt)
         return np.asarray(value * (np.maximum(h.bus_voltage, 0.0) / h.nominal_bus) ** self.exponent)
 
