@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from rig.config import CampaignConfig
 from rig.errors import ConfigError, PlanError
-from rig.loading import load_campaign
 from rig.plan_file import Level, Template, template_of, write_campaign
 
 if TYPE_CHECKING:
@@ -20,7 +19,11 @@ def asked(plan: Path | None, campaign: Path | None) -> CampaignConfig | None:
     """The campaign whose bench is used. Raises ConfigError for a plan without one, before anything is computed."""
     if plan is not None and campaign is None:
         raise ConfigError("--plan needs --campaign, the campaign file of the recordings: it names bench and pacing")
-    return None if campaign is None else load_campaign(campaign)
+    if campaign is None:
+        return None
+    from rig.loading import load_campaign  # pydantic and every driver: not for a diagnosis without a plan
+
+    return load_campaign(campaign)
 
 
 def limits_of(

@@ -13,7 +13,6 @@ from typing import Protocol
 
 from rig.config import CampaignConfig
 from rig.errors import ConfigError
-from rig.loading import load_campaign
 from rig.plan import TareConfig
 from rig.shapes import require, require_above_zero
 
@@ -194,6 +193,8 @@ def _rows(numbers: Sequence[str]) -> list[str]:
 
 def _write(path: Path, text: str) -> Path:
     """Write beside it, read back, then take its name: a file that the loader refuses replaces nothing."""
+    from rig.loading import load_campaign
+
     part = path.with_name(f"{path.name}.part")
     try:
         part.write_text(text, encoding="utf-8")

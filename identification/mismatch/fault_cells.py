@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import t as student
 
 from identification.recording import Channel, Floats, Recording
+from identification.tails import student_sf
 
 DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
 MOST_CELLS = 1500
@@ -168,7 +168,7 @@ def by_blocks(cells: Cells, value: Floats) -> tuple[float, float, float]:
     mean = float(means.mean())
     if error <= 0:
         return mean, 0.0, 0.0 if mean > 0 else 1.0
-    return mean, error, float(student.sf(mean / error, means.size - 1))
+    return mean, error, float(student_sf(mean / error, means.size - 1))
 
 
 def gain(cells: Cells, columns: Floats, y: Floats, which: int) -> tuple[float, float, float]:
@@ -188,5 +188,5 @@ def gain(cells: Cells, columns: Floats, y: Floats, which: int) -> tuple[float, f
     if n < 3:
         return whole, np.inf, 1.0
     error = float(np.sqrt((n - 1) / n * np.sum((np.array(left) - np.mean(left)) ** 2)))
-    p = 2 * float(student.sf(abs(whole) / error, n - 1)) if error > 0 else 0.0
+    p = 2 * float(student_sf(abs(whole) / error, n - 1)) if error > 0 else 0.0
     return whole, error, p

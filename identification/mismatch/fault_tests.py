@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from scipy.stats import t as student
 
 from identification.mismatch.diagnosis import Value
 from identification.mismatch.fault_cells import (
@@ -22,6 +21,7 @@ from identification.mismatch.fault_cells import (
     shapes,
 )
 from identification.recording import Floats
+from identification.tails import student_sf
 
 LINEAR = ("rotation_rate", "motor_voltage")
 SQUARE = ("thrust", "current", "torque")
@@ -137,7 +137,7 @@ def _change(cells: Cells, y: Floats) -> tuple[float, float, float, float] | None
     if not _telling(float(np.exp(middle))) or spread > STEADY * abs(middle):
         return None
     error = spread / np.sqrt(logs.size)
-    p = float(2 * student.sf(abs(middle) / max(error, 1e-12), logs.size - 1))
+    p = float(2 * student_sf(abs(middle) / max(error, 1e-12), logs.size - 1))
     return float(cells.time[good[at]]), float(np.exp(middle)), float(np.exp(middle) * error), p
 
 

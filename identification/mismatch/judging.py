@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2 as chi2_law
 
 from identification.mismatch.fitting import Fit, fit, raw
 from identification.mismatch.model import Data, Model, Theta, weights
 from identification.mismatch.noise import Noise
 from identification.mismatch.search import State, forces
 from identification.physics.history import History
+from identification.tails import chi2_sf
 
 KEPT_BACK = 4
 """One block of so many is not fitted."""
@@ -130,4 +130,4 @@ def whiteness(fitted: Fit, data: Data) -> float:
         for k in range(1, lags + 1):
             statistic += n * (n + 2) * (float(e[k:] @ e[:-k]) / power) ** 2 / (n - k) if power > 0 else 0.0
         dof += lags
-    return float(chi2_law.sf(statistic, dof)) if dof else 1.0
+    return float(chi2_sf(statistic, dof)) if dof else 1.0

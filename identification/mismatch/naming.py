@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2 as chi2_law
-from scipy.stats import ncx2
 
 from identification.mismatch.fitting import Fit, extended, fit, raw
 from identification.mismatch.model import Data, Weights, predict
@@ -17,6 +15,7 @@ from identification.mismatch.screening import directions, orthogonal_basis, refi
 from identification.mismatch.search import STATIC, State, refresh
 from identification.physics.term import Term
 from identification.recording import Floats
+from identification.tails import chi2_sf, noncentral_chi2_sf
 
 NEAR = 9.0
 """BIC units: a rival this near is stated."""
@@ -193,7 +192,7 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
         if size < 1e-3 * float(np.linalg.norm(column)) or size < 0.3:
             continue
         score = float(rest @ state.fit.residual[:n]) / size
-        p = float(ncx2.sf(score**2, 1, (SAME * size) ** 2))
+        p = float(noncentral_chi2_sf(score**2, 1, (SAME * size) ** 2))
         if p * len(splits) * many < INCONSTANT:
             out.append(f"its parameter is not the same {what} ({abs(score) / size * 100:.0f} % apart)")
     return tuple(out)
@@ -239,7 +238,7 @@ def name(
                 tuple(float(s) for s in std[at : at + len(values)]),
                 gain,
                 gain - len(values) * logn,
-                float(max(chi2_law.sf(max(gain, 0.0), len(values)), 1e-300)),
+                float(max(chi2_sf(max(gain, 0.0), len(values)), 1e-300)),
                 float(probability),
                 tuple(unique.values()),
                 doubts(state, term, data, many),

@@ -11,14 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2 as chi2_law
-from scipy.stats import ncx2
 
 from identification.mismatch.coordinates import Coordinate, coordinates
 from identification.mismatch.fitting import Fit
 from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.screening import orthogonal_basis, quiet, surrogate_scores
 from identification.recording import Floats
+from identification.tails import chi2_sf, noncentral_chi2_sf
 
 SHAPE_ERROR = 0.03
 """A textbook shape is trusted to this share of its own correction."""
@@ -73,7 +72,7 @@ def judge_left(
     clean = quiet(residual, np.column_stack(spans))
     ends = np.cumsum([Q.shape[1] for Q in spans])[:-1]
     scores = np.split(surrogate_scores(np.column_stack(spans), clean, rng) ** 2, ends, axis=1)
-    nulls = [chi2_law.sf(s.sum(axis=1), s.shape[1]) for s in scores]
+    nulls = [chi2_sf(s.sum(axis=1), s.shape[1]) for s in scores]
     smallest = np.min(np.array(nulls), axis=0)
     least = groups[order[0]].p_value
     # scaled so that the family behaves as its draws do: heavy tails and colour within a block are in them
@@ -86,7 +85,7 @@ def judge_left(
 
 
 def _tail(stat: float, dof: int, extra: float) -> float:
-    p = float(ncx2.sf(stat, dof, extra)) if extra > 1e-9 else float(chi2_law.sf(stat, dof))
+    p = float(noncentral_chi2_sf(stat, dof, extra)) if extra > 1e-9 else float(chi2_sf(stat, dof))
     return p if np.isfinite(p) else 0.0
 
 

@@ -12,9 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.fft import rfft
 from scipy.optimize import minimize
-from scipy.signal import welch
 
-from identification.mismatch.spectrum import Series, clipped, finite, spacing_of
+from identification.mismatch.spectrum import Series, averaged, clipped, finite, spacing_of
 from identification.recording import Floats
 
 MOST_BANDS = 2
@@ -80,7 +79,7 @@ def _candidates(grids: Sequence[tuple[Floats, float]]) -> list[tuple[float, floa
         segment = 2 * longest.size // averages
         if segment < 64:
             continue
-        f, density = welch(longest, fs=1 / spacing, nperseg=segment)
+        f, density = averaged(longest, 1 / spacing, segment)
         f, density = f[3:-1], density[3:-1]
         knots = np.unique(np.geomspace(1, f.size, KNOTS).astype(np.intp)) - 1
         low = np.searchsorted(f, f[knots] / SURROUNDINGS)

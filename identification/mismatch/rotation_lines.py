@@ -13,13 +13,21 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len
-from scipy.ndimage import gaussian_filter1d
-from scipy.signal import welch
-from scipy.stats import gamma
 
-from identification.mismatch.spectrum import CELLS, OVERSAMPLING, Series, clipped, family_wise, spacing_of, transform
+from identification.mismatch.spectrum import (
+    CELLS,
+    OVERSAMPLING,
+    Series,
+    averaged,
+    clipped,
+    family_wise,
+    smoothed,
+    spacing_of,
+    transform,
+)
 from identification.physics.filters import integral
 from identification.recording import Floats
+from identification.tails import gamma_median, gamma_sf
 
 HIGHEST = 400.0
 """Hz at the highest speed: blade pass of the fastest thrusters, with their harmonics."""
@@ -107,7 +115,7 @@ class _Colour:
         grid[index] = _quick(series)
         segment = min(max(int(LONGEST / spacing), LEAST), grid.size)
         self._rate = 1.0 / spacing
-        self._f, density = welch(grid, fs=self._rate, nperseg=segment, detrend="constant")
+        self._f, density = averaged(grid, self._rate, segment)
         density[0] = density[min(1, density.size - 1)]
         self._density = np.maximum(density, 1e-9 * float(density.max()) + 1e-300)
 
@@ -128,7 +136,7 @@ def _quick(series: Series) -> Floats:
     """The residual without what is slower than about 1/(4 SMOOTH)."""
     value = clipped(series.residual)
     spacing, _ = spacing_of(series.time)
-    out: Floats = value - gaussian_filter1d(value, SMOOTH / spacing, mode="nearest")
+    out: Floats = value - smoothed(value, SMOOTH / spacing)
     return out
 
 
@@ -193,11 +201,11 @@ def _peak(by_group: Floats, z: Floats, longest: float, alarm: float) -> tuple[fl
     trials = float(z[-1] - z[0]) * longest
     at = int(np.argmax(_standing(total)[0]))
     strong, shape = _standing(total)
-    p = family_wise(float(gamma.sf(strong[at], shape)), float(strong[at]), trials)
+    p = family_wise(float(gamma_sf(strong[at], shape)), float(strong[at]), trials)
     without = total - kept[int(np.argmax(kept[:, at])), :]
     rest, rest_shape = _standing(without)
     around = slice(max(at - 2, 0), at + 3)
-    p_rest = float(gamma.sf(np.max(rest[around]), rest_shape)) * 5
+    p_rest = float(gamma_sf(np.max(rest[around]), rest_shape)) * 5
     p = max(p, p_rest)
     return (float(z[at]), p) if p < alarm else (None, 1.0)
 
@@ -213,7 +221,7 @@ def _standing(total: Floats) -> tuple[Floats, float]:
     shape = float(np.median((centre / np.maximum(0.5 * (high - low), 1e-300)) ** 2))
     shape = float(np.clip(shape, 1.0, 1e6))
     level_now = np.interp(np.arange(total.size), middle, np.maximum(centre, 1e-300))
-    expected = float(gamma.median(shape))
+    expected = gamma_median(shape)
     out: Floats = total / level_now * expected
     return out, shape
 

@@ -12,12 +12,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from identification.mismatch.fitting import Fit, extended, raw
 from identification.mismatch.model import Data, Weights
 from identification.physics.term import Term
 from identification.recording import Floats
+from identification.tails import normal_sf
 
 SURROGATES = 1000
 BLOCKS = 120
@@ -211,6 +211,6 @@ def _p_value(largest: float, null: Floats, normal: Floats) -> float:
             continue
         # tail of the normal maximum: as of one normal deviate, times the number of independent ones it acts like
         at = max(float(np.quantile(draws, 0.95)), 1e-6)
-        many = 0.05 / max(norm.sf(at), 1e-300)
-        found.append(float(min(many * norm.sf(largest), share)))
+        many = 0.05 / max(normal_sf(at), 1e-300)
+        found.append(float(min(many * normal_sf(largest), share)))
     return max(found)

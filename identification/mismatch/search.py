@@ -6,7 +6,6 @@ from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2 as chi2_law
 
 from identification.mismatch.coordinates import coordinates
 from identification.mismatch.fitting import Fit, bounds_of, columns_of, extended, fit, raw
@@ -26,6 +25,7 @@ from identification.physics.catalogue import CATALOGUE
 from identification.physics.history import History
 from identification.physics.term import Term
 from identification.recording import Floats
+from identification.tails import chi2_isf
 
 ALARM = 0.01
 """Family-wise false-alarm rate of the search."""
@@ -245,7 +245,7 @@ class Found:
 
 
 def accept_threshold(extra: int) -> float:
-    return float(chi2_law.isf(ALARM / 50, extra))
+    return chi2_isf(ALARM / 50, extra)
 
 
 def search(

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.fft import next_fast_len, rfft
-from scipy.stats import f as f_law
+from scipy.fft import irfft, next_fast_len, rfft
 
 from identification.recording import Floats
+from identification.tails import fisher_sf
 
 OVERSAMPLING = 2
 """Frequencies per 1/T: between two of them at most a tenth of the power is lost."""
@@ -104,6 +104,30 @@ def level(power: Floats, independent: float) -> Floats:
     return out
 
 
+def averaged(value: Floats, rate: float, segment: int) -> tuple[Floats, Floats]:
+    """Frequencies in Hz and one-sided power density of even samples at `rate` per s: Hann windows of `segment` samples,
+    each without its mean, half over one another (Welch, IEEE Trans. Audio 15, 70, 1967)."""
+    segment = min(segment, value.size)
+    window = 0.5 - 0.5 * np.cos(2 * np.pi * np.arange(segment) / segment)
+    starts = np.arange(0, value.size - segment + 1, segment - segment // 2)
+    parts = np.lib.stride_tricks.sliding_window_view(value, segment)[starts]
+    power = np.abs(rfft((parts - parts.mean(axis=1, keepdims=True)) * window)) ** 2
+    density: Floats = power.mean(axis=0) / (rate * float(window @ window))
+    density[1 : (segment + 1) // 2] *= 2
+    return np.arange(density.size) * (rate / segment), density
+
+
+def smoothed(value: Floats, width: float) -> Floats:
+    """Mean weighted by a Gaussian of `width` samples, cut at four of them; the ends go on as they are."""
+    reach = int(4.0 * width + 0.5)
+    weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) / width) ** 2)
+    padded = np.concatenate([np.full(reach, value[0]), value, np.full(reach, value[-1])])
+    length = next_fast_len(padded.size + 2 * reach, real=True)
+    both = irfft(rfft(padded, length) * rfft(weight / weight.sum(), length), length)
+    out: Floats = both[2 * reach : 2 * reach + value.size]
+    return out
+
+
 def spectrum_of(series: Series, longest: float, spacing: float, *, even: bool) -> Spectrum:
     """Of one run, on the grid of the longest run (s) so that spectra of several runs can be added."""
     cell = spacing if even else spacing / CELLS
@@ -118,7 +142,7 @@ def spectrum_of(series: Series, longest: float, spacing: float, *, even: bool) -
 
 def tail(mean_ratio: float, parts: float, neighbours: float) -> float:
     """P(mean of `parts` ratios of power to noise exceeds this): Fisher's F, for the noise is estimated too."""
-    return float(f_law.sf(mean_ratio, 2 * parts, 2 * MEDIAN_WORTH * neighbours * parts))
+    return float(fisher_sf(mean_ratio, 2 * parts, 2 * MEDIAN_WORTH * neighbours * parts))
 
 
 def family_wise(single: float, ratio: float, trials: float) -> float:

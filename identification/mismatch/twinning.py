@@ -7,7 +7,6 @@ from dataclasses import replace
 from math import isfinite
 
 import numpy as np
-from scipy.stats import norm
 
 from identification.mismatch.diagnosis import Diagnosis, Finding, Value
 from identification.mismatch.fitting import raw
@@ -16,6 +15,7 @@ from identification.mismatch.preparing import FEW_SAMPLES, Refusal
 from identification.mismatch.search import State
 from identification.physics.history import CHANGED, History
 from identification.recording import Floats, Recording
+from identification.tails import normal_sf
 from identification.twin import Source, Twin, TwinNoise, TwinTerm, names_of
 
 ALARM = 0.01
@@ -286,7 +286,7 @@ def changed_constant(twin: Twin, state: State, known: str, unit: str) -> Finding
     if not isfinite(both) or both <= 0:
         return None
     z = (value - was) / both
-    p = float(max(2 * norm.sf(abs(z)), 1e-300))
+    p = float(max(2 * normal_sf(abs(z)), 1e-300))
     if p >= ALARM:
         return None
     share = 100 * (value - was) / abs(was)
