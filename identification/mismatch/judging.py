@@ -109,6 +109,15 @@ def by_runs(before: State, after: State, data: Data, others: Sequence[History]) 
     return HeldOut(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
 
 
+def rmse_on_runs(fitted: Fit, data: Data, others: Sequence[History]) -> float:
+    """Per sample, N, on whole runs that were not fitted; infinite where one lacks what a term needs."""
+    if any(not set(term.needs) <= set(h.others) for term in fitted.model.terms for h in others):
+        return float("inf")
+    unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
+    theta = _with_tares(fitted.model, fitted.theta, unseen)
+    return rmse(fitted.model, theta, unseen, [np.ones(r.size, dtype=bool) for r in unseen.rows])
+
+
 def _with_tares(model: Model, theta: Theta, data: Data) -> Theta:
     zero = replace(theta, tares=tuple(0.0 for _ in data.histories))
     thrust, _ = raw(model, zero, data, with_rate=False)

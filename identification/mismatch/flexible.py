@@ -1,0 +1,286 @@
+"""A flexible term where no physics fits: a spline over the located coordinate, so that the fit still improves.
+
+Coordinate, multiplier, knots and degree are chosen on a part of the data with the state's coloured noise; a term is
+kept only when the rest of the data, which it has not seen, is predicted better. Then the terms are fitted to all rows.
+Where a term of the catalogue fits but its name was not earned, the flexible term may take its place.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.mismatch.coordinates import FOLLOWED, LOADS
+from identification.mismatch.fitting import Fit, extended, fit
+from identification.mismatch.judging import blocks, refitted, rmse, rmse_on_runs
+from identification.mismatch.knots import Moments, choose, heights, nodes_of
+from identification.mismatch.model import Data, Weights, predict, weights
+from identification.mismatch.omnibus import Omnibus, judge_left
+from identification.mismatch.screening import orthogonal_basis
+from identification.mismatch.search import State, forces, refresh
+from identification.physics.free_form import Flexible, Multiplier, spline
+from identification.physics.history import History
+from identification.physics.term import Term
+from identification.recording import Floats
+
+ALARM = 0.01
+"""False-alarm rate below which a further coordinate is taken to hold structure."""
+MOST_TERMS = 3
+MOST_COORDINATES = 3
+"""Coordinates tried for each term, the clearest first."""
+LOCATED = 0.8
+"""Share of the best coordinate's gain at which the located one is kept."""
+FIT_STEPS = 10
+UNITS = dict(FOLLOWED)
+Judge = Callable[[Fit], float]
+"""RMSE per sample on data that were not fitted, N."""
+
+
+@dataclass(frozen=True, eq=False)
+class Extended:
+    """A model with flexible terms, on all rows."""
+
+    state: State
+    terms: tuple[Flexible, ...]
+    """In the order in which they were found."""
+    dropped: tuple[Term, ...]
+    """Terms of the model before whose place they take."""
+    without: float
+    """Held-out RMSE of the model before, N."""
+    held: float
+    """Held-out RMSE with them, N."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One flexible term with its linear estimate."""
+
+    term: Flexible
+    start: tuple[float, ...]
+    gain: float
+    """Of BIC."""
+
+
+def extend(
+    after: State,
+    data: Data,
+    left: Omnibus,
+    located: str,
+    doubted: Sequence[Term],
+    others: Sequence[History],
+    rng: np.random.Generator,
+) -> Extended | None:
+    """The model with up to MOST_TERMS flexible terms; None where none improves what was not fitted.
+
+    `left`: what the model leaves; `located`: the coordinate where; `doubted`: terms whose name was not earned;
+    `others`: whole runs to judge on, blocks of time when empty.
+    """
+    part, judge, begin = _split(after, data, others)
+    error = judge(begin.fit)
+    order = [located, *(g.coordinate.quantity for g in left.groups if g.p_value < ALARM)]
+    for smaller in _bases(begin, part, doubted):
+        state, terms, held = _grown(smaller, part, order, judge, rng)
+        if terms and held < error:
+            break
+    else:
+        return None
+    whole = refresh(state.fit.model, replace(state.fit.theta, tares=after.fit.theta.tares), data, None, None)
+    dropped = tuple(t for t in after.fit.model.terms if t not in state.fit.model.terms)
+    return Extended(whole, tuple(terms), dropped, error, held)
+
+
+def _split(after: State, data: Data, others: Sequence[History]) -> tuple[Data, Judge, State]:
+    """What is fitted, what judges it, and the present model fitted to that part."""
+    if others:
+        return data, lambda found: rmse_on_runs(found, data, others), after
+    keep = [blocks(h) for h in data.histories]
+    back = [~k for k in keep]
+    part = replace(data, keep=tuple(keep))
+    begin = refitted(after, data, keep)
+    w = weights(part, after.noise, forces(begin.model, begin.theta, part), after.rate_noise)
+    state = State(begin, after.noise, after.rate_noise, w, part.thrust_rows)
+    return part, lambda found: rmse(found.model, found.theta, data, back), state
+
+
+def _bases(begin: State, part: Data, doubted: Sequence[Term]) -> list[State]:
+    """The model without what was doubted, and as it is."""
+    if not doubted:
+        return [begin]
+    model, theta = begin.fit.model, begin.fit.theta
+    kept = tuple(v for t, v in zip(model.terms, theta.terms, strict=True) if t not in doubted)
+    smaller = replace(model, terms=tuple(t for t in model.terms if t not in doubted))
+    less = fit(smaller, replace(theta, terms=kept), part, begin.weights)
+    return [replace(begin, fit=less), begin]
+
+
+def _grown(
+    state: State, part: Data, order: Sequence[str], judge: Judge, rng: np.random.Generator
+) -> tuple[State, list[Flexible], float]:
+    """Terms one after another while each predicts better what was not fitted."""
+    terms: list[Flexible] = []
+    held = judge(state.fit)
+    while True:
+        taken = {t.quantity for t in terms}
+        new = None
+        for candidate in _candidates(state, part, [q for q in dict.fromkeys(order) if q not in taken]):
+            tried, term = _added(state, part, candidate)
+            error = judge(tried.fit)
+            if error < held:
+                new, held = tried, error
+                terms.append(term)
+                break
+        if new is None:
+            return state, terms, held
+        state = new
+        if len(terms) == MOST_TERMS:
+            return state, terms, held
+        left = judge_left(state.fit, part, state.weights, rng)
+        if left.p_value >= ALARM:
+            return state, terms, held
+        order = [g.coordinate.quantity for g in left.groups if g.p_value < ALARM]
+
+
+def _candidates(state: State, part: Data, order: Sequence[str]) -> list[Candidate]:
+    """The best over each of the first coordinates; the located one first unless others gain more."""
+    found = [best_over(quantity, state, part) for quantity in order[:MOST_COORDINATES]]
+    gaining = [c for c in found if c is not None and c.gain > 0]
+    if not gaining:
+        return []
+    most = max(c.gain for c in gaining)
+    return sorted(gaining, key=lambda c: (c.term.quantity != order[0] or c.gain < LOCATED * most, -c.gain))
+
+
+def _added(state: State, part: Data, candidate: Candidate) -> tuple[State, Flexible]:
+    """The model with the term, its noise estimated anew, and the knots chosen again with that noise."""
+    first = _joined(state, part, candidate)
+    first = refresh(first.fit.model, first.fit.theta, part, None, replace(first, rows=part.thrust_rows))
+    less = fit(state.fit.model, state.fit.theta, part, first.weights)
+    again = best_of([candidate.term], replace(first, fit=less), part)
+    if again is None or again.term == candidate.term:
+        return first, candidate.term
+    return _joined(replace(first, fit=less), part, again), again.term
+
+
+def _joined(state: State, part: Data, candidate: Candidate) -> State:
+    bigger = state.fit.model.plus(candidate.term)
+    theta = extended(state.fit.theta, state.fit.model, candidate.term, candidate.start, bigger)
+    return replace(state, fit=fit(bigger, theta, part, state.weights, FIT_STEPS))
+
+
+def best_over(quantity: str, state: State, data: Data) -> Candidate | None:
+    """The best flexible term over a coordinate by BIC; None where there is none that could be."""
+    return best_of(shapes_over(quantity, data), state, data)
+
+
+def best_of(shapes: Sequence[Flexible], state: State, data: Data) -> Candidate | None:
+    """The best of several kinds of flexible term, their knots chosen."""
+    found = [chosen for shape in shapes if (chosen := with_knots(shape, state, data)) is not None]
+    return max(found, key=lambda c: c.gain, default=None)
+
+
+def shapes_over(quantity: str, data: Data) -> list[Flexible]:
+    """What a flexible term over this coordinate may multiply; knots to be chosen."""
+    driver = data.histories[0].driver_quantity
+    units = {"time": "s", "time_since_step": "s", "previous_voltage": data.scale.driver_unit, **UNITS}
+
+    def over(*times: tuple[Multiplier, ...], unit: str = "1", memory: float = 0.0) -> list[Flexible]:
+        unit = units.get(quantity, unit)
+        return [Flexible(quantity, unit, (0.0,), (), each, memory=memory) for each in times]
+
+    match quantity:
+        case _ if quantity == driver:
+            return over(("force",), ("gain",), unit=data.scale.driver_unit)
+        case "direction":
+            return over(("gain",), ("force",))
+        case "time":
+            return over(("gain",), ("force",), ("gain", "force"))
+        case "time_since_step":
+            return over(("step",), ("gain",), ("step", "gain"))
+        case "previous_voltage" | "direction_of_change":
+            return over(("gain",), ("even",), ("force",), ("gain", "even"))
+        case "load_history":
+            memories = [tau for tau in LOADS if tau < 0.5 * data.scale.duration]
+            return [each for tau in memories for each in over(("gain",), ("force",), memory=tau)]
+        case "rotation_rate":
+            return over(("drive",), unit=data.scale.driver_unit)
+        case _ if quantity in UNITS:
+            return over(("gain",), ("force",), ("rate",), ("gain", "even"), ("gain", "force"))
+        case _:
+            return []
+
+
+def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
+    """Knots and degree by BIC, from the whitened residual of the state, its own parameters free to follow."""
+    over, columns = seen_at(shape, state.fit, data)
+    if shape.quantity == "time_since_step":
+        shape = replace(shape, knots=(max(1.5 * data.scale.interval, 0.02),))
+    axis = [shape.axis(v) for v in over]
+    every = np.concatenate(axis)
+    if float(np.ptp(every)) <= 1e-9 * max(float(np.max(np.abs(every))), 1e-12):
+        return None
+    nodes = nodes_of(every, (0.0,) if every.min() < 0 < every.max() and shape.quantity != "time_since_step" else ())
+    if nodes.size < 2:
+        return None
+    moments = _moments(shape, nodes, axis, columns, state, data)
+    zero = _zero_nodes(shape, nodes, data)
+    found = choose(moments, zero)
+    if found is None:
+        return None
+    at = nodes[list(found.knots)]
+    at = np.exp(at) if shape.quantity == "time_since_step" else at
+    knots = tuple(float(f"{x:.6g}") for x in at)
+    zeros = tuple(i for i, k in enumerate(found.knots) if k in zero)
+    term = replace(shape, knots=knots, zero=zeros, degree=found.degree)
+    start = heights(moments, found.knots, found.degree, [term.free(m) for m in term.times])
+    return Candidate(term, tuple(map(float, start)), found.gain)
+
+
+def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], list[Floats]]:
+    """Per run at its thrust rows: the coordinate (n,), and what each multiplier makes of 1 (n, multipliers)."""
+    over, columns = [], []
+    for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
+        F, x = predict(fitted.model, fitted.theta, h, data.scale, i)
+        before = h.previous
+        made: dict[Multiplier, Floats] = {
+            "force": np.ones_like(F),
+            "gain": F,
+            "even": np.abs(F),
+            "step": F - fitted.theta.C * before * np.abs(before),
+            "rate": np.abs(x) / data.scale.driver,
+            "drive": 2 * fitted.theta.C * np.abs(x),
+        }
+        over.append(shape.covariate(h, x, data.scale)[r])
+        columns.append(np.column_stack([made[m][r] for m in shape.times]))
+    return over, columns
+
+
+def _moments(
+    shape: Flexible, nodes: Floats, axis: Sequence[Floats], columns: Sequence[Floats], state: State, data: Data
+) -> Moments:
+    n = data.size
+    raw = []
+    for values, times in zip(axis, columns, strict=True):
+        hats = spline(values, nodes, np.eye(nodes.size), 1)
+        raw.append(np.column_stack([hats * times[:, [j]] for j in range(times.shape[1])]))
+    white = Weights(state.weights.thrust).whiten(raw, [])
+    basis = orthogonal_basis(state.fit.jacobian[:n])
+    white = white - basis @ (basis.T @ white)
+    constant = tuple(not replace(shape, zero=(0,)).zeros(m) for m in shape.times)
+    return Moments(nodes, white.T @ white, white.T @ state.fit.residual[:n], n, constant)
+
+
+def _zero_nodes(shape: Flexible, nodes: Floats, data: Data) -> tuple[int, ...]:
+    """Nodes at which the spline is nothing by definition: at rest, at zero, at the beginning, long after a step."""
+    nearest = int(np.argmin(np.abs(nodes)))
+    match shape.quantity:
+        case "time" | "direction_of_change":
+            return (0,)
+        case "direction" | "time_since_step":
+            return (nodes.size - 1,)
+        case quantity if quantity == data.histories[0].driver_quantity:
+            largest = int(np.argmax(np.abs(nodes)))
+            return tuple(sorted({nearest, largest})) if shape.times == ("force",) else (largest,)
+        case _:
+            return (nearest,)
