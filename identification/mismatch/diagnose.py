@@ -186,10 +186,10 @@ def _faulty(
 
 def _with_channels(answer: Diagnosis, lines: Sequence[Line], faults: Sequence[Fault]) -> Diagnosis:
     """The answer with periodic disturbances and channel faults among its findings, faults first."""
-    grave = [f for f in faults if f.kind != "nan"]
+    grave = [f for f in faults if f.grave and f.kind != "nan"]
     found = (*map(_fault_finding, grave), *answer.findings, *map(_line_finding, lines))
-    notes = [f"{f.recording_id}: {f.statement}" for f in faults if f.kind == "nan"]
-    notes += [f"for the model this was put right: {f.statement}" for f in grave if f.grave and f.repairable]
+    notes = [f"{f.recording_id}: {f.statement}" for f in faults if f not in grave]
+    notes += [f"for the model this was put right: {f.statement}" for f in grave if f.repairable]
     verdict = "explained" if answer.verdict == "adequate" and found else answer.verdict
     terms = (*answer.model_terms, *("periodic_disturbance" for _ in lines))
     return replace(answer, verdict=verdict, findings=found, notes=(*answer.notes, *notes), model_terms=terms)

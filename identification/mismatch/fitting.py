@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict
 from identification.physics.filters import delayed, reconstructed
+from identification.physics.term import Term
 from identification.recording import Floats
 
 MOST_STEPS = 25
@@ -192,8 +193,8 @@ def fit(
         if fall < CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1)):
             break
     vector = theta.vector
-    at_bound = (vector <= low) | (vector >= high)
-    free = may & ~at_bound
+    ended = (vector <= low) | (vector >= high)
+    free = may & ~ended
     J = J[:, free[may]]
     return Fit(model, theta, residual, J, free, weights.log_det)
 
@@ -202,3 +203,13 @@ def extended(theta: Theta, model: Model, term: object, values: tuple[float, ...]
     """Theta of `bigger` = model + term, started at `values` for the new one."""
     known = dict(zip(model.terms, theta.terms, strict=True))
     return replace(theta, terms=tuple(values if t == term else known[t] for t in bigger.terms))
+
+
+def at_bound(term: Term, fitted: Fit, data: Data) -> bool:
+    """Whether a parameter sits at the end of what is physically possible."""
+    values = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))[term]
+    for p, value in zip(term.parameters(data.scale), values, strict=True):
+        edge = 1e-3 * (p.high - p.low)
+        if (value <= p.low + edge and p.neutral != p.low) or (value >= p.high - edge and p.neutral != p.high):
+            return True
+    return False

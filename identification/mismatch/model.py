@@ -20,7 +20,7 @@ ORDER = {term: i for i, term in enumerate(sorted(CATALOGUE, key=lambda t: STAGES
 
 HYDRO = STAGES.index("hydro")
 CELL = STAGES.index("cell")
-MOST_REMEMBERED = 48
+MOST_REMEMBERED = 400
 
 
 @dataclass(frozen=True, eq=False, slots=True)

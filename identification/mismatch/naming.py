@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.mismatch.fitting import Fit, extended, fit, raw
+from identification.mismatch.fitting import Fit, at_bound, extended, fit, raw
 from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.omnibus import Omnibus
 from identification.mismatch.preparing import DRIVERS
@@ -141,16 +141,6 @@ def mirrored(term: Term, values: tuple[float, ...], data: Data) -> tuple[float, 
     first = term.parameters(data.scale)[0]
     assert first.neutral is not None
     return (min(max(2 * first.neutral - values[0], first.low), first.high), *values[1:])
-
-
-def at_bound(term: Term, fitted: Fit, data: Data) -> bool:
-    """Whether a parameter sits at the end of what is physically possible."""
-    values = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))[term]
-    for p, value in zip(term.parameters(data.scale), values, strict=True):
-        edge = 1e-3 * (p.high - p.low)
-        if (value <= p.low + edge and p.neutral != p.low) or (value >= p.high - edge and p.neutral != p.high):
-            return True
-    return False
 
 
 def _effect(now: Fit, term: Term, data: Data, state: State) -> Floats:

@@ -10,18 +10,22 @@ from numpy.typing import NDArray
 from identification.mismatch.channels import followed, jumps, neighbour_at, supply
 from identification.mismatch.grid import STEP, Held, distinct, edges_of
 from identification.physics.filters import reconstructed, within_intervals
-from identification.physics.history import History
+from identification.physics.history import CHANGED, History
 from identification.recording import Channel, Floats, Recording
 
 DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
 """What may explain the thrust, best first."""
 JITTER_BEFORE, JITTER_AFTER = 0.002, 0.003
 """s round a step within which a sample may belong to either level: time stamps are not better."""
-MOST_INTERVALS = 12000
+JITTER_SHARE = 0.1
+"""Of the time between samples: where they are dense, so good are their stamps."""
+MOST_INTERVALS = 6000
 LEAST_DWELL = 0.5
 """s of a level in a static table."""
 FEW_SAMPLES = 3
 """Samples of a level, at most, that make a static table."""
+LEAST_HELD = 0.5
+"""s of a level of which the second half counts as steady."""
 LEAST_SAMPLES = 5
 FOLLOWED = ("bus_voltage", "flow_speed", "current", "torque", "motor_temperature", "water_temperature", "rotation_rate")
 """Quantities that terms and tests may look at."""
@@ -96,9 +100,10 @@ def _clear_of_steps(time: Floats, force: Floats, held: Held) -> tuple[Floats, Fl
     steps = held.time[big]
     if not (held.stepwise and steps.size) or time.size < 4 * steps.size:
         return time, force
-    after = np.searchsorted(steps, time + JITTER_BEFORE, side="right") - 1
+    least = JITTER_SHARE * float(np.median(np.diff(time)))
+    after = np.searchsorted(steps, time + min(JITTER_BEFORE, least), side="right") - 1
     late = time - steps[np.maximum(after, 0)]
-    clear = (after < 0) | (late > JITTER_AFTER)
+    clear = (after < 0) | (late > min(JITTER_AFTER, least))
     return time[clear], force[clear]
 
 
@@ -153,9 +158,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         good = np.isfinite(turning.value)
         turning_time = turning.time[good]
         rate, rate_count, rate_sampled = _binned(turning.time[good], turning.value[good], edges)
-        weighted = driven * np.diff(edges)
-        power = float(weighted @ driven)
-        per_driver = float(weighted @ others["rotation_rate"]) / power if power > 0 else 1.0
+        per_driver = _rate_per_driver(driven, others["rotation_rate"], edges)
     return History(
         recording_id=recording.recording_id,
         driver_quantity=held.quantity,
@@ -175,11 +178,33 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         rate_count=rate_count,
         rate_sampled=rate_sampled,
         others=others,
-        rate_per_driver=per_driver or 1.0,
+        rate_per_driver=per_driver,
         spacing=float(np.median(np.diff(time))),
         rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
         static=_is_table(held, time.size),
     )
+
+
+def _rate_per_driver(driven: Floats, rate: Floats, edges: Floats) -> float:
+    """Weighted median of rate over driver in the second half of each level that was held, or of everything."""
+    dt = np.diff(edges)
+    size = float(np.max(np.abs(driven), initial=0.0))
+    new = np.abs(np.diff(driven, prepend=np.nan)) > CHANGED * size
+    new[0] = True
+    starts = np.flatnonzero(new)
+    which = np.searchsorted(starts, np.arange(dt.size), side="right") - 1
+    begun, ended = edges[starts][which], np.append(edges[starts[1:]], edges[-1])[which]
+    held = (edges[:-1] > 0.5 * (begun + ended)) & (ended - begun > LEAST_HELD)
+    weight = driven**2 * dt * held
+    if not weight.any():
+        weight = driven**2 * dt
+    at = np.flatnonzero(weight)
+    if at.size == 0:
+        return 1.0
+    ratio = rate[at] / driven[at]
+    order = np.argsort(ratio)
+    total = np.cumsum(weight[at][order])
+    return float(ratio[order[np.searchsorted(total, 0.5 * total[-1])]]) or 1.0
 
 
 def _explaining(recording: Recording, driver: Channel, held: Held, edges: Floats, driven: Floats) -> dict[str, Floats]:

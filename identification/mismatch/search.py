@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.mismatch.coordinates import coordinates
-from identification.mismatch.fitting import Fit, bounds_of, columns_of, extended, fit, raw
+from identification.mismatch.fitting import Fit, at_bound, bounds_of, columns_of, extended, fit, raw
 from identification.mismatch.model import Data, Model, Theta, Weights, scale_of, weights
 from identification.mismatch.noise import Noise, Rows, fit_noise
 from identification.mismatch.screening import (
@@ -31,6 +31,8 @@ ALARM = 0.01
 """Family-wise false-alarm rate of the search."""
 CLOCKS = 0.001
 """s: clocks of two devices are not trusted to agree better."""
+CLOCK_SHARE = 0.1
+"""Of the time between samples: where they are dense, so well do clocks agree."""
 CANDIDATES = 5
 MOST_TERMS = 6
 NOISE_ROUNDS = 5
@@ -102,7 +104,7 @@ def start(histories: Sequence[History]) -> tuple[Data, Theta]:
     C = right / gram if gram > 0 else 0.0
     with_rate = all(h.rate is not None and h.rate_rows.size > 20 for h in histories)
     moving = histories[0].driver_quantity == "command_voltage" and not any(h.static for h in histories)
-    most = CLOCKS if moving else 0.0
+    most = min(CLOCKS, CLOCK_SHARE * min(h.spacing for h in histories)) if moving else 0.0
     data = Data(tuple(histories), scale_of(histories, C or 1e-12), with_rate=with_rate, most_shift=most)
     return data, Theta(C, (), tuple(float(ym - C * fm) for fm, ym in means), k=_k(histories))
 
@@ -178,18 +180,22 @@ def _independent(parts: Sequence[Floats]) -> list[Floats]:
     return list(np.split(u, ends[:-1]))
 
 
-def pursue(fit_now: Fit, data: Data, weights: Weights, terms: Sequence[Term]) -> Floats:
-    """(n, k) raw columns that together take what is plainly no noise: of the catalogue's terms and of any shape.
+def every_shape(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
+    """(n, k) raw columns: all trials of the catalogue's terms, and any shape over each coordinate."""
+    columns = np.column_stack(
+        [raw_directions(fit_now, data, terms)] + [np.concatenate(c.columns) for c in coordinates(fit_now, data)]
+    )
+    out: Floats = columns[:, np.linalg.norm(columns, axis=0) > 0]
+    return out
+
+
+def pursue(fit_now: Fit, data: Data, weights: Weights, raw_columns: Floats) -> Floats:
+    """(n, k) those of `every_shape` that together take what is plainly no noise.
 
     Orthogonal matching pursuit. Noise is estimated beside these columns, or a mismatch would be mistaken for it.
     """
     thrust_only = Weights(weights.thrust)
     n = data.size
-    raw_columns = np.column_stack(
-        [raw_directions(fit_now, data, terms)] + [np.concatenate(c.columns) for c in coordinates(fit_now, data)]
-    )
-    size = np.linalg.norm(raw_columns, axis=0)
-    raw_columns = raw_columns[:, size > 0]
     columns = thrust_only.whiten(_split(raw_columns, data), [])
     basis = orthogonal_basis(fit_now.jacobian[:n])
     columns = columns - basis @ (basis.T @ columns)
@@ -223,8 +229,9 @@ def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> S
     first = fit(model, theta, data, unit)
     state = refresh(model, first.theta, data, None, None)
     taken = 0
+    shapes = every_shape(state.fit, data, terms)
     for _ in range(NOISE_ROUNDS):
-        plain = pursue(state.fit, data, state.weights, terms)
+        plain = pursue(state.fit, data, state.weights, shapes)
         if plain.shape[1] <= taken:
             break
         taken = plain.shape[1]
@@ -286,7 +293,8 @@ def search(
         if best is None:
             break
         remaining = [t for t in terms if t.id not in {u.id for u in best.model.terms}]
-        state = refresh(best.model, best.theta, data, pursue(best, data, state.weights, remaining), state)
+        plain = pursue(best, data, state.weights, every_shape(best, data, remaining))
+        state = refresh(best.model, best.theta, data, plain, state)
         state = prune(state, data)
         if frozenset(state.fit.model.terms) in seen:  # what was added was dropped again
             break
@@ -302,11 +310,9 @@ def _best_addition(state: State, judged: Screening, data: Data) -> Fit | None:
         theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
         new = fit(bigger, theta, data, state.weights)
         gain = state.fit.chi2 - new.chi2
-        fits.append((gain - len(values) * np.log(new.residual.size), new))
-    if not fits:
-        return None
-    gain, best = max(fits, key=lambda pair: pair[0])
-    return best if gain > 0 else None
+        if gain > len(values) * np.log(new.residual.size):
+            fits.append((not at_bound(term, new, data), gain - len(values) * np.log(new.residual.size), new))
+    return max(fits, key=lambda each: each[:2])[2] if fits else None
 
 
 def prune(state: State, data: Data) -> State:

@@ -29,7 +29,11 @@ class DeadBand:
         return tuple((share * scale.driver,) for share in (0.01, 0.03, 0.07, 0.15, 0.3))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return ()
+        if self.form == "shrink":
+            return ()
+        # a jump moves nothing between two levels: no slope leads from one to the next
+        most = self.parameters(scale)[0].high
+        return tuple((min(float(share) * values[0], most),) for share in np.geomspace(0.3, 3.0, 48))
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         size = np.abs(value)

@@ -1,4 +1,4 @@
-"""Rotor inertia: first order x' = (V - x)/tau, or the torque balance x' = a (V|V| - x|x|)."""
+"""Rotor inertia: first order x' = (V - x)/tau, the torque balance x' = a (V|V| - x|x|), or both at once."""
 
 from __future__ import annotations
 
@@ -12,20 +12,25 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class MotorLag:
-    """Rotor inertia: first order x' = (V - x)/tau, or the torque balance x' = a (V|V| - x|x|)."""
+    """Rotor inertia: x' = a (V|V| - x|x|) + b (V - x); first order without a, the torque balance without b.
+
+    The water's torque grows with the square of the rate, back-EMF and the controller's hold with the rate itself.
+    """
 
     id: ClassVar[str] = "motor_lag"
     stage: ClassVar[Stage] = "rotor"
     physics: ClassVar[str] = "the rotor needs time to follow"
     needs: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
-    form: Literal["first_order", "quadratic"] = "first_order"
+    form: Literal["first_order", "quadratic", "mixed"] = "first_order"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("time_constant", "s", 0.0, 10.0, 0.0),)
+        tau = Parameter("time_constant", "s", 0.0, 10.0, 0.0)
+        return (tau, Parameter("linear_share", "1", 0.0, 1.0)) if self.form == "mixed" else (tau,)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return tuple((tau,) for tau in (0.005, 0.02, 0.06, 0.15, 0.4, 1.0) if tau >= 0.1 * scale.interval)
+        rest = (0.5,) if self.form == "mixed" else ()
+        return tuple((tau, *rest) for tau in (0.005, 0.02, 0.06, 0.15, 0.4, 1.0) if tau >= 0.1 * scale.interval)
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
@@ -35,16 +40,18 @@ class MotorLag:
         if tau <= 1e-6:
             return value
         start = float(value[0])
-        if self.form == "quadratic":
-            return lag(value, now.history.dt, 1 / (2 * tau * now.scale.driver), 0.0, start)
-        return lowpass(value, now.history.dt, tau, start)[1]
+        if self.form == "first_order":
+            return lowpass(value, now.history.dt, tau, start)[1]
+        linear = theta[1] if self.form == "mixed" else 0.0
+        return lag(value, now.history.dt, (1 - linear) / (2 * tau * now.scale.driver), linear / tau, start)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        at = f" at {scale.driver:.3g} {scale.driver_unit}, slower at less" if self.form == "quadratic" else ""
-        return f"Motor lag: the rotor follows the command with a time constant of {1000 * theta[0]:.3g} ms{at}."
+        slower = "" if self.form == "first_order" else f" at {scale.driver:.3g} {scale.driver_unit}, slower at less"
+        return f"Motor lag: the rotor follows the command with a time constant of {1000 * theta[0]:.3g} ms{slower}."
 
 
 FORMS = (
     MotorLag("first_order"),
     MotorLag("quadratic"),
+    MotorLag("mixed"),
 )

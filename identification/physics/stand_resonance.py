@@ -27,7 +27,7 @@ class StandResonance:
         return (
             Parameter("compliance", "1", 0.0, 1.0, 0.0),
             Parameter("frequency", "Hz", 0.1, 0.45 / scale.interval),
-            Parameter("damping", "1", 0.005, 0.95),
+            Parameter("damping", "1", 0.005, 0.4),
         )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
