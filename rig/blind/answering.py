@@ -1,6 +1,6 @@
 """The process that diagnoses: `python -m rig.blind.answering OPEN ANSWERS`. It sees recordings, never a truth.
 
-One JSON line in, {"token", "tag", "without", "code"}, one line out when the answer is there: ANSWERS/<token>/<tag>.json,
+One JSON line in, {"token", "tag", "without", "code"}, one line out when the answer is there: ANSWERS/<token>/<tag>.json
 and beside it <tag>.npz, what the model that was found and the baseline predict for the other run. From its start on it
 refuses to open any file of the store that is not a recording or an answer of its own.
 """

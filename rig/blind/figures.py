@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -17,6 +17,14 @@ LARGE: Final = 9.9
 
 def cell(scores: Iterable[Score], *names: str) -> list[Score]:
     return [s for s in scores if s.order.cell in names]
+
+
+def by_label(scores: Iterable[Score], *names: str) -> dict[str, list[Score]]:
+    """Those of the cells `names`, effect by effect."""
+    found: dict[str, list[Score]] = {}
+    for s in cell(scores, *names):
+        found.setdefault(s.order.label, []).append(s)
+    return dict(sorted(found.items()))
 
 
 def goals(scores: Sequence[Score]) -> list[Goal]:
@@ -153,6 +161,21 @@ def said(s: Score) -> dict[str, Any]:
         "statement": s.statement,
         "seconds": round(s.seconds, 1),
     }
+
+
+def instead(group: Iterable[Score], most: int = 6) -> str:
+    """What was said where it was not right, the most frequent first."""
+    seen = Counter(" + ".join(s.named) or s.said for s in group if not s.right)
+    return counts(dict(seen.most_common(most)))
+
+
+def counts(found: Mapping[str, int]) -> str:
+    """Names with how often.
+
+    >>> counts({"heating": 2, "adequate": 1})
+    'heating (2), adequate'
+    """
+    return ", ".join(f"{name} ({n})" if n > 1 else name for name, n in found.items())
 
 
 def twins(scores: Iterable[Score]) -> list[dict[str, Any]]:

@@ -17,6 +17,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from threading import Event, Thread
+from time import monotonic
 from typing import Any
 
 from rig.blind.design import Job, Kinds, Order
@@ -56,12 +57,16 @@ class Child:
             process.stdin.flush()
         except OSError as error:
             raise Ended(self._end()) from error
-        ready, _, _ = select.select([process.stdout], [], [], limit)
-        if not ready:
-            self.close(0.0)
-            raise Overdue
-        if not os.read(process.stdout.fileno(), 4096):
-            raise Ended(self._end())
+        end, said = monotonic() + limit, b""
+        while not said.endswith(b"\n"):
+            ready, _, _ = select.select([process.stdout], [], [], max(end - monotonic(), 0.0))
+            if not ready:
+                self.close(0.0)
+                raise Overdue
+            piece = os.read(process.stdout.fileno(), 4096)
+            if not piece:
+                raise Ended(self._end())
+            said += piece
 
     def close(self, patience: float = STOPPING) -> None:
         """End it; it is killed when that takes more than `patience` s."""

@@ -45,6 +45,15 @@ class Rate:
         half = Z / (1 + weight) * sqrt(p * (1 - p) / self.n + weight / (4 * self.n))
         return max(middle - half, 0.0), min(middle + half, 1.0)
 
+    @property
+    def told(self) -> str:
+        """Empty when nothing was counted.
+
+        >>> Rate(3, 4).told, Rate(0, 0).told
+        ('75 % of 4', '')
+        """
+        return f"{100 * self.value:.0f} % of {self.n}" if self.n else ""
+
     def json(self) -> dict[str, float | int | None]:
         return {
             "hits": self.hits,

@@ -1,0 +1,173 @@
+"""The page of `rig prove`: goals and figures side by side, then each of them in full, then the worst cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from rig.blind.collecting import Collected
+from rig.blind.design import STRENGTHS
+from rig.blind.figures import by_label, cell, confusion, goals, instead
+from rig.blind.rates import Goal, rate
+from rig.blind.scoring import Score
+from rig.report import figures_proof
+from rig.report.figures_proof import Row
+from rig.report.page import Page, Picture, Remark, Section, Sentences, Table
+from rig.report.proof_parts import SIGNS, alarms_section, models_section, open_section, power_section
+
+UNNAMED = ("unexplained", "adequate", "failed")
+MOST_SAID = 4
+"""Cases told of one cell in the list of the worst."""
+
+
+def proof_page(found: Collected, figures: dict[str, Any]) -> Page:
+    """`figures`: of blind.figures.tables."""
+    scores, told = found.scores, goals(found.scores)
+    parts = [
+        _goals(told),
+        _alone(scores),
+        _taken(scores),
+        _other_cells(scores),
+        open_section(figures),
+        alarms_section(scores),
+        models_section(scores, figures),
+        power_section(scores, figures),
+        _worst(figures),
+        _made(found, figures),
+    ]
+    return Page(
+        "Blind proof of the diagnosis", _lead(found, told), tuple(p for p in parts if p is not None), contents=True
+    )
+
+
+def _lead(found: Collected, told: Sequence[Goal]) -> str:
+    counts = {sign: sum(g.met == sign for g in told if g.n) for sign in SIGNS}
+    unmeasured = sum(not g.n for g in told)
+    more = f", {unmeasured} not measured" if unmeasured else ""
+    return (
+        f"{len(found.scores)} diagnoses of recordings with concealed physics: {counts['yes']} goals met, "
+        f"{counts['no']} missed, {counts['open']} that so few runs cannot decide{more}."
+    )
+
+
+def _goals(told: Sequence[Goal]) -> Section:
+    head = ("figure", "goal", "measured", "95 % interval", "n", "")
+    rows = tuple((g.what, g.wanted, g.measured, g.interval, str(g.n), SIGNS[g.met] if g.n else "") for g in told)
+    lead = "Missed: the interval does not reach the goal. Open: it does, the rate itself does not; more runs decide."
+    return Section("Goals", (Table("Goals and what was measured", head, rows, frozenset({0, 1, 5})),), lead)
+
+
+def _alone(scores: Sequence[Score]) -> Section | None:
+    effects = by_label(scores, *STRENGTHS)
+    if not effects:
+        return None
+    rows = [
+        Row(e, tuple(rate(s.right for s in cell(group, name)) for name in STRENGTHS)) for e, group in effects.items()
+    ]
+    series = [f"{name} ({d:g} sigma)" for name, d in STRENGTHS.items()]
+    plot = figures_proof.rates(rows, series, "right or among stated rivals / %")
+    head = ("effect", *(f"{name}: {what}" for name in STRENGTHS for what in ("right", "alone")), "wrong names")
+    cells = tuple(
+        (
+            e,
+            *(
+                r.told
+                for n in STRENGTHS
+                for r in (rate(s.right for s in cell(g, n)), rate(s.alone for s in cell(g, n)))
+            ),
+            rate(s.wrong for s in g).told,
+        )
+        for e, g in effects.items()
+    )
+    table = Table("Each effect by itself", head, cells, folded=True)
+    lead = "Strength is d', the sigma at which an oracle sees the effect that knows it, its shape and the noise."
+    picture = Picture("Effects by themselves", plot, "Bars are 95 % intervals (Wilson).")
+    return Section("One effect", (picture, table), lead)
+
+
+def _taken(scores: Sequence[Score]) -> Section | None:
+    parts = []
+    for name, d in STRENGTHS.items():
+        counts = confusion(scores, name)
+        if counts:
+            title = f"What was answered, {name} ({d:g} sigma)"
+            parts.append(
+                Picture(
+                    title,
+                    figures_proof.taken_for(counts, UNNAMED),
+                    "One row for each effect that was concealed; the area of a mark is its share of the answers.",
+                )
+            )
+    return Section("What was taken for what", tuple(parts)) if parts else None
+
+
+def _other_cells(scores: Sequence[Score]) -> Section | None:
+    head = ("concealed", "right", "alone", "wrong names", "said instead")
+    parts = []
+    for name, caption in (
+        ("form", "Textbook forms at plain strength"),
+        ("fault", "Channels that lie"),
+        ("pair", "Pairs"),
+    ):
+        groups = by_label(scores, name)
+        if name == "pair":
+            groups = {"two effects at random": cell(scores, name)} if groups else {}
+        rows = tuple(
+            (
+                label.replace(":", ", "),
+                rate(s.right for s in group).told,
+                rate(s.alone for s in group).told,
+                rate(s.wrong for s in group).told,
+                instead(group),
+            )
+            for label, group in groups.items()
+        )
+        if rows:
+            parts.append(Table(caption, head, rows, frozenset({0, 4})))
+    return Section("Forms, faults and pairs", tuple(parts)) if parts else None
+
+
+def _worst(figures: dict[str, Any]) -> Section | None:
+    head = ("case", "failures", "what was said")
+    cells = tuple(
+        (
+            f"{row['cell']}/{row['label']}",
+            f"{row['failures']} of {row['n']}",
+            "; ".join(map(_short, row["said"][:MOST_SAID])),
+        )
+        for row in figures["worst"]
+    )
+    if not cells:
+        return None
+    how = Sentences(("One case anew, with truth and answer: rig prove --case plain/heating/3",))
+    return Section("Worst cells", (how, Table("Cells with the most failures", head, cells, frozenset({0, 2}))))
+
+
+def _short(said: dict[str, Any]) -> str:
+    number = said["id"].rsplit("/", 1)[1]
+    place = f" at {said['place']}" if said["place"] else ""
+    truth = f" of {' + '.join(said['truth'])}" if len(said["truth"]) > 1 else ""
+    return f"#{number}{truth}: {said['verdict'][:60]}{place} {' + '.join(said['named'])}".strip()
+
+
+def _made(found: Collected, figures: dict[str, Any]) -> Section:
+    seconds = figures["seconds"]
+    failed = [f"{s['id']}: {s['verdict'][:200]}" for s in figures["failed"]]
+    several = len(found.versions) > 1
+    rows: list[str | Remark] = [
+        "The world's process wrote recordings and, apart from them, the sealed truth; the diagnosis ran in a process "
+        "that cannot open the seals.",
+        f"{found.missing} orders are not answered yet; {len(found.undrawn)} cases could not be drawn: no plan, scale "
+        "and noise of a load cell shows that effect at that strength.",
+        f"One diagnosis takes {seconds['0.5']:.1f} s (median), {seconds['0.95']:.1f} s (95 %), "
+        f"{seconds['1.0']:.0f} s at most.",
+        Remark(
+            f"Versions of the diagnosis that answered: {', '.join(found.versions) or 'none'}"
+            + ("; --renew answers all with the present one." if several else "."),
+            "doubt" if several else "",
+        ),
+        *(Remark(text, "bad") for text in failed[:20]),
+    ]
+    if len(failed) > 20:
+        rows.append(Remark(f"and {len(failed) - 20} more that crashed, refused or took too long", "bad"))
+    return Section("How it was made", (Sentences(tuple(rows)),))

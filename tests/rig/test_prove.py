@@ -1,0 +1,282 @@
+"""The blind proof: its design, its scoring on made-up answers, its page, and a tiny form end to end."""
+
+import json
+import sys
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from blind_scores import CATALOGUE, WORLD, answer, finding, order, truth, whole_proof
+from click.testing import CliRunner
+from report_reading import open_fonts
+
+from rig.blind.answering import answered
+from rig.blind.collecting import collected
+from rig.blind.design import Job, design, matches
+from rig.blind.figures import confusion, goals, half, half_named, tables, twins, worst
+from rig.blind.lanes import Child, Ended, Lane, Overdue, carry_out, concealable
+from rig.blind.meaning import SAME, true_values
+from rig.blind.places import PLACES
+from rig.blind.rates import Goal, Rate, of_rate
+from rig.blind.scoring import Score, scored
+from rig.blind.store import ProofError, Store
+from rig.prove import designed, prove_command
+from rig.report.page import html
+from rig.report.proof import proof_page
+
+
+@pytest.fixture(autouse=True, scope="module")
+def fonts():
+    open_fonts()
+
+
+def test_the_design_has_every_cell_and_breaks_off_evenly():
+    jobs = design(WORLD, CATALOGUE, 6)
+    orders = [o.id for job in jobs for o in job.orders]
+    assert len(set(orders)) == len(orders)
+    assert len({job.token for job in jobs}) == len(jobs)
+    cells = {o.split("/")[0] for o in orders}
+    assert cells >= {"faint", "clear", "plain", "removed", "outside", "form", "fault", "pair", "clean", "power_2.3"}
+    half_done = [job.id for job in jobs[: len(jobs) // 2]]
+    for label in ("faint/dead_band", "plain/heating", "outside/fouling", "fault/frozen"):
+        assert 2 <= sum(name.startswith(f"{label}/") for name in half_done) <= 4
+    assert sum(name.startswith("clean/") for name in orders) == 300
+    assert all(not set(job.token) - set("0123456789abcdef") for job in jobs)  # the token tells nothing
+
+
+def test_the_physics_that_is_taken_out_is_asked_of_the_same_recording():
+    (job,) = [job for job in design(WORLD, CATALOGUE, 1) if job.id == "plain/heating/0"]
+    assert [(o.id, o.without) for o in job.orders] == [("plain/heating/0", ()), ("removed/heating/0", ("heating",))]
+    assert "heating" not in job.spec["rivals"]
+    (only,) = design(WORLD, CATALOGUE, 1, ["removed/heating"])
+    assert [o.id for o in only.orders] == ["removed/heating/0"]
+    assert (only.token, only.seed) == (job.token, job.seed)
+
+
+def test_orders_are_asked_for_by_pattern():
+    assert matches("clean/white/12", ["clean/white/12"])
+    assert matches("clean/white/12", ["faint", "clean/*"])
+    assert not matches("clean/white/12", ["clean/white/1"])
+
+
+def test_right_alone_right_with_a_rival_and_wrong():
+    asked, hidden = order("plain/heating/0"), truth("heating")
+    alone = scored(asked, hidden, answer("explained", finding("heating")))
+    assert (alone.right, alone.alone, alone.wrong, alone.answer) == (True, True, False, "heating")
+    rival = scored(asked, hidden, answer("ambiguous", finding("supply_sag", ["heating"])))
+    assert (rival.right, rival.alone, rival.wrong) == (True, False, False)
+    unsure = scored(asked, hidden, answer("ambiguous", finding("heating", ["supply_sag"])))
+    assert (unsure.right, unsure.alone) == (True, False)
+    extra = scored(asked, hidden, answer("explained", finding("heating"), finding("asymmetry")))
+    assert (extra.right, extra.alone, extra.wrong) == (True, False, False)
+    wrong = scored(asked, hidden, answer("explained", finding("supply_sag", ["recirculation"])))
+    assert (wrong.right, wrong.wrong, wrong.answer) == (False, True, "supply_sag")
+    silent = scored(asked, hidden, answer("adequate"))
+    assert (silent.right, silent.wrong, silent.answer) == (False, False, "adequate")
+
+
+def test_a_pair_is_right_when_both_are_there():
+    asked, hidden = order("pair/any/0"), truth("heating", "asymmetry")
+    both = scored(asked, hidden, answer("explained", finding("asymmetry"), finding("heating")))
+    assert (both.right, both.alone) == (True, True)
+    one = scored(asked, hidden, answer("explained", finding("asymmetry")))
+    assert (one.right, one.wrong) == (False, False)
+    swapped = answer("ambiguous", finding("asymmetry"), finding("supply_sag", ["heating"]))
+    assert scored(asked, hidden, swapped).right
+
+
+def test_a_clean_run_is_right_when_it_is_adequate():
+    assert scored(order("clean/white/0"), truth(), answer("adequate")).right
+    alarm = scored(order("clean/white/0"), truth(), answer("explained", finding("motor_lag")))
+    assert (alarm.right, alarm.wrong, alarm.answer) == (False, True, "motor_lag")
+    assert not scored(order("clean/white/0"), truth(), answer("unexplained", place="time")).right
+
+
+def test_a_lie_is_right_when_it_is_called_one():
+    hidden = truth(fault={"kind": "swapped"})
+    assert scored(order("fault/swapped/0"), hidden, answer("explained", finding("channel_fault"))).alone
+
+
+def test_a_crash_is_a_failure():
+    crash = scored(order("plain/heating/0"), truth("heating"), {"seconds": 1.0, "error": "ValueError: x", "code": ""})
+    assert (crash.failed, crash.right, crash.answer, crash.outcome) == (True, False, "failed", "failed")
+    clean = scored(order("clean/white/0"), truth(), {"seconds": 300.0, "error": "timeout", "code": ""})
+    assert not clean.right
+
+
+@pytest.mark.parametrize(
+    ("said", "outcome"),
+    [
+        (answer("unexplained", place="time"), "located"),
+        (answer("unexplained", finding("asymmetry"), place="time"), "located"),
+        (answer("unexplained", place="flow_speed"), "misplaced"),
+        (answer("explained", finding("zero_drift")), "wrong name"),
+        (answer("adequate"), "missed"),
+    ],
+)
+def test_outcomes_of_the_open_world(said, outcome):
+    found = scored(order("outside/gain_step/0"), truth("gain_step"), said)
+    assert found.outcome == outcome
+    assert found.good == (outcome == "located")
+
+
+def test_twins_are_not_counted_and_listed():
+    near = [{"rival": "exponent", "form": "below", "left": 2.5}]
+    hidden = truth("dead_band", twins=near)
+    whole = scored(order("plain/dead_band/0"), hidden, answer("ambiguous", finding("dead_band", ["exponent"])))
+    without = scored(order("removed/dead_band/0", "dead_band"), hidden, answer("explained", finding("exponent")))
+    assert not without.counted
+    (row,) = twins([whole, without])
+    assert (row["effect"], row["twin"], row["left"]) == ("dead_band", "exponent", [2.5, 2.5])
+    assert row["rivals_stated"]["hits"] == 1
+    assert row["said_instead"] == {"exponent": 1}
+    shown = {g.what: g for g in goals([whole, without])}
+    assert shown["open world: a wrong name instead"].n == 0
+
+
+def test_intervals_and_held_out_errors():
+    asked, hidden = order("clear/dead_band/0"), truth("dead_band", form="shrink", half_width=0.5)
+    told = answer("explained", finding("dead_band", form="shrink", half_width=(0.53, 0.01)))
+    t = np.linspace(0.0, 1.0, 400)
+    noise = 0.1 * np.random.default_rng(1).standard_normal(t.size)
+    found = scored(asked, hidden, told, (t, t + noise), {"model": t + 3.0, "baseline": 0.0 * t})
+    (interval,) = found.intervals
+    assert interval.z == pytest.approx(3.0)
+    assert not interval.covers
+    assert found.held_out.model == pytest.approx(1.0, abs=0.01)  # a constant is a tare, not an error
+    assert found.held_out.baseline > 2.0
+    other = scored(asked, hidden, answer("explained", finding("dead_band", form="jump", half_width=(0.5, 0.1))))
+    assert other.intervals == ()
+
+
+def test_parameters_that_mean_the_same_are_known_for_effects_of_the_world():
+    known = set(concealable().effects)
+    assert set(SAME) <= known
+    assert known == set(PLACES)
+    told = truth("cavitation", form="linear", slope=0.1, onset=12.0)
+    assert true_values("cavitation", "linear", told) == {"slope": 0.2, "onset": 6.0}
+
+
+def test_rates_have_wilson_s_interval_and_goals_three_states():
+    assert (Rate(0, 20).low, Rate(0, 20).high) == (0.0, pytest.approx(0.1611, abs=1e-4))
+    assert (Rate(20, 20).low, Rate(20, 20).high) == (pytest.approx(0.8389, abs=1e-4), pytest.approx(1.0))
+    assert of_rate("", Rate(95, 100), least=0.92).met == "yes"
+    assert of_rate("", Rate(90, 100), least=0.92).met == "open"
+    assert of_rate("", Rate(70, 100), least=0.92).met == "no"
+    assert of_rate("", Rate(0, 0), least=0.92).met == "open"
+    assert of_rate("", Rate(0, 1000), least=0.003, most=0.02).met == "open"  # too silent is no virtue
+    assert Goal("", 0.0, 1.05, 1.2, 1.2, 1.2, 30, percent=False).met == "no"
+
+
+def test_the_strength_that_is_named_in_half_the_runs():
+    assert half({2.0: 0.25, 4.0: 0.75}) == pytest.approx(np.sqrt(8.0))
+    assert half({2.0: 0.0, 4.0: 0.6, 8.0: 0.4}) == pytest.approx(2.0 * 2.0 ** (0.5 / 0.6))  # a dip is chance
+    assert half({2.0: 0.0, 4.0: 0.2}) == np.inf
+    only_plain = [Score(order("plain/heating/0"), ("heating",), "explained", ("heating",))]
+    assert half_named(only_plain) == []  # its fainter strengths were not tried
+
+
+def test_figures_of_a_whole_proof_are_json_and_a_page():
+    scores = whole_proof()
+    figures = json.loads(json.dumps(tables(scores, 4, ("abc", "def"), ("faint/x/0: no",)), allow_nan=False))
+    assert sum(confusion(scores, "plain")["heating"].values()) == 4
+    assert figures["goals"][0]["n"] == 20
+    assert {row["cell"] for row in figures["open_world"]} == {"outside", "removed"}
+    assert worst(scores)[0]["failures"] >= worst(scores)[-1]["failures"]
+    page = html(proof_page(store_less(scores), figures))
+    for text in ("Open world", "False alarms by kind of noise", "Twins", "Detection power", "✗ missed", "--renew"):
+        assert text in page
+
+
+def store_less(scores):
+    found = collected(Store(None), [])
+    return replace(found, scores=tuple(scores), versions=("abc", "def"), undrawn=("faint/x/0: no",))
+
+
+def test_a_page_of_nothing_is_still_a_page():
+    figures = tables([], 1, (), ())
+    assert "not measured" in html(proof_page(collected(Store(None), []), figures))
+
+
+TINY = ("clean/white/0", "plain/dead_band/0", "plain/asymmetry/0", "removed/asymmetry/0", "outside/gain_step/0")
+
+
+@pytest.mark.timeout(600)
+def test_a_tiny_proof_end_to_end(tmp_path):
+    """Shortened recordings; the same road as the whole proof: three processes, seals, answers, page, resumed."""
+    jobs = [shortened(job) for job in designed(1, TINY)]
+    store = Store(tmp_path / "proof")
+    lane = Lane(store, "0", 120.0, "code")
+    carry_out(jobs[:2], [lane], renew=False, told=lambda _: None)
+    assert collected(store, jobs).missing > 0
+    carry_out([j for j in jobs if store.pending(j)], [lane], renew=False, told=lambda _: None)
+    found = collected(store, jobs)
+    assert (found.missing, found.undrawn, found.versions) == (0, (), ("code",))
+    by_id = {s.order.id: s for s in found.scores}
+    assert set(by_id) == set(TINY)
+    assert not any(s.failed for s in found.scores)
+    assert by_id["plain/asymmetry/0"].right
+    assert by_id["plain/asymmetry/0"].held_out.left < 0.3
+    assert "asymmetry" not in by_id["removed/asymmetry/0"].named
+    assert by_id["removed/asymmetry/0"].near is not None
+    assert not list(store.opened.iterdir())  # recordings are dropped once they are answered
+    assert not any(store.pending(job) for job in jobs)
+    assert all(store.pending(job, "other code") for job in jobs)
+    with pytest.raises(ProofError, match="of another design"):
+        store.truth(replace(jobs[0], spec={}))
+
+
+def shortened(job: Job) -> Job:
+    return replace(job, spec={**job.spec, "duration": 120.0, "sampling": 25.0, "plan": "interleaved"})
+
+
+def test_the_diagnosing_process_cannot_open_a_seal(tmp_path):
+    for name in ("open", "sealed", "answers"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "x.json").write_text("{}", encoding="utf-8")
+    code = (
+        "import sys; from pathlib import Path; from rig.blind.answering import Sealed, blindfold\n"
+        "root = Path(sys.argv[1]); blindfold(root, (root / 'open', root / 'answers'))\n"
+        "(root / 'open/x.json').read_text(); (root / 'answers/y.json').write_text('')\n"
+        "seen = []\n"
+        "for act in ((root / 'sealed/x.json').read_text, lambda: list((root / 'sealed').iterdir()),\n"
+        "            (root / 'open/../sealed/x.json').read_text):\n"
+        "    try: act()\n"
+        "    except Sealed: seen.append(1)\n"
+        "assert len(seen) == 3, seen\n"
+        "assert not [m for m in sys.modules if m.startswith('sim_devices')]\n"
+    )
+    child = Child([sys.executable, "-c", code, str(tmp_path)], tmp_path / "log")
+    with pytest.raises(Ended, match="exit status 0"):
+        child.ask({}, 60.0)
+
+
+def test_a_diagnosis_that_crashes_has_an_answer(tmp_path):
+    said, arrays = answered(tmp_path)  # no recording at all
+    assert said["error"] == "refused: no recording was given"
+    assert arrays == {}
+
+
+def test_a_child_that_is_late_is_killed_and_started_again(tmp_path):
+    code = "import sys\nfor line in sys.stdin:\n    print('ok' if 'x' in line else input(), flush=True)"
+    child = Child([sys.executable, "-c", code], tmp_path / "log")
+    child.ask({"x": 1}, 30.0)
+    with pytest.raises(Overdue):
+        child.ask({}, 0.2)
+    child.ask({"x": 1}, 30.0)
+    child.close()
+
+
+def test_the_command_says_what_is_wrong(tmp_path):
+    done = CliRunner().invoke(prove_command, ["--only", "plain/nothing", "--store", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "no case is called plain/nothing" in done.output
+
+
+def test_the_command_tells_an_empty_store(tmp_path):
+    out = tmp_path / "figures.json"
+    words = ["--no-run", "--seeds", "1", "--store", str(tmp_path), "--json", str(out)]
+    done = CliRunner().invoke(prove_command, words)
+    assert done.exit_code == 0, done.output
+    assert "0 answers" in done.output
+    assert json.loads(out.read_text(encoding="utf-8"))["format"] == "thruster-rig-proof"
