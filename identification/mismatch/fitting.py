@@ -17,6 +17,8 @@ LEAST_REACH = 0.05
 """sigma: a parameter that changes less within its bounds is left where it is."""
 SLOW_FALLS = 3.0
 """Further falls of the last size that a fit may be short of what is hoped for."""
+PRESSED = 2.5
+"""Sigmas by which a parameter asks to go beyond its bound."""
 CLOSE = 1e-4
 """Fall of chi-square at which a fit has ended; a difference of 1 is one sigma."""
 
@@ -205,11 +207,32 @@ def extended(theta: Theta, model: Model, term: object, values: tuple[float, ...]
     return replace(theta, terms=tuple(values if t == term else known[t] for t in bigger.terms))
 
 
-def at_bound(term: Term, fitted: Fit, data: Data) -> bool:
-    """Whether a parameter sits at the end of what is physically possible."""
-    values = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))[term]
-    for p, value in zip(term.parameters(data.scale), values, strict=True):
+def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:
+    """Whether a parameter is pressed against the end of what is physically possible.
+
+    One that merely lies there, because the data say little of it, is not: beyond the end the fit would be no better.
+    """
+    at = 1
+    for other, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
+        if other == term:
+            break
+        at += len(values)
+    for j, (p, value) in enumerate(zip(term.parameters(data.scale), values, strict=True)):
         edge = 1e-3 * (p.high - p.low)
-        if (value <= p.low + edge and p.neutral != p.low) or (value >= p.high - edge and p.neutral != p.high):
+        low = value <= p.low + edge and p.neutral != p.low
+        high = value >= p.high - edge and p.neutral != p.high
+        if (low or high) and (p.neutral is not None or abs(_push(at + j, fitted, data, weights)) > PRESSED):
             return True
     return False
+
+
+def _push(j: int, fitted: Fit, data: Data, weights: Weights) -> float:
+    """Sigmas by which the residual asks for more of parameter j, beside all that was free."""
+    which = np.zeros(fitted.free.size, dtype=bool)
+    which[j] = True
+    column = columns_of(fitted.model, fitted.theta, data, weights, which)[:, 0]
+    u, s, _ = np.linalg.svd(fitted.jacobian, full_matrices=False)
+    u = u[:, s > 1e-9 * s[0]] if s.size else u
+    rest = column - u @ (u.T @ column)
+    size = float(np.linalg.norm(rest))
+    return float(rest @ fitted.residual) / size if size > 1e-6 * float(np.linalg.norm(column)) else 0.0

@@ -47,6 +47,8 @@ class Rival:
     fit: Fit
     bic_loss: float
     """By how much its BIC is worse."""
+    aic_loss: float
+    """By how much its AIC is worse: BIC alone would hide a rival with more parameters than the data can tell apart."""
 
 
 Standing = tuple[Fit, list[Rival]]
@@ -126,13 +128,14 @@ def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]
             break
         bigger = less.model.plus(other)
         begin = refined(less, data, state.weights, other, values)
-        extra = (len(values) - extra_now) * logn
+        more = len(values) - extra_now
+        extra = more * logn
         begun = extended(less.theta, less.model, other, begin, bigger)
-        new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - extra)
-        if at_bound(other, new, data):
+        new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - min(extra, 2.0 * more))
+        if at_bound(other, new, data, state.weights):
             continue
         loss = new.chi2 - now.chi2 + extra
-        out.append(Rival(other, new, float(loss)))
+        out.append(Rival(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))
     return sorted(out, key=lambda rival: rival.bic_loss)
 
 
@@ -159,7 +162,7 @@ def _effect(now: Fit, term: Term, data: Data, state: State) -> Floats:
 def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
     """Where the parameter of a term is not the same: halves of the run, directions, levels, runs."""
     out = []
-    if at_bound(term, state.fit, data):
+    if at_bound(term, state.fit, data, state.weights):
         out.append("its parameters end at what is physically possible")
     change = _raw_effect(state.fit, term, data)
     n = data.size
@@ -216,7 +219,7 @@ def name(
             less = without(state, term, data)
             others = swaps(state, term, less, data, terms)
         gain = less.chi2 - state.fit.chi2
-        close = [r for r in others if r.bic_loss < NEAR and r.term.id != term.id]
+        close = [r for r in others if min(r.bic_loss, r.aic_loss) < NEAR and r.term.id != term.id]
         unique: dict[str, Rival] = {}
         for r in close:
             unique.setdefault(r.term.id, r)

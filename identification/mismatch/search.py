@@ -311,7 +311,9 @@ def _best_addition(state: State, judged: Screening, data: Data) -> Fit | None:
         new = fit(bigger, theta, data, state.weights)
         gain = state.fit.chi2 - new.chi2
         if gain > len(values) * np.log(new.residual.size):
-            fits.append((not at_bound(term, new, data), gain - len(values) * np.log(new.residual.size), new))
+            fits.append(
+                (not at_bound(term, new, data, state.weights), gain - len(values) * np.log(new.residual.size), new)
+            )
     return max(fits, key=lambda each: each[:2])[2] if fits else None
 
 

@@ -147,7 +147,7 @@ def test_a_parameter_that_differs_from_run_to_run_earns_no_name():
     found = diagnosed(run(seed=1, seconds=90.0, volts=dead_band(0.4)), run(seed=2, seconds=90.0, volts=dead_band(1.4)))
     assert found.verdict == "unexplained"
     assert "dead_band" not in effects(found)
-    assert found.heldout.after > 2 * found.heldout.noise
+    assert found.heldout.after > 1.3 * found.heldout.noise  # a flexible term may fit it, a name does not
 
 
 def test_held_out_runs_judge_both_models():

@@ -144,20 +144,21 @@ def test_ids_and_forms_are_unique():
 
 
 @every_term
-def test_finer_trials_surround_the_best_one(term):
-    for trial in term.trials(S)[::10]:
-        for values in term.finer(trial, S):
-            assert values[0] == trial[0]
+def test_finer_trials_reach_to_the_neighbours(term):
+    places = sorted({t[-1] for t in term.trials(S)})
+    for trial in term.trials(S):
         finer = np.array(term.finer(trial, S))
-        if finer.size:
-            coarse = np.diff(sorted({t[1] for t in term.trials(S)}))
-            assert finer[:, 1].min() < trial[1] < finer[:, 1].max()
-            assert np.ptp(finer[:, 1]) >= 1.9 * coarse.max()  # no place between two trials is missed
-            assert np.diff(finer[:, 1]).max() < 0.2 * coarse.min()
+        if finer.size:  # the place of the jump comes last
+            assert np.all(finer[:, :-1] == trial[:-1])
+            at = places.index(trial[-1])
+            assert finer[:, -1].min() <= 0.05 * places[at] + 0.95 * places[max(at - 1, 0)]
+            assert finer[:, -1].max() >= 0.05 * places[at] + 0.95 * places[min(at + 1, len(places) - 1)]
+            assert np.diff(finer[:, -1]).max() < 0.2 * max(np.diff(places).min(), trial[-1])
 
 
-def test_only_a_jump_of_the_zero_has_finer_trials():
-    assert {t.id for t in CATALOGUE if t.finer(t.trials(S)[0], S)} == {"zero_offset"}
+def test_only_jumps_have_finer_trials():
+    finer = {(t.id, t.form) for t in CATALOGUE if t.finer(t.trials(S)[0], S)}
+    assert finer == {("zero_offset", ""), ("dead_band", "jump")}
 
 
 # ---------------------------------------------------------------- filters against independent solvers
