@@ -143,6 +143,12 @@ class Diagnosis:
     curves: tuple[Curves, ...] = field(default=(), repr=False)
     twin: Twin | None = field(default=None, repr=False)
     """The final model with its numbers: what `--save-twin` writes."""
+    response: str = "thrust"
+    """What is explained: of a vehicle its `position`, `depth`, `heading` or `speed`."""
+    unit: str = "N"
+    """Of the response and its errors."""
+    force_unit: str = "N"
+    """Of the shape of what is not explained: of a vehicle a force all the same."""
 
     @property
     def statement(self) -> str:
@@ -170,6 +176,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, object]:
         "version": 1,
         "recordings": list(d.recordings),
         "thruster": d.thruster,
+        "response": {"quantity": d.response, "unit": d.unit, "force_unit": d.force_unit},
         "verdict": d.verdict,
         "statement": d.statement,
         "baseline": {"model": d.baseline_model, "parameters": _values(d.baseline)},
