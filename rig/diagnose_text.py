@@ -20,7 +20,7 @@ def diagnosis_text(d: Diagnosis) -> str:
     lines += _where(d)
     lines += _findings(d)
     if d.unexplained is not None:
-        lines += _unexplained(d.unexplained)
+        lines += _unexplained(d.unexplained, d.force_unit)
     lines += _model(d)
     lines += _fit(d)
     lines += _next(d)
@@ -99,22 +99,22 @@ def _finding(f: Finding) -> Iterator[str]:
         yield from _para(f"- or {rival.effect} (BIC worse by {rival.bic_loss:.1f}): {rival.statement}", "  ")
 
 
-def _unexplained(u: Unexplained) -> Iterator[str]:
+def _unexplained(u: Unexplained, force: str) -> Iterator[str]:
     yield f"Not explained: {100 * u.share:.0f} % of what remains, at {place(u.where)} ({rarity(u.p_value)})"
-    yield from _shape(u)
+    yield from _shape(u, force)
     for text in u.resembles:
         yield from _para(f"- resembles {text}", "  ")
     yield ""
 
 
-def _shape(u: Unexplained) -> Iterator[str]:
+def _shape(u: Unexplained, force: str) -> Iterator[str]:
     """The residual over the covariate, bin by bin, as numbers and bars."""
     rows = [(a, b, c) for a, b, c in u.shape if isfinite(b)]
     size = max((abs(b) for _, b, _ in rows), default=0.0)
     if not size:
         return
     unit = "" if u.where.unit in ("", "1") else f" / {u.where.unit}"
-    yield f"  {u.where.quantity + unit:>24}{'residual / N':>14}{'std / N':>10}"
+    yield f"  {u.where.quantity + unit:>24}{f'residual / {force}':>14}{f'std / {force}':>10}"
     for at, residual, std in rows:
         length = round(BAR * abs(residual) / size)
         bar = (" " * (BAR - length) + "-" * length + "|").ljust(2 * BAR + 1) if residual < 0 else " " * BAR + "|"
@@ -129,7 +129,7 @@ def _model(d: Diagnosis) -> Iterator[str]:
 
 
 def _fit(d: Diagnosis) -> Iterator[str]:
-    yield f"{'RMSE per sample / N':<24}{'before':>12}{'after':>12}{'noise':>12}"
+    yield f"{f'RMSE per sample / {d.unit}':<24}{'before':>12}{'after':>12}{'noise':>12}"
     yield f"{'  fitted':<24}{d.train.before:>12.4g}{d.train.after:>12.4g}"
     yield f"{'  not fitted':<24}{d.heldout.before:>12.4g}{d.heldout.after:>12.4g}{d.heldout.noise:>12.4g}"
     yield from _para(f"not fitted: {d.heldout.what}", "  ")
