@@ -1,11 +1,15 @@
 # Two commands on a fresh machine with Python 3.11+, venv and make:
 #   make demo   calibrates two thrusters on the simulated bench, over real bytes
 #   make test   every check and every test
+# and one that takes a night (make prove-short: minutes):
+#   make prove  the blind proof of the diagnosis, resumable, with its report in build/prove
 PYTHON ?= python3
 VENV := .venv
+# one case each: some effects at each strength, the same taken out of the catalogue, some that are in none, lies, noise
+SHORT := */asymmetry */dead_band */heating */motor_lag */zero_offset outside fault pair/any/0 pair/any/1 clean/*/0 clean/*/1
 BIN := $(VENV)/bin
 
-.PHONY: demo test check lint types imports wheel clean
+.PHONY: demo test check lint types imports wheel prove prove-short clean
 
 $(VENV)/.demo: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -43,6 +47,13 @@ wheel: $(VENV)/.test
 	$(PYTHON) -m venv --clear build/clean
 	build/clean/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt build/wheel/*.whl
 	cd build && clean/bin/rig --help
+
+prove: $(VENV)/.demo
+	$(BIN)/rig prove --store build/prove --report build/prove/report.html --json build/prove/report.json
+
+prove-short: $(VENV)/.demo
+	$(BIN)/rig prove --store build/prove-short --seeds 1 $(foreach part,$(SHORT),--only '$(part)') \
+		--report build/prove-short/report.html --json build/prove-short/report.json
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis .coverage

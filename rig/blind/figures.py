@@ -133,9 +133,9 @@ def confusion(scores: Iterable[Score], *names: str) -> dict[str, dict[str, int]]
 
 
 def worst(scores: Iterable[Score], most: int = 60) -> list[dict[str, Any]]:
-    """Cells with the most failures first: what was said in each."""
+    """Cells with the most failures first, without those below faint: what was said in each."""
     by: dict[tuple[str, str], list[Score]] = {}
-    for s in scores:
+    for s in (s for s in scores if s.order.cell not in LADDER):
         by.setdefault((s.order.cell, s.order.label), []).append(s)
     rows = []
     for (name, label), group in by.items():

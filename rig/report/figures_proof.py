@@ -13,11 +13,12 @@ from scipy.stats import norm
 
 from identification.recording import Floats
 from rig.blind.rates import Rate
-from rig.report.look import DATA, GRID, INK, MODEL, MUTED, NARROW, OTHER, THIRD, Plot, labels
-from rig.report.look import legend_above as legend
+from rig.report.look import DATA, GRID, INK, MODEL, MUTED, NARROW, OTHER, THIRD, Plot, labels, legend_above
 
 ROW = 0.27
 """inches of one row of names."""
+APART = 0.28
+"""of the distance of two names: the series of one."""
 LEAST = 2.6
 """inches: legend, axis and a row or two."""
 DESK = 8.0
@@ -38,14 +39,13 @@ class Row:
 def rates(rows: Sequence[Row], series: Sequence[str], x: str, goal: float | None = None) -> Plot:
     """Rates with Wilson's intervals, one name below the other, the series a little apart; `goal` a dashed line."""
     told = "; ".join(f"{row.name} " + " ".join(f"{100 * r.value:.0f} %" for r in row.rates if r.n) for row in rows)
-    gap = 0.22
 
     def draw(figure: Figure) -> None:
         axes = figure.subplots()
         if goal is not None:
             axes.axvline(100 * goal, color=MUTED, linestyle="--", linewidth=1.2)
         for j, (name, (colour, marker)) in enumerate(zip(series, LOOKS, strict=False)):
-            shift = (j - (len(series) - 1) / 2) * gap
+            shift = (j - (len(series) - 1) / 2) * APART
             seen = [(i + shift, row.rates[j]) for i, row in enumerate(rows) if row.rates[j].n]
             for y, r in seen:
                 axes.plot([100 * r.low, 100 * r.high], [y, y], color=colour, linewidth=1.2)
@@ -53,9 +53,9 @@ def rates(rows: Sequence[Row], series: Sequence[str], x: str, goal: float | None
             axes.plot(values, at, marker, color=colour, linestyle="none", markersize=4.5, label=name)
         labels(axes, x, "")
         _names(axes, [row.name for row in rows])
-        legend(axes)
+        _legend(figure, axes)
 
-    height = max(1.2 + max(ROW, gap * len(series) + 0.08) * len(rows), LEAST)
+    height = max(1.2 + max(ROW, 0.14 * len(series)) * len(rows), LEAST)
     return Plot(draw, f"{x}: {told}.", (NARROW[0], height), (9.0, height))
 
 
@@ -63,6 +63,14 @@ def _names(axes: Axes, names: Sequence[str]) -> None:
     axes.set_yticks(range(len(names)), list(names))
     axes.set_ylim(len(names) - 0.4, -0.6)
     axes.grid(visible=False, axis="y")
+
+
+def _legend(figure: Figure, axes: Axes) -> None:
+    """From the left edge of the figure: beside long names the axes are too narrow for it."""
+    handles, names = axes.get_legend_handles_labels()
+    if len(names) > 1:
+        columns = len(names) if figure.get_figwidth() >= DESK else 2
+        figure.legend(handles, names, loc="outside upper left", ncols=columns, columnspacing=1.0)
 
 
 def taken_for(counts: Mapping[str, Mapping[str, int]], others: Sequence[str]) -> Plot:
@@ -85,7 +93,7 @@ def taken_for(counts: Mapping[str, Mapping[str, int]], others: Sequence[str]) ->
         axes.axvline(len(answers) - len(others) - 0.5, color=MUTED, linewidth=1.0)
         _names(axes, effects)
 
-    def short(axes: Axes) -> None:
+    def short(figure: Figure, axes: Axes) -> None:
         parts = {"right": DATA, "another name": MODEL, **dict(zip(others, (MUTED, GRID, INK), strict=False))}
         left = np.zeros(len(effects))
         for part, colour in parts.items():
@@ -94,10 +102,14 @@ def taken_for(counts: Mapping[str, Mapping[str, int]], others: Sequence[str]) ->
             left += n
         labels(axes, "share of the answers / %", "")
         _names(axes, effects)
-        legend(axes)
+        _legend(figure, axes)
 
     def draw(figure: Figure) -> None:
-        (whole if figure.get_figwidth() >= DESK else short)(figure.subplots())
+        axes = figure.subplots()
+        if figure.get_figwidth() >= DESK:
+            whole(axes)
+        else:
+            short(figure, axes)
 
     height = max(1.2 + ROW * len(effects), LEAST)
     said = told or "every answer names what was concealed"
@@ -130,7 +142,7 @@ def outcomes(rows: Sequence[tuple[str, Mapping[str, int]]], names: Sequence[str]
             left += n
         labels(axes, "share of the runs that can be told / %", "")
         _names(axes, [row for row, _ in rows])
-        legend(axes)
+        _legend(figure, axes)
 
     height = max(1.2 + ROW * len(rows), LEAST)
     return Plot(draw, f"Outcomes in the open world: {told}.", (NARROW[0], height), (9.0, height))
@@ -154,7 +166,7 @@ def power(measured: Mapping[float, Rate], oracle: float) -> Plot:
         axes.xaxis.set_major_locator(FixedLocator([1, 2, 5, 10, 20, 40]))
         axes.xaxis.set_minor_locator(NullLocator())
         axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-        legend(axes)
+        legend_above(axes)
 
     return Plot(draw, f"All effects together: named in {told}.", NARROW)
 
@@ -174,7 +186,7 @@ def distribution(model: Floats, baseline: Floats, limits: Sequence[float]) -> Pl
             axes.step(x, 100 * np.arange(1, x.size + 1) / x.size, dash, where="post", color=colour, label=name)
         axes.set_xlim(0.97, max(1.4, min(float(np.quantile(baseline, 0.9)), 3.0)))
         labels(axes, "error / error of the true model", "runs below / %")
-        legend(axes)
+        legend_above(axes)
 
     told = " and ".join(f"{np.median(v):.3f} ({name})" for v, name in ((model, "model found"), (baseline, "baseline")))
     return Plot(draw, f"Held-out error relative to that of the true model, median {told}.", NARROW)

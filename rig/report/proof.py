@@ -16,6 +16,8 @@ from rig.report.page import Page, Picture, Remark, Section, Sentences, Table
 from rig.report.proof_parts import SIGNS, alarms_section, models_section, open_section, power_section
 
 UNNAMED = ("unexplained", "adequate", "failed")
+FEW = 8
+"""Rows of a table that is shown without being asked for."""
 MOST_SAID = 4
 """Cases told of one cell in the list of the worst."""
 
@@ -123,7 +125,7 @@ def _other_cells(scores: Sequence[Score]) -> Section | None:
             for label, group in groups.items()
         )
         if rows:
-            parts.append(Table(caption, head, rows, frozenset({0, 4})))
+            parts.append(Table(caption, head, rows, frozenset({0, 4}), folded=len(rows) > FEW))
     return Section("Forms, faults and pairs", tuple(parts)) if parts else None
 
 
@@ -131,7 +133,7 @@ def _worst(figures: dict[str, Any]) -> Section | None:
     head = ("case", "failures", "what was said")
     cells = tuple(
         (
-            f"{row['cell']}/{row['label']}",
+            f"{row['cell']}: {row['label']}",
             f"{row['failures']} of {row['n']}",
             "; ".join(map(_short, row["said"][:MOST_SAID])),
         )
