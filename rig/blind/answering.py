@@ -58,8 +58,8 @@ def answered(folder: Path, without: Sequence[str] = ()) -> tuple[dict[str, Any],
     if isinstance(found, Refusal):
         return {"seconds": seconds, "error": f"refused: {found.reason}"}, {}
     drive = folder / "drive.npz"
-    error, predicted = predictions(found, recording(drive), times(drive)) if drive.exists() else (None, {})
-    answer = {"seconds": seconds, "error": None, "diagnosis": diagnosis_json(found), "not_predicted": error}
+    lacking, predicted = predictions(found, recording(drive), times(drive)) if drive.exists() else (None, {})
+    answer = {"seconds": seconds, "error": None, "diagnosis": diagnosis_json(found), "not_predicted": lacking}
     return answer, predicted
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from operator import attrgetter
 from typing import Any, Final
 
 import numpy as np
@@ -137,7 +138,7 @@ def worst(scores: Iterable[Score], most: int = 60) -> list[dict[str, Any]]:
     by: dict[tuple[str, str], list[Score]] = {}
     for s in (s for s in scores if s.order.cell not in LADDER):
         by.setdefault((s.order.cell, s.order.label), []).append(s)
-    rows = []
+    rows: list[dict[str, Any]] = []
     for (name, label), group in by.items():
         bad = [s for s in group if not s.good]
         if bad:
@@ -250,7 +251,7 @@ def coverage(scores: Iterable[Score]) -> list[dict[str, Any]]:
 def tables(scores: Sequence[Score], seeds: int, versions: Sequence[str], undrawn: Sequence[str]) -> dict[str, Any]:
     """All of it, for `--json`."""
     quantiles = (0.05, 0.5, 0.95)
-    held = {name: ratios(scores, lambda h, name=name: getattr(h, name)) for name in ("model", "baseline", "left")}
+    held = {name: ratios(scores, attrgetter(name)) for name in ("model", "baseline", "left")}
     seconds = np.array([s.seconds for s in scores]) if scores else np.zeros(1)
     return {
         "format": "thruster-rig-proof",

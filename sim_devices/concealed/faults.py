@@ -18,6 +18,8 @@ Rng = np.random.Generator
 KINDS = ("swapped", "rescaled", "reversed", "frozen", "unsigned")
 SIGNED = ("thrust", "rotation_rate", "current")
 """Channels whose sign somebody can get wrong."""
+DIRECTED = ("thrust", "rotation_rate")
+"""Channels of which the size alone is a lie; of a current many drives tell no more."""
 FACTORS = (0.01, 0.1, 0.4536, 2.0, 9.80665, 60.0)
 """Units mixed up: per cent, a digit, pounds, both directions, kilograms, minutes."""
 
@@ -50,7 +52,8 @@ def fault(kind: str, quantities: Sequence[str], duration: float, rng: Rng) -> di
         one, other = rng.choice(list(quantities), 2, replace=False)
         return {"kind": kind, "channel": str(one), "other": str(other)}
     if kind in ("reversed", "unsigned"):
-        return {"kind": kind, "channel": str(rng.choice(signed))}
+        known = [q for q in signed if kind == "reversed" or q in DIRECTED]
+        return {"kind": kind, "channel": str(rng.choice(known))}
     start = duration * float(rng.uniform(0.2, 0.7))
     found: dict[str, Any] = {"kind": kind, "channel": str(rng.choice(signed)), "start": start}
     return found | ({"factor": float(rng.choice(FACTORS))} if kind == "rescaled" else {})

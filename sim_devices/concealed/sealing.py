@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from sim_devices.concealed.another import another
 from sim_devices.concealed.draw import NOISE_KINDS
@@ -29,6 +30,8 @@ from sim_devices.concealed.records import Rows, rows, truth
 from sim_devices.concealed.rivals import twins
 from sim_devices.concealed.shapes import FORMS, SHAPES
 from sim_devices.tables import WorldError
+
+Floats = NDArray[np.float64]
 
 KINDS: Mapping[str, Any] = {
     "effects": list(SHAPES),
@@ -75,7 +78,7 @@ def conceal(asked: Mapping[str, Any], out: Path) -> None:
     _write_json(sealed / f"{token}.json", told)  # last: a seal stands for a case that is complete
 
 
-def _write_rows(path: Path, found: Rows, **more: np.ndarray[Any, np.dtype[np.float64]]) -> None:
+def _write_rows(path: Path, found: Rows, at: Floats | None = None) -> None:
     about = {
         "recording_id": found.recording_id,
         "thruster": found.thruster,
@@ -86,9 +89,10 @@ def _write_rows(path: Path, found: Rows, **more: np.ndarray[Any, np.dtype[np.flo
         "steps": [asdict(step) for step in found.steps],
         "duration": found.duration,
     }
-    arrays = {f"time{i}": c.time for i, c in enumerate(found.columns)}
-    arrays |= {f"value{i}": c.value for i, c in enumerate(found.columns)}
-    np.savez(path, about=np.array(json.dumps(about)), **arrays, **more)
+    arrays: dict[str, Any] = {"about": np.array(json.dumps(about))}
+    for i, column in enumerate(found.columns):
+        arrays |= {f"time{i}": column.time, f"value{i}": column.value}
+    np.savez(path, **(arrays if at is None else arrays | {"at": at}))
 
 
 def _write_json(path: Path, table: Mapping[str, Any]) -> None:
