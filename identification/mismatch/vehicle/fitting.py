@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.mismatch.noise import Noise, Whitener, fit_noise
+from identification.mismatch.noise import Noise, Rows, Whitener, fit_noise
 from identification.mismatch.vehicle.model import Known, Layout, known, predict
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared
@@ -42,9 +42,15 @@ class Fit:
 Weights = tuple[Whitener, ...]
 
 
-def weights(noise: Noise, data: Prepared) -> Weights:
-    """One whitening for each run."""
-    return tuple(Whitener(noise, run.rows, np.zeros(run.time.size)) for run in data.runs)
+def weights(noise: Noise, data: Prepared, keep: Sequence[Floats] | None = None) -> Weights:
+    """One whitening for each run, of the rows in `keep` alone where it is given."""
+    kept = [run.rows if keep is None else _part(run.rows, keep[j]) for j, run in enumerate(data.runs)]
+    return tuple(Whitener(noise, rows, np.zeros(rows.time.size)) for rows in kept)
+
+
+def _part(rows: Rows, keep: Floats) -> Rows:
+    on = keep > 0
+    return Rows(rows.time[on], rows.count[on], rows.extra[on], rows.width[on])
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,13 +97,17 @@ def fit(
     guess: Sequence[Motion] | None = None,
     keep: Sequence[Floats] | None = None,
     steps: int = STEPS,
+    fixed: Floats | None = None,
 ) -> Fit:
     """Gauss and Newton's steps with damping; a parameter that would leave its bounds stays there for the step.
 
-    `keep` (n,) per run: rows above 0 are fitted; `white` must then be made of those rows (`kept_weights`).
+    `keep` (n,) per run: rows above 0 are fitted; `white` must then be made of those rows.
+    `fixed` (p,): parameters above 0 keep their values.
     """
     low, high = layout.bounds()
     theta = np.clip(theta, low, high)
+    if fixed is not None:
+        low, high = np.where(fixed > 0, theta, low), np.where(fixed > 0, theta, high)
     told = known(layout, data)
     now = _at(layout, theta, data, white, told, keep, guess, slopes=True)
     damping = DAMPING
@@ -124,7 +134,7 @@ def fit(
 def _stuck(now: _At, theta: Floats, low: Floats, high: Floats) -> Floats:
     """(p,) of bool: at a bound, and the data would push it on."""
     downhill = now.jacobian.T @ now.residual
-    out: Floats = ((theta <= low) & (downhill <= 0)) | ((theta >= high) & (downhill >= 0))
+    out: Floats = ((theta <= low) & (downhill <= 0)) | ((theta >= high) & (downhill >= 0)) | (low >= high)
     return out
 
 

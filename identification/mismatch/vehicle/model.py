@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.mismatch.vehicle.motion import Motion, from_start, left_over, linearised, moved, observed, solved
+from identification.mismatch.vehicle.motion import Motion, changes, left_over, linearised, moved, observed
 from identification.mismatch.vehicle.runs import Prepared, Run
 from identification.physics.term import Parameter
 from identification.physics.vehicle.term import STAGES, Body, VehicleTerm
@@ -163,8 +163,8 @@ def push_of(layout: Layout, theta: Floats, run: Run) -> Floats:
     for term in ordered:
         if term.stage == "thrust":
             thrust = term.on_thrust(thrust, run.moment, values[id(term)])
-    out: Floats = run.arms @ thrust.mean(axis=2)
-    return out
+    whole = np.tensordot(run.arms, thrust, axes=1)
+    return np.asarray(whole @ np.full(whole.shape[1], 1 / whole.shape[1]))
 
 
 def _thrust(layout: Layout, theta: Floats, run: Run, volts: Floats) -> Floats:
@@ -213,24 +213,22 @@ def predict(layout: Layout, theta: Floats, data: Prepared, j: int, guess: Motion
     response = observed(run, motion.v, motion.x)
     if not slopes:
         return Prediction(motion, response, np.empty((run.time.size, 0)))
+    forces = added_forces(layout, theta, data, j, motion)
+    whole = respond(layout, theta, data, j, motion, forces)
     H = np.zeros((run.time.size, layout.size))
-    H[:, : layout.starts] = respond(layout, theta, data, j, motion, _added_forces(layout, theta, data, j, motion))
-    here = linearised(body, motion, run.moment.step, origin_of(run))
-    dv, dx = from_start(here)
-    H[:, layout.starts + 2 * j :][:, :2] = observed(run, np.vstack([[1.0, 0.0], dv]), np.vstack([[0.0, 1.0], dx]))
+    H[:, : layout.starts] = whole[:, :-2]
+    H[:, layout.starts + 2 * j :][:, :2] = whole[:, -2:]
     return Prediction(motion, response, H)
 
 
 def respond(layout: Layout, theta: Floats, data: Prepared, j: int, motion: Motion, forces: Floats) -> Floats:
-    """(n, q): what small forces (g, q) on the vehicle, beside those there are, change of what is measured in run j."""
+    """(n, q + 2): what small added forces (g, q), and speed and place at the start, change of run j's measurement."""
     run = data.runs[j]
     here = linearised(body_of(layout, theta, run, data), motion, run.moment.step, origin_of(run))
-    dv, dx = solved(here, forces)
-    still = np.zeros((1, forces.shape[1]))
-    return observed(run, np.vstack([still, dv]), np.vstack([still, dx]))
+    return observed(run, *changes(here, forces))
 
 
-def _added_forces(layout: Layout, theta: Floats, data: Prepared, j: int, motion: Motion) -> Floats:
+def added_forces(layout: Layout, theta: Floats, data: Prepared, j: int, motion: Motion) -> Floats:
     """(g, starts): slope over each parameter of the force that the motion as it is would need more."""
     run = data.runs[j]
     low, high = layout.bounds()
@@ -242,9 +240,11 @@ def _added_forces(layout: Layout, theta: Floats, data: Prepared, j: int, motion:
         d = size if theta[i] + size <= high[i] else -size
         moved_theta = theta.copy()
         moved_theta[i] += d
-        moved_push = push_of(layout, moved_theta, run) if _pushes(layout, i) else push
+        if _pushes(layout, i):
+            out[:, i] = (push_of(layout, moved_theta, run) - push) / d
+            continue
         moved_body = body_of(layout, moved_theta, run, data)
-        out[:, i] = (-left_over(moved_body, moved_push, motion, run.moment.step, origin_of(run)) - base) / d
+        out[:, i] = (-left_over(moved_body, push, motion, run.moment.step, origin_of(run)) - base) / d
     return out
 
 
@@ -256,7 +256,9 @@ def _pushes(layout: Layout, i: int) -> bool:
     return layout.model.terms[at].stage != "body"
 
 
-def with_term(layout: Layout, data: Prepared, theta: Floats, term: VehicleTerm, values: Sequence[float]) -> tuple[Layout, Floats]:
+def with_term(
+    layout: Layout, data: Prepared, theta: Floats, term: VehicleTerm, values: Sequence[float]
+) -> tuple[Layout, Floats]:
     """The same model and parameters with one term more."""
     new = layout_of(VehicleModel((*layout.model.terms, term)), data)
     return new, np.concatenate([theta[: layout.starts], values, theta[layout.starts :]])
@@ -275,5 +277,3 @@ def on_other_runs(layout: Layout, data: Prepared, theta: Floats) -> tuple[Layout
     start = begin(new, data)
     start[: new.starts] = theta[: layout.starts]
     return new, start
-
-

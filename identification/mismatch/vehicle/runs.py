@@ -10,7 +10,7 @@ import numpy as np
 from identification.efficiency import Installation
 from identification.mismatch.noise import Rows
 from identification.mismatch.preparing import Refusal
-from identification.mismatch.vehicle.setup import Stated, VehicleSetup, thrust_known
+from identification.mismatch.vehicle.setup import ANY_AXIS, Stated, VehicleSetup, thrust_known
 from identification.physics.vehicle.term import Moment, Scale
 from identification.recording import Channel, Floats, Recording
 from identification.vehicle_trials import response_of, thruster_volts
@@ -82,7 +82,7 @@ def prepare(
     if len({quantity for quantity, _, _ in channels}) > 1:
         return Refusal("some recordings have a position and others a speed; diagnose those with one kind of motion")
     ballasts = tuple(dict.fromkeys(setup.ballast.get(one.recording_id, one.recording_id) for one in recordings))
-    mass = setup.mass.get(axis)
+    mass = setup.mass.get(ANY_AXIS, setup.mass.get(axis))
     grids = [_volts(one, pushing, time) for one, (_, time, _) in zip(recordings, channels, strict=True)]
     for grid in grids:
         if isinstance(grid, Refusal):
@@ -260,14 +260,10 @@ def _run(
         at.append(tuple(range(ends, ends + len(thruster.names))))
         ends += len(thruster.names)
     heading = np.full(middle.size, np.nan) if axis == "yaw" else _heading(recording, middle)
-    moment = Moment(
-        scale, grid.step, np.array([grid.volts[name] for name in names]), active, heading, ballast
-    )
+    moment = Moment(scale, grid.step, np.array([grid.volts[name] for name in names]), active, heading, ballast)
     rows = Rows(time, count, np.ones(time.size), width)
     arms = np.array([t.arms[axis] for t in installation.thrusters])
-    return Run(
-        recording.recording_id, quantity, time, value, rows, grid.start, arms, tuple(at), moment, installation
-    )
+    return Run(recording.recording_id, quantity, time, value, rows, grid.start, arms, tuple(at), moment, installation)
 
 
 def _averaged(time: Floats, value: Floats) -> tuple[Floats, Floats, Floats, Floats]:

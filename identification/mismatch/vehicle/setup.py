@@ -16,6 +16,10 @@ KNOWN = 0.5
 """Relative standard deviation of a thruster's model above which it counts as not known."""
 
 
+ANY_AXIS = ""
+"""Key of a mass that holds for the axis that is diagnosed, whichever that is."""
+
+
 @dataclass(frozen=True, slots=True)
 class Stated:
     """A number from elsewhere; `std` 0: exact."""
@@ -31,7 +35,7 @@ class VehicleSetup:
     installation: Installation | None = None
     """Thrusters with their models and where they push; None: each pushes straight along the measured axis."""
     mass: Mapping[str, Stated] = field(default_factory=dict)
-    """axis -> stated inertia, kg (yaw: kg.m^2)."""
+    """axis, or ANY_AXIS -> stated inertia, kg (yaw: kg.m^2)."""
     ballast: Mapping[str, str] = field(default_factory=dict)
     """recording id -> ballast, heave; a recording that is not named is a ballast of its own."""
     axis: str = ""
@@ -68,13 +72,18 @@ def straight_ahead(recordings: Sequence[Recording]) -> Installation | Refusal:
     return Installation(thrusters, 100.0 * np.eye(len(thrusters)))
 
 
+def driven_axis(recording: Recording, installation: Installation, setup: VehicleSetup) -> str | None:
+    """What the campaign says, else the axis that the commands push hardest; None: nothing is commanded."""
+    return setup.axes.get(recording.recording_id) or dominant_axis(recording, installation)
+
+
 def axis_of(recordings: Sequence[Recording], installation: Installation, setup: VehicleSetup) -> str | Refusal:
     """The axis that all of them drive."""
     if setup.axis:
         return setup.axis
     driven: dict[str, list[str]] = {}
     for recording in recordings:
-        axis = setup.axes.get(recording.recording_id) or dominant_axis(recording, installation)
+        axis = driven_axis(recording, installation, setup)
         name = recording.source or recording.recording_id
         if axis is None:
             return Refusal(f"{name}: no thruster of the installation is commanded in it: nothing drives the vehicle")

@@ -1,0 +1,200 @@
+"""A vehicle's diagnosis put together: places, findings, what is left, numbers with units, what is tied by scale."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.stats import chi2 as chi2_law
+
+from identification.mismatch.diagnosis import Curves, Finding, Mismatch, RivalFinding, Unexplained, Value, Where
+from identification.mismatch.vehicle.fitting import Fit
+from identification.mismatch.vehicle.left import ALARM, Left, Structure, place_of
+from identification.mismatch.vehicle.naming import Named
+from identification.mismatch.vehicle.runs import Prepared
+from identification.mismatch.vehicle.search import State
+from identification.recording import Floats
+
+MOST_PLACES = 3
+LAGS = 20
+
+
+def baseline_words(data: Prepared) -> str:
+    """The baseline as a formula."""
+    inertia = "v'" if data.scale.per_kg else "m v'"
+    return f"{inertia} = -k2 |v| v + thrusters"
+
+
+def values_of(fitted: Fit, data: Prepared) -> dict[str, Value]:
+    """Every parameter but the starts of the runs; thrusters' constants in their own unit."""
+    std = np.sqrt(np.diag(fitted.cov))
+    out = {}
+    for i, p in enumerate(fitted.layout.base):
+        factor, unit = _of_thruster(p.name, data) if p.name.startswith("C[") else (1.0, p.unit)
+        out[p.name] = Value(float(fitted.theta[i]) * factor, float(std[i]) * abs(factor), unit)
+    for i, term in enumerate(fitted.layout.model.terms):
+        for k, p in enumerate(fitted.layout.parts[i]):
+            at = fitted.layout.first_of[i] + k
+            out[f"{term.id}.{p.name}"] = Value(float(fitted.theta[at]), float(std[at]), p.unit)
+    return out
+
+
+def _of_thruster(name: str, data: Prepared) -> tuple[float, str]:
+    thruster = next(t for t in data.installation.thrusters if f"C[{t.name}]" == name)
+    if thruster.levels is None and thruster.coefficients.size == 1:
+        return float(thruster.coefficients[0]), "N/V^2" + (" per kg" if data.scale.per_kg else "")
+    return 1.0, "1"
+
+
+def _parameters(fitted: Fit, i: int) -> dict[str, Value]:
+    begin, std = fitted.layout.first_of[i], np.sqrt(np.diag(fitted.cov))
+    return {
+        p.name: Value(float(fitted.theta[begin + k]), float(std[begin + k]), p.unit)
+        for k, p in enumerate(fitted.layout.parts[i])
+    }
+
+
+def findings_of(named: Sequence[Named], state: State, data: Prepared) -> tuple[Finding, ...]:
+    return tuple(_finding(n, state, data) for n in named)
+
+
+def _finding(n: Named, state: State, data: Prepared) -> Finding:
+    values = state.fit.layout.of(n.index, state.fit.theta)
+    rivals = tuple(
+        RivalFinding(
+            r.term.id,
+            r.term.form,
+            _parameters(r.fit, len(r.fit.layout.model.terms) - 1),
+            r.bic_loss,
+            r.term.statement(r.fit.layout.of(len(r.fit.layout.model.terms) - 1, r.fit.theta), data.scale),
+        )
+        for r in n.rivals
+    )
+    return Finding(
+        n.term.id,
+        n.term.form,
+        n.term.statement(values, data.scale),
+        _parameters(state.fit, n.index),
+        n.p_value,
+        n.bic_gain,
+        n.probability,
+        rivals,
+    )
+
+
+def where_of(structure: Structure) -> Where:
+    place = place_of(structure)
+    return Where(structure.coordinate.quantity, place.low, place.high, structure.coordinate.unit)
+
+
+def _place(where: Where, data: Prepared) -> str:
+    if where.quantity == "run":
+        return f"run {where.low:.0f} ({data.runs[round(where.low) - 1].recording_id})"
+    unit = "" if where.unit == "1" else f" {where.unit}"
+    return f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
+
+
+def places_of(left: Left, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
+    """Where the baseline fails, the clearest coordinates first."""
+    out = []
+    for structure in left.structures[:MOST_PLACES]:
+        if structure.p_value > ALARM:
+            break
+        where = where_of(structure)
+        says = (
+            f"{structure.coordinate.what} explains {100 * structure.share:.0f} % of the whitened residual, most at "
+            f"{_place(where, data)}."
+        )
+        out.append(Mismatch(channel, where, structure.share, structure.p_value, says[0].upper() + says[1:]))
+    return tuple(out)
+
+
+def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Unexplained | None:
+    """What remains; `named` are those whose name is doubted."""
+    if not left.structures or (left.p_value >= ALARM and not named):
+        return None
+    structure = left.structures[0]
+    if left.p_value >= ALARM:
+        own = {c for n in named for c in n.term.coordinates}
+        structure = next((s for s in left.structures if s.coordinate.quantity in own), structure)
+    where = where_of(structure)
+    says = (
+        f"Something is left that no effect of the catalogue carries: {structure.coordinate.what}, clearest at "
+        f"{_place(where, data)}, {100 * structure.share:.2g} % of the whitened residual."
+    )
+    resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in named)
+    if named:
+        says += f" It resembles {', '.join(n.term.id for n in named)}, but {named[0].doubts[0]}."
+    table = place_of(structure).table
+    return Unexplained(where, structure.share, left.p_value, table, says, resembles)
+
+
+def whiteness(state: State) -> float:
+    """p-value of Ljung and Box over LAGS lags of the whitened residual, run by run."""
+    ends = np.cumsum([w.rows.time.size for w in state.white])
+    statistic, dof = 0.0, 0
+    for part in np.split(state.fit.residual[: ends[-1]], ends[:-1]):
+        n, lags = part.size, min(LAGS, part.size // 5)
+        e = np.clip(part - part.mean(), -4, 4)
+        power = float(e @ e)
+        for k in range(1, lags + 1):
+            statistic += n * (n + 2) * (float(e[k:] @ e[:-k]) / power) ** 2 / (n - k) if power > 0 else 0.0
+        dof += lags
+    return float(chi2_law.sf(statistic, dof)) if dof else 1.0
+
+
+def curves_of(before: Fit, after: Fit, data: Prepared, added: Sequence[Floats]) -> tuple[Curves, ...]:
+    """What a report draws; `added` (n,) per run: what a flexible force puts on top of the model."""
+    out = []
+    for run, old, new, more in zip(data.runs, before.predicted, after.predicted, added, strict=True):
+        command = np.mean(np.sign(run.arms)[:, None] * run.moment.volts.mean(axis=2), axis=0)
+        at = np.clip(((run.time - run.start) / run.moment.step).astype(int), 0, run.steps - 1)
+        out.append(Curves(run.recording_id, run.time, command[at], run.response, old, new + more))
+    return tuple(out)
+
+
+def ties(data: Prepared, fitted: Fit, unseen: Sequence[str]) -> tuple[str, ...]:
+    """What goes together by scale: said, not hidden."""
+    scale = data.scale
+    out = []
+    if scale.per_kg:
+        out.append(
+            "neither the mass nor the thrusters' models are known: forces are per kg of inertia, and what is "
+            "determined are the ratios C/m and k2/m"
+        )
+    elif scale.mass is None:
+        out.append(
+            "no mass is stated: m and all drags are as right as the thrusters' models are, and an efficiency common to "
+            "all thrusters would scale them; state the mass (--mass) to see it"
+        )
+    elif not scale.thrust_known:
+        out.append("the thrusters' models are not known: C and all drags are as right as the stated mass is")
+    else:
+        out.append(
+            "mass and thrust are taken as stated: an efficiency common to all thrusters and an added mass change the "
+            "same ratio of force to inertia, and each is stated given the other"
+        )
+        out += _per_mass(data, fitted)
+    out += unseen if scale.per_kg or scale.mass is None else ()
+    return tuple(dict.fromkeys(out))
+
+
+def _per_mass(data: Prepared, fitted: Fit) -> list[str]:
+    """eta/m, which is what the motion shows, with its own error."""
+    layout = fitted.layout
+    names = [p.name for p in layout.base]
+    out = []
+    for i, term in enumerate(layout.model.terms):
+        if term.id != "installation_efficiency" or term.form != "overall" or data.mass is None:
+            continue
+        at = layout.first_of[i]
+        eta = float(fitted.theta[at])
+        m = float(fitted.theta[names.index("m")]) if "m" in names else data.mass.value
+        slope = np.zeros(layout.size)
+        slope[at] = 1 / m
+        if "m" in names:
+            slope[names.index("m")] = -eta / m**2
+        std = float(np.sqrt(slope @ np.nan_to_num(fitted.cov) @ slope))
+        name = layout.parts[i][0].name
+        out.append(f"what the motion shows is {name}/m = {eta / m:.4g} +- {std:.2g} 1/{data.scale.mass_unit}")
+    return out

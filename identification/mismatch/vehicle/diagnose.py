@@ -1,0 +1,162 @@
+"""Recordings of a vehicle in, diagnosis out: locate, name, refit, judge."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.mismatch.diagnosis import Diagnosis, Mismatch, Rmse, Verdict
+from identification.mismatch.preparing import Refusal
+from identification.mismatch.vehicle.answering import (
+    baseline_words,
+    curves_of,
+    findings_of,
+    places_of,
+    ties,
+    unexplained_of,
+    values_of,
+    whiteness,
+)
+from identification.mismatch.vehicle.experiment import propose
+from identification.mismatch.vehicle.judging import free_force, held_out, only, residuals, rms
+from identification.mismatch.vehicle.left import ALARM, Left, Structure, free_columns, judge_left
+from identification.mismatch.vehicle.naming import EQUAL, Named, name
+from identification.mismatch.vehicle.runs import Prepared, prepare
+from identification.mismatch.vehicle.screening import applicable
+from identification.mismatch.vehicle.search import Found, State, search
+from identification.mismatch.vehicle.setup import VehicleSetup, axis_of, straight_ahead
+from identification.recording import Floats, Recording
+
+NO_SETUP = VehicleSetup()
+
+
+def diagnose_vehicle(
+    recordings: Sequence[Recording],
+    holdout: Sequence[Recording] = (),
+    seed: int = 0,
+    setup: VehicleSetup = NO_SETUP,
+    without: Collection[str] = (),
+) -> Diagnosis | Refusal:
+    """What m v' = -k2 |v| v + thrusters leaves out of recordings of one axis of one vehicle.
+
+    `setup`: the thrusters as mounted with their models, the mass, ballasts; `without`: effect ids out of the catalogue.
+    """
+    wrong = _unfit(recordings, holdout)
+    if wrong is not None:
+        return wrong
+    everything = [*recordings, *holdout]
+    installation = setup.installation or straight_ahead(everything)
+    if isinstance(installation, Refusal):
+        return installation
+    axis = axis_of(everything, installation, setup)
+    if isinstance(axis, Refusal):
+        return axis
+    whole = prepare(everything, installation, axis, setup)
+    if isinstance(whole, Refusal):
+        return whole
+    data = only(whole, whole.runs[: len(recordings)])
+    unseen = only(whole, whole.runs[len(recordings) :]) if holdout else None
+    return _diagnosed(recordings, data, unseen, np.random.default_rng(seed), tuple(without))
+
+
+def _unfit(recordings: Sequence[Recording], holdout: Sequence[Recording]) -> Refusal | None:
+    if not recordings:
+        return Refusal("no recording was given")
+    everything = [*recordings, *holdout]
+    other = next((r for r in everything if r.kind != "vehicle"), None)
+    if other is not None:
+        who = other.source or other.recording_id
+        return Refusal(f"{who} is a {other.kind} recording, the others are of a vehicle; diagnose them apart")
+    vehicles = {r.thruster for r in everything}
+    if len(vehicles) > 1:
+        return Refusal(f"recordings of several vehicles ({', '.join(sorted(vehicles))}); diagnose one at a time")
+    if len({r.recording_id for r in everything}) < len(everything):
+        return Refusal("the same recording was given twice")
+    return None
+
+
+def _diagnosed(
+    recordings: Sequence[Recording],
+    data: Prepared,
+    unseen: Prepared | None,
+    rng: np.random.Generator,
+    without: Sequence[str],
+) -> Diagnosis:
+    candidates, unseen_effects = applicable(data, without)
+    found = search(data, candidates, rng)
+    after, named = name(found.after, data, candidates, rng)
+    found = replace(found, after=after)
+    left = judge_left(after.fit, after.white, data, rng)
+    earned, doubted = [n for n in named if not n.doubts], [n for n in named if n.doubts]
+    flexible = left.structures[0] if left.p_value < ALARM else None
+    unexplained = unexplained_of(left, doubted, data)
+    added = _added(after, data, flexible)
+    n, p = after.fit.residual.size, int(np.sum(after.fit.free))
+    channel = _channel(data)
+    return Diagnosis(
+        recordings=tuple(r.recording_id for r in recordings),
+        thruster=recordings[0].thruster,
+        verdict="unexplained" if unexplained is not None else _verdict(earned),
+        baseline_model=baseline_words(data),
+        baseline=values_of(found.before.fit, data),
+        mismatch=_places(found, data, channel, left, rng),
+        findings=findings_of(earned, after, data),
+        unexplained=unexplained,
+        model_terms=tuple(term.id for term in after.terms),
+        model=values_of(after.fit, data),
+        train=Rmse(
+            rms(residuals(found.before.fit, data)),
+            rms([r - a for r, a in zip(residuals(after.fit, data), added, strict=True)]),
+        ),
+        heldout=held_out(found.before, after, data, unseen, flexible),
+        chi2_per_dof=after.fit.chi2 / max(n - p, 1),
+        whiteness_p=whiteness(after),
+        next_experiment=propose(after, earned, data) if unexplained is None else None,
+        notes=(*ties(data, after.fit, unseen_effects), *_noise_note(after, data)),
+        curves=curves_of(found.before.fit, after.fit, data, added),
+        response=channel,
+        unit=data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit,
+        force_unit=data.scale.force_unit,
+    )
+
+
+def _verdict(earned: Sequence[Named]) -> Verdict:
+    if not earned:
+        return "adequate"
+    return "ambiguous" if any(r.bic_loss < EQUAL for n in earned for r in n.rivals) else "explained"
+
+
+def _channel(data: Prepared) -> str:
+    if data.runs[0].quantity == "speed":
+        return "speed"
+    return {"heave": "depth", "yaw": "heading"}.get(data.scale.axis, "position")
+
+
+def _places(found: Found, data: Prepared, channel: str, left: Left, rng: np.random.Generator) -> tuple[Mismatch, ...]:
+    """Where the baseline fails; nothing when nothing was found and nothing is left."""
+    if not found.after.terms:
+        return places_of(left, data, channel)
+    return places_of(judge_left(found.before.fit, found.before.white, data, rng), data, channel)
+
+
+def _added(after: State, data: Prepared, flexible: Structure | None) -> list[Floats]:
+    """(n,) per run: what the flexible force changes, to first order."""
+    if flexible is None:
+        return [np.zeros(run.time.size) for run in data.runs]
+    beta = free_force(after.fit, data, flexible, after)
+    return [c @ beta for c in free_columns(after.fit, data, flexible.coordinate)]
+
+
+def _noise_note(after: State, data: Prepared) -> tuple[str, ...]:
+    """Slow noise is where a disturbance (waves, wind, a hand on the cable) goes that no term carries."""
+    slow = float(np.sqrt(sum(after.noise.slow)))
+    white = float(np.sqrt(after.noise.white))
+    if slow < 2 * white:
+        return ()
+    unit = data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit
+    return (
+        f"what remains is {slow:.3g} {unit} of slow disturbance beside {white:.3g} {unit} of white noise: errors and "
+        "p-values allow for it, and what is weaker than it cannot be seen",
+    )

@@ -1,0 +1,109 @@
+"""The run that tells two explanations of a vehicle's motion apart best: a few plans, each foreseen by both."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.stats import norm
+
+from identification.mismatch.diagnosis import NextExperiment, PlanStep
+from identification.mismatch.noise import Noise, Rows, Whitener
+from identification.mismatch.vehicle.fitting import Fit
+from identification.mismatch.vehicle.model import on_other_runs, predict
+from identification.mismatch.vehicle.naming import EQUAL, Named
+from identification.mismatch.vehicle.runs import Prepared, Run
+from identification.mismatch.vehicle.search import State
+from identification.recording import Floats
+
+BUDGET = 300.0
+"""s."""
+LEAST_POWER = 0.5
+ALARM = 0.01
+MOORED = (
+    "moor the vehicle to a force gauge and run these steps: the steady pull is the thrust as installed, which no free "
+    "run tells from the mass"
+)
+
+
+def propose(state: State, named: Sequence[Named], data: Prepared) -> NextExperiment | None:
+    """For the finding whose nearest rival is nearest."""
+    pairs = [(n, r) for n in named for r in n.rivals if r.bic_loss < EQUAL]
+    if not pairs:
+        return None
+    finding, rival = min(pairs, key=lambda pair: pair[1].bic_loss)
+    top = data.scale.volts
+    found = [(power(steps, state.fit, rival.fit, data, state.noise), steps) for steps in plans(top)]
+    best, steps = max(found, key=lambda one: one[0])
+    why = f"separates {finding.term.id} from {rival.term.id}"
+    if best < LEAST_POWER:
+        why = f"{MOORED} ({finding.term.id} or {rival.term.id})"
+        steps = tuple(PlanStep(sign * share * top, 20.0) for share in (0.4, 0.7, 1.0) for sign in (1, -1))
+    return NextExperiment(why, steps, best)
+
+
+def plans(top: float) -> tuple[tuple[PlanStep, ...], ...]:
+    """Holds of both signs; fine levels round zero; quick reversals; one way and back."""
+
+    def of(levels: Sequence[float], each: float) -> tuple[PlanStep, ...]:
+        return tuple(PlanStep(share * top, each) for share in levels)
+
+    return (
+        of([s * level for level in (0.3, 0.5, 0.7, 0.85, 1.0) for s in (1, -1)], BUDGET / 10),
+        of([s * level for level in (0.04, 0.08, 0.12, 0.16, 0.22, 0.3) for s in (1, -1)], BUDGET / 12),
+        of([1.0, -1.0] * 15, BUDGET / 30),
+        of([0.6, 0.0, 1.0, 0.0, 0.3, 0.0], BUDGET / 6),
+        of([1.0, -1.0], BUDGET / 2),
+    )
+
+
+def power(steps: Sequence[PlanStep], one: Fit, other: Fit, data: Prepared, noise: Noise) -> float:
+    """Probability that a run of these steps decides between two fitted models, at a false-alarm rate of ALARM."""
+    run = _planned(steps, data)
+    there = replace(data, runs=(run,))
+    predicted = []
+    for fitted in (one, other):
+        layout, theta = on_other_runs(fitted.layout, there, fitted.theta)
+        theta[layout.starts :] = 0.0
+        predicted.append(predict(layout, theta, there, 0, None, slopes=False).response)
+    apart = predicted[0] - predicted[1]
+    ones = np.ones((run.time.size, 1)) if run.quantity == "position" else np.zeros((run.time.size, 0))
+    white = Whitener(noise, run.rows, np.zeros(run.time.size))
+    left = white.whiten(apart)
+    if ones.shape[1]:
+        base = white.whiten(ones)
+        left = left - base @ np.linalg.lstsq(base, left, rcond=None)[0]
+    d = float(np.linalg.norm(left))
+    return float(norm.sf(norm.isf(ALARM) - d))
+
+
+def _planned(steps: Sequence[PlanStep], data: Prepared) -> Run:
+    """All thrusters that push, at these volts, measured as the first run was."""
+    like = data.runs[0]
+    moment = like.moment
+    ends = np.cumsum([s.duration for s in steps])
+    g = int(np.ceil(ends[-1] / moment.step))
+    looks = moment.volts.shape[2]
+    fine = (np.arange(g * looks) + 0.5) * moment.step / looks
+    level = np.array([s.command_voltage for s in steps])[np.minimum(np.searchsorted(ends, fine), len(steps) - 1)]
+    each = {
+        t.name: (np.sign(arm) * level).reshape(g, looks)
+        for t, arm in zip(like.installation.thrusters, like.arms, strict=True)
+    }
+    names = list(each)
+    active = {
+        name: np.array(
+            [
+                np.any([i.active(t, each) for i in like.installation.interactions if i.name == name], axis=0)
+                for t in names
+            ]
+        )
+        for name in moment.active
+    }
+    spacing = float(np.median(np.diff(like.time)))
+    time: Floats = np.arange(int(ends[-1] / spacing) + 1) * spacing
+    one = np.ones(time.size)
+    heading = np.full(g, float(moment.heading[0]) if moment.heading.size else np.nan)
+    new = replace(moment, volts=np.array([each[name] for name in names]), active=active, heading=heading)
+    return replace(like, time=time, response=0 * time, rows=Rows(time, one, one, spacing * one), start=0.0, moment=new)

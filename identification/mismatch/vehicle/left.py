@@ -1,0 +1,236 @@
+"""What is left that no term carries: a free force over speed, command, time, place or heading, and where it acts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2 as chi2_law
+
+from identification.mismatch.vehicle.fitting import Fit, Weights
+from identification.mismatch.vehicle.model import added_forces, respond
+from identification.mismatch.vehicle.motion import Motion
+from identification.mismatch.vehicle.runs import Prepared, Run
+from identification.mismatch.vehicle.screening import beyond, surrogates
+from identification.recording import Floats
+
+BUMPS = 6
+ALARM = 0.01
+INCONSTANT = 1e-3
+"""p-value, after all tests of a term, below which its parameter is not the same everywhere."""
+SAME = 0.15
+"""Parts of the recordings whose parameters differ by less count as the same."""
+BACK = 1e-300
+
+
+@dataclass(frozen=True, eq=False)
+class Coordinate:
+    """A covariate (g,) of each run on its grid, and the knots (b,) of a free force over it."""
+
+    quantity: str
+    unit: str
+    values: tuple[Floats, ...]
+    knots: Floats
+    what: str
+
+    def bumps(self, j: int) -> Floats:
+        """(g, b): triangles that add up to one, flat beyond the ends; 0 where the covariate is not known."""
+        x = self.values[j]
+        eye = np.eye(self.knots.size)
+        out = np.column_stack([np.interp(x, self.knots, row) for row in eye])
+        out[~np.isfinite(x)] = 0.0
+        return out
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """A free force over one coordinate, fitted to what remains."""
+
+    coordinate: Coordinate
+    p_value: float
+    """Of the coordinate, allowing for how many were tried."""
+    share: float
+    """Of the whitened residual's sum of squares."""
+    force: Floats
+    """(b,) N at the knots."""
+    std: Floats
+    beta: Floats
+    """(b,) as fitted: `force` about its mean, which the model's own parameters may hold."""
+
+
+def coordinates(fitted: Fit, data: Prepared) -> tuple[Coordinate, ...]:
+    """What a force that was left out may depend on."""
+    speed = tuple(_middle(m.v) for m in fitted.motions)
+    place = tuple(_middle(m.x) for m in fitted.motions)
+    time = tuple(_middle(run.edges) for run in data.runs)
+    out = [
+        _coordinate("speed", data.scale.speed_unit, speed, "a force over the speed"),
+        _coordinate("command_voltage", "V", tuple(map(_command, data.runs)), "a force over the command"),
+        _coordinate("time", "s", time, "a force over time"),
+    ]
+    if data.runs[0].quantity == "position":
+        name = "depth" if data.scale.axis == "heave" else "position"
+        out.append(_coordinate(name, data.scale.length_unit, place, "a force over the place"))
+    if np.isfinite(data.scale.heading_spread) and data.scale.heading_spread > 1e-3:
+        psi = tuple(np.angle(np.exp(1j * run.moment.heading)) for run in data.runs)
+        out.append(_coordinate("heading", "rad", psi, "a force over the heading"))
+    if len(data.runs) > 1:
+        out.append(_by_run(data))
+    return tuple(one for one in out if one is not None)
+
+
+def _middle(y: Floats) -> Floats:
+    out: Floats = 0.5 * (y[1:] + y[:-1])
+    return out
+
+
+def _command(run: Run) -> Floats:
+    """(g,) V: the mean over the thrusters that push, each as it pushes ahead."""
+    sign = np.sign(run.arms)[:, None]
+    out: Floats = np.mean(sign * run.moment.volts.mean(axis=2), axis=0)
+    return out
+
+
+def _coordinate(quantity: str, unit: str, values: tuple[Floats, ...], what: str) -> Coordinate | None:
+    whole = np.concatenate(values)
+    whole = whole[np.isfinite(whole)]
+    if whole.size == 0 or float(np.ptp(whole)) == 0:
+        return None
+    knots = np.unique(np.quantile(whole, np.linspace(0, 1, BUMPS)))
+    span = float(np.ptp(whole))
+    kept = [knots[0]]
+    for knot in knots[1:]:
+        if knot - kept[-1] > 0.03 * span:
+            kept.append(knot)
+    return Coordinate(quantity, unit, values, np.array(kept), what) if len(kept) > 1 else None
+
+
+def _by_run(data: Prepared) -> Coordinate:
+    index = tuple(np.full(run.steps, float(j + 1)) for j, run in enumerate(data.runs))
+    return Coordinate("run", "1", index, np.arange(1.0, len(data.runs) + 1), "a force that differs from run to run")
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """Every coordinate against the residual, the clearest first."""
+
+    p_value: float
+    structures: tuple[Structure, ...]
+
+
+def free_columns(fitted: Fit, data: Prepared, coordinate: Coordinate) -> list[Floats]:
+    """(n, b) per run: what a unit of force at each knot changes of the measurement."""
+    layout, theta = fitted.layout, fitted.theta
+    return [
+        respond(layout, theta, data, j, fitted.motions[j], coordinate.bumps(j))[:, :-2] for j in range(len(data.runs))
+    ]
+
+
+def judge_left(fitted: Fit, white: Weights, data: Prepared, rng: np.random.Generator) -> Left:
+    """Does a free force over any coordinate still explain something?"""
+    base = _base(fitted)
+    flipped = surrogates(fitted.residual, [w.rows.time.size for w in white], rng)
+    flipped = flipped - base @ (base.T @ flipped)
+    size = max(float(np.mean(fitted.residual**2)), 1e-12)
+    found = []
+    seen = coordinates(fitted, data)
+    for coordinate in seen:
+        columns = _stacked(white, free_columns(fitted, data, coordinate), fitted.residual.size)
+        Q = beyond(base, columns)
+        if not Q.shape[1]:
+            continue
+        gain = float(np.sum((Q.T @ fitted.residual) ** 2))
+        usual = float(np.mean(np.sum((Q.T @ flipped) ** 2, axis=0))) / Q.shape[1]
+        p = float(chi2_law.sf(gain / max(usual, size, 1.0), Q.shape[1]))
+        beta, std = _solved(columns, base, fitted.residual)
+        found.append((p, gain, coordinate, beta, std))
+    found.sort(key=lambda one: (one[0], -one[1]))
+    total = float(fitted.residual @ fitted.residual)
+    structures = tuple(
+        Structure(c, min(1.0, max(p, BACK) * len(seen)), gain / total, beta - beta.mean(), std, beta)
+        for p, gain, c, beta, std in found
+    )
+    return Left(structures[0].p_value if structures else 1.0, structures)
+
+
+def _base(fitted: Fit) -> Floats:
+    size = np.sqrt(np.sum(fitted.jacobian**2, axis=0))
+    Q, _ = np.linalg.qr(fitted.jacobian[:, size > 0] / size[size > 0])
+    return np.asarray(Q)
+
+
+def _stacked(white: Weights, columns: Sequence[Floats], rows: int) -> Floats:
+    whole = np.vstack([w.whiten(c) for w, c in zip(white, columns, strict=True)])
+    return np.vstack([whole, np.zeros((rows - whole.shape[0], whole.shape[1]))])
+
+
+def _solved(columns: Floats, base: Floats, residual: Floats) -> tuple[Floats, Floats]:
+    """Forces at the knots and their standard errors; of what the model's parameters could hold too, the least."""
+    left = columns - base @ (base.T @ columns)
+    U, s, Vt = np.linalg.svd(left, full_matrices=False)
+    kept = s > 1e-5 * s[0]
+    inverse = Vt[kept].T / s[kept]
+    return inverse @ (U[:, kept].T @ residual), np.sqrt(np.sum(inverse**2, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Where most of it lies."""
+
+    low: float
+    high: float
+    table: tuple[tuple[float, float, float], ...]
+
+
+def place_of(structure: Structure) -> Place:
+    """From the knot before to the one after the stretch with most force, in standard errors."""
+    knots = structure.coordinate.knots
+    weight = np.abs(structure.force) / np.maximum(structure.std, 1e-300)
+    i = int(np.argmax(weight))
+    last = knots.size - 1
+    low, high = float(knots[max(i - 1, 0)]), float(knots[min(i + 1, last)])
+    if structure.coordinate.quantity == "run":
+        low = high = float(knots[i])
+    rows = zip(knots.tolist(), structure.force.tolist(), structure.std.tolist(), strict=True)
+    return Place(low, high, tuple(rows))
+
+
+def inconstancies(fitted: Fit, white: Weights, data: Prepared, term: int) -> list[str]:
+    """Parts of the recordings in which a term's amount differs by more than chance and by more than SAME."""
+    base = _base(fitted)
+    layout, i = fitted.layout, fitted.layout.first_of[term]
+    amount = fitted.theta[i] - (layout.parts[term][0].neutral or 0.0)
+    if len(layout.parts[term]) > 1 or amount == 0 or not fitted.free[i]:
+        return []
+    effects = [added_forces(layout, fitted.theta, data, j, fitted.motions[j])[:, i] for j in range(len(data.runs))]
+    out = []
+    splits = _splits(fitted.motions, data)
+    for name, masks in splits.items():
+        columns = [
+            respond(layout, fitted.theta, data, j, fitted.motions[j], (effects[j] * masks[j])[:, None])[:, :-2]
+            for j in range(len(data.runs))
+        ]
+        column = _stacked(white, columns, fitted.residual.size)[:, 0]
+        left = column - base @ (base.T @ column)
+        size = float(left @ left)
+        if size <= 1e-6 * float(column @ column):
+            continue
+        shift = float(left @ fitted.residual) / size
+        p = float(chi2_law.sf(shift**2 * size, 1)) * len(splits)
+        if p < INCONSTANT and abs(shift) > SAME * abs(amount):
+            out.append(f"it is not the same {name} (by {100 * abs(shift / amount):.0f} %)")
+    return out
+
+
+def _splits(motions: Sequence[Motion], data: Prepared) -> dict[str, list[Floats]]:
+    """Two parts of all that was recorded, several times."""
+    halves = [(np.arange(run.steps) < run.steps // 2).astype(np.float64) for run in data.runs]
+    ahead = [(_middle(m.v) > 0).astype(np.float64) for m in motions]
+    out = {"in the first and the second half of the runs": halves}
+    share = float(np.mean(np.concatenate(ahead)))
+    if 0.1 < share < 0.9:
+        out["ahead and astern"] = ahead
+    if len(data.runs) > 1:
+        out["in every second run"] = [np.full(run.steps, float(j % 2)) for j, run in enumerate(data.runs)]
+    return out
