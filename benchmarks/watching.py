@@ -1,7 +1,7 @@
 """Live watching: delay to the alarm when an effect begins midway, and alarms in clean hours.
 
-    python benchmarks/watching.py changes [CAMPAIGNS]    # 50: zero drift, fouling, supply sag in turn, at 40 and 15 sigma
-    python benchmarks/watching.py clean [HOURS]          # 20: every kind of noise in turn
+    python benchmarks/watching.py changes [CAMPAIGNS [SIGMA]]    # 50, 40: drift, fouling, sag in turn
+    python benchmarks/watching.py clean [HOURS]                  # 20: every kind of noise in turn
 
 Recordings are concealed ones (sim_devices.concealed): thruster, plan, sampling, noise and channels drawn at random; an
 effect begins between 40 and 60 % of the run, as strong as an oracle sees it at so many sigma over the whole run that
@@ -96,7 +96,8 @@ def shape(effect: str, s: Scale, start: float, rng: np.random.Generator) -> Shap
 def changing(rng: np.random.Generator, effect: str, sigma: float) -> tuple[Case, float]:
     """A case whose effect begins midway, and when."""
     while True:
-        case = replace(concealed.case(rng), decoys={})
+        seconds, rate = float(rng.uniform(300.0, 480.0)), float(np.exp(rng.uniform(np.log(20.0), np.log(120.0))))
+        case = replace(concealed.case(rng, duration=seconds, sampling=rate), decoys={})
         start = case.scale.duration * float(rng.uniform(0.4, 0.6))
         case = replace(case, effects=(Concealed(shape(effect, case.scale, start, rng), 0.0),))
         try:
@@ -112,36 +113,33 @@ def is_right(effect: str, case: Case, place: str) -> bool:
     return place in right
 
 
-def changes(campaigns: int) -> None:
-    for sigma in (40.0, 15.0):
-        delays: dict[str, list[float]] = {effect: [] for effect in EFFECTS}
-        counts = dict.fromkeys(("early", "missed", "right at once", "right at the end"), 0)
-        off: list[float] = []
-        for number in range(campaigns):
-            effect = EFFECTS[number % len(EFFECTS)]
-            case, start = changing(np.random.default_rng([number, round(sigma), 8]), effect, sigma)
-            found = watched(case)
-            about = f"{sigma:3.0f} sigma {number:3d} {effect:<10} {case.noise_kind:<12} {case.runs[0].profile.kind:<11}"
-            about += f" begins {start:3.0f} of {found.duration:3.0f} s: "
-            if found.first is None or found.watch.alarm is None:
-                counts["missed"] += 1
-                delays[effect].append(np.inf)
-                print(f"{about} no alarm", flush=True)
-                continue
-            first, last = found.first, found.watch.alarm
-            counts["early"] += first.time < start
-            counts["right at once"] += is_right(effect, case, first.place)
-            counts["right at the end"] += is_right(effect, case, last.place)
-            delays[effect].append(first.time - start)
-            off.append(first.began - start)
-            print(
-                f"{about} after {first.time - start:4.0f} s: {first.headline}; in the end {last.headline}", flush=True
-            )
-        everything = np.concatenate([np.array(d) for d in delays.values()])
-        print(f"{sigma:g} sigma: {counts} of {campaigns}; delay {_spread(everything)}")
-        for effect, found_after in delays.items():
-            print(f"  {effect}: delay {_spread(np.array(found_after))}")
-        print(f"  begin as first said minus true: {_spread(np.array(off))}", flush=True)
+def changes(campaigns: int, sigma: float) -> None:
+    delays: dict[str, list[float]] = {effect: [] for effect in EFFECTS}
+    counts = dict.fromkeys(("early", "missed", "right at once", "right at the end"), 0)
+    off: list[float] = []
+    for number in range(campaigns):
+        effect = EFFECTS[number % len(EFFECTS)]
+        case, start = changing(np.random.default_rng([number, round(sigma), 8]), effect, sigma)
+        found = watched(case)
+        about = f"{sigma:3.0f} sigma {number:3d} {effect:<10} {case.noise_kind:<12} {case.runs[0].profile.kind:<11}"
+        about += f" begins {start:3.0f} of {found.duration:3.0f} s: "
+        if found.first is None or found.watch.alarm is None:
+            counts["missed"] += 1
+            delays[effect].append(np.inf)
+            print(f"{about} no alarm", flush=True)
+            continue
+        first, last = found.first, found.watch.alarm
+        counts["early"] += first.time < start
+        counts["right at once"] += is_right(effect, case, first.place)
+        counts["right at the end"] += is_right(effect, case, last.place)
+        delays[effect].append(first.time - start)
+        off.append(first.began - start)
+        print(f"{about} after {first.time - start:4.0f} s: {first.headline}; in the end {last.headline}", flush=True)
+    everything = np.concatenate([np.array(d) for d in delays.values()])
+    print(f"{sigma:g} sigma: {counts} of {campaigns}; delay {_spread(everything)}")
+    for effect, found_after in delays.items():
+        print(f"  {effect}: delay {_spread(np.array(found_after))}")
+    print(f"  begin as first said minus true: {_spread(np.array(off))}", flush=True)
 
 
 def _spread(values: Floats) -> str:
@@ -177,4 +175,4 @@ if __name__ == "__main__":
     if what == "clean":
         clean(float(amount[0]) if amount else 20.0)
     else:
-        changes(int(amount[0]) if amount else 50)
+        changes(int(amount[0]) if amount else 50, float(amount[1]) if amount[1:] else 40.0)

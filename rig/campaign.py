@@ -22,6 +22,7 @@ from rig.measuring import measure
 from rig.mounting import mount
 from rig.recorder_link import RecorderLink
 from rig.session import Session, Stopped, begin
+from rig.watch_link import WatchLink
 
 SOCKET_NAME = "controller.sock"
 LOG_NAME = "controller.log"
@@ -35,12 +36,18 @@ def open_session(campaign: CampaignConfig, folder: Path, thrusters: tuple[str, .
     clients = Clients(listen(socket_path(folder, SOCKET_NAME)))
     with (folder / "recorder.log").open("ab") as log:
         recorder = RecorderLink.start(log)
+    watch = _watcher(folder) if not campaign.watch.off else None
     ledger = Ledger.open(folder)
     own_log = LineWriter((folder / LOG_NAME).open("ab"), sync=False)
     parts = (build(campaign.bench), recorder, ledger, own_log, clients, MonotonicClock())
-    session = begin(campaign, folder, thrusters, parts, before)
+    session = begin(campaign, folder, thrusters, parts, before, watch)
     session.status.files.extend(finished_runs(before).values())
     return session
+
+
+def _watcher(folder: Path) -> WatchLink:
+    with (folder / "watcher.log").open("ab") as log:
+        return WatchLink.start(log)
 
 
 def run(session: Session) -> None:

@@ -85,6 +85,20 @@ class BenchConfig:
 
 
 @dataclass(frozen=True, slots=True)
+class WatchConfig:
+    """`[watch]`: the running campaign is watched for a mismatch (identification.watching)."""
+
+    false_alarms_per_hour: float = 0.05
+    """At most so many, on average, while nothing changes."""
+    twin: str = ""
+    """Path of a model known before the run, relative to the campaign file; `{thruster}` stands for the one under test.
+    Empty: the static curve is learnt from the run itself."""
+    off: bool = False
+    stop: bool = False
+    """An alarm ends the campaign in order, at zero. By default it is said, and the run goes on."""
+
+
+@dataclass(frozen=True, slots=True)
 class CampaignConfig:
     """A campaign file: which thrusters, which plan, how attended."""
 
@@ -98,6 +112,7 @@ class CampaignConfig:
     output: Path
     """Folder for recordings; relative to the campaign file."""
     tare: TareConfig = field(default_factory=TareConfig)
+    watch: WatchConfig = field(default_factory=WatchConfig)
     kind: str = "tunnel"
     operator: str = ""
     notes: str = ""

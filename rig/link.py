@@ -23,8 +23,11 @@ from pydantic_core import to_json
 from rig.errors import LinkError
 from rig.messages import Request, Snapshot
 from rig.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Ready, Rows, StepRow
+from rig.watch_messages import Mismatch, Watched
 
-Message = Snapshot | Request | Open | Rows | StepRow | EventRow | Close | Ready | Ack | Closed | Failed
+Message = (
+    Snapshot | Request | Open | Rows | StepRow | EventRow | Close | Ready | Ack | Closed | Failed | Watched | Mismatch
+)
 
 KINDS: Final[dict[int, type[Any]]] = {
     1: Snapshot,
@@ -38,6 +41,8 @@ KINDS: Final[dict[int, type[Any]]] = {
     26: Closed,
     27: Failed,
     32: Rows,
+    40: Watched,
+    48: Mismatch,
 }
 NUMBERS: Final = {message: number for number, message in KINDS.items()}
 ADAPTERS: Final[dict[int, TypeAdapter[Any]]] = {

@@ -10,18 +10,19 @@ from typing import Any, TypeVar
 
 from drivers import KINDS
 from rig.bench import build
-from rig.config import BenchConfig, CampaignConfig, CanBusConfig, DeviceConfig, LimitConfig, MountConfig
+from rig.config import BenchConfig, CampaignConfig, CanBusConfig, DeviceConfig, LimitConfig, MountConfig, WatchConfig
 from rig.errors import ConfigError
 from rig.guard import watches
 from rig.plan import Dwell, FixedDwell, Plan, SteadyDwell, TareConfig
 from rig.shapes import SHAPES, Shape
 from rig.tables import Table, construct, decode, joined, read_toml, refuse_unknown, table_at, typed, values
+from rig.watch_messages import twin_path
 
 T = TypeVar("T")
 
 BENCH_ELSEWHERE = ("path", "text", "devices", "can", "limits", "mount")
 """Fields of BenchConfig that are no keys of `[bench]`."""
-CAMPAIGN_ELSEWHERE = ("path", "text", "bench", "plan", "tare")
+CAMPAIGN_ELSEWHERE = ("path", "text", "bench", "plan", "tare", "watch")
 """Fields of CampaignConfig that are no keys of `[campaign]`."""
 PLAN_ELSEWHERE = ("shape", "dwell", "coast_time", "tare")
 """Fields of Plan that are no keys of `[plan]`; the keys of its shape are."""
@@ -53,15 +54,17 @@ def load_bench(path: Path) -> BenchConfig:
 def load_campaign(path: Path) -> CampaignConfig:
     """Read a campaign file and the bench file it names. Raises ConfigError, or PlanError for an impossible plan."""
     text, content = read_toml(path, "campaign file")
-    refuse_unknown(path, "", content, ("campaign", "tare", "plan"))
+    refuse_unknown(path, "", content, ("campaign", "tare", "plan", "watch"))
     table = table_at(path, content, "campaign")
     scalars = values(CampaignConfig, table, path, "campaign", elsewhere=CAMPAIGN_ELSEWHERE, also=("bench",))
     bench = load_bench((path.parent / _required(str, table, "bench", path, "campaign")).resolve())
     tare = decode(TareConfig, table_at(path, content, "tare", optional=True), path, "tare")
     plan = _plan(path, table_at(path, content, "plan"), tare, bench.coast_time)
-    campaign = CampaignConfig(path=path, text=text, bench=bench, plan=plan, tare=tare, **scalars)
+    watch = _watch(path, table_at(path, content, "watch", optional=True))
+    campaign = CampaignConfig(path=path, text=text, bench=bench, plan=plan, tare=tare, watch=watch, **scalars)
     if not campaign.thrusters or len(set(campaign.thrusters)) != len(campaign.thrusters):
         raise ConfigError(f"{path}: campaign.thrusters must name at least one thruster, and none twice")
+    _require_twins(campaign)
     if campaign.expected_C is not None:
         _require_above_zero(path, "campaign.expected_C", campaign.expected_C, "N/V^2")
     if campaign.flow_speed is not None and not math.isfinite(campaign.flow_speed):
@@ -95,6 +98,23 @@ def _plan(path: Path, table: Table, tare: TareConfig, coast_time: float) -> Plan
     dwell = _dwell(path, table_at(path, table, "dwell", "plan")) if held else FixedDwell(1.0)
     parts = {"shape": made, "dwell": dwell, "tare": tare, "coast_time": coast_time}
     return construct(Plan, parts | pacing, path, "plan")
+
+
+def _watch(path: Path, table: Table) -> WatchConfig:
+    watch = decode(WatchConfig, table, path, "watch")
+    _require_above_zero(path, "watch.false_alarms_per_hour", watch.false_alarms_per_hour, "alarms per hour")
+    return replace(watch, twin=str(path.parent.resolve() / watch.twin)) if watch.twin else watch
+
+
+def _require_twins(campaign: CampaignConfig) -> None:
+    """The twins that the runs are watched with are there."""
+    for thruster in campaign.thrusters:
+        twin = twin_path(campaign.watch.twin, thruster)
+        if campaign.watch.twin and not Path(twin).is_file():
+            raise ConfigError(
+                f"{campaign.path}: watch.twin of {thruster} is {twin}, but there is no such file; "
+                "`rig diagnose --save-twin` writes one"
+            )
 
 
 def _dwell(path: Path, table: Table) -> Dwell:

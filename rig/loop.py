@@ -26,6 +26,7 @@ from rig.messages import Request
 from rig.pace import Pace
 from rig.readings import Readings
 from rig.recorder_link import RecorderLink
+from rig.watch_link import WatchLink
 
 PUBLISH_PERIOD = 0.1
 """s between snapshots to the front ends."""
@@ -86,6 +87,8 @@ class Loop:
     clock: Clock
     unattended: bool
     publish: Callable[[float], None]
+    watcher: WatchLink | None = None
+    """Sees what is recorded; None: nobody watches."""
     signals: deque[Request] = field(default_factory=deque)
     """Requests that came by another way than a front end; a signal handler may append at any instant."""
     guarded: bool = False
@@ -254,6 +257,8 @@ class Loop:
             self._recorded_command = (decision.volts,)
             rows.append(Sample(COMMAND_STREAM, now_ns, (nan if decision.volts is None else decision.volts,)))
         self.recorder.rows(rows)
+        if self.watcher is not None:
+            self.watcher.rows(rows, now_ns * 1e-9)
 
     def _show(self, now: float) -> None:
         since = self.recording_since_ns

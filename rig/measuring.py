@@ -14,6 +14,7 @@ from rig.recorder_messages import Outcome, StepRow
 from rig.sequencer import Sequencer
 from rig.session import Session, Stopped
 from rig.ticks import Output, Tick, settings_for
+from rig.watching import begin_watch, end_watch, hear_watch
 
 
 def measure(session: Session) -> None:
@@ -29,6 +30,7 @@ def measure(session: Session) -> None:
     session.recorder.open(request, loop.now)
     loop.clients.clear_trace()
     loop.begin_recording(t0_ns)
+    begin_watch(session, thruster, t0_ns)  # before the first row is recorded
     status.files.append(str(path))
     session.wait_for_recorder(lambda: session.recorder.ready, f"open {path}")
     session.chronicle.begin(t0_ns)
@@ -53,6 +55,7 @@ def sequence(session: Session, sequencer: Sequencer, t0_ns: int) -> Output:
         trip = replace(inputs.trip, time=since_begun) if inputs.trip else None
         output = sequencer.advance(Tick(since_begun, thrust, inputs.rotation, trip, inputs.requests))
         _take(session, output, t0_ns, begun)
+        hear_watch(session)
         session.note(inputs.requests)
         return Decision(output.volts, output.release)
 
@@ -83,6 +86,7 @@ def _close(session: Session, output: Output) -> None:
     """Close the file in order and tell the ledger; a run that did not complete ends the campaign."""
     status, recorder, loop = session.status, session.recorder, session.loop
     _last_words(session)
+    end_watch(session)
     outcome, cause = judged(session, output)
     session.chronicle.end()
     recorder.close_file(outcome, cause)

@@ -132,6 +132,8 @@ class Snapshot:
     """s since the controller began, the clock of `log`."""
     mounted_by_hand: bool = False
     """True: in the state `mount` an operator puts the thruster on the bench, then sends `mounted`. False: a command."""
+    mismatch: str = ""
+    """Where this run stopped fitting what it was, or its twin, in one line; empty: nowhere, as far as is seen."""
 
 
 RequestKind = Literal[

@@ -23,6 +23,7 @@ from rig.recorder_link import RecorderLink
 from rig.recorder_messages import Outcome
 from rig.status import Status
 from rig.stopping import Stop, turning
+from rig.watch_link import WatchLink
 
 RECORDER_WAIT = 20.0
 """s for the recorder to open or close a file."""
@@ -57,6 +58,8 @@ class Session:
     motor: MotorController | None = None
     proved: bool = False
     """The motor's own watchdog was proved."""
+    watched: bool = False
+    """This run is; False once it was said why it is not."""
     measured: set[tuple[int, str]] = field(default_factory=set)
     """(index, phase) of the steps of this run that were run to their end."""
 
@@ -155,6 +158,8 @@ class Session:
             closing.callback(self.ledger.close)
             closing.callback(self._last_fact)
             closing.callback(self.recorder.shut_down)
+            if self.loop.watcher is not None:
+                closing.callback(self.loop.watcher.shut_down)
             closing.callback(self._close_recording)
             closing.callback(self.bench.close)
             closing.callback(self.loop.clients.close)
@@ -175,6 +180,7 @@ def begin(
     thrusters: tuple[str, ...],
     parts: tuple[Bench, RecorderLink, Ledger, LineWriter, Clients, Clock],
     before: tuple[Fact, ...] = (),
+    watch: WatchLink | None = None,
 ) -> Session:
     """Put the parts of a campaign together. Nothing is opened here but what is handed in."""
     bench, recorder, ledger, log, clients, clock = parts
@@ -190,5 +196,5 @@ def begin(
         if clients.connected:
             clients.publish(status.snapshot(now, time, loop.command, readings.view(now)))
 
-    loop = Loop(bench, readings, recorder, ledger, clients, clock, campaign.unattended, publish)
+    loop = Loop(bench, readings, recorder, ledger, clients, clock, campaign.unattended, publish, watch)
     return Session(campaign, folder, status, bench, recorder, ledger, log, chronicle, loop, before)

@@ -30,6 +30,8 @@ class Status:
     outcome: Literal["", "running", "completed", "aborted", "tripped"] = ""
     cause: str = ""
     stop_confirmed: bool | None = None
+    mismatch: str = ""
+    """Of this thruster's run, as the watcher last said; empty: none."""
     started: float | None = None
     """s, when the operator started the campaign."""
     output: Output | None = None
@@ -75,6 +77,7 @@ class Status:
             attended=not self.campaign.unattended,
             since_begin=now - self.begun,
             mounted_by_hand=not self.campaign.bench.mount.command,
+            mismatch=self.mismatch,
         )
 
     def _progress(self, now: float) -> Progress | None:

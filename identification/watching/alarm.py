@@ -16,10 +16,10 @@ WHERE: Final[dict[Place, str]] = {
     "bus": "while running, along with the bus voltage",
 }
 LOOK: Final[dict[Place, str]] = {
-    "zero": "look at the cell's zero and at what pulls on it: cables, struts, temperature; a rest at 0 V shows it alone",
+    "zero": "look at the cell's zero and what pulls on it: cables, struts, temperature; a rest at 0 V shows it alone",
     "running": "look at the propeller and at what drives it; the zero at rest has not moved with it",
-    "forward": "look at what only forward thrust meets: the blades' faces, the duct's outlet, the load path's forward stop",
-    "reverse": "look at what only reverse thrust meets: the blades' backs, the duct's inlet, the load path's rear stop",
+    "forward": "look at what only forward thrust meets: the blades' faces, the duct's outlet, the front stop",
+    "reverse": "look at what only reverse thrust meets: the blades' backs, the duct's inlet, the rear stop",
     "high": "repeat a low and a high level; look at supply, drive and water at full load",
     "bus": "look at the supply and its cables; hold one level and change the supply",
 }
@@ -41,7 +41,7 @@ class Alarm:
     rivals: tuple[Place, ...]
     """Other places with a probability above a tenth."""
     size: float
-    """N, by now: of the zero, or at the highest command."""
+    """N, by now: of the zero, or at the highest command; there, forward and reverse, below 0 is a loss."""
     size_std: float
     """N, one standard deviation."""
     share: float | None

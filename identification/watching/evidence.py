@@ -22,7 +22,7 @@ from identification.watching.laws import TIMES, Laws
 
 SIZES = (2.0, 8.0, 32.0, 128.0)
 """Standard deviations of a candidate's amplitude, in those of a mean over laws.REFERENCE s."""
-SLOTS = 32
+SLOTS = 20
 """Beginnings that are followed; when one more comes the least likely of the old ones is let go, which only loses."""
 LEAST_DOF = 4.0
 """Rows beyond the static columns before anything is judged: with fewer the size of the noise is a guess."""
@@ -192,8 +192,8 @@ class Evidence:
 def level_of(v: float, bins: int) -> int | None:
     """The bin of a command v in -1..1 that has a deviation of its own; None at rest, where the tare says it.
 
-    >>> level_of(0.0, 32), level_of(-1.0, 32), level_of(1.0, 32), level_of(0.02, 32)
-    (None, 0, 31, 16)
+    >>> level_of(0.0, 16), level_of(-1.0, 16), level_of(1.0, 16), level_of(0.02, 16)
+    (None, 0, 15, 8)
     """
     if v == 0.0:
         return None

@@ -14,12 +14,15 @@ from identification.recording import Floats
 
 REFERENCE = 4.0
 """s of samples in a mean of unit white variance."""
-TIMES = (6.0, 20.0, 60.0, 200.0)
+TIMES = (8.0, 30.0, 100.0)
 """s: time constants of the slow parts, first-order Gauss-Markov each. What is slower is called drift, not noise."""
-RATIOS = (1.0, 6.0, 36.0, 216.0, 1296.0)
-"""Variance of the slow part over the white one. A factor of 6 between neighbours: the truth is at most sqrt(6) away."""
+RATIOS = (1.0, 10.0, 100.0, 1000.0)
+"""Variance of the slow part over the white one. A decade between neighbours: the truth is at most sqrt(10) away."""
 LEVELS = (0.0, 9.0, 900.0)
 """Variance of the deviation of a level from the smooth static curve over the white one: friction, settling, shape."""
+
+KNOWN_LEVELS = LEVELS[:2]
+"""The same for a model known before the run, whose deviations of shape are allowed for apart."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -32,14 +35,14 @@ class Laws:
     """(H,) variance of each level's own deviation."""
 
 
-def laws() -> Laws:
+def laws(levels: tuple[float, ...] = LEVELS) -> Laws:
     """White alone; one slow part of each time and ratio; equal parts at all times, which is 1/f noise.
 
     >>> laws().slow.shape
-    (78, 4)
+    (51, 3)
     """
     m = len(TIMES)
     shapes = [np.eye(m)[i] for i in range(m)] + [np.full(m, 1.0 / m)]
     slow = [np.zeros(m)] + [ratio * shape for shape, ratio in product(shapes, RATIOS)]
-    both = list(product(slow, LEVELS))
+    both = list(product(slow, levels))
     return Laws(np.array([s for s, _ in both]), np.array([level for _, level in both]))

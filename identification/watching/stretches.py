@@ -19,6 +19,8 @@ SWEEPING = 0.5
 """s; a command that changes sooner than this after its last change is a sweep, not a hold."""
 LEAST_SWEEP = 2.0
 """s of a sweep that make a stretch."""
+PASSING = 5.0
+"""s of a sweep before its first stretch: shorter ones are the way from one hold to the next, and less sure."""
 LEAST = 5
 """Batches that make a stretch of a hold."""
 LONGEST = 6.0
@@ -142,6 +144,8 @@ class Stretches:
     _step: bool = True
     """The hold began with a step; False: it is the continuation of one that was cut for its length."""
     _batches: Batches = field(default_factory=Batches)
+    _sweeping: float | None = None
+    """s since which the command has been moving; None while it is held."""
     _swept: list[tuple[float, float, float, Floats, float]] = field(default_factory=list)
     """(s, duration, V, batch values, N expected) of the short holds a sweep is made of, LEAST_SWEEP s at most."""
 
@@ -153,6 +157,7 @@ class Stretches:
             self._close(time)
         if not isfinite(volts):
             self._swept.clear()
+            self._sweeping = None
         self._begin(time, volts, step=True)
 
     def thrust(self, time: Floats, value: Floats) -> None:
@@ -179,14 +184,19 @@ class Stretches:
         self._batches._finish(self._since)
         if time - self._since >= SWEEPING or not self._step:
             self._swept.clear()
+            self._sweeping = None
             self._hold(time)
             return
+        if self._sweeping is None:
+            self._sweeping = self._since
         values = np.array(self._batches.value)
         if values.size:
             expected = self._expected(self._volts, time)
             self._swept.append((self._since, time - self._since, self._volts, values, expected))
         if self._swept and time - self._swept[0][0] >= LEAST_SWEEP:
-            self._sweep(time)
+            if self._swept[0][0] - self._sweeping >= PASSING:
+                self._sweep(time)
+            self._swept.clear()
 
     def _expected(self, volts: float, now: float) -> float:
         if self.expected is None:
@@ -203,7 +213,9 @@ class Stretches:
         time, value = time[first:], value[first:]
         if value.size >= LEAST:
             features = np.array([features_of(self._volts / self.highest)])
-            self._emit(time[0] - BATCH / 2, end, self._volts, features[0], 0.0, value, self._expected(self._volts, end))
+            expected = self._expected(self._volts, end)
+            used = value.size * BATCH
+            self._emit(time[0] - BATCH / 2, end, self._volts, features[0], 0.0, value, used, expected)
 
     def _sweep(self, end: float) -> None:
         weights = np.array([values.size for _, _, _, values, _ in self._swept], dtype=np.float64)
@@ -214,11 +226,19 @@ class Stretches:
         slope = (features[-1, 0] - features[0, 0]) / (end - start)
         values = np.concatenate([values for _, _, _, values, _ in self._swept])
         expected = float(weights @ np.array([e for *_, e in self._swept]) / weights.sum())
-        self._emit(start, end, float(weights @ volts / weights.sum()), mean, float(slope), values, expected)
-        self._swept.clear()
+        middle = float(weights @ volts / weights.sum())
+        self._emit(start, end, middle, mean, float(slope), values, end - start, expected)
 
     def _emit(
-        self, start: float, end: float, volts: float, features: Floats, slope: float, values: Floats, expected: float
+        self,
+        start: float,
+        end: float,
+        volts: float,
+        features: Floats,
+        slope: float,
+        values: Floats,
+        used: float,
+        expected: float,
     ) -> None:
         flow = self.flow.mean(end)
         self.done.append(
@@ -231,7 +251,7 @@ class Stretches:
                 expected=expected,
                 thrust=float(values.mean()),
                 variance=fast_variance(values),
-                used=values.size * BATCH,
+                used=used,
                 bus=self.bus.mean(end),
                 flow=flow if isfinite(flow) else 0.0,
                 rate=self.rate.mean(end),

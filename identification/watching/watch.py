@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 from math import exp, isfinite
 
@@ -10,13 +11,13 @@ import numpy as np
 from identification.recording import Floats
 from identification.watching.alarm import Alarm
 from identification.watching.evidence import Evidence, Posterior, level_of
-from identification.watching.laws import REFERENCE, laws
+from identification.watching.laws import KNOWN_LEVELS, LEVELS, REFERENCE, laws
 from identification.watching.signatures import BUS, RAMP, RAMPS, SIGNATURES, STATIC, Place, signature_row, static_row
 from identification.watching.stretches import BATCH, Expected, Stretch, Stretches
 
 FALSE_ALARMS = 0.05
 """Per hour, by default."""
-BINS = 32
+BINS = 16
 """Of the command, from the lowest to the highest, that may each deviate from the smooth static curve."""
 FROM_START = 0.1
 """h of allowance for a run that does not fit its known model from the start on; only with one."""
@@ -24,6 +25,8 @@ KNOWN = 0.005
 """Relative standard deviation that a known model has at least from one mounting to the next, in gain and in shape."""
 LIKELY = 0.1
 """Probability from which another place is named beside the best."""
+MOST_WAITING = 4096
+"""Commands that wait for samples of thrust."""
 LOUDEST = 1e4
 """Fast noise while running is at most this much louder (in variance) than at rest for the weights of the means."""
 
@@ -50,8 +53,8 @@ class Settings:
 class Watch:
     """One run of one thruster; another mounting needs another Watch.
 
-    Feed `command`, `thrust` and what else is measured in order of time; `look` says what there is to say. A command's
-    row comes after the samples that were taken before it, or late samples are left out.
+    Feed `command`, `thrust` and what else is measured as they come, each in order of time; `look` says what there is to
+    say. A command is fed before the samples of thrust that were taken under it; it waits for those taken before it.
 
     >>> watch = Watch(Settings(highest=10.0))
     >>> rng = np.random.default_rng(3)
@@ -74,7 +77,10 @@ class Watch:
         self.log_evidence = float("-inf")
         """log of the sum that raises the alarm at 0; stays at its largest."""
         self._cut = Stretches(settings.highest, settings.expected)
-        self._evidence = Evidence(laws(), len(STATIC), len(SIGNATURES), BINS)
+        self._commands: deque[tuple[float, float]] = deque()
+        self._evidence = Evidence(
+            laws(LEVELS if settings.expected is None else KNOWN_LEVELS), len(STATIC), len(SIGNATURES), BINS
+        )
         self._loudness = Loudness()
         self._bus0 = float("nan")
         self._zero = self._slope = float("nan")
@@ -85,10 +91,17 @@ class Watch:
 
     def command(self, time: float, volts: float) -> None:
         """From `time` (s) on; NaN: nothing is sent."""
-        self._cut.command(time, volts)
+        self._commands.append((time, volts))
+        if len(self._commands) > MOST_WAITING:  # no thrust comes any more
+            self._cut.command(*self._commands.popleft())
 
     def thrust(self, time: Floats, value: Floats) -> None:
         """Samples (n,) in s and N, in order. NaN and gaps are left out."""
+        while self._commands and time.size and self._commands[0][0] <= time[-1]:
+            before = int(np.searchsorted(time, self._commands[0][0], side="left"))
+            self._cut.thrust(time[:before], value[:before])
+            self._cut.command(*self._commands.popleft())
+            time, value = time[before:], value[before:]
         self._cut.thrust(time, value)
 
     def bus_voltage(self, time: Floats, value: Floats) -> None:
@@ -175,7 +188,6 @@ class Watch:
         early, late = np.interp((0.05, 0.95), np.cumsum(when[order]), begun[order])
         grows = (now - begun[j]) / RAMP if RAMPS[g] else 1.0
         full = self._full or abs(float(found.static[STATIC.index("x")]) + self._slope)
-        reverse = -1.0 if best == "reverse" else 1.0
         size, std = float(found.amplitude[j, g]) * grows, float(found.std[j, g]) * grows
         if best == "bus":  # as it is now: by how much the thrust at the highest command has changed with the bus
             size, std = size * self._bus_now(), std * abs(self._bus_now())
@@ -188,9 +200,9 @@ class Watch:
             place=best,
             probability=by_place[best],
             rivals=tuple(p for p, weight in by_place.items() if p != best and weight > LIKELY),
-            size=size * reverse,
+            size=size,
             size_std=std,
-            share=size / full if best != "zero" and full > 0 else None,
+            share=size / full if full > 0 and best != "zero" and SIGNATURES[g][0] != "even step" else None,
             growing=bool(RAMPS[g]),
             e_value=exp(min(found.log_sum, 600.0)) / (self.settings.false_alarms_per_hour * hours),
             from_start=bool(self._full) and j == 0,

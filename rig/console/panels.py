@@ -88,7 +88,7 @@ def _attendance(snapshot: Snapshot | None) -> str:
 
 
 class ProgressPanel(Panel):
-    """Campaign and step, two lines."""
+    """Campaign and step, two lines; a third where the run no longer fits."""
 
     def show(self, view: View) -> None:
         snapshot, width = view.snapshot, self.content_size.width
@@ -99,6 +99,8 @@ class ProgressPanel(Panel):
         lines = Text(no_wrap=True)
         lines.append(wording.campaign_line(progress, snapshot.thruster, width) + "\n")
         lines.append(wording.step_line(progress, snapshot, width))
+        if snapshot.mismatch:
+            lines.append(f"\nmismatch: {snapshot.mismatch}", LOG_STYLES["warning"])
         self.put(lines.plain, lines)
 
 
