@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rig.diagnose_vehicle import VehicleFiles, diagnose_vehicle_files, is_vehicle, refuse_for_tunnel
 from rig.errors import RecordingError, RigError
 from rig.next_plan import asked, limits_of, write_next
 
@@ -21,6 +22,7 @@ if TYPE_CHECKING:  # numpy and scipy come up when a diagnosis is made, not for `
     from identification.recording import Recording
     from identification.twin import Twin
 
+NO_VEHICLE = VehicleFiles()
 WHAT = "expected one or more recordings (*.h5) of one thruster"
 
 
@@ -56,9 +58,11 @@ def diagnose_files(
     *,
     any_thruster: bool = False,
     limits: Limits | None = None,
+    vehicle: VehicleFiles = NO_VEHICLE,
 ) -> Diagnosis:
     """The diagnosis of recordings of one thruster, against C V|V| or a twin; its own twin knows the files' hashes.
 
+    Of recordings of a vehicle, against its drag and its thrusters' models; `vehicle` says what is known of it.
     Raises RecordingError for what cannot be diagnosed, TwinError for a twin that cannot be read.
     """
     from rig.twin import read_twin, stamped
@@ -66,6 +70,13 @@ def diagnose_files(
     files = recordings_in(paths)
     baseline = None if twin is None else read_twin(twin)
     recordings = read(files)
+    if is_vehicle(recordings):
+        if baseline is not None:
+            raise RecordingError(f"--twin is of a thruster, and {files[0]} is a recording of a vehicle")
+        held = list(holdout)
+        kept = dict(zip(held, read(held), strict=True))
+        return diagnose_vehicle_files(dict(zip(files, recordings, strict=True)), kept, seed, vehicle)
+    refuse_for_tunnel(vehicle)
     if baseline is not None and any_thruster:
         baseline = replace(baseline, thruster=recordings[0].thruster)
     found = diagnosed(recordings, read(holdout), seed, baseline, limits)
@@ -100,6 +111,8 @@ def tell(
     from identification.mismatch.diagnosis import diagnosis_json
     from rig.diagnose_text import diagnosis_text
 
+    if save_twin is not None and found.response != "thrust":
+        raise RecordingError("--save-twin keeps the model of a thruster; these are recordings of a vehicle")
     if save_twin is not None and found.twin is not None:
         from rig.twin import write_twin
 
@@ -134,6 +147,13 @@ PATH = click.Path(path_type=Path)
     type=click.Path(dir_okay=False, path_type=Path),
     help="Write the fitted model here, as a twin (JSON).",
 )
+@click.option("--thrusters", multiple=True, type=PATH, help="Vehicle: what `rig fit --json` wrote of its thrusters.")
+@click.option("--installation", type=PATH, help="Vehicle: which thruster sits where (TOML), as for `rig vehicle`.")
+@click.option(
+    "--mass", type=float, metavar="KG", help="Vehicle: its inertia on that axis, in the installation's place."
+)
+@click.option("--mass-std", type=float, default=0.0, metavar="KG", help="Standard deviation of --mass.  [default: 0]")
+@click.option("--axis", type=click.Choice(["surge", "sway", "heave", "yaw"]), help="Vehicle: only trials of this axis.")
 @click.option("--plan", type=PATH, help="Write the next experiment here, as a campaign; needs --campaign.")
 @click.option("--campaign", type=PATH, help="Campaign of the recordings: bench and pacing of the next experiment.")
 @click.option("--budget", type=float, metavar="S", help="Longest next experiment.  [default: 300]")
@@ -146,6 +166,11 @@ def diagnose_command(
     json_path: Path | None,
     report: Path | None,
     save_twin: Path | None,
+    thrusters: tuple[Path, ...],
+    installation: Path | None,
+    mass: float | None,
+    mass_std: float,
+    axis: str | None,
     plan: Path | None,
     campaign: Path | None,
     budget: float | None,
@@ -153,13 +178,16 @@ def diagnose_command(
 ) -> None:
     """Find the physics that C V|V| leaves out of recordings of one thruster; a folder stands for its *.h5.
 
+    Of recordings of a vehicle: what its drag and the models of its thrusters leave out.
+
     Exit status 0 for every honest verdict, 2 for input that cannot be used (one sentence why).
     """
     try:
         held = recordings_in(holdout) if holdout else []
         bench = asked(plan, campaign)
         limits = limits_of(bench, budget)
-        found = diagnose_files(files, held, seed, twin, any_thruster=any_thruster, limits=limits)
+        vehicle = VehicleFiles(thrusters, installation, mass, mass_std, axis or "")
+        found = diagnose_files(files, held, seed, twin, any_thruster=any_thruster, limits=limits, vehicle=vehicle)
         tell(found, json_path, report, save_twin, recordings_in(files))
         if plan is not None and bench is not None:
             for file in write_next(found, bench, plan):

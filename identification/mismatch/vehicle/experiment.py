@@ -15,7 +15,6 @@ from identification.mismatch.vehicle.model import on_other_runs, predict
 from identification.mismatch.vehicle.naming import EQUAL, Named
 from identification.mismatch.vehicle.runs import Prepared, Run
 from identification.mismatch.vehicle.search import State
-from identification.recording import Floats
 
 BUDGET = 300.0
 """s."""
@@ -102,7 +101,7 @@ def _planned(steps: Sequence[PlanStep], data: Prepared) -> Run:
         for name in moment.active
     }
     spacing = float(np.median(np.diff(like.time)))
-    time: Floats = np.arange(int(ends[-1] / spacing) + 1) * spacing
+    time = np.asarray(np.arange(int(ends[-1] / spacing) + 1) * spacing, dtype=np.float64)
     one = np.ones(time.size)
     heading = np.full(g, float(moment.heading[0]) if moment.heading.size else np.nan)
     new = replace(moment, volts=np.array([each[name] for name in names]), active=active, heading=heading)

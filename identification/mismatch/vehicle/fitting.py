@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.mismatch.noise import Noise, Rows, Whitener, fit_noise
 from identification.mismatch.vehicle.model import Known, Layout, known, predict
@@ -17,6 +18,7 @@ STEPS = 30
 ENOUGH = 1e-3
 """Change of chi-square below which a fit has arrived."""
 DAMPING = 1e-3
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +37,8 @@ class Fit:
     predicted: tuple[Floats, ...]
     cov: Floats
     """(p, p); columns at a bound are taken as fixed there: 0."""
-    free: Floats
-    """(p,) of bool: not at a bound."""
+    free: Mask
+    """(p,) not at a bound."""
 
 
 Weights = tuple[Whitener, ...]
@@ -131,10 +133,10 @@ def fit(
     )
 
 
-def _stuck(now: _At, theta: Floats, low: Floats, high: Floats) -> Floats:
-    """(p,) of bool: at a bound, and the data would push it on."""
+def _stuck(now: _At, theta: Floats, low: Floats, high: Floats) -> Mask:
+    """(p,) at a bound, and the data would push it on."""
     downhill = now.jacobian.T @ now.residual
-    out: Floats = ((theta <= low) & (downhill <= 0)) | ((theta >= high) & (downhill >= 0)) | (low >= high)
+    out: Mask = ((theta <= low) & (downhill <= 0)) | ((theta >= high) & (downhill >= 0)) | (low >= high)
     return out
 
 
@@ -157,7 +159,7 @@ def _step(now: _At, theta: Floats, low: Floats, high: Floats, damping: float) ->
     return step
 
 
-def _cov(H: Floats, free: Floats) -> Floats:
+def _cov(H: Floats, free: Mask) -> Floats:
     out = np.zeros((H.shape[1], H.shape[1]))
     at = np.flatnonzero(free)
     size = np.sqrt(np.sum(H[:, at] ** 2, axis=0))

@@ -41,7 +41,7 @@ class Slopes:
 
     @property
     def alone(self) -> bool:
-        return self.bands.shape[0] == 2
+        return len(self.bands) == 2
 
 
 def drag(body: Body, v: Floats, x: Floats, origin: float) -> tuple[Floats, Floats, Floats]:
@@ -144,7 +144,8 @@ def observed(run: Run, v: Floats, x: Floats) -> Floats:
     i = np.minimum(at.astype(np.intp), run.steps - 1)
     s = (at - i).reshape((-1,) + (1,) * (v.ndim - 1))
     if run.quantity == "speed":
-        return (1 - s) * v[i] + s * v[i + 1]
+        straight: Floats = (1 - s) * v[i] + s * v[i + 1]
+        return straight
     out: Floats = (
         (1 + 2 * s) * (1 - s) ** 2 * x[i]
         + s * (1 - s) ** 2 * h * v[i]

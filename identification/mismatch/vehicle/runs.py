@@ -247,7 +247,9 @@ def _run(
     quantity, time, value = measured
     time, value, count, width = _averaged(time, value)
     names = [t.name for t in installation.thrusters]
-    middle = grid.start + (np.arange(next(iter(grid.volts.values())).shape[0]) + 0.5) * grid.step
+    middle = np.asarray(
+        grid.start + (np.arange(next(iter(grid.volts.values())).shape[0]) + 0.5) * grid.step, dtype=np.float64
+    )
     active = {}
     for name in installation.etas:
         on = [

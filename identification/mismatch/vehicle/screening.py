@@ -150,7 +150,7 @@ def beyond(base: Floats, columns: Floats) -> Floats:
     size = np.sqrt(np.sum(columns**2, axis=0))
     scaled = columns[:, size > 0] / size[size > 0]
     left = scaled - base @ (base.T @ scaled)
-    left = left - base @ (base.T @ left)
+    left = np.asarray(left - base @ (base.T @ left))
     if not left.shape[1]:
         return left
     U, s, _ = np.linalg.svd(left, full_matrices=False)
