@@ -1,6 +1,6 @@
 """What the proof asks: jobs (one case of the world each) with orders (one diagnosis each), cells interleaved. Pure.
 
->>> world = Kinds(("dead_band", "fouling"), {"dead_band": ("shrink", "jump")}, ("swapped",), ("white",))
+>>> world = Kinds(("dead_band", "fouling"), {"dead_band": ("shrink", "jump")}, {}, ("swapped",), ("white",))
 >>> [job.id for job in design(world, frozenset({"dead_band", "heating"}), 1) if "plain" in job.id or "other" in job.id]
 ['plain/dead_band/0', 'outside/fouling/0']
 """
@@ -39,6 +39,9 @@ class Kinds:
 
     effects: tuple[str, ...]
     forms: Mapping[str, tuple[str, ...]]
+    """Of effects that have several; one is drawn where none is asked for."""
+    variants: Mapping[str, tuple[str, ...]]
+    """Forms that are there when asked for only: not those of the catalogue."""
     lies: tuple[str, ...]
     noise: tuple[str, ...]
 
@@ -149,10 +152,11 @@ def _open(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tupl
 def _others(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tuple[float, Job]]:
     """Pairs, textbook forms, clean recordings."""
     known = [effect for effect in world.effects if effect in catalogue]
-    for effect, forms in world.forms.items():
-        for form in forms if effect in catalogue else ():
-            spec = {"effects": [effect], "strength": STRENGTHS["plain"], "forms": [form]}
-            yield from _many("form", f"{effect}:{form}", seeds, spec)
+    for cell, table in (("form", world.forms), ("variant", world.variants)):
+        for effect, forms in table.items():
+            for form in forms if effect in catalogue else ():
+                spec = {"effects": [effect], "strength": STRENGTHS["plain"], "forms": [form]}
+                yield from _many(cell, f"{effect}:{form}", seeds, spec)
     for place, job in _many("pair", "any", PAIRS_PER_SEED * seeds if len(known) > 1 else 0, {}):
         two = np.random.default_rng(job.seed).choice(known, 2, replace=False).tolist()
         yield place, Job(job.id, {"effects": two, "strength": PAIR_STRENGTH}, job.orders)

@@ -40,7 +40,7 @@ def goals(scores: Sequence[Score]) -> list[Goal]:
         of_rate("plain: right alone", rate(s.alone for s in clean[1]), least=0.95),
         of_rate("wrong names, one effect", rate(s.wrong for s in alone), most=0.01),
         of_rate(f"pairs at {PAIR_STRENGTH:g}: both right", rate(s.right for s in cell(scores, "pair")), least=0.92),
-        of_rate("textbook forms at plain: right", rate(s.right for s in cell(scores, "form")), least=0.90),
+        of_rate("other textbook forms at plain: right", rate(s.right for s in cell(scores, "variant")), least=0.90),
         of_rate("open world: unexplained, right place", rate(s.outcome == "located" for s in counted), least=0.90),
         of_rate("open world: a wrong name instead", rate(s.outcome == "wrong name" for s in counted), most=0.05),
     ]
@@ -61,7 +61,7 @@ def _alarms(scores: Sequence[Score]) -> list[Goal]:
 
 def ratios(scores: Iterable[Score], of: Callable[[Any], float]) -> np.ndarray[Any, np.dtype[np.float64]]:
     """Held-out figures of the runs with one effect or two, by the whole catalogue."""
-    kept = (s for s in cell(scores, *STRENGTHS, "pair", "form") if s.held_out is not None)
+    kept = (s for s in cell(scores, *STRENGTHS, "pair", "form", "variant") if s.held_out is not None)
     return np.array([of(s.held_out) for s in kept])
 
 
@@ -267,7 +267,7 @@ def tables(scores: Sequence[Score], seeds: int, versions: Sequence[str], undrawn
             | ({"low": g.low, "high": g.high} if g.percent else {})
             for g in goals(scores)
         ],
-        "confusion": {name: confusion(scores, name) for name in (*STRENGTHS, "form", "fault", "clean")},
+        "confusion": {name: confusion(scores, name) for name in (*STRENGTHS, "form", "variant", "fault", "clean")},
         "power": {e: {str(d): r.json() for d, r in by.items()} for e, by in named_by_strength(scores).items()},
         "half_named": {e: d if np.isfinite(d) else None for e, d in half_named(scores)},
         "open_world": open_world(scores),

@@ -109,8 +109,8 @@ def concealable() -> Kinds:
     if told.returncode:
         raise ProofError(f"the simulated world does not answer: {told.stderr.decode(errors='replace').strip()}")
     found = json.loads(told.stdout)
-    forms = {effect: tuple(names) for effect, names in found["forms"].items()}
-    return Kinds(tuple(found["effects"]), forms, tuple(found["lies"]), tuple(found["noise"]))
+    forms, variants = ({e: tuple(names) for e, names in found[part].items()} for part in ("forms", "variants"))
+    return Kinds(tuple(found["effects"]), forms, variants, tuple(found["lies"]), tuple(found["noise"]))
 
 
 @dataclass

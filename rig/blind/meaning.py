@@ -59,7 +59,7 @@ def _bend(p: Table, form: str, _k: float, _truth: Table) -> Table:
 def _drift(p: Table, form: str, _k: float, _truth: Table) -> Table:
     if "rate" in p:
         return {"rate": p["rate"]} if form == "linear" else {}
-    return {n: p[n] for n in ("amplitude", "time_constant")} if form == "exponential" else {}
+    return {n: p[n] for n in ("amplitude", "time_constant")} if form == "exponential" and "amplitude" in p else {}
 
 
 def _line(p: Table, _form: str, _k: float, _truth: Table) -> Table:

@@ -107,7 +107,8 @@ def _other_cells(scores: Sequence[Score]) -> Section | None:
     head = ("concealed", "right", "alone", "wrong names", "said instead")
     parts = []
     for name, caption in (
-        ("form", "Textbook forms at plain strength"),
+        ("variant", "Textbook forms that the catalogue has in other words, at plain strength"),
+        ("form", "Textbook forms of the catalogue at plain strength"),
         ("fault", "Channels that lie"),
         ("pair", "Pairs"),
     ):

@@ -30,7 +30,7 @@ from sim_devices.concealed.oracle import OutOfReach, scaled_to, strength
 from sim_devices.concealed.plans import KINDS as PLAN_KINDS
 from sim_devices.concealed.records import Rows, rows, truth
 from sim_devices.concealed.rivals import twins
-from sim_devices.concealed.shapes import FORMS, SHAPES
+from sim_devices.concealed.shapes import FORMS, SHAPES, VARIANTS
 
 __all__ = [
     "FORMS",
@@ -38,6 +38,7 @@ __all__ = [
     "NOISE_KINDS",
     "PLAN_KINDS",
     "SHAPES",
+    "VARIANTS",
     "Case",
     "Column",
     "OutOfReach",

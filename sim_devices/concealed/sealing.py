@@ -28,7 +28,7 @@ from sim_devices.concealed.faults import KINDS as LIES
 from sim_devices.concealed.oracle import OutOfReach
 from sim_devices.concealed.records import Rows, rows, truth
 from sim_devices.concealed.rivals import twins
-from sim_devices.concealed.shapes import FORMS, SHAPES
+from sim_devices.concealed.shapes import FORMS, SHAPES, VARIANTS
 from sim_devices.tables import WorldError
 
 Floats = NDArray[np.float64]
@@ -36,6 +36,7 @@ Floats = NDArray[np.float64]
 KINDS: Mapping[str, Any] = {
     "effects": list(SHAPES),
     "forms": {effect: list(forms) for effect, forms in FORMS.items()},
+    "variants": {effect: list(forms) for effect, forms in VARIANTS.items()},
     "lies": list(LIES),
     "noise": list(NOISE_KINDS),
 }

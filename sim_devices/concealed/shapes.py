@@ -77,8 +77,9 @@ def shape(effect: str, scale: Scale, rng: Rng, form: str = "") -> Shape:
     if effect not in SHAPES:
         raise ValueError(f"effect must be one of {', '.join(SHAPES)}, got {effect!r}")
     forms = FORMS.get(effect, ("",))
-    if form and form not in forms:
-        raise ValueError(f"form of {effect} must be one of {', '.join(forms)}, got {form!r}")
+    known = (*forms, *VARIANTS.get(effect, ()))
+    if form and form not in known:
+        raise ValueError(f"form of {effect} must be one of {', '.join(known)}, got {form!r}")
     return SHAPES[effect](scale, rng, form or str(rng.choice(forms)))
 
 
@@ -97,6 +98,19 @@ FORMS: dict[str, tuple[str, ...]] = {
     "periodic_disturbance": ("frequency", "blades"),
     "supply_sag": ("resistance", "discharge"),
 }
+
+
+VARIANTS: dict[str, tuple[str, ...]] = {
+    "dead_band": ("smooth",),
+    "command_saturation": ("soft",),
+    "winding_resistance": ("linearised",),
+    "motor_lag": ("two_lags",),
+    "cavitation": ("exponential",),
+    "recirculation": ("late",),
+    "zero_drift": ("root",),
+    "load_cell_saturation": ("soft",),
+}
+"""Further textbook forms, there when asked for by name only: the same physics in other words."""
 
 
 def _log(rng: Rng, low: float, high: float) -> float:
@@ -135,6 +149,8 @@ def _cavitation(s: Scale, rng: Rng, form: str) -> Shape:
 
 
 def _drift(s: Scale, rng: Rng, form: str) -> Shape:
+    if form == "root":
+        return Shape("zero_drift", "root", 0.5, _sign(rng) * s.thrust / s.duration**0.5)
     if form == "rate":
         return Shape("zero_drift", "rate", 0.5, _sign(rng) * s.thrust / s.duration)
     fixed = {"time_constant": s.duration * _uniform(rng, 0.15, 0.6)}
@@ -162,9 +178,25 @@ def _lag(s: Scale, rng: Rng, form: str) -> Shape:
     return Shape("motor_lag", "time_constant", 1.5, fixed=fixed, lowest=s.grid)
 
 
-def _winding(s: Scale, _rng: Rng, _form: str) -> Shape:
+def _winding(s: Scale, _rng: Rng, form: str) -> Shape:
     """Amount: the share of the largest command that is lost in the winding, to first order."""
+    if form:
+        return Shape("winding_resistance", "resistance", 0.4, s.voltage / s.current, fixed={"form": form})
     return Shape("winding_resistance", "resistance", 1.0, s.voltage / s.current)
+
+
+def _clipped(effect: str, highest: float, limit: float, form: str) -> Shape:
+    """A soft limit also bends what lies far below it: it may lie above the largest value."""
+    if form:
+        return Shape(effect, "limit", highest + 0.3, -limit, base=1.3 * limit, fixed={"form": form})
+    return Shape(effect, "limit", highest, -limit, base=limit)
+
+
+def _recirculation(s: Scale, rng: Rng, form: str) -> Shape:
+    fixed: dict[str, Any] = {"time_constant": _log(rng, 10.0, 50.0), "form": form}
+    if form == "late":
+        fixed["delay"] = _uniform(rng, 0.1, 0.4) * fixed["time_constant"]
+    return Shape("recirculation", "coefficient", 0.4, s.thrust / s.rate**2, fixed=fixed)
 
 
 def _neighbour(s: Scale, rng: Rng, _form: str) -> Shape:
@@ -174,7 +206,7 @@ def _neighbour(s: Scale, rng: Rng, _form: str) -> Shape:
 
 
 SHAPES: dict[str, Callable[[Scale, Rng, str], Shape]] = {
-    "command_saturation": lambda s, _r, _f: Shape("command_saturation", "limit", 0.6, -s.voltage, base=s.voltage),
+    "command_saturation": lambda s, _r, f: _clipped("command_saturation", 0.6, s.voltage, f),
     "supply_sag": _sag,
     "dead_band": lambda s, _r, f: Shape("dead_band", "half_width", 0.4, s.voltage, fixed={"form": f}),
     "winding_resistance": _winding,
@@ -194,13 +226,7 @@ SHAPES: dict[str, Callable[[Scale, Rng, str], Shape]] = {
     "reversal_loss": lambda _s, r, _f: Shape("reversal_loss", "loss", 0.8, fixed={"time_constant": _log(r, 0.5, 4.0)}),
     "linear_term": lambda s, r, _f: Shape("linear_term", "coefficient", 0.4, _sign(r) * s.thrust / s.voltage),
     "speed_of_advance": lambda s, _r, _f: Shape("speed_of_advance", "coefficient", 0.5, s.thrust / (s.rate * s.flow)),
-    "recirculation": lambda s, r, f: Shape(
-        "recirculation",
-        "coefficient",
-        0.4,
-        s.thrust / s.rate**2,
-        fixed={"time_constant": _log(r, 10.0, 50.0), "form": f},
-    ),
+    "recirculation": _recirculation,
     "thruster_interaction": _neighbour,
     "strut_drag": lambda s, _r, _f: Shape("strut_drag", "coefficient", 0.4, -s.thrust / s.flow**2),
     "torque_crosstalk": lambda s, r, f: Shape(
@@ -223,7 +249,7 @@ SHAPES: dict[str, Callable[[Scale, Rng, str], Shape]] = {
     "zero_offset": lambda s, r, _f: Shape(
         "zero_offset", "offset", 0.5, _sign(r) * s.thrust, fixed={"start": s.duration * _uniform(r, 0.25, 0.75)}
     ),
-    "load_cell_saturation": lambda s, _r, _f: Shape("load_cell_saturation", "limit", 0.7, -s.thrust, base=s.thrust),
+    "load_cell_saturation": lambda s, _r, f: _clipped("load_cell_saturation", 0.7, s.thrust, f),
     "gain_step": lambda s, r, _f: Shape(
         "gain_step", "amount", 0.5, _sign(r), fixed={"start": s.duration * _uniform(r, 0.3, 0.7)}
     ),

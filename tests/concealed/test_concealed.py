@@ -75,6 +75,14 @@ def test_each_effect_is_as_strong_as_asked_and_changes_what_it_should(effect):
     assert told["effects"][0]["d_prime"] == pytest.approx(40.0, rel=1e-3)
 
 
+@pytest.mark.parametrize(("effect", "form"), [(e, f) for e, forms in concealed.VARIANTS.items() for f in forms])
+def test_a_variant_is_there_when_asked_for_and_as_strong(effect, form):
+    case = concealed.case(rng(3), [effect], 40.0, forms=[form], noise="white", sampling=40.0, duration=200.0)
+    assert concealed.strength(case, effect) == pytest.approx(40.0, rel=1e-3)
+    assert form in (case.effects[0].parameters.get("form"), case.effects[0].shape.knob)
+    assert form not in concealed.FORMS.get(effect, ())  # never drawn by chance
+
+
 def test_the_strength_of_a_linear_effect_is_the_formula():
     case = concealed.case(rng(5), ["linear_term"], 15.0, noise="white", **SHORT)
     volts = history_volts(case, 0)

@@ -8,6 +8,7 @@ from rig.blind.scoring import HeldOut, Interval, Near, Score
 WORLD = Kinds(
     effects=("dead_band", "heating", "asymmetry", "exponent", "time_skew", "gain_step", "fouling"),
     forms={"dead_band": ("shrink", "jump"), "heating": ("winding", "magnet")},
+    variants={"dead_band": ("smooth",)},
     lies=("swapped", "frozen"),
     noise=("white", "flicker", "heavy_tailed"),
 )

@@ -36,7 +36,19 @@ def test_the_design_has_every_cell_and_breaks_off_evenly():
     assert len(set(orders)) == len(orders)
     assert len({job.token for job in jobs}) == len(jobs)
     cells = {o.split("/")[0] for o in orders}
-    assert cells >= {"faint", "clear", "plain", "removed", "outside", "form", "fault", "pair", "clean", "power_2.3"}
+    assert cells >= {
+        "faint",
+        "clear",
+        "plain",
+        "removed",
+        "outside",
+        "form",
+        "variant",
+        "fault",
+        "pair",
+        "clean",
+        "power_2.3",
+    }
     half_done = [job.id for job in jobs[: len(jobs) // 2]]
     for label in ("faint/dead_band", "plain/heating", "outside/fouling", "fault/frozen"):
         assert 2 <= sum(name.startswith(f"{label}/") for name in half_done) <= 4

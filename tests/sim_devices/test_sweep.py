@@ -41,6 +41,14 @@ OTHER_FORMS = [
     ("torque_crosstalk", {"coefficient": 0.01, "form": "torque"}),
     ("load_cell_creep", {"share": 0.02, "time_constant": 3.0, "share_2": 0.02, "time_constant_2": 20.0}),
     ("zero_drift", {"amplitude": 1.0, "time_constant": 5.0}),
+    ("zero_drift", {"root": 0.5}),
+    ("dead_band", {"half_width": 0.9, "form": "smooth"}),
+    ("command_saturation", {"limit": 12.0, "form": "soft"}),
+    ("winding_resistance", {"resistance": 0.1, "form": "linearised"}),
+    ("motor_lag", {"time_constant": 0.2, "form": "two_lags"}),
+    ("cavitation", {"onset": 15.0, "slope": 0.05, "form": "exponential"}),
+    ("recirculation", {"coefficient": 0.02, "time_constant": 5.0, "form": "late", "delay": 1.5}),
+    ("load_cell_saturation", {"limit": 100.0, "form": "soft"}),
 ]
 SLOWER = {
     "stand_resonance": {"frequency": 2.0, "damping": 0.05},

@@ -73,7 +73,8 @@ class LinearTerm:
 class Cavitation:
     """Thrust breaks down above a rate, never below zero; e = max(|n| - onset, 0).
 
-    form "linear": T (1 - slope e). form "square": T (1 - (slope e)^2), which sets in gently.
+    form "linear": T (1 - slope e). form "square": T (1 - (slope e)^2), which sets in gently. form "exponential":
+    T e^(-slope e).
     """
 
     stage: ClassVar[Stage] = "hydro"
@@ -84,14 +85,18 @@ class Cavitation:
     form: str = "linear"
 
     def __post_init__(self) -> None:
-        require_choice("form", self.form, ("linear", "square"))
+        require_choice("form", self.form, ("linear", "square", "exponential"))
 
     def apply(self, value: float, s: State, _dt: float) -> float:
         lost = self.slope * max(abs(s.n) - self.onset, 0.0)
+        if self.form == "exponential":
+            return value * exp(-lost)
         return value * max(1.0 - (lost if self.form == "linear" else lost * lost), 0.0)
 
     def over(self, value: Floats, h: History) -> Floats:
         lost = self.slope * np.maximum(np.abs(h.n) - self.onset, 0.0)
+        if self.form == "exponential":
+            return np.asarray(value * np.exp(-lost))
         return np.asarray(value * np.maximum(1.0 - (lost if self.form == "linear" else lost * lost), 0.0))
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import exp, pi, sin
+from math import exp, pi, sin, sqrt
 from typing import ClassVar
 
 import numpy as np
 
-from sim_devices.world.effects.stage import Floats, Stage, require_positive
+from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
 from sim_devices.world.filters import low_pass
 from sim_devices.world.history import History
 from sim_devices.world.state import State
+
+KNEE = 8.0
+"""Of a limit that sets in softly: the larger, the sharper its bend."""
 
 
 @dataclass(slots=True)
@@ -102,7 +105,10 @@ class PeriodicDisturbance:
 
 @dataclass(slots=True)
 class ZeroDrift:
-    """Cell or amplifier warms: + amplitude (1 - e^(-t/time_constant)) + rate t, t counted from `start` on."""
+    """Cell or amplifier warms: + amplitude (1 - e^(-t/time_constant)) + rate t + root sqrt(t), t from `start` on.
+
+    The root is heat that diffuses into a thick body.
+    """
 
     stage: ClassVar[Stage] = "cell"
     amplitude: float = 0.0
@@ -111,6 +117,8 @@ class ZeroDrift:
     """s."""
     rate: float = 0.0
     """N/s."""
+    root: float = 0.0
+    """N/s^0.5."""
     start: float = 0.0
     """s of world time."""
 
@@ -119,11 +127,12 @@ class ZeroDrift:
 
     def apply(self, value: float, s: State, _dt: float) -> float:
         t = max(s.t - self.start, 0.0)
-        return value + self.amplitude * (1.0 - exp(-t / self.time_constant)) + self.rate * t
+        return value + self.amplitude * (1.0 - exp(-t / self.time_constant)) + self.rate * t + self.root * sqrt(t)
 
     def over(self, value: Floats, h: History) -> Floats:
         t = np.maximum(h.t - self.start, 0.0)
-        return np.asarray(value + self.amplitude * (1.0 - np.exp(-t / self.time_constant)) + self.rate * t)
+        warmed = self.amplitude * (1.0 - np.exp(-t / self.time_constant))
+        return np.asarray(value + warmed + self.rate * t + self.root * np.sqrt(t))
 
 
 @dataclass(slots=True)
@@ -145,17 +154,26 @@ class ZeroOffset:
 
 @dataclass(slots=True)
 class LoadCellSaturation:
-    """Cell or amplifier clips, noise and all: clip(reading, -limit, limit)."""
+    """Cell or amplifier clips, noise and all: clip(reading, -limit, limit).
+
+    form "soft": reading / (1 + |reading/limit|^KNEE)^(1/KNEE), which bends before it is flat.
+    """
 
     stage: ClassVar[Stage] = "output"
     limit: float
     """N."""
+    form: str = "hard"
 
     def __post_init__(self) -> None:
         require_positive(limit=self.limit)
+        require_choice("form", self.form, ("hard", "soft"))
 
     def apply(self, value: float, _s: State, _dt: float) -> float:
+        if self.form == "soft":
+            return float(value / (1.0 + abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
         return min(max(value, -self.limit), self.limit)
 
     def over(self, value: Floats, _h: History) -> Floats:
+        if self.form == "soft":
+            return np.asarray(value / (1.0 + np.abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
         return np.clip(value, -self.limit, self.limit)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import copysign, sqrt
+from math import copysign, sqrt, tanh
 from typing import ClassVar
 
 import numpy as np
@@ -15,23 +15,34 @@ from sim_devices.world.state import State
 
 OUTPUT_CAPACITOR = 0.02
 """s: the supply's output capacitor, so that current and voltage do not chase each other step by step."""
+KNEE = 8.0
+"""Of a limit that sets in softly: the larger, the sharper its bend."""
 
 
 @dataclass(slots=True)
 class CommandSaturation:
-    """The drive clips: V_eff = clip(V, -limit, limit)."""
+    """The drive clips: V_eff = clip(V, -limit, limit).
+
+    form "soft": V / (1 + |V/limit|^KNEE)^(1/KNEE), which bends before it is flat.
+    """
 
     stage: ClassVar[Stage] = "command"
     limit: float
     """V."""
+    form: str = "hard"
 
     def __post_init__(self) -> None:
         require_positive(limit=self.limit)
+        require_choice("form", self.form, ("hard", "soft"))
 
     def apply(self, value: float, _s: State, _dt: float) -> float:
+        if self.form == "soft":
+            return float(value / (1.0 + abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
         return min(max(value, -self.limit), self.limit)
 
     def over(self, value: Floats, _h: History) -> Floats:
+        if self.form == "soft":
+            return np.asarray(value / (1.0 + np.abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
         return np.clip(value, -self.limit, self.limit)
 
 
@@ -73,7 +84,8 @@ class SupplySag:
 class DeadBand:
     """Static friction or the neutral zone of a drive.
 
-    form "shrink": V_eff = sgn(V) max(|V| - half_width, 0); form "jump": V_eff = V where |V| >= half_width, else 0.
+    form "shrink": V_eff = sgn(V) max(|V| - half_width, 0); form "jump": V_eff = V where |V| >= half_width, else 0;
+    form "smooth": V - half_width tanh(V/half_width), friction that gives way little by little.
     """
 
     stage: ClassVar[Stage] = "command"
@@ -83,15 +95,19 @@ class DeadBand:
 
     def __post_init__(self) -> None:
         require_positive(half_width=self.half_width)
-        require_choice("form", self.form, ("shrink", "jump"))
+        require_choice("form", self.form, ("shrink", "jump", "smooth"))
 
     def apply(self, value: float, _s: State, _dt: float) -> float:
+        if self.form == "smooth":
+            return value - self.half_width * tanh(value / self.half_width)
         size = abs(value)
         if size < self.half_width:
             return 0.0
         return value if self.form == "jump" else copysign(size - self.half_width, value)
 
     def over(self, value: Floats, _h: History) -> Floats:
+        if self.form == "smooth":
+            return np.asarray(value - self.half_width * np.tanh(value / self.half_width))
         size = np.abs(value)
         if self.form == "jump":
             return np.where(size < self.half_width, 0.0, value)
@@ -100,21 +116,30 @@ class DeadBand:
 
 @dataclass(slots=True)
 class WindingResistance:
-    """Voltage lost in the winding: |V| = |n|/k + R I(n) with I = alpha n^2 / b, so V_eff = n/k solves a quadratic."""
+    """Voltage lost in the winding: |V| = |n|/k + R I(n) with I = alpha n^2 / b, so V_eff = n/k solves a quadratic.
+
+    form "linearised": V (1 - loss |V|), the same to first order, never below zero.
+    """
 
     stage: ClassVar[Stage] = "command"
     resistance: float
     """ohm."""
+    form: str = "balance"
 
     def __post_init__(self) -> None:
         require_positive(resistance=self.resistance)
+        require_choice("form", self.form, ("balance", "linearised"))
 
     def apply(self, value: float, s: State, _dt: float) -> float:
         loss = self._loss(s)
+        if self.form == "linearised":
+            return value * max(1.0 - loss * abs(value), 0.0)
         return copysign((sqrt(1.0 + 4.0 * loss * abs(value)) - 1.0) / (2.0 * loss), value)
 
     def over(self, value: Floats, h: History) -> Floats:
         loss = self._loss(h)
+        if self.form == "linearised":
+            return np.asarray(value * np.maximum(1.0 - loss * np.abs(value), 0.0))
         return np.asarray(np.sign(value) * (np.sqrt(1.0 + 4.0 * loss * np.abs(value)) - 1.0) / (2.0 * loss))
 
     def _loss(self, s: State | History) -> float:

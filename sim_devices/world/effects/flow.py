@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, field
 from math import copysign, sqrt
 from typing import ClassVar
@@ -9,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
-from sim_devices.world.filters import low_pass
+from sim_devices.world.filters import delayed, low_pass
 from sim_devices.world.history import History
 from sim_devices.world.state import State
 
@@ -60,6 +61,7 @@ class Recirculation:
     """The jet comes round the tunnel: T - coefficient |n| u, u' = (j - u)/time_constant.
 
     form "rate": the jet j is n. form "thrust": j = sgn(T) sqrt(|T| / C_t), momentum theory's jet of the thrust itself.
+    form "late": j is n of `delay` ago, the time that the water takes round the tunnel.
     """
 
     stage: ClassVar[Stage] = "hydro"
@@ -68,20 +70,31 @@ class Recirculation:
     time_constant: float
     """s."""
     form: str = "rate"
+    delay: float = 10.0
+    """s; only for "late"."""
+    way: deque[float] = field(init=False, default_factory=deque)
+    """rev/s, what is under way."""
     jet: float = field(init=False, default=0.0)
     """rev/s: u."""
 
     def __post_init__(self) -> None:
         require_positive(time_constant=self.time_constant)
-        require_choice("form", self.form, ("rate", "thrust"))
+        require_choice("form", self.form, ("rate", "thrust", "late"))
 
     def apply(self, value: float, s: State, dt: float) -> float:
-        made = s.n if self.form == "rate" else copysign(sqrt(abs(value) / s.thrust_constant), value)
+        if self.form == "late":
+            self.way.append(s.n)
+            made = self.way.popleft() if len(self.way) > round(self.delay / dt) else self.way[0]
+        else:
+            made = s.n if self.form == "rate" else copysign(sqrt(abs(value) / s.thrust_constant), value)
         self.jet += (made - self.jet) * min(dt / self.time_constant, 1.0)
         return value - self.coefficient * abs(s.n) * self.jet
 
     def over(self, value: Floats, h: History) -> Floats:
-        made = h.n if self.form == "rate" else np.sign(value) * np.sqrt(np.abs(value) / h.thrust_constant)
+        if self.form == "thrust":
+            made = np.sign(value) * np.sqrt(np.abs(value) / h.thrust_constant)
+        else:
+            made = h.n if self.form == "rate" else delayed(h.n, self.delay, h.dt)
         return np.asarray(value - self.coefficient * np.abs(h.n) * low_pass(made, self.time_constant, h.dt))
 
 

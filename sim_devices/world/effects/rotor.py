@@ -20,7 +20,8 @@ class MotorLag:
 
     form "first_order": n' = (k V - n)/time_constant. form "quadratic": n' = beta V|V| - alpha n|n| with
     beta = alpha k^2 (thesis equation 4.14), alpha = 1 / (2 n_ref time_constant), so that `time_constant` is the one of
-    small changes at the rate n_ref = k reference_voltage.
+    small changes at the rate n_ref = k reference_voltage. form "two_lags": the drive's current and the rotor one after
+    the other, time_constant / 2 each.
     """
 
     stage: ClassVar[Stage] = "rotor"
@@ -31,15 +32,19 @@ class MotorLag:
     """V; only for "quadratic"."""
     n: float = field(init=False, default=0.0)
     """rev/s."""
+    driven: float = field(init=False, default=0.0)
+    """rev/s, after the first of two lags."""
 
     def __post_init__(self) -> None:
         require_positive(time_constant=self.time_constant, reference_voltage=self.reference_voltage)
-        require_choice("form", self.form, ("first_order", "quadratic"))
+        require_choice("form", self.form, ("first_order", "quadratic", "two_lags"))
 
     def apply(self, value: float, s: State, dt: float) -> float:
         before = self.n
         if self.form == "first_order":
             self.n = value + (before - value) * exp(-dt / self.time_constant)
+        elif self.form == "two_lags":
+            self._two_lags(value, dt)
         else:
             self.n = _quadratic_step(before, value, self._alpha(s.rate_per_volt), dt)
         s.acceleration = (self.n - before) / dt
@@ -48,10 +53,19 @@ class MotorLag:
     def over(self, value: Floats, h: History) -> Floats:
         if self.form == "first_order":
             n = low_pass(value, self.time_constant, h.dt)
+        elif self.form == "two_lags":
+            n = low_pass(low_pass(value, self.time_constant / 2.0, h.dt), self.time_constant / 2.0, h.dt)
         else:
             n = self._quadratic(value, self._alpha(h.rate_per_volt), h.dt)
         h.acceleration = np.diff(n, prepend=0.0) / h.dt
         return n
+
+    def _two_lags(self, target: float, dt: float) -> None:
+        """Exact for a held target: d = n - target decays as (d + (driven - target) t/T) e^(-t/T)."""
+        t = dt / (self.time_constant / 2.0)
+        ahead = self.driven - target
+        self.n = target + (self.n - target + ahead * t) * exp(-t)
+        self.driven = target + ahead * exp(-t)
 
     def _alpha(self, rate_per_volt: float) -> float:
         """1/rev."""
