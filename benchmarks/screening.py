@@ -1,0 +1,194 @@
+"""Which of 200 and more candidates would help, on 10^6 samples: our screening against refitting each candidate.
+
+    python benchmarks/screening.py [SECONDS]        of one recording at 1 kHz, default 1000
+
+Candidates are all trials of all terms of the catalogue (every channel recorded). The noise is estimated once and is the
+same for all. Three ways to the same sigmas of each candidate:
+
+- ours: samples are summed into some thousand intervals (one bincount), candidates are predicted there by linear
+  filters, whitened together, C V|V| and tare are projected out, one product with the residual (Frisch and Waugh);
+- projected: every candidate at every sample, whitened, projected and multiplied, one at a time;
+- refitted: numpy.linalg.lstsq of C V|V|, tare and the candidate at every sample, whitened, one at a time.
+
+The columns of the last two are ours, laid on the straight lines between intervals; making them is not in their time.
+Each is a process of its own, with one BLAS thread: CPU time, and peak memory above that with the recording loaded.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from resource import RUSAGE_SELF, getrusage
+from time import process_time
+
+import h5py
+import numpy as np
+
+from identification.mismatch.fitting import extended
+from identification.mismatch.model import Data, Model, Theta, predict
+from identification.mismatch.noise import Rows, Whitener
+from identification.mismatch.preparing import Refusal, history_of
+from identification.mismatch.screening import directions
+from identification.mismatch.search import State, available, refresh, start
+from identification.physics.filters import delayed, within_intervals
+from identification.physics.history import History
+from identification.recording import Recording
+from rig.hdf5 import load
+from sim_devices import concealed
+
+RATE = 1000.0
+CHANNELS = ("rotation_rate", "current", "bus_voltage", "motor_temperature", "flow_speed")
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+WAYS = ("ours", "projected", "refitted")
+SLIGHT = 1e-4
+"""s: for a slope over the shift of the clocks."""
+
+
+def write_case(path: Path, seconds: float) -> None:
+    rng = np.random.default_rng(5)
+    case = concealed.case(
+        rng, ["heating"], 40.0, noise="mixed", plan="interleaved", sampling=RATE, duration=seconds, channels=CHANNELS
+    )
+    (rows,) = concealed.rows(case)
+    with h5py.File(path, "w") as file:
+        file.attrs.update(format="thruster-rig-recording", format_version=1, recording_id=rows.recording_id)
+        file.attrs.update(thruster=rows.thruster, complete=True, outcome="completed")
+        for c in rows.columns:
+            group = file.require_group(f"streams/{c.stream}")
+            group["time"], group[c.name] = c.time, c.value
+            group[c.name].attrs.update(quantity=c.quantity, unit=c.unit)
+
+
+def prepared(recording: Recording) -> tuple[History, Data, State]:
+    """C V|V| and tare with the noise that they leave; the thrust is the only response."""
+    history = history_of(recording)
+    assert not isinstance(history, Refusal)
+    data, theta = start([history])
+    data = Data(data.histories, data.scale)
+    return history, data, refresh(Model(), theta, data, None, None)
+
+
+def ours(recording: Recording) -> tuple[list[str], list[float], float, int]:
+    """Names, sigmas, CPU s, bytes at the peak."""
+    _, data, state = prepared(recording)
+    at_rest = peak()
+    began = process_time()
+    history = history_of(recording)
+    assert not isinstance(history, Refusal)
+    data = Data((history,), data.scale)
+    found = directions(state.fit, data, state.weights, available(data))
+    sigmas = found.columns.T @ state.fit.residual
+    took = process_time() - began
+    names = [f"{t.id} {t.form} {v}" for t, v in zip(found.terms, found.values, strict=True)]
+    return names, sigmas.tolist(), took, peak() - at_rest
+
+
+def by_samples(recording: Recording, *, refit: bool) -> tuple[list[str], list[float], float, int]:
+    history, data, state = prepared(recording)
+    whitener, base, left = _at_samples(history, state)
+    Q, _ = np.linalg.qr(base)
+    names, sigmas, took, at_rest = [], [], 0.0, peak()
+    for name, change in _candidates(history, data, state.fit.theta):
+        began = process_time()
+        column = whitener.whiten(change)
+        rest = column - Q @ (Q.T @ column)
+        sigma = float(rest @ left / np.linalg.norm(rest))
+        if refit:
+            began = process_time()
+            column = whitener.whiten(change)
+            x = np.linalg.lstsq(np.column_stack([base, column]), left, rcond=None)[0]
+            took += process_time() - began
+            sigma = float(x[-1] * np.linalg.norm(rest))  # the coefficient over its standard error
+        else:
+            took += process_time() - began
+        names.append(name)
+        sigmas.append(sigma)
+    return names, sigmas, took, peak() - at_rest
+
+
+def _at_samples(history: History, state: State) -> tuple[Whitener, np.ndarray, np.ndarray]:
+    """Whitener, whitened columns of the baseline (C, tare and, where it is free, the shift of the clocks), residual."""
+    theta = state.fit.theta
+    F = theta.C * history.driver * np.abs(history.driver)
+    late = _laid(delayed(F, history.edges, theta.shift), history)
+    n = history.sample_time.size
+    rows = Rows(history.sample_time, np.ones(n), np.ones(n), np.full(n, history.spacing))
+    whitener = Whitener(state.noise, rows, np.abs(late))
+    base = [late, np.ones(n)]
+    if state.fit.free[-3]:
+        base.append((_laid(delayed(F, history.edges, theta.shift + SLIGHT), history) - late) / SLIGHT)
+    return (
+        whitener,
+        whitener.whiten(np.column_stack(base)),
+        whitener.whiten(history.sample_thrust - late - theta.tares[0]),
+    )
+
+
+def _laid(value: np.ndarray, history: History) -> np.ndarray:
+    return within_intervals(value, history.edges, history.sample_time)
+
+
+def _candidates(history: History, data: Data, theta: Theta) -> Iterator[tuple[str, np.ndarray]]:
+    """Each trial's change of the thrust, at every sample."""
+    model = Model()
+    base = _laid(predict(model, theta, history, data.scale)[0], history)
+    for term in available(data):
+        bigger = model.plus(term)
+        for trial in term.trials(data.scale):
+            new, _ = predict(bigger, extended(theta, model, term, trial, bigger), history, data.scale)
+            yield f"{term.id} {term.form} {trial}", _laid(new, history) - base
+
+
+def peak() -> int:
+    return getrusage(RUSAGE_SELF).ru_maxrss * 1024
+
+
+def one(way: str, path: Path) -> None:
+    recording = load(path)
+    names, sigmas, took, memory = ours(recording) if way == "ours" else by_samples(recording, refit=way == "refitted")
+    print(json.dumps({"names": names, "sigmas": sigmas, "seconds": took, "memory": memory}))
+
+
+def as_process(way: str, path: Path) -> dict[str, object]:
+    done = subprocess.run(
+        [sys.executable, __file__, way, str(path)],
+        env={**os.environ, **ONE_THREAD},
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    return json.loads(done.stdout)
+
+
+def main(seconds: float) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "long.h5"
+        write_case(path, seconds)
+        print("| way | candidates | CPU s | of ours | peak MB | sigmas differ: median | at most | same 20 clearest |")
+        print("|---|---|---|---|---|---|---|---|")
+        found = {way: as_process(way, path) for way in WAYS}
+        own = found["ours"]
+        known = dict(zip(own["names"], own["sigmas"], strict=True))
+        for way, other in found.items():
+            theirs = dict(zip(other["names"], other["sigmas"], strict=True))
+            both = [name for name in known if name in theirs]
+            off = [abs(known[n] - theirs[n]) for n in both]
+            clearest = [set(sorted(both, key=lambda n: -abs(s[n]))[:20]) for s in (known, theirs)]
+            print(
+                f"| {way} | {len(theirs)} | {other['seconds']:.2f} | {other['seconds'] / own['seconds']:.1f} "
+                f"| {other['memory'] / 1e6:.0f} | {np.median(off):.3f} | {max(off):.2f} "
+                f"| {len(clearest[0] & clearest[1])} of 20 |",
+                flush=True,
+            )
+
+
+if __name__ == "__main__":
+    if len(sys.argv) == 3:
+        one(sys.argv[1], Path(sys.argv[2]))
+    else:
+        main(float(sys.argv[1]) if len(sys.argv) > 1 else 1000.0)
