@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import copysign
 
 AXES = ("surge", "sway", "heave", "yaw")
 
@@ -18,9 +19,15 @@ class Body:
     """N/(m/s), N.m/(rad/s)."""
     quadratic: float
     """N/(m/s)^2, N.m/(rad/s)^2."""
+    astern: float = 1.0
+    """Factor of the quadratic drag while it moves backwards through the water."""
 
     def __post_init__(self) -> None:
-        if not self.inertia > 0 or min(self.linear, self.quadratic) < 0 or self.linear + self.quadratic == 0:
+        if (
+            not (self.inertia > 0 and self.astern > 0)
+            or min(self.linear, self.quadratic) < 0
+            or self.linear + self.quadratic == 0
+        ):
             raise ValueError(f"Body: inertia must be above 0, drag not negative and not absent, got {self}")
 
 
@@ -53,6 +60,12 @@ class Hull:
     """m/s, uniform current towards north and east."""
     buoyancy: float = 0.0
     """N downwards beside the ballast of a trial: negative when the vehicle floats."""
+    dead_band: float = 0.0
+    """V below which no thruster turns; beyond it only the rest of the voltage acts."""
+    motor_lag: float = 0.0
+    """s, time constant with which each thruster's rate follows its voltage."""
+    tether: float = 0.0
+    """N/(m/s)^2 of drag for each m that the line is paid out: from the start of a trial, in heave from the surface."""
     wander: float = 0.0
     """N (N.m), standard deviation of a slow force from the cable, anew in each hold."""
     noise: Mapping[str, float] = field(
@@ -61,13 +74,17 @@ class Hull:
         default_factory=lambda: {"position": 0.07, "depth": 0.005, "heading": 0.005}
     )
 
+    def acting(self, V: float) -> float:
+        """What the dead band leaves of a voltage."""
+        return copysign(max(abs(V) - self.dead_band, 0.0), V)
+
     def thrust(self, name: str, volts: Mapping[str, float]) -> float:
         """N of one thruster as installed, all of them at `volts`."""
-        own, V = self.thrusters[name], volts.get(name, 0.0)
+        own, V = self.thrusters[name], self.acting(volts.get(name, 0.0))
         force = own.C * V * abs(V)
         if own.hull_side * V > 0:
             force *= self.eta_hull
-        if V != 0 and own.partner and volts.get(own.partner, 0.0) != 0:
+        if V != 0 and own.partner and self.acting(volts.get(own.partner, 0.0)) != 0:
             force *= self.eta_pair
         return force
 

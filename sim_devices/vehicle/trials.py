@@ -135,13 +135,29 @@ def _commands(trial: Trial) -> tuple[Floats, list[dict[str, float]], list[Record
 
 def _forces(hull: Hull, trial: Trial, times: Floats, rows: list[dict[str, float]], rng: np.random.Generator) -> Floats:
     """N (N.m) on the trial's axis in every simulation step."""
-    own = np.array([hull.force(trial.axis, row) for row in rows])
-    if hull.wander and len(trial.parts) == len(rows):
-        own = own + hull.wander * rng.standard_normal(own.size)
     steps = round(trial.duration / STEP)
     index = np.searchsorted(times, (np.arange(steps) + 0.5) * STEP, side="right") - 1
     weight = hull.buoyancy + trial.ballast if trial.axis == "heave" else 0.0
+    if hull.motor_lag:
+        turned = _lagged(hull, rows, index)
+        return np.array([hull.force(trial.axis, row) for row in turned]) + weight
+    own = np.array([hull.force(trial.axis, row) for row in rows])
+    if hull.wander and len(trial.parts) == len(rows):
+        own = own + hull.wander * rng.standard_normal(own.size)
     out: Floats = own[index] + weight
+    return out
+
+
+def _lagged(hull: Hull, rows: list[dict[str, float]], index: NDArray[np.intp]) -> list[dict[str, float]]:
+    """Volts of the steady state that each thruster's rate stands for, in the middle of every step; all begin at rest."""
+    names = list(hull.thrusters)
+    asked = np.array([[row.get(name, 0.0) for name in names] for row in rows])[index]
+    keep = float(np.exp(-STEP / hull.motor_lag))
+    halfway = float(np.exp(-0.5 * STEP / hull.motor_lag))
+    x, out = np.zeros(len(names)), []
+    for V in asked:
+        out.append(dict(zip(names, (V + (x - V) * halfway).tolist(), strict=True)))
+        x = V + (x - V) * keep
     return out
 
 
@@ -160,7 +176,7 @@ def _current(hull: Hull, trial: Trial) -> float:
 def _move(hull: Hull, trials: Sequence[Trial], forces: Sequence[Floats]) -> list[tuple[Floats, Floats]]:
     """Velocity over ground and position of every trial from rest over ground, all trials in one sweep (Heun's rule)."""
     bodies = [hull.axes[trial.axis] for trial in trials]
-    m, a, b = (np.array([getattr(x, f) for x in bodies]) for f in ("inertia", "linear", "quadratic"))
+    m, a, b, back = (np.array([getattr(x, f) for x in bodies]) for f in ("inertia", "linear", "quadratic", "astern"))
     stream = np.array([_current(hull, trial) for trial in trials])
     steps = max(f.size for f in forces)
     push = np.zeros((steps, len(trials)))
@@ -170,12 +186,18 @@ def _move(hull: Hull, trials: Sequence[Trial], forces: Sequence[Floats]) -> list
     speeds, places = [v + stream], [x]
     halves = 2
     h = STEP / halves
+
+    def slope(p: Floats, v: Floats, x: Floats) -> Floats:
+        square = b * np.where(v < 0, back, 1.0) + hull.tether * np.abs(x)
+        out: Floats = (p - (a + square * np.abs(v)) * v) / m
+        return out
+
     for p in push:
         for _ in range(halves):
-            first = (p - (a + b * np.abs(v)) * v) / m
+            first = slope(p, v, x)
             guess = v + h * first
-            later = v + 0.5 * h * (first + (p - (a + b * np.abs(guess)) * guess) / m)
-            x = x + h * (0.5 * (v + later) + stream) - h * h / 12 * ((p - (a + b * np.abs(later)) * later) / m - first)
+            later = v + 0.5 * h * (first + slope(p, guess, x + h * (v + stream)))
+            x = x + h * (0.5 * (v + later) + stream) - h * h / 12 * (slope(p, later, x) - first)
             v = later
         speeds.append(v + stream)
         places.append(x)
