@@ -10,7 +10,8 @@ import numpy as np
 from identification.mismatch.coordinates import coordinates
 from identification.mismatch.fitting import Fit, at_bound, bounds_of, columns_of, extended, fit, raw
 from identification.mismatch.model import Data, Model, Theta, Weights, scale_of, weights
-from identification.mismatch.noise import Noise, Rows, fit_noise
+from identification.mismatch.noise import Noise, Rows
+from identification.mismatch.noise_likelihood import fit_noise
 from identification.mismatch.screening import (
     MOST_PLAIN,
     PLAIN,

@@ -6,7 +6,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.noise import OUTLIER, Noise, Rows, Whitener, _cost, fit_noise, with_outliers
+from identification.mismatch.noise import OUTLIER, Noise, Rows, Whitener, with_outliers
+from identification.mismatch.noise_likelihood import _cost, fit_noise
 
 MIXED = Noise(0.04, 0.0009, (0.15, 4.0), (0.05, 0.3), ((3.0, 4.0),), (0.2,))
 SLOW = Noise(0.04, 0.0009, (0.15, 4.0), (0.05, 0.3))

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.noise import Noise, Rows, Whitener, fit_noise
+from identification.mismatch.noise import Noise, Rows, Whitener
+from identification.mismatch.noise_likelihood import fit_noise
 from identification.mismatch.vehicle.model import Known, Layout, known, predict
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared
