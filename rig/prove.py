@@ -91,6 +91,14 @@ def summary(found: Collected) -> str:
     return "\n".join([*rows, f"{tail}; {len(found.undrawn)} cases could not be drawn"])
 
 
+def still_wrong(found: Collected) -> str:
+    """What is not good, a line each: of cases that all had come out wrong, so no rates."""
+    from rig.blind.figures import said
+
+    rows = [json.dumps({k: v for k, v in said(s).items() if v}) for s in found.scores if not s.good]
+    return "\n".join([*rows, f"{len(found.scores) - len(rows)} of {len(found.scores)} came out right this time"])
+
+
 def one_case(name: str, limit: float, *, verbose: bool) -> str:
     """Make and answer one order anew, and tell truth and answer. Raises ProofError."""
     from rig.blind.collecting import collected
@@ -148,6 +156,7 @@ def _told(store: Store, job: Job, *, verbose: bool) -> str:
     help="Longest diagnosis; a longer one has failed.",
 )
 @click.option("--renew", is_flag=True, help="Answer again what another version of the diagnosis answered.")
+@click.option("--failures", is_flag=True, help="Only what came out wrong by another version of the diagnosis: again.")
 @click.option("--keep", is_flag=True, help="Keep the recordings (some 5 MB each).")
 @click.option("--no-run", is_flag=True, help="Only tell what is in the store.")
 @click.option("--case", metavar="CELL/EFFECT/NUMBER", help="Make and answer this one case, print truth and answer.")
@@ -163,6 +172,7 @@ def prove_command(
     store: Path,
     limit: float,
     renew: bool,
+    failures: bool,
     keep: bool,
     no_run: bool,
     case: str | None,
@@ -174,7 +184,7 @@ def prove_command(
 
     Exit status 0 whatever the figures are, 2 when the proof cannot be run.
     """
-    from rig.blind.collecting import collected
+    from rig.blind.collecting import collected, not_good
     from rig.blind.figures import tables
     from rig.blind.store import Store
 
@@ -183,10 +193,12 @@ def prove_command(
             click.echo(one_case(case, limit, verbose=verbose))
             return
         kept, jobs = Store(store), designed(seeds, only)
+        if failures:
+            jobs, renew = not_good(collected(kept, jobs), jobs), True
         if not no_run:
             run(kept, jobs, lanes or os.cpu_count() or 1, limit, renew=renew, keep=keep)
         found = collected(kept, jobs)
-        click.echo(summary(found))
+        click.echo(still_wrong(found) if failures else summary(found))
         figures = tables(found.scores, seeds, found.versions, found.undrawn)
         if json_path is not None:
             json_path.parent.mkdir(parents=True, exist_ok=True)

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
-from rig.blind.design import Job
+from rig.blind.design import LADDER, Job
 from rig.blind.scoring import Score, scored
 from rig.blind.store import Store
 
@@ -19,6 +19,13 @@ class Collected:
     undrawn: tuple[str, ...]
     versions: tuple[str, ...]
     """Of the diagnosis, the most frequent first."""
+
+
+def not_good(found: Collected, jobs: Sequence[Job]) -> list[Job]:
+    """The jobs with their orders that did not come out as they should, those below faint left aside."""
+    bad = {s.order.id for s in found.scores if not s.good and s.order.cell not in LADDER}
+    kept = (replace(job, orders=tuple(o for o in job.orders if o.id in bad)) for job in jobs)
+    return [job for job in kept if job.orders]
 
 
 def collected(store: Store, jobs: Sequence[Job]) -> Collected:

@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from report_reading import open_fonts
 
 from rig.blind.answering import answered
-from rig.blind.collecting import collected
+from rig.blind.collecting import collected, not_good
 from rig.blind.design import Job, design, matches
 from rig.blind.figures import confusion, goals, half, half_named, tables, twins, worst
 from rig.blind.lanes import Child, Ended, Lane, Overdue, carry_out, concealable
@@ -233,6 +233,8 @@ def test_a_tiny_proof_end_to_end(tmp_path):
     assert by_id["removed/asymmetry/0"].near is not None
     assert not list(store.opened.iterdir())  # recordings are dropped once they are answered
     assert not any(store.pending(job) for job in jobs)
+    again = {o.id for job in not_good(found, jobs) for o in job.orders}
+    assert again == {name for name, s in by_id.items() if not s.good}
     assert all(store.pending(job, "other code") for job in jobs)
     with pytest.raises(ProofError, match="of another design"):
         store.truth(replace(jobs[0], spec={}))
