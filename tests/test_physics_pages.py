@@ -11,12 +11,13 @@ import pytest
 
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.term import Scale, Term
+from identification.physics.vehicle.catalogue import CATALOGUE as VEHICLE
 
 ROOT = Path(__file__).parents[1]
 PAGES = ROOT / "docs" / "physics"
 WITHOUT_CLASS = ("periodic_disturbance", "channel_fault")
 """Found by identification.mismatch.lines and faults."""
-IDS = (*dict.fromkeys(t.id for t in CATALOGUE), *WITHOUT_CLASS)
+IDS = (*dict.fromkeys(t.id for t in (*CATALOGUE, *VEHICLE)), *WITHOUT_CLASS)
 SECTIONS = (
     "Formula",
     "Source",

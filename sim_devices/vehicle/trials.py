@@ -149,7 +149,7 @@ def _forces(hull: Hull, trial: Trial, times: Floats, rows: list[dict[str, float]
 
 
 def _lagged(hull: Hull, rows: list[dict[str, float]], index: NDArray[np.intp]) -> list[dict[str, float]]:
-    """Volts of the steady state that each thruster's rate stands for, in the middle of every step; all begin at rest."""
+    """Volts that each thruster's rate stands for, in the middle of every step; all begin at rest."""
     names = list(hull.thrusters)
     asked = np.array([[row.get(name, 0.0) for name in names] for row in rows])[index]
     keep = float(np.exp(-STEP / hull.motor_lag))

@@ -183,7 +183,7 @@ def _scale(
     if force == 0:
         return Refusal(f"no command pushes along {axis}: nothing drives the vehicle there")
     if max(float(np.ptp(V)) for grid in grids for V in grid.volts.values()) == 0 and len(grids) == 1:
-        return Refusal("the command is constant: drag and inertia cannot be told from one force; vary it")
+        return Refusal("the command is constant: what is left out shows in how the motion changes with it; vary it")
     known = thrust_known(installation)
     spacing = min(grid.step for grid in grids)
     return Scale(
