@@ -118,7 +118,8 @@ def tell(
 
         write_twin(found.twin, save_twin)
     if report is not None:
-        import_module("rig.report.diagnosis").write(found, report, read(files))  # matplotlib: only for a page
+        page = "rig.report.diagnosis" if found.response == "thrust" else "rig.report.diagnosis_vehicle"
+        import_module(page).write(found, report, read(files))  # matplotlib: only for a page
     if json_path is not None:
         text = json.dumps(diagnosis_json(found), indent=1, allow_nan=False)
         if str(json_path) == "-":

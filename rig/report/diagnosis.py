@@ -47,7 +47,7 @@ def diagnosis_page(d: Diagnosis, recordings: Sequence[Recording] = ()) -> Page:
     """The page of one diagnosis."""
     runs = runs_of(d, recordings)
     sections = (
-        Section("In short", sentences(_short(d))),
+        Section("In short", sentences(short(d))),
         where_section(d, runs),
         *what_section(d, runs),
         *unexplained_section(d, runs),
@@ -61,17 +61,16 @@ def diagnosis_page(d: Diagnosis, recordings: Sequence[Recording] = ()) -> Page:
     return Page(f"Diagnosis of {d.thruster or 'a thruster'}: {d.verdict}", words(d.statement), sections, contents=True)
 
 
-def _short(d: Diagnosis) -> Iterator[Remark]:
+def short(d: Diagnosis) -> Iterator[Remark]:
+    """Verdict, error on what was not fitted, what next."""
     yield VERDICTS[d.verdict]
     held = d.heldout
     if isfinite(held.before) and isfinite(held.after):
-        change = _change(held.before, held.after)
-        better = "" if held.after >= held.before else f", {change} less"
-        noise = f"; the noise alone is {held.noise:.3g} N" if isfinite(held.noise) else ""
+        better = "" if held.after >= held.before else f", {_change(held.before, held.after)} less"
+        noise = f"; the noise alone is {held.noise:.3g} {d.unit}" if isfinite(held.noise) else ""
         tone = "good" if held.after <= held.before else "bad"
-        text = (
-            f"On data that were not fitted the error goes from {held.before:.3g} to {held.after:.3g} N{better}{noise}."
-        )
+        change = f"from {held.before:.3g} to {held.after:.3g} {d.unit}"
+        text = f"On data that were not fitted the error goes {change}{better}{noise}."
         yield Remark(text) if not d.model_terms else Remark(text, "good" if tone == "good" else "bad")
     if d.next_experiment is not None:
         total = sum(step.duration for step in d.next_experiment.steps)
@@ -140,7 +139,12 @@ def unexplained_section(d: Diagnosis, runs: Sequence[Run]) -> tuple[Section, ...
 
 def after_section(d: Diagnosis) -> Section:
     """How much better it is."""
-    head = ("RMSE per sample", "before / N", "after / N", "noise / N", "smaller by")
+    return Section("Before and after", (*after_table(d), *before_after_pictures(d)))
+
+
+def after_table(d: Diagnosis) -> tuple[Table, Sentences]:
+    """Errors before and after, in the unit of what is explained."""
+    head = ("RMSE per sample", *(f"{name} / {d.unit}" for name in ("before", "after", "noise")), "smaller by")
     held, known = d.heldout, isfinite(d.heldout.noise)
     listed = [
         ("fitted", d.train.before, d.train.after, ""),
@@ -161,7 +165,7 @@ def after_section(d: Diagnosis) -> Section:
         ),
     )
     table = Table("Baseline and model", head, tuple(rows), columns(head, head[0]))
-    return Section("Before and after", (table, Sentences(judged), *before_after_pictures(d)))
+    return table, Sentences(judged)
 
 
 def parameter_section(d: Diagnosis) -> Section:
