@@ -1,0 +1,181 @@
+"""Who names what a model leaves out? PySINDy, SysIdentPy, stepwise regression with HAC errors, and `rig diagnose`.
+
+    python -m venv build/peers-venv; build/peers-venv/bin/pip install -e '.[benchmark]'     SysIdentPy wants numpy < 2.4
+    build/peers-venv/bin/python benchmarks/peers.py N          N recordings of each kind; resumes from build/peers.jsonl
+    build/peers-venv/bin/python benchmarks/peers.py tune N     every setting of every grid on N recordings of each kind
+
+Kinds: clean, one effect at 15 sigma (clear), one effect at 40 sigma (plain); effects in turn, all else drawn at random
+by `sim_devices.concealed`. Every method gets the same recording, as our own candidate columns (`peers.columns`), and
+names the effects whose columns it keeps; it never sees the truth, which is put beside the answers at the end. Ours gets
+the recording itself. The settings of the peers (`peers.methods.TUNED`) are the best of their grids on seeds of their
+own: most recordings right, clean ones counted like the others.
+
+Right alone: the effect and nothing else. Right among: the effect and others; for ours also as a stated rival.
+Wrong: names without the effect. None: no name, though there is an effect. False alarm: any name on a clean recording.
+Error: rms on another recording of the same thruster with another plan, over that of its noise; kept columns and C by
+least squares on the first recording, the tare from the second. Seconds: the method, without making the columns.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from time import process_time
+from typing import Any
+
+os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"))  # before numpy
+
+import numpy as np
+from peers.cases import EFFECTS, STRENGTHS, Puzzle, made
+from peers.columns import Problem, problem
+from peers.methods import GRIDS, TUNED, names
+
+from identification.mismatch.diagnose import diagnose
+from identification.mismatch.preparing import Refusal
+
+OURS = "rig diagnose"
+BARE = "C V|V| alone"
+STORE = Path(__file__).parents[1] / "build" / "peers.jsonl"
+FIRST_TUNING_SEED = 50_000
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    method: str
+    kind: str
+    effect: str
+    seed: int
+    named: tuple[str, ...]
+    rivals: tuple[str, ...]
+    error: float
+    """Of the noise."""
+    seconds: float
+    setting: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def outcome(self) -> str:
+        if not self.effect:
+            return "false alarm" if self.named else "quiet"
+        if self.effect in self.named:
+            return "alone" if len(set(self.named)) == 1 and not self.rivals else "among"
+        if self.effect in self.rivals:
+            return "among"
+        return "wrong" if self.named else "none"
+
+
+def drawn(number: int, first: int) -> Iterator[tuple[str, str, int]]:
+    """(kind, effect, seed), the kinds in turn."""
+    order = np.random.default_rng(first).permutation(EFFECTS)
+    for i in range(number):
+        for j, kind in enumerate(STRENGTHS):
+            yield kind, "" if kind == "clean" else str(order[(i + 13 * (j - 1)) % order.size]), first + 10 * i + j
+
+
+def ours(puzzle: Puzzle) -> tuple[tuple[str, ...], tuple[str, ...], float]:
+    found = diagnose([puzzle.fitted], [puzzle.unseen])
+    assert not isinstance(found, Refusal)
+    named = tuple(f.effect for f in found.findings)
+    rivals = tuple(r.effect for f in found.findings for r in f.rivals if r.effect not in named)
+    return named, rivals, found.heldout.after
+
+
+def answered(kind: str, effect: str, seed: int) -> Iterator[Answer]:
+    puzzle, truth = made(kind, effect, seed)
+    began = process_time()
+    named, rivals, error = ours(puzzle)
+    yield Answer(OURS, kind, effect, seed, named, rivals, error / truth.noise, process_time() - began)
+    p = problem(puzzle)
+    yield Answer(BARE, kind, effect, seed, (), (), p.held_out([]) / truth.noise, 0.0)
+    for method, setting in TUNED.items():
+        yield _answer(method, p, setting, kind, effect, seed, truth.noise)
+
+
+def _answer(
+    method: str, p: Problem, setting: dict[str, Any], kind: str, effect: str, seed: int, noise: float
+) -> Answer:
+    began = process_time()
+    named, kept = names(p, method, setting)
+    took = process_time() - began
+    return Answer(method, kind, effect, seed, tuple(sorted(named)), (), p.held_out(kept) / noise, took, setting)
+
+
+def kept_answers() -> list[Answer]:
+    if not STORE.exists():
+        return []
+    lines = STORE.read_text(encoding="utf-8").splitlines()
+    return [Answer(**json.loads(line)) for line in lines]
+
+
+def run(number: int) -> list[Answer]:
+    STORE.parent.mkdir(exist_ok=True)
+    answers = kept_answers()
+    done = {(a.kind, a.effect, a.seed) for a in answers if a.method == list(TUNED)[-1]}
+    with STORE.open("a", encoding="utf-8") as store:
+        for kind, effect, seed in drawn(number, 1000):
+            if (kind, effect, seed) in done:
+                continue
+            new = list(answered(kind, effect, seed))
+            store.writelines(json.dumps(asdict(a)) + "\n" for a in new)
+            store.flush()
+            answers += new
+            print(f"{kind} {effect} {seed}: " + "; ".join(f"{a.method} {a.outcome}" for a in new), file=sys.stderr)
+    wanted = set(drawn(number, 1000))
+    return [a for a in answers if (a.kind, a.effect, a.seed) in wanted]
+
+
+def table(answers: list[Answer]) -> None:
+    columns = "| right alone | right among names | wrong | none |"
+    print(f"| method | strength {columns} error, median | error, 95 % | false alarms | CPU s, median |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    for method in (OURS, *TUNED, BARE):
+        mine = [a for a in answers if a.method == method]
+        clean = [a for a in mine if not a.effect]
+        alarms = sum(a.outcome == "false alarm" for a in clean)
+        for kind in ("clear", "plain"):
+            some = [a for a in mine if a.kind == kind]
+            if not some:
+                continue
+            counts = [sum(a.outcome == o for a in some) for o in ("alone", "among", "wrong", "none")]
+            shares = " | ".join(f"{100 * c / len(some):.0f} %" for c in counts)
+            errors = [a.error for a in some]
+            seconds = np.median([a.seconds for a in some])
+            print(
+                f"| {method} | {STRENGTHS[kind]:.0f} | {shares} | {np.median(errors):.3f} "
+                f"| {np.quantile(errors, 0.95):.2f} | {alarms} of {len(clean)} | {seconds:.1f} |"
+            )
+
+
+def tune(number: int) -> None:
+    """How many of the recordings each setting has right: alone, or quiet on a clean one."""
+    right: dict[tuple[str, str], list[bool]] = {}
+    for kind, effect, seed in drawn(number, FIRST_TUNING_SEED):
+        puzzle, truth = made(kind, effect, seed)
+        p = problem(puzzle)
+        for method, grid in GRIDS.items():
+            for setting in grid:
+                a = _answer(method, p, setting, kind, effect, seed, truth.noise)
+                right.setdefault((method, json.dumps(setting)), []).append(a.outcome in ("alone", "quiet"))
+        print(f"{kind} {effect} {seed}", file=sys.stderr)
+        if kind == "plain":
+            _tuned_so_far(right)
+
+
+def _tuned_so_far(right: dict[tuple[str, str], list[bool]]) -> None:
+    for (method, setting), found in sorted(right.items(), key=lambda each: (each[0][0], -sum(each[1]))):
+        print(f"| {method} | {setting} | {sum(found)} of {len(found)} |")
+    print(flush=True)
+
+
+def main() -> None:
+    if sys.argv[1:2] == ["tune"]:
+        tune(int(sys.argv[2]) if len(sys.argv) > 2 else 5)
+    else:
+        table(run(int(sys.argv[1]) if len(sys.argv) > 1 else 5))
+
+
+if __name__ == "__main__":
+    main()
