@@ -6,12 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from identification.physics.catalogue import CATALOGUE
+from identification.physics.free_form import Flexible
 from identification.physics.term import Scale, Term
 
 
 @dataclass(frozen=True, slots=True)
 class TwinTerm:
-    """One effect of the catalogue with its values. The same effect may stand there twice: terms add up."""
+    """One effect of the catalogue, or a flexible term, with its values. The same effect may stand there twice."""
 
     effect: str
     form: str
@@ -19,6 +20,8 @@ class TwinTerm:
     """name -> value, in the units of the catalogue."""
     scale: Scale
     """The sizes that its form refers to (an exponent is relative to a voltage)."""
+    flexible: Flexible | None = None
+    """The shape that `parameters` are values of, where it is none of the catalogue."""
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -27,8 +30,13 @@ class TwinTerm:
 
     @property
     def term(self) -> Term:
-        """Of the catalogue. Raises KeyError when there is none of that effect and form."""
-        return TERMS[self.effect, self.form]
+        """Of the catalogue, or flexible. Raises KeyError when there is none of that effect and form."""
+        return TERMS[self.effect, self.form] if self.flexible is None else self.flexible
+
+    @property
+    def known(self) -> bool:
+        """Whether this program can act it."""
+        return self.flexible is not None or (self.effect, self.form) in TERMS
 
 
 TERMS: Mapping[tuple[str, str], Term] = {(term.id, term.form): term for term in CATALOGUE}

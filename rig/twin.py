@@ -8,13 +8,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, fields, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
+from itertools import pairwise
 from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.physics.term import Scale
+from identification.physics.free_form import MULTIPLIERS, Flexible
+from identification.physics.term import Scale, Term
 from identification.twin import TERMS, Source, Twin, TwinNoise, TwinTerm, names_of
 from rig.errors import TwinError
 
@@ -34,7 +36,13 @@ def twin_json(twin: Twin) -> dict[str, object]:
         "driver": twin.driver_quantity,
         "C": twin.C,
         "terms": [
-            {"effect": t.effect, "form": t.form, "parameters": _with_units(t), "scale": asdict(t.scale)}
+            {
+                "effect": t.effect,
+                "form": t.form,
+                **({} if t.flexible is None else {"flexible": asdict(t.flexible)}),
+                "parameters": _with_units(t),
+                "scale": asdict(t.scale),
+            }
             for t in twin.terms
         ],
         "covariance": {"names": list(twin.names), "matrix": [list(row) for row in twin.covariance]},
@@ -177,12 +185,10 @@ def _twin(top: Table) -> Twin:
 
 def _term(table: Table) -> TwinTerm:
     effect, form = table.text("effect"), table.text("form")
-    known = sorted({e for e, _ in TERMS})
-    if effect not in known:
-        raise table.wrong("effect", f"an effect of the catalogue ({', '.join(known)})")
-    if (effect, form) not in TERMS:
-        forms = ", ".join(repr(f) for e, f in TERMS if e == effect)
-        raise table.wrong("form", f"a form of {effect} ({forms})")
+    own = _flexible(table.table("flexible")) if "flexible" in table.content else None
+    term = _of_catalogue(table, effect, form) if own is None else own
+    if (term.id, term.form) != (effect, form):
+        raise table.wrong("effect", f"{term.id!r} of form {term.form!r}, as its shape is")
     sizes = table.table("scale")
     scale = Scale(
         driver_unit=sizes.text("driver_unit"),
@@ -193,7 +199,7 @@ def _term(table: Table) -> TwinTerm:
         },
     )
     inside = table.table("parameters")
-    expected = TERMS[effect, form].parameters(scale)
+    expected = term.parameters(scale)
     odd = sorted(set(inside.content) - {p.name for p in expected})
     if odd:
         raise TwinError(
@@ -208,7 +214,40 @@ def _term(table: Table) -> TwinTerm:
             raise entry.wrong("unit", repr(p.unit))
         if not p.low <= values[p.name] <= p.high:
             raise entry.wrong("value", f"within {p.low:g} and {p.high:g} {p.unit}")
-    return TwinTerm(effect, form, values, scale)
+    return TwinTerm(effect, form, values, scale, own)
+
+
+def _of_catalogue(table: Table, effect: str, form: str) -> Term:
+    known = sorted({e for e, _ in TERMS})
+    if effect not in known:
+        raise table.wrong("effect", f"an effect of the catalogue ({', '.join(known)})")
+    if (effect, form) not in TERMS:
+        forms = ", ".join(repr(f) for e, f in TERMS if e == effect)
+        raise table.wrong("form", f"a form of {effect} ({forms})")
+    return TERMS[effect, form]
+
+
+def _flexible(table: Table) -> Flexible:
+    """The shape of a flexible term."""
+    knots = table.numbers("knots")
+    if not knots or any(b <= a for a, b in pairwise(knots)):
+        raise table.wrong("knots", "a list of ascending numbers")
+    zero, times = table.get("zero"), table.get("times")
+    if not isinstance(zero, list) or any(i not in range(len(knots)) for i in zero):
+        raise table.wrong("zero", "a list of places in knots")
+    if not isinstance(times, list) or not times or any(m not in MULTIPLIERS for m in times):
+        raise table.wrong("times", f"a list of some of {', '.join(MULTIPLIERS)}")
+    if table.whole("degree") not in (1, 3):
+        raise table.wrong("degree", "1 or 3")
+    return Flexible(
+        table.text("quantity"),
+        table.text("unit"),
+        knots,
+        tuple(zero),
+        tuple(times),
+        1 if table.whole("degree") == 1 else 3,
+        table.number("memory", 0.0),
+    )
 
 
 def _covariance(table: Table, names: Sequence[str]) -> tuple[tuple[float, ...], ...]:

@@ -11,7 +11,6 @@ from identification.mismatch.diagnosis import (
     Curves,
     Diagnosis,
     Finding,
-    HeldOutRmse,
     Mismatch,
     RivalFinding,
     Rmse,
@@ -22,6 +21,8 @@ from identification.mismatch.diagnosis import (
 )
 from identification.mismatch.faults import Fault, find_faults, repaired
 from identification.mismatch.fitting import Fit, raw
+from identification.mismatch.flexible import Extended, extend
+from identification.mismatch.flexible_shape import refitted_names, with_flexible, with_held
 from identification.mismatch.full_rate import look
 from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
 from identification.mismatch.lines import Line
@@ -89,7 +90,7 @@ def diagnose(
         standing = standing if after is settled else None
     left = judge_left(after.fit, found.data, after.weights, rng)
     measured = replace(found.data, histories=histories)
-    answer = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
+    answer, after = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
     answer = _with_channels(answer, lines, faults)
     return with_twin(answer, after, found.data, recordings, baseline)
 
@@ -123,18 +124,23 @@ def _answer(
     limits: Limits | None,
     standing: dict[Term, Standing] | None,
     measured: Data,
-) -> Diagnosis:
+) -> tuple[Diagnosis, State]:
+    """The answer, and the final model: with flexible terms where no physics carries what is left."""
     data, before, after = found.data, found.before, found.after
     structure = left.p_value < ALARM
     named = with_doubts(name(after, data, found.terms, standing), left if structure else None)
     earned = [n for n in named if not n.doubts]
     doubted = [n for n in named if n.doubts]
-    unexplained = _unexplained(left, after, data, doubted) if structure or doubted else None
+    open_ended = (structure or bool(doubted)) and bool(left.groups)
+    free = extend(after, data, _foremost(left, doubted), doubted, others, rng) if open_ended else None
+    unexplained = _unexplained(left, after, data, doubted, free, others) if open_ended else None
     verdict = _verdict(earned, unexplained)
+    if free is not None:
+        after, earned = free.state, refitted_names(earned, free.state)
     every = [np.ones(r.size, dtype=bool) for r in data.rows]
     held = by_runs(before, after, data, others) if others else by_blocks(before, after, data, measured)
     n, p = after.fit.residual.size, int(after.fit.free.sum())
-    return Diagnosis(
+    answer = Diagnosis(
         recordings=tuple(r.recording_id for r in recordings),
         thruster=recordings[0].thruster,
         verdict=verdict,
@@ -149,12 +155,13 @@ def _answer(
             rmse(before.fit.model, before.fit.theta, measured, every),
             rmse(after.fit.model, after.fit.theta, data, every),
         ),
-        heldout=HeldOutRmse(held.before, held.after, held.noise, held.what),
+        heldout=with_held(held, free),
         chi2_per_dof=after.fit.chi2 / max(n - p, 1),
         whiteness_p=whiteness(after.fit, data),
-        next_experiment=propose(after, data, earned, limits) if _equals(earned) else None,
+        next_experiment=propose(found.after, data, earned, limits) if _equals(earned) else None,
         curves=_curves(before, after, data),
     )
+    return answer, after
 
 
 def _verdict(earned: Sequence[Named], unexplained: Unexplained | None) -> Verdict:
@@ -291,19 +298,30 @@ def _places(found: Found, rng: np.random.Generator) -> tuple[Mismatch, ...]:
     return tuple(out)
 
 
-def _unexplained(left: Omnibus, after: State, data: Data, doubted: Sequence[Named]) -> Unexplained | None:
-    if not left.groups:
-        return None
-    judged = left.groups[0]
+def _foremost(left: Omnibus, doubted: Sequence[Named]) -> str:
+    """The coordinate over which it is left most clearly."""
     if left.p_value >= ALARM:  # nothing beyond noise is left: the doubt itself is the place
         own = {c for n in doubted for c in n.term.coordinates}
-        judged = next((g for g in left.groups if g.coordinate.quantity in own), judged)
+        return next((g for g in left.groups if g.coordinate.quantity in own), left.groups[0]).coordinate.quantity
+    return left.groups[0].coordinate.quantity
+
+
+def _unexplained(
+    left: Omnibus,
+    after: State,
+    data: Data,
+    doubted: Sequence[Named],
+    free: Extended | None,
+    others: Sequence[History],
+) -> Unexplained:
+    quantity = _foremost(left, doubted) if free is None else free.terms[0].quantity
+    judged = next((g for g in left.groups if g.coordinate.quantity == quantity), left.groups[0])
     where, share, table = _where(judged, after.fit, data)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in doubted)
     says = f"Something is left that no term of the catalogue carries: {_says(where, share, judged.coordinate.what)}"
     if doubted:
         says += f" It resembles {', '.join(n.term.id for n in doubted)}, but {doubted[0].doubts[0]}."
-    return Unexplained(where, judged.share, left.p_value, table, says, resembles)
+    return with_flexible(Unexplained(where, judged.share, left.p_value, table, says, resembles), free, data, others)
 
 
 def _curves(before: State, after: State, data: Data) -> tuple[Curves, ...]:

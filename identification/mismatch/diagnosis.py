@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Literal
 
+from identification.mismatch.remainder import FlexibleShape, FormulaFound, flexible_json, formula_json
 from identification.recording import Floats
 from identification.twin import Twin
 
@@ -79,6 +80,13 @@ class Unexplained:
     statement: str
     resembles: tuple[str, ...] = ()
     """Effects that fit but whose name was not earned, each with the reason."""
+    flexible: tuple[FlexibleShape, ...] = ()
+    """Of the final model, the clearest first; empty where none predicts better what was not fitted."""
+    replaces: tuple[str, ...] = ()
+    """Effects whose name was not earned and whose place the flexible terms take."""
+    heldout_without: float | None = None
+    """RMSE per sample on what was not fitted, without the flexible terms, N."""
+    formula: FormulaFound | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -261,4 +269,6 @@ def _unexplained(u: Unexplained) -> dict[str, object]:
         "shape": [{"at": _number(a), "residual": _number(b), "std": _number(c)} for a, b, c in u.shape],
         "statement": u.statement,
         "resembles": list(u.resembles),
+        "flexible": flexible_json(u.flexible, u.replaces, u.heldout_without),
+        "formula": None if u.formula is None else formula_json(u.formula),
     }

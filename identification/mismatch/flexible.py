@@ -1,7 +1,8 @@
 """A flexible term where no physics fits: a spline over the located coordinate, so that the fit still improves.
 
 Coordinate, multiplier, knots and degree are chosen on a part of the data with the state's coloured noise; a term is
-kept only when the rest of the data, which it has not seen, is predicted better. Then the terms are fitted to all rows.
+kept only when the rest of the data, which it has not seen, is predicted better. Then the terms are fitted to all rows,
+their knots chosen anew.
 Where a term of the catalogue fits but its name was not earned, the flexible term may take its place.
 """
 
@@ -14,10 +15,11 @@ import numpy as np
 
 from identification.mismatch.coordinates import FOLLOWED, LOADS
 from identification.mismatch.fitting import Fit, extended, fit
-from identification.mismatch.judging import blocks, refitted, rmse, rmse_on_runs
+from identification.mismatch.judging import Score, blocks, judge_blocks, judge_runs, refitted
 from identification.mismatch.knots import Moments, choose, heights, nodes_of
 from identification.mismatch.model import Data, Weights, predict, weights
-from identification.mismatch.omnibus import Omnibus, judge_left
+from identification.mismatch.naming import Named
+from identification.mismatch.omnibus import judge_left
 from identification.mismatch.screening import orthogonal_basis
 from identification.mismatch.search import State, forces, refresh
 from identification.physics.free_form import Flexible, Multiplier, spline
@@ -30,12 +32,17 @@ ALARM = 0.01
 MOST_TERMS = 3
 MOST_COORDINATES = 3
 """Coordinates tried for each term, the clearest first."""
+EQUAL = 10.0
+"""BIC within which two coordinates do equally well."""
 LOCATED = 0.8
 """Share of the best coordinate's gain at which the located one is kept."""
 FIT_STEPS = 10
 UNITS = dict(FOLLOWED)
-Judge = Callable[[Fit], float]
-"""RMSE per sample on data that were not fitted, N."""
+WORTH = 6.0
+"""By which chi-square must fall on what was not fitted, beside 2 for each parameter."""
+SLACK = 1.002
+"""RMSE may grow by this where chi-square falls: the loudest noise weighs most in it."""
+Judge = Callable[[Fit], Score]
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,42 +73,62 @@ class Candidate:
 def extend(
     after: State,
     data: Data,
-    left: Omnibus,
     located: str,
-    doubted: Sequence[Term],
+    doubted: Sequence[Named],
     others: Sequence[History],
     rng: np.random.Generator,
 ) -> Extended | None:
     """The model with up to MOST_TERMS flexible terms; None where none improves what was not fitted.
 
-    `left`: what the model leaves; `located`: the coordinate where; `doubted`: terms whose name was not earned;
+    `located`: the coordinate over which it is left; `doubted`: terms whose name was not earned;
     `others`: whole runs to judge on, blocks of time when empty.
     """
-    part, judge, begin = _split(after, data, others)
-    error = judge(begin.fit)
-    order = [located, *(g.coordinate.quantity for g in left.groups if g.p_value < ALARM)]
-    for smaller in _bases(begin, part, doubted):
-        state, terms, held = _grown(smaller, part, order, judge, rng)
-        if terms and held < error:
+    part, judge, begin = split(after, data, others)
+    first = judge(begin.fit)
+    for smaller in _bases(begin, part, [n.term for n in doubted]):
+        state, terms, held = _grown(smaller, part, located, judge, rng)
+        if terms and better(held, first, 0):
             break
     else:
         return None
     whole = refresh(state.fit.model, replace(state.fit.theta, tares=after.fit.theta.tares), data, None, None)
+    whole, final = _anew(whole, terms, data)
     dropped = tuple(t for t in after.fit.model.terms if t not in state.fit.model.terms)
-    return Extended(whole, tuple(terms), dropped, error, held)
+    return Extended(whole, tuple(final), dropped, first.rmse, held.rmse)
 
 
-def _split(after: State, data: Data, others: Sequence[History]) -> tuple[Data, Judge, State]:
+def better(new: Score, old: Score, parameters: int) -> bool:
+    """Whether what was not fitted is predicted better by more than chance."""
+    return new.chi2 < old.chi2 - (WORTH + 2 * parameters if parameters else 0) and new.rmse < SLACK * old.rmse
+
+
+def _anew(whole: State, terms: Sequence[Flexible], data: Data) -> tuple[State, list[Flexible]]:
+    """Knots chosen again with all rows, one term after the other."""
+    final = []
+    for term in terms:
+        smaller = whole.fit.model.without(term)
+        known = dict(zip(whole.fit.model.terms, whole.fit.theta.terms, strict=True))
+        theta = replace(whole.fit.theta, terms=tuple(known[t] for t in smaller.terms))
+        less = replace(whole, fit=fit(smaller, theta, data, whole.weights))
+        found = best_of([term], less, data)
+        if found is None or found.term == term:
+            final.append(term)
+            continue
+        whole = _joined(less, data, found)
+        final.append(found.term)
+    return whole, final
+
+
+def split(after: State, data: Data, others: Sequence[History]) -> tuple[Data, Judge, State]:
     """What is fitted, what judges it, and the present model fitted to that part."""
     if others:
-        return data, lambda found: rmse_on_runs(found, data, others), after
+        return data, judge_runs(after, data, others), after
     keep = [blocks(h) for h in data.histories]
-    back = [~k for k in keep]
     part = replace(data, keep=tuple(keep))
     begin = refitted(after, data, keep)
     w = weights(part, after.noise, forces(begin.model, begin.theta, part), after.rate_noise)
     state = State(begin, after.noise, after.rate_noise, w, part.thrust_rows)
-    return part, lambda found: rmse(found.model, found.theta, data, back), state
+    return part, judge_blocks(state, data, keep), state
 
 
 def _bases(begin: State, part: Data, doubted: Sequence[Term]) -> list[State]:
@@ -116,19 +143,20 @@ def _bases(begin: State, part: Data, doubted: Sequence[Term]) -> list[State]:
 
 
 def _grown(
-    state: State, part: Data, order: Sequence[str], judge: Judge, rng: np.random.Generator
-) -> tuple[State, list[Flexible], float]:
+    state: State, part: Data, located: str, judge: Judge, rng: np.random.Generator
+) -> tuple[State, list[Flexible], Score]:
     """Terms one after another while each predicts better what was not fitted."""
     terms: list[Flexible] = []
     held = judge(state.fit)
+    order = list(dict.fromkeys((located, *_left(state, part, rng))))
     while True:
         taken = {t.quantity for t in terms}
         new = None
-        for candidate in _candidates(state, part, [q for q in dict.fromkeys(order) if q not in taken]):
+        for candidate in _candidates(state, part, [q for q in order if q not in taken]):
             tried, term = _added(state, part, candidate)
-            error = judge(tried.fit)
-            if error < held:
-                new, held = tried, error
+            score = judge(tried.fit)
+            if better(score, held, len(term.parameters(part.scale))):
+                new, held = tried, score
                 terms.append(term)
                 break
         if new is None:
@@ -136,20 +164,29 @@ def _grown(
         state = new
         if len(terms) == MOST_TERMS:
             return state, terms, held
-        left = judge_left(state.fit, part, state.weights, rng)
-        if left.p_value >= ALARM:
-            return state, terms, held
-        order = [g.coordinate.quantity for g in left.groups if g.p_value < ALARM]
+        order = _left(state, part, rng)
+
+
+def _left(state: State, part: Data, rng: np.random.Generator) -> list[str]:
+    """Coordinates over which something is left, the clearest first."""
+    left = judge_left(state.fit, part, state.weights, rng)
+    return [g.coordinate.quantity for g in left.groups if g.p_value < ALARM] if left.p_value < ALARM else []
 
 
 def _candidates(state: State, part: Data, order: Sequence[str]) -> list[Candidate]:
-    """The best over each of the first coordinates; the located one first unless others gain more."""
+    """The best over each of the first coordinates; the located one first unless others gain more, or a recorded
+    quantity gains as much: what a channel does, time can do too."""
     found = [best_over(quantity, state, part) for quantity in order[:MOST_COORDINATES]]
     gaining = [c for c in found if c is not None and c.gain > 0]
     if not gaining:
         return []
     most = max(c.gain for c in gaining)
-    return sorted(gaining, key=lambda c: (c.term.quantity != order[0] or c.gain < LOCATED * most, -c.gain))
+
+    def rank(c: Candidate) -> tuple[bool, bool, float]:
+        recorded = c.term.quantity in UNITS and c.gain > most - EQUAL
+        return not recorded, c.term.quantity != order[0] or c.gain < LOCATED * most, -c.gain
+
+    return sorted(gaining, key=rank)
 
 
 def _added(state: State, part: Data, candidate: Candidate) -> tuple[State, Flexible]:

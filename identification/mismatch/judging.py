@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -109,13 +109,46 @@ def by_runs(before: State, after: State, data: Data, others: Sequence[History]) 
     return HeldOut(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
 
 
-def rmse_on_runs(fitted: Fit, data: Data, others: Sequence[History]) -> float:
-    """Per sample, N, on whole runs that were not fitted; infinite where one lacks what a term needs."""
-    if any(not set(term.needs) <= set(h.others) for term in fitted.model.terms for h in others):
-        return float("inf")
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Of a fit on what it was not fitted to."""
+
+    rmse: float
+    """Per sample, N."""
+    chi2: float
+    """Of the residual, whitened with one and the same noise."""
+
+
+def judge_blocks(state: State, data: Data, keep: Sequence[NDArray[np.bool_]]) -> Callable[[Fit], Score]:
+    """Judges fits of the rows in `keep` on all others, with the noise of `state`."""
+    back = [~k for k in keep]
+    part = replace(data, keep=tuple(back))
+    w = weights(part, state.noise, forces(state.fit.model, state.fit.theta, part), None)
+
+    def score(found: Fit) -> Score:
+        thrust, _ = raw(found.model, found.theta, part, with_rate=False)
+        left = w.whiten([y - f for y, f in zip(part.thrust, thrust, strict=True)], [])
+        return Score(rmse(found.model, found.theta, data, back), float(left @ left))
+
+    return score
+
+
+def judge_runs(state: State, data: Data, others: Sequence[History]) -> Callable[[Fit], Score]:
+    """Judges fits on whole runs, their tares fitted; a fit that needs what one of these lacks is infinitely bad."""
     unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
-    theta = _with_tares(fitted.model, fitted.theta, unseen)
-    return rmse(fitted.model, theta, unseen, [np.ones(r.size, dtype=bool) for r in unseen.rows])
+    every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
+    first = _with_tares(state.fit.model, state.fit.theta, unseen)
+    w = weights(unseen, state.noise, forces(state.fit.model, first, unseen), None)
+
+    def score(found: Fit) -> Score:
+        if any(not set(term.needs) <= set(h.others) for term in found.model.terms for h in others):
+            return Score(float("inf"), float("inf"))
+        theta = _with_tares(found.model, found.theta, unseen)
+        thrust, _ = raw(found.model, theta, unseen, with_rate=False)
+        left = w.whiten([y - f for y, f in zip(unseen.thrust, thrust, strict=True)], [])
+        return Score(rmse(found.model, theta, unseen, every), float(left @ left))
+
+    return score
 
 
 def _with_tares(model: Model, theta: Theta, data: Data) -> Theta:

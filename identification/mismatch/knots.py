@@ -26,6 +26,8 @@ MOST_NODES = 65
 EVEN = (2, 3, 4, 5, 7, 9, 13)
 """Knots at even shares of the data to begin with."""
 MOST_KNOTS = 24
+SMOOTH = 10.0
+"""BIC by which a broken line must be better to be preferred to a cubic."""
 MOST_MOVES = 4
 LEAST_SHARE = 0.003
 """Of all rows: a level met more often than this is a node."""
@@ -82,7 +84,7 @@ def nodes_of(values: Floats, must: Sequence[float] = ()) -> Floats:
 def choose(moments: Moments, must: tuple[int, ...] = (), degrees: Sequence[Degree] = (3, 1)) -> Chosen | None:
     """The spline of the largest gain. `must`: nodes that are knots always; both ends are anyway."""
     found = [c for degree in degrees if (c := _of_degree(moments, must, degree)) is not None]
-    return max(found, key=lambda each: each.gain, default=None)
+    return max(found, key=lambda each: each.gain + (SMOOTH if each.degree == 3 else 0.0), default=None)
 
 
 def heights(moments: Moments, knots: tuple[int, ...], degree: Degree, free: Sequence[tuple[int, ...]]) -> Floats:

@@ -14,7 +14,7 @@ from identification.mismatch.preparing import history_of
 from identification.mismatch.twinning import given
 from identification.physics.history import TURNING, History
 from identification.recording import Floats, Recording
-from identification.twin import TERMS, Twin
+from identification.twin import Twin
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +69,7 @@ def _run(curves: Curves, recording: Recording | None, twin: Twin | None, C: floa
     full = None if recording is None else history_of(recording)
     if isinstance(full, History) and np.isin(curves.time, full.sampled).all():
         history, rows = full, np.searchsorted(full.sampled, curves.time)
-        known = twin is not None and all((t.effect, t.form) in TERMS for t in twin.terms)
+        known = twin is not None and all(t.known for t in twin.terms)
         effects = _effects(twin, full, rows) if twin is not None and known else {}
     else:
         history, rows, effects = _history(curves), np.arange(curves.time.size), {}

@@ -13,6 +13,7 @@ from identification.mismatch.fitting import raw
 from identification.mismatch.model import Data, Given, Model, Spread, Theta, acting
 from identification.mismatch.preparing import FEW_SAMPLES, Refusal
 from identification.mismatch.search import State
+from identification.physics.free_form import Flexible
 from identification.physics.history import CHANGED, History
 from identification.recording import Floats, Recording
 from identification.tails import normal_sf
@@ -97,6 +98,7 @@ def twin_of(state: State, data: Data, recordings: Sequence[Recording], before: T
             term.form,
             {p.name: value for p, value in zip(term.parameters(sizes), values, strict=True)},
             sizes,
+            term if isinstance(term, Flexible) else None,
         )
         for term, values, sizes in acting(fitted.model, fitted.theta, data.scale)
     )

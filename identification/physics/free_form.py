@@ -29,8 +29,8 @@ WORDS: dict[Multiplier, str] = {
     "rate": "adds a force in proportion to the size of the drive",
     "drive": "adds to the drive",
 }
-ALONE: tuple[Multiplier, ...] = ("force", "gain", "drive")
-"""Where a constant would be the tare, another C or another rate: the spline is zero at its `zero` knots."""
+ALONE: tuple[Multiplier, ...] = ("force", "gain", "even", "drive")
+"""Where a constant would be the tare, another C, an asymmetry or another rate: the spline is zero at `zero`."""
 COMPUTED = ("time", "time_since_step", "previous_voltage", "direction", "direction_of_change", "load_history")
 """Coordinates that every run has."""
 MOST = 5.0
