@@ -1,8 +1,8 @@
 """What the proof asks: jobs (one case of the world each) with orders (one diagnosis each), cells interleaved. Pure.
 
 >>> world = Kinds(("dead_band", "fouling"), {"dead_band": ("shrink", "jump")}, {}, ("swapped",), ("white",))
->>> [job.id for job in design(world, frozenset({"dead_band", "heating"}), 1) if "plain" in job.id or "other" in job.id]
-['plain/dead_band/0', 'outside/fouling/0']
+>>> [job.id for job in design(world, frozenset({"dead_band", "heating"}), 1, ["plain", "outside"])]
+['outside/fouling/0', 'plain/dead_band/0']
 """
 
 from __future__ import annotations

@@ -158,7 +158,7 @@ def said(s: Score) -> dict[str, Any]:
         "place": s.place,
         "resembles": list(s.resembles),
         "nearest": None if s.near is None else [s.near.rival, round(s.near.left, 1)],
-        "noise": s.noise,
+        "case": s.case,
         "statement": s.statement,
         "seconds": round(s.seconds, 1),
     }

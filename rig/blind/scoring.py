@@ -83,7 +83,8 @@ class Score:
     held_out: HeldOut | None = None
     intervals: tuple[Interval, ...] = ()
     seconds: float = 0.0
-    noise: str = ""
+    case: str = ""
+    """What the recording was like, in words."""
 
     @property
     def right(self) -> bool:
@@ -141,9 +142,7 @@ def scored(
     """`thrust`: true and measured of the other run, `predicted`: by model and baseline; None where there is none."""
     hidden = concealed(truth)
     if answer["error"]:
-        return Score(
-            order, hidden, answer["error"], failed=True, seconds=answer["seconds"], noise=str(truth["noise_kind"])
-        )
+        return Score(order, hidden, answer["error"], failed=True, seconds=answer["seconds"], case=described(truth))
     found = answer["diagnosis"]
     findings, unexplained = found["findings"], found["unexplained"]
     twins = truth.get("twins") or [None]
@@ -160,7 +159,7 @@ def scored(
         held_out=held_out(*thrust, predicted) if thrust and predicted else None,
         intervals=intervals(findings, truth) if len(hidden) == 1 else (),
         seconds=answer["seconds"],
-        noise=truth["noise_kind"],
+        case=described(truth),
     )
 
 
@@ -170,12 +169,39 @@ def concealed(truth: Table) -> tuple[str, ...]:
     return (*(effect["effect"] for effect in truth["effects"]), *lie)
 
 
+def described(truth: Table) -> str:
+    """Noise, sampling, plan, channels, and the effects with their parameters.
+
+    >>> effect = {"effect": "dead_band", "parameters": {"form": "jump", "half_width": 0.51234}}
+    >>> scale = {"voltage": 10.0, "thrust": 80.0, "duration": 400.2}
+    >>> seal = {"noise_kind": "white", "rate": 25.0, "plan": ["ramp"], "channels": ["current"], "scale": scale}
+    >>> described(seal | {"effects": [effect], "fault": None})
+    'white noise, 25 /s, ramp of 400 s, 10 V, 80 N, with current; dead_band: form jump, half_width 0.5123'
+    """
+    scale = truth["scale"]
+    with_channels = f", with {', '.join(truth['channels'])}" if truth["channels"] else ""
+    plan = f"{' and '.join(truth['plan'])} of {scale['duration']:.0f} s"
+    parts = [
+        f"{truth['noise_kind']} noise, {truth['rate']:.3g} /s, {plan}, "
+        f"{scale['voltage']:.3g} V, {scale['thrust']:.3g} N{with_channels}"
+    ]
+    for effect in truth["effects"]:
+        told = ", ".join(
+            f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in effect["parameters"].items()
+        )
+        parts.append(f"{effect['effect']}: {told}")
+    if truth["fault"]:
+        parts.append(", ".join(f"{k} {v}" for k, v in truth["fault"].items()))
+    return "; ".join(parts)
+
+
 def held_out(true: Floats, measured: Floats, predicted: Mapping[str, Floats]) -> HeldOut:
     """Errors of the model and of the baseline, `model` and `baseline` (n,) N, in the other run.
 
     >>> t = np.array([0.0, 1.0, 0.0, 1.0])
-    >>> held_out(t, t + [0.1, 0.1, -0.1, -0.1], {"model": t + 5.0, "baseline": 0.0 * t})
-    HeldOut(model=1.0, baseline=5.099019513592785, left=0.0)
+    >>> found = held_out(t, t + [0.1, 0.1, -0.1, -0.1], {"model": t + 5.0, "baseline": 0.0 * t})
+    >>> round(found.model, 6), round(found.baseline, 3), found.left
+    (1.0, 5.099, 0.0)
     """
     noise = float(np.std(measured - true))
     model, baseline = (predicted[name] for name in ("model", "baseline"))

@@ -20,7 +20,10 @@ def truth(*effects, fault=None, twins=None, **parameters):
         "effects": [{"effect": e, "parameters": parameters, "d_prime": 40.0} for e in effects],
         "fault": fault,
         "noise_kind": "white",
-        "scale": {"rate": 20.0, "voltage": 10.0, "current": 5.0},
+        "scale": {"rate": 20.0, "voltage": 10.0, "current": 5.0, "thrust": 80.0, "duration": 400.0},
+        "rate": 25.0,
+        "plan": ["ramp"],
+        "channels": ["current"],
         "twins": twins,
         "error": None,
     }
@@ -53,10 +56,10 @@ def _one(job, order, rng, skill):
     if order.cell in ("outside", "removed"):
         near = Near("exponent", float(rng.choice([3.0, 20.0])))
         said = ("unexplained", (), "time") if good else ("explained", ("exponent",), "")
-        return Score(order, truth, said[0], said[1], place=said[2], near=near, seconds=3.0, noise="white")
+        return Score(order, truth, said[0], said[1], place=said[2], near=near, seconds=3.0, case="white noise")
     if not truth:
         named = () if good else ("motor_lag",)
-        return Score(order, (), "explained" if named else "adequate", named, noise=order.label)
+        return Score(order, (), "explained" if named else "adequate", named, case=order.label)
     named = truth if good else (str(rng.choice(sorted(CATALOGUE))),)
     z = (Interval(truth[0], "share", float(rng.standard_normal())),)
     return Score(order, truth, "explained", named, statement="It is so.", held_out=held, intervals=z, seconds=2.0)
