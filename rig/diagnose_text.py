@@ -7,6 +7,7 @@ from math import floor, isfinite, log10
 from textwrap import wrap
 
 from identification.mismatch.diagnosis import Diagnosis, Finding, Unexplained, Value, Where
+from identification.mismatch.remainder import FlexibleShape, FormulaFound
 
 WIDTH = 100
 MOST_STEPS = 12
@@ -104,7 +105,36 @@ def _unexplained(u: Unexplained, force: str) -> Iterator[str]:
     yield from _shape(u, force)
     for text in u.resembles:
         yield from _para(f"- resembles {text}", "  ")
+    for flexible in u.flexible:
+        yield from _flexible(flexible)
+    if u.replaces:
+        yield from _para(f"It stands in the place of {', '.join(u.replaces)}, whose name was not earned.", "  ")
+    if u.formula is not None:
+        yield from _formula(u.formula)
     yield ""
+
+
+def _flexible(f: FlexibleShape) -> Iterator[str]:
+    """The spline in bins, beside what was measured there."""
+    yield from _para(f.statement, "  ")
+    unit = "" if f.unit in ("", "1") else f" / {f.unit}"
+    for s in f.splines:
+        label = s.times if s.unit in ("", "1") else f"{s.times} / {s.unit}"
+        size = max((abs(value) for _, value, _, _ in s.table), default=0.0) or 1.0
+        yield f"  {f.covariate + unit:>24}{label:>14}{'measured':>12}{'std':>10}"
+        for at, value, measured, std in s.table:
+            yield f"  {at:>24.4g}{value:>14.3g}{measured:>12.3g}{std:>10.2g}  {_bar(value, size)}".rstrip()
+
+
+def _formula(f: FormulaFound) -> Iterator[str]:
+    yield from _para(f"formula (not a physics): {f.text}", "  ")
+    yield from _para(
+        f"{_values(f.coefficients)}; not fitted {f.heldout_before:.4g} -> {f.heldout_after:.4g} N; the same in both "
+        f"halves with {rarity(f.halves_p)}",
+        "  ",
+    )
+    if f.equals:
+        yield from _para(f"about as well: {', '.join(f.equals)} (F: the thrust)", "  ")
 
 
 def _shape(u: Unexplained, force: str) -> Iterator[str]:
@@ -116,11 +146,18 @@ def _shape(u: Unexplained, force: str) -> Iterator[str]:
     unit = "" if u.where.unit in ("", "1") else f" / {u.where.unit}"
     yield f"  {u.where.quantity + unit:>24}{f'residual / {force}':>14}{f'std / {force}':>10}"
     for at, residual, std in rows:
-        length = round(BAR * abs(residual) / size)
-        bar = (" " * (BAR - length) + "-" * length + "|").ljust(2 * BAR + 1) if residual < 0 else " " * BAR + "|"
-        bar += "+" * length if residual >= 0 else ""
         known = f"{std:.2g}" if isfinite(std) else "-"
-        yield f"  {at:>24.4g}{residual:>14.3g}{known:>10}  {bar}".rstrip()
+        yield f"  {at:>24.4g}{residual:>14.3g}{known:>10}  {_bar(residual, size)}".rstrip()
+
+
+def _bar(value: float, size: float) -> str:
+    """Minus signs to the left of a line, plus signs to the right.
+
+    >>> _bar(-1.0, 2.0)
+    '            ------------|'
+    """
+    length = round(BAR * abs(value) / size)
+    return " " * (BAR - length) + "-" * length + "|" if value < 0 else " " * BAR + "|" + "+" * length
 
 
 def _model(d: Diagnosis) -> Iterator[str]:

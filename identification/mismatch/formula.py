@@ -81,7 +81,7 @@ def find_formula(extended_by: Extended, data: Data, others: Sequence[History]) -
         return None
     text, coefficients = told(term, whole.fit, data)
     same = {frozenset(q for m in plainest for q, _ in m.powers)}
-    equals = []
+    equals: list[str] = []
     for other in near:
         symbols = frozenset(q for m in other for q, _ in m.powers)
         if symbols not in same and len(equals) < MOST_EQUALS:

@@ -28,7 +28,8 @@ def told(term: Formula, fitted: Fit, data: Data) -> tuple[str, dict[str, Value]]
         a, std = float(values[high]), sqrt(float(covariance[high, high]))
         text = f"residual = {_number(a, std)} ({symbol} - {_number(middle, middle_std)} {unit})^2{factor}"
         return text, {"a": Value(a, std, units[high]), f"{symbol}_0": Value(middle, middle_std, unit)}
-    parts, coefficients = [], {}
+    parts: list[str] = []
+    coefficients: dict[str, Value] = {}
     for i, (m, name) in enumerate(zip(term.monomials, names, strict=True)):
         c, std = float(values[i]), sqrt(float(covariance[i, i]))
         sign = "" if not parts else " + "

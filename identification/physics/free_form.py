@@ -147,7 +147,9 @@ class Flexible:
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         what = " and ".join(WORDS[m] for m in self.times)
-        return f"A flexible term over {self.quantity} ({len(self.knots)} knots) {what}; no physics is claimed for it."
+        of_run = " It is of this run's own clock: another run need not repeat it." if self.quantity == "time" else ""
+        says = f"A flexible term over {self.quantity} ({len(self.knots)} knots) {what}; no physics is claimed for it."
+        return says + of_run
 
 
 def multiplied(multiplier: Multiplier, value: Floats, now: Moment) -> Floats:

@@ -11,6 +11,7 @@ from identification.mismatch.reported_runs import Run, runs_of
 from identification.recording import Recording
 from rig.report import page as pages
 from rig.report import provenance
+from rig.report.diagnosis_flexible import flexible_pictures, modelled_remarks
 from rig.report.diagnosis_pictures import (
     before_after_pictures,
     finding_pictures,
@@ -132,8 +133,10 @@ def unexplained_section(d: Diagnosis, runs: Sequence[Run]) -> tuple[Section, ...
     left = f"{100 * u.share:.0f} % of what remains is structure, not noise ({rarity(u.p_value)})."
     told = [Remark(left, "bad")]
     told += [Remark(words(f"Resembles {text.removesuffix('.')}."), "doubt") for text in u.resembles]
+    told += modelled_remarks(u)
     picture = unexplained_picture(u, driver_quantity(d))
-    drawn = (*(() if picture is None else (picture,)), *shape_pictures(d, runs))
+    drawn = (*(() if picture is None else (picture,)), *flexible_pictures(u, driver_quantity(d)))
+    drawn = (*drawn, *shape_pictures(d, runs))
     return (Section("What is not explained", (*sentences(told), *drawn)),)
 
 
@@ -180,7 +183,8 @@ def parameter_section(d: Diagnosis) -> Section:
 
 def _parameter_row(name: str, value: Value, before: Value | None, findings: set[str]) -> tuple[str, ...]:
     effect, dot, parameter = name.partition(".")
-    doubted = "" if not dot or effect.split("#")[0] in findings else " (name not earned)"
+    named = not dot or effect.split("#")[0] in findings or effect.startswith("flexible:")
+    doubted = "" if named else " (name not earned)"
     shown = (parameter if dot else name).replace("_", " ")
     of = effect_name(effect) + doubted if dot else "baseline"
     return (shown, of, *value_cells(value), "" if before is None else value_cells(before)[0])

@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from identification.recording import Floats
-from rig.report.figures import Curve, Group, draw_groups
+from rig.report.figures import Curve, Group, draw_curve, draw_groups
 from rig.report.look import BAND, DATA, MODEL, MUTED, NARROW, OTHER, Plot, labels, legend_above
 
 Stretch = tuple[float, float]
@@ -101,6 +101,26 @@ def signature_over(measured: Group, model: Curve, x: str, y: str, *, spread_out:
         _across(axes, spread_out=spread_out)
         axes.axhline(0.0, color=MUTED, linewidth=0.8)
         axes.plot(model.x, model.y, "-s", markersize=3.5, color=MODEL, label=model.label, zorder=2.5)
+        draw_groups(axes, [measured])
+        _named(axes, x, y, spread_out=spread_out)
+        axes.margins(y=0.1)
+        legend_above(axes)
+
+    return Plot(draw, alt, (NARROW[0], 3.6))
+
+
+def spline_over(measured: Group, curve: Curve, x: str, y: str, *, spread_out: bool = False) -> Plot:
+    """A flexible term with its 95 % band, beside what was measured in bins of its coordinate."""
+    alt = (
+        f"{y} over {x}: a spline from {curve.y.min():.3g} to {curve.y.max():.3g} with its 95 % band, and the residual "
+        f"measured in {measured.x.size} bins."
+    )
+
+    def draw(figure: Figure) -> None:
+        axes = figure.subplots()
+        _across(axes, spread_out=spread_out)
+        axes.axhline(0.0, color=MUTED, linewidth=0.8)
+        draw_curve(axes, curve)
         draw_groups(axes, [measured])
         _named(axes, x, y, spread_out=spread_out)
         axes.margins(y=0.1)
