@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.recording import Channel, Floats
 
@@ -36,14 +37,27 @@ def distinct(time: Floats, value: Floats) -> tuple[Floats, Floats]:
     return unique, mean
 
 
+def _gaps(time: Floats, good: NDArray[np.bool_]) -> Floats:
+    """(g, 2) first and one past last time of each stretch that is not good, between two that are."""
+    change = np.diff(good.astype(np.int8))
+    begun, ended = np.flatnonzero(change == -1) + 1, np.flatnonzero(change == 1) + 1
+    ended = ended[ended > begun[0]] if begun.size else ended[:0]
+    return np.column_stack([time[begun[: ended.size]], time[ended]]).astype(np.float64)
+
+
 class Held:
     """The driver as a function of time: constant between rows of a command, a straight line between measurements."""
 
     def __init__(self, channel: Channel, end: float) -> None:
         good = np.isfinite(channel.value)
-        self.time, self.value = distinct(channel.time[good], channel.value[good])
         self.quantity = str(channel.quantity)
         self.stepwise = channel.quantity == "command_voltage"
+        self.unknown = _gaps(channel.time, good) if self.stepwise else np.empty((0, 2))
+        """(g, 2) s: from a command that is no number to the next that is one; taken as that one."""
+        known = channel.time.astype(np.float64)
+        for begun, ended in self.unknown:
+            known[channel.time == ended] = begun
+        self.time, self.value = distinct(known[good], channel.value[good])
         last = max(end, float(self.time[-1]))
         knots = np.append(self.time, last + 1.0)
         if self.stepwise:

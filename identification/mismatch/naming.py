@@ -23,6 +23,8 @@ EQUAL = 4.0
 """BIC units: nearer than this two answers are equally good."""
 LIKELY = 40.0
 """Chi-square that a rival may lose by the tangent alone and is still refitted: its inner parameters may move."""
+PRESSED_SHARE = 0.3
+"""Of its gain: a rival may be worse by this than a term whose parameters end at what is possible."""
 RIVAL_STEPS = 15
 MOST_REFITS = 7
 SAME = 0.1
@@ -88,9 +90,14 @@ def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> tuple[State
         for term in state.fit.model.terms:
             less = without(state, term, data)
             standing[term] = (less, swaps(state, term, less, data, terms))
+            # a value that is not possible explains nothing: whatever does nearly as well goes before it
+            price = 0.0
+            if at_bound(term, state.fit, data, state.weights):
+                price = PRESSED_SHARE * (less.chi2 - state.fit.chi2)
             for rival in standing[term][1]:
-                if rival.bic_loss < -BETTER and (best is None or rival.bic_loss < best[0]):
-                    best = (rival.bic_loss, rival.fit)
+                loss = rival.bic_loss - price
+                if loss < -BETTER and (best is None or loss < best[0]):
+                    best = (loss, rival.fit)
         if best is None:
             return state, standing
         state = refresh(best[1].model, best[1].theta, data, None, state)

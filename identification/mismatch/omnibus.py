@@ -8,7 +8,7 @@ under drawn signs of blocks, as the screening is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -16,11 +16,9 @@ from identification.mismatch.coordinates import Coordinate, coordinates
 from identification.mismatch.fitting import Fit
 from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.screening import orthogonal_basis, quiet, surrogate_scores
+from identification.mismatch.shape_error import allowed_in, corrections
 from identification.recording import Floats
 from identification.tails import chi2_sf, noncentral_chi2_sf
-
-SHAPE_ERROR = 0.03
-"""A textbook shape is trusted to this share of its own correction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +50,7 @@ def judge_left(
     n = data.size
     basis = orthogonal_basis(fit.jacobian[:n])
     residual = fit.residual[:n]
-    allowed = _allowance(fit, data, weights, n)
+    changes = corrections(fit, data, Weights(weights.thrust))
     groups, spans = [], []
     for c in found:
         columns = Weights(weights.thrust).whiten(list(c.columns), [])
@@ -62,7 +60,7 @@ def judge_left(
             continue
         score = Q.T @ residual
         stat, dof = float(score @ score), Q.shape[1]
-        extra = float(sum(np.sum((Q.T @ a) ** 2) for a in allowed))
+        extra = allowed_in(changes, Q)
         p = _tail(stat, dof, extra)
         groups.append(Judged(c, stat, dof, p, max(stat - dof, 0.0) / max(float(residual @ residual), 1e-300)))
         spans.append(Q)
@@ -87,24 +85,6 @@ def judge_left(
 def _tail(stat: float, dof: int, extra: float) -> float:
     p = float(noncentral_chi2_sf(stat, dof, extra)) if extra > 1e-9 else float(chi2_sf(stat, dof))
     return p if np.isfinite(p) else 0.0
-
-
-def _allowance(fit: Fit, data: Data, weights: Weights, n: int) -> list[Floats]:
-    """Whitened (n,) SHAPE_ERROR of what each term changes."""
-    out = []
-    for term in fit.model.terms:
-        smaller = fit.model.without(term)
-        values = dict(zip(fit.model.terms, fit.theta.terms, strict=True))
-        theta = replace(fit.theta, terms=tuple(values[t] for t in smaller.terms))
-        change = []
-        for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
-            with_it, _ = predict(fit.model, fit.theta, h, data.scale, i)
-            without, _ = predict(smaller, theta, h, data.scale, i)
-            change.append((with_it - without)[r])
-        moved = Weights(weights.thrust).whiten(change, [])
-        basis = orthogonal_basis(fit.jacobian[:n])
-        out.append(SHAPE_ERROR * (moved - basis @ (basis.T @ moved)))
-    return out
 
 
 @dataclass(frozen=True, slots=True)

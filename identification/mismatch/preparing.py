@@ -18,8 +18,12 @@ DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
 JITTER_BEFORE, JITTER_AFTER = 0.002, 0.003
 """s round a step within which a sample may belong to either level: time stamps are not better."""
 JITTER_SHARE = 0.1
-"""Of the time between samples: where they are dense, so good are their stamps."""
+"""Of the time between samples: where they are dense and even, so good are their stamps."""
+JITTERS = 3.0
+"""Standard deviations of the time between samples that a stamp may be off."""
 MOST_INTERVALS = 6000
+AFTER_UNKNOWN = 1.0
+"""s after a stretch of unknown command before thrust counts again."""
 LEAST_DWELL = 0.5
 """s of a level in a static table."""
 FEW_SAMPLES = 3
@@ -86,10 +90,13 @@ def _driver(recording: Recording) -> Channel | str:
 
 
 def _driven(time: Floats, force: Floats, held: Held) -> tuple[Floats, Floats]:
-    """Without what was measured before the first and, for a measured driver, after the last row of the driver."""
+    """Without what was measured before the first row of the driver, while it was unknown (and a little longer, the
+    rotor coasts), and, for a measured driver, after its last row."""
     slack = 0.5 * float(np.median(np.diff(time)))
     end = np.inf if held.stepwise else held.time[-1] + slack
     inside = (time >= held.time[0] - slack) & (time <= end)
+    for begun, ended in held.unknown:
+        inside &= (time < begun) | (time > ended + AFTER_UNKNOWN)
     return time[inside], force[inside]
 
 
@@ -100,11 +107,18 @@ def _clear_of_steps(time: Floats, force: Floats, held: Held) -> tuple[Floats, Fl
     steps = held.time[big]
     if not (held.stepwise and steps.size) or time.size < 4 * steps.size:
         return time, force
-    least = JITTER_SHARE * float(np.median(np.diff(time)))
+    least = jitter_of(time)
     after = np.searchsorted(steps, time + min(JITTER_BEFORE, least), side="right") - 1
     late = time - steps[np.maximum(after, 0)]
     clear = (after < 0) | (late > min(JITTER_AFTER, least))
     return time[clear], force[clear]
+
+
+def jitter_of(time: Floats) -> float:
+    """Time in s by which stamps may be off, as their own spacing tells: a share of it, or its scatter."""
+    step = np.diff(time)
+    spacing = float(np.median(step))
+    return max(JITTER_SHARE * spacing, JITTERS * float(np.median(np.abs(step - spacing))) / 0.6745)
 
 
 def _clear_of_jumps(recording: Recording, time: Floats, force: Floats) -> tuple[Floats, Floats]:
@@ -180,6 +194,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         others=others,
         rate_per_driver=per_driver,
         spacing=float(np.median(np.diff(time))),
+        jitter=jitter_of(time),
         rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
         static=_is_table(held, time.size),
     )

@@ -47,6 +47,8 @@ class Screening:
     directions: Directions
     z: Floats
     """(q,) sigmas; one-sided ones are 0 where physics has the other sign."""
+    plain: Floats
+    """(q,) the same before anything was spared for shape error."""
     p_value: float
     """Family-wise, of the largest."""
     threshold: float
@@ -60,13 +62,13 @@ class Screening:
         """Terms in descending order of z, each form once with its best trial, those within `share` of the best."""
         out: list[tuple[Term, tuple[float, ...], float]] = []
         seen: set[Term] = set()
-        for j in np.argsort(-self.z):
+        for j in np.argsort(-self.plain):
             term = self.directions.terms[j]
-            if self.z[j] < share * self.largest or len(out) >= most:
+            if self.plain[j] < share * self.plain.max() or len(out) >= most:
                 break
             if term not in seen:
                 seen.add(term)
-                out.append((term, self.directions.values[j], float(self.z[j])))
+                out.append((term, self.directions.values[j], float(self.plain[j])))
         return out
 
 
@@ -137,19 +139,25 @@ def directions(
     )
 
 
-def screen(fit: Fit, found: Directions, rng: np.random.Generator, alarm: float = 0.01) -> Screening:
-    """Sigmas of each direction and the family-wise judgement of the largest."""
+def screen(
+    fit: Fit, found: Directions, rng: np.random.Generator, alarm: float = 0.01, allowed: Floats | None = None
+) -> Screening:
+    """Sigmas of each direction and the family-wise judgement of the largest.
+
+    `allowed` (q,): sigmas of each that the terms found so far may leave behind (shape_error.py).
+    """
     score = found.columns.T @ fit.residual
     sided = np.array(found.one_sided, dtype=bool)
-    z = np.where(sided, np.maximum(score, 0.0), np.abs(score))
+    plain = np.where(sided, np.maximum(score, 0.0), np.abs(score))
+    z = plain if allowed is None else np.maximum(plain - allowed, 0.0)
     if not score.size:
-        return Screening(found, z, 1.0, float("inf"))
+        return Screening(found, z, plain, 1.0, float("inf"))
     null = surrogate_scores(found.columns, quiet(fit.residual, found.columns), rng)
     null = np.where(sided, np.maximum(null, 0.0), np.abs(null)).max(axis=1)
     normal = _normal_scores(found.columns, rng)
     normal = np.where(sided, np.maximum(normal, 0.0), np.abs(normal)).max(axis=1)
     threshold = float(max(np.quantile(null, 1 - alarm), np.quantile(normal, 1 - alarm)))
-    return Screening(found, z, _p_value(float(z.max()), null, normal), threshold)
+    return Screening(found, z, plain, _p_value(float(z.max()), null, normal), threshold)
 
 
 def matching_pursuit(columns: Floats, residual: Floats, least: float, most: int) -> tuple[list[int], Floats]:

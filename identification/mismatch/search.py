@@ -22,6 +22,7 @@ from identification.mismatch.screening import (
     refined,
     screen,
 )
+from identification.mismatch.shape_error import allowed, corrections
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.history import History
 from identification.physics.term import Term
@@ -31,10 +32,11 @@ from identification.tails import chi2_isf
 ALARM = 0.01
 """Family-wise false-alarm rate of the search."""
 CLOCKS = 0.001
-"""s: clocks of two devices are not trusted to agree better."""
-CLOCK_SHARE = 0.1
-"""Of the time between samples: where they are dense, so well do clocks agree."""
+"""s: clocks of two devices are not trusted to agree better, unless stamps are dense and even."""
+
 CANDIDATES = 5
+NEARLY = 0.93
+"""Of the best gain: a candidate with fewer parameters that reaches it goes first; swaps come later (naming.py)."""
 MOST_TERMS = 6
 NOISE_ROUNDS = 5
 STATIC = ("command_voltage", "thrust")
@@ -105,7 +107,7 @@ def start(histories: Sequence[History]) -> tuple[Data, Theta]:
     C = right / gram if gram > 0 else 0.0
     with_rate = all(h.rate is not None and h.rate_rows.size > 20 for h in histories)
     moving = histories[0].driver_quantity == "command_voltage" and not any(h.static for h in histories)
-    most = min(CLOCKS, CLOCK_SHARE * min(h.spacing for h in histories)) if moving else 0.0
+    most = min(CLOCKS, max(h.jitter for h in histories)) if moving else 0.0
     data = Data(tuple(histories), scale_of(histories, C or 1e-12), with_rate=with_rate, most_shift=most)
     return data, Theta(C, (), tuple(float(ym - C * fm) for fm, ym in means), k=_k(histories))
 
@@ -281,7 +283,8 @@ def search(
         if sum(set(t.coordinates) <= set(STATIC) for t in state.fit.model.terms) >= MOST_STATIC:
             left = [t for t in left if not set(t.coordinates) <= set(STATIC)]
         found = directions(state.fit, data, state.weights, left)
-        judged = screen(state.fit, found, rng, ALARM)
+        spared = allowed(corrections(state.fit, data, state.weights), found.columns)
+        judged = screen(state.fit, found, rng, ALARM, spared)
         screenings.append(judged)
         if trace is not None:
             trace.append(
@@ -311,11 +314,15 @@ def _best_addition(state: State, judged: Screening, data: Data) -> Fit | None:
         theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
         new = fit(bigger, theta, data, state.weights)
         gain = state.fit.chi2 - new.chi2
-        if gain > len(values) * np.log(new.residual.size):
-            fits.append(
-                (not at_bound(term, new, data, state.weights), gain - len(values) * np.log(new.residual.size), new)
-            )
-    return max(fits, key=lambda each: each[:2])[2] if fits else None
+        price = len(values) * np.log(new.residual.size)
+        if gain > price:
+            fits.append((at_bound(term, new, data, state.weights), gain - price, len(values), new))
+    if not fits:
+        return None
+    possible = [each for each in fits if not each[0]] or fits
+    most = max(each[1] for each in possible)
+    near = [each for each in possible if each[1] >= NEARLY * most]
+    return min(near, key=lambda each: (each[2], -each[1]))[3]
 
 
 def prune(state: State, data: Data) -> State:

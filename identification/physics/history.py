@@ -53,6 +53,8 @@ class History:
     """rev/s per unit of the driver, where both are steady; of no use without a rate."""
     spacing: float = 1.0
     """s between thrust samples."""
+    jitter: float = 0.001
+    """s by which the time stamps of the thrust may be off."""
     rate_spacing: float = 1.0
     lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     """(M,) or (1,): driver at the samples less its mean over the interval: ticks may keep step with samples."""

@@ -14,32 +14,50 @@ from identification.recording import Floats
 
 
 def slip(history: History, x: Floats, k: float) -> Floats:
-    """(M,) measured rate / k minus x: taken where the rate was measured, a straight line between."""
+    """(M,) measured rate / k minus x: a share of x that drifts, or an amount that does, whichever foretells it better."""
     rows = history.rate_rows
     if history.rate is None or history.rate_sampled is None or rows.size < 2:
         return np.zeros_like(x)
+    at = history.rate_sampled[rows]
     there = reconstructed(x, history.middle, history.rate_sampled)[rows]
-    out: Floats = np.interp(history.middle, history.rate_sampled[rows], calmed(history.rate[rows] / k - there))
+    gap = history.rate[rows] / k - there
+    amount, missed = calmed(gap, np.ones_like(gap))
+    share, missed_by_share = calmed(gap, there)
+    if missed_by_share < missed:
+        out: Floats = x * np.interp(history.middle, at, share)
+        return out
+    out = np.interp(history.middle, at, amount)
     return out
 
 
-def calmed(value: Floats) -> Floats:
-    """Running mean over as many neighbours as foretell a value best (leave-one-out): noise would hide the coupling."""
-    total = np.concatenate([[0.0], np.cumsum(value)])
+def calmed(value: Floats, basis: Floats) -> tuple[Floats, float]:
+    """Running coefficient of value on a basis (n,), and its leave-one-out error: over as many neighbours as err least.
+
+    The noise of the rate would hide the coupling. One alone, as measured, errs by what a straight line through both
+    neighbours would.
+    """
+    if value.size < LEAST_ROWS:
+        return np.divide(value, basis, out=np.zeros_like(value), where=basis != 0), float(np.mean(value**2))
+    power = np.concatenate([[0.0], np.cumsum(basis**2)])
+    product = np.concatenate([[0.0], np.cumsum(basis * value)])
     index = np.arange(value.size)
-    best, error = value, np.inf
+    tiny = 1e-9 * power[-1] / value.size
+    alone = value[1:-1] - 0.5 * (value[2:] + value[:-2])
+    best = np.divide(value, basis, out=np.zeros_like(value), where=basis**2 > tiny)
+    error = float(np.mean(alone**2)) if basis.std() == 0 else np.inf
     for reach in REACHES:
         if 2 * reach + 1 > value.size // 4:
             break
         low, high = np.maximum(index - reach, 0), np.minimum(index + reach + 1, value.size)
-        many = high - low
-        mean = (total[high] - total[low]) / many
-        missed = float(np.mean(((value - mean) * many / np.maximum(many - 1, 1)) ** 2))
+        b2, by = power[high] - power[low], product[high] - product[low]
+        others = np.maximum(b2 - basis**2, tiny)
+        missed = float(np.mean((value - basis * (by - basis * value) / others) ** 2))
         if missed < error:
-            best, error = mean, missed
-    return best
+            best, error = by / np.maximum(b2, tiny), missed
+    return best, error
 
 
+LEAST_ROWS = 8
 REACHES = (1, 2, 4, 8, 16, 32, 64, 128)
 """Rows on either side."""
 

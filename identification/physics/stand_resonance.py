@@ -11,6 +11,9 @@ from identification.physics.filters import resonant
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
+TRIED = 18
+"""Frequencies to look for it with."""
+
 
 @dataclass(frozen=True, slots=True)
 class StandResonance:
@@ -31,10 +34,13 @@ class StandResonance:
         )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return tuple((1.0, f, 0.15) for f in np.geomspace(0.5, max(0.25 / scale.interval, 0.6), 7))
+        return tuple((1.0, float(f), 0.1) for f in np.geomspace(0.5, max(0.4 / scale.interval, 0.6), TRIED))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return ()
+        # ringing that is out of phase after a cycle or two looks like nothing: no slope leads there
+        most = self.parameters(scale)[1].high
+        near = values[1] * np.geomspace(0.6, 1.6, 31)
+        return tuple((values[0], float(min(f, most)), damping) for f in near for damping in (0.03, 0.1))
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         rung = resonant(value, now.history.dt, theta[1], theta[2])

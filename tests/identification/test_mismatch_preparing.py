@@ -135,8 +135,9 @@ def test_every_sample_clear_of_a_step_is_in_one_interval(rate):
     r = stepped(rate)
     h = history_of(r)
     t, f = r.channels[1].time, r.channels[1].value
-    late = t - CHANGES[np.maximum(np.searchsorted(CHANGES, t + 0.002, side="right") - 1, 0)]
-    clear = (late > 0.003) | (t < CHANGES[1] - 0.002)  # the first row, 0 V, is no step
+    before, after = min(0.002, 0.1 / rate), min(0.003, 0.1 / rate)
+    late = t - CHANGES[np.maximum(np.searchsorted(CHANGES, t + before, side="right") - 1, 0)]
+    clear = (late > after) | (t < CHANGES[1] - before)  # the first row, 0 V, is no step
     if t.size >= 4 * CHANGES.size:
         t, f = t[clear], f[clear]
     assert h.count.sum() == t.size
@@ -168,7 +169,7 @@ def test_intervals_are_short_after_a_step_and_grow():
     inner = h.middle > 5.1
     assert h.dt[inner & (since < 0.03)].max() <= 0.0126
     assert np.median(h.dt[inner & (since > 4.0)]) > 0.1
-    assert h.dt.max() < 0.3
+    assert h.dt.max() < 0.5
     assert h.edges.size < 0.4 * 40 * 200
 
 
