@@ -15,6 +15,9 @@ import socket
 import sys
 from pathlib import Path
 
+import numpy as np
+
+from identification.recording import Floats
 from identification.watching import Alarm, Settings, Watch
 from rig.errors import LinkError, RigError, TwinError
 from rig.link import Message, Peer
@@ -85,7 +88,7 @@ def settings_of(run: Watched) -> Settings:
 
 def feed(watch: Watch, run: Watched, rows: Rows) -> None:
     """Rows of one stream, each channel to where it belongs."""
-    time = (rows.t_ns - run.t0_ns) * 1e-9
+    time: Floats = (rows.t_ns - run.t0_ns).astype(np.float64) * 1e-9
     for column, quantity in run.streams[rows.stream].columns:
         value = rows.values[:, column]
         match quantity:

@@ -7,13 +7,13 @@ from typing import Final
 
 from identification.watching.signatures import Place
 
-WHERE: Final[dict[Place, str]] = {
-    "zero": "at rest and while running alike",
+WHERE: Final[dict[Place, str]] = {  # a headline fits into 80 columns
+    "zero": "at rest and running alike",
     "running": "while running, in both directions",
     "forward": "while running forward",
     "reverse": "while running in reverse",
-    "high": "at high levels, more than in proportion to thrust",
-    "bus": "while running, along with the bus voltage",
+    "high": "at high levels above all",
+    "bus": "while running, with bus voltage",
 }
 LOOK: Final[dict[Place, str]] = {
     "zero": "look at the cell's zero and what pulls on it: cables, struts, temperature; a rest at 0 V shows it alone",

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 from textual.pilot import Pilot
 
 from rig.console.app import ConsoleApp
-from rig.messages import Progress, Snapshot
+from rig.messages import LogLine, Progress, Snapshot
 
-from .feeds import CHECKS, ManualClock, PlayedFeed, campaign, running, snapshot
+from .feeds import CHECKS, LOG, ManualClock, PlayedFeed, campaign, running, snapshot
 
 
 @dataclass(frozen=True)
@@ -30,6 +30,14 @@ STALE = tuple(
     for r in running().readings
 )  # fmt: skip
 
+HEADLINE = "thrust -2.6 % (-4.3 N) while running, in both directions, since 32 s"
+MISMATCH = LogLine(
+    46.2,
+    "warning",
+    f"mismatch: {HEADLINE} (between 30 and 36 s), ± 0.3 N; e-value 4.8e+04; look at the propeller and at what drives "
+    "it; the zero at rest has not moved with it",
+)
+
 SCENES = {
     "preflight": Scene((snapshot("preflight"),)),
     "preflight_failed": Scene((snapshot("preflight", checks=FAILED),)),
@@ -38,6 +46,7 @@ SCENES = {
     "time": Scene((running(),), keys=("3",)),
     "events": Scene((running(),), keys=("4",)),
     "limit": Scene((running(readings=STALE),)),
+    "mismatch": Scene((running(log=(*LOG, MISMATCH), log_count=len(LOG) + 1, mismatch=HEADLINE),)),
     "mount": Scene((
         running("mount", thruster="T3", command=0.0, points=(), trace=(), mounted_by_hand=True,
                 progress=Progress(0, 0, 0.0, 0.0, 1, 2, 60.0, 241.0, 0.2)),)),
