@@ -23,7 +23,7 @@ def chi2_sf(x: Floats | float, dof: float) -> Floats:
     >>> round(float(chi2_sf(3.841459, 1)), 4)
     0.05
     """
-    out: Floats = chdtrc(dof, np.maximum(x, 0.0))
+    out: Floats = np.asarray(chdtrc(dof, np.maximum(x, 0.0)), dtype=np.float64)
     return out
 
 
@@ -46,13 +46,13 @@ def student_sf(x: Floats | float, dof: float) -> Floats:
 
 def fisher_sf(x: Floats | float, above: float, below: float) -> Floats:
     """P(Fisher's F of `above` and `below` degrees of freedom > x)."""
-    out: Floats = fdtrc(above, below, np.maximum(x, 0.0))
+    out: Floats = np.asarray(fdtrc(above, below, np.maximum(x, 0.0)), dtype=np.float64)
     return out
 
 
 def gamma_sf(x: Floats | float, shape: float) -> Floats:
     """P(gamma variate of `shape` and scale 1 > x)."""
-    out: Floats = gammaincc(shape, np.maximum(x, 0.0))
+    out: Floats = np.asarray(gammaincc(shape, np.maximum(x, 0.0)), dtype=np.float64)
     return out
 
 

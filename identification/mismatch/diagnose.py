@@ -34,7 +34,6 @@ from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.search import Found, State, prune, search
 from identification.mismatch.sweeps import Limits
 from identification.mismatch.twinning import starting, unfit, with_twin
-from identification.mismatch.vehicle.diagnose import diagnose_vehicle
 from identification.physics.history import History
 from identification.physics.term import Term
 from identification.recording import Recording
@@ -62,6 +61,8 @@ def diagnose(
     `without`: ids of effects taken out of the catalogue (what does the tool say of a physics that it does not know?).
     """
     if any(r.kind == "vehicle" for r in recordings):
+        from identification.mismatch.vehicle.diagnose import diagnose_vehicle  # as much again to start, for a few
+
         return diagnose_vehicle(recordings, holdout, seed, without=without)
     histories = _histories(recordings)
     if isinstance(histories, Refusal):

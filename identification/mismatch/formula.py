@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from scipy.stats import chi2 as chi2_law
 
 from identification.mismatch.fitting import Fit, extended, fit
 from identification.mismatch.flexible import Extended, best_over, better, split
@@ -28,6 +27,7 @@ from identification.physics.formula_form import times as multiplied
 from identification.physics.free_form import Flexible
 from identification.physics.history import History
 from identification.recording import Floats
+from identification.tails import chi2_sf
 
 MOST_DEGREE = 3
 TIMES: tuple[Times, ...] = ("1", "F", "|F|")
@@ -246,7 +246,7 @@ def halves(term: Formula, state: State, data: Data) -> float:
     Q, C = rest[:, :q], orthogonal_basis(rest[:, q:])
     Q = orthogonal_basis(Q - C @ (C.T @ Q))
     score = Q.T @ state.fit.residual[:n]
-    return float(chi2_law.sf(float(score @ score), Q.shape[1])) if Q.shape[1] else 1.0
+    return float(chi2_sf(float(score @ score), Q.shape[1])) if Q.shape[1] else 1.0
 
 
 def _less(term: Formula, fitted: Fit) -> Theta:

@@ -114,7 +114,8 @@ def averaged(value: Floats, rate: float, segment: int) -> tuple[Floats, Floats]:
     power = np.abs(rfft((parts - parts.mean(axis=1, keepdims=True)) * window)) ** 2
     density: Floats = power.mean(axis=0) / (rate * float(window @ window))
     density[1 : (segment + 1) // 2] *= 2
-    return np.arange(density.size) * (rate / segment), density
+    frequency: Floats = np.arange(density.size, dtype=np.float64) * (rate / segment)
+    return frequency, density
 
 
 def smoothed(value: Floats, width: float) -> Floats:
