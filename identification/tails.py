@@ -34,13 +34,13 @@ def chi2_isf(p: float, dof: float) -> float:
 
 def normal_sf(x: Floats | float) -> Floats:
     """P(standard normal > x)."""
-    out: Floats = ndtr(np.negative(x))
+    out: Floats = np.asarray(ndtr(np.negative(x)), dtype=np.float64)
     return out
 
 
 def student_sf(x: Floats | float, dof: float) -> Floats:
     """P(Student's t of `dof` > x)."""
-    out: Floats = stdtr(dof, np.negative(x))
+    out: Floats = np.asarray(stdtr(dof, np.negative(x)), dtype=np.float64)
     return out
 
 
