@@ -71,8 +71,11 @@ def require_runnable(campaign: Path, thrusters: tuple[str, ...], *, headless: bo
 
 def run_campaign(campaign: Path, folder: Path, thrusters: tuple[str, ...], front: FrontEnd) -> int:
     """Start a controller in `folder` and attend it to its end; the exit status."""
-    run, _process = start_controller(campaign, folder, thrusters)
-    return follow(run, front)
+    run, process = start_controller(campaign, folder, thrusters)
+    try:
+        return follow(run, front)
+    finally:
+        process.poll()  # one that has ended leaves nothing behind: more runs may follow in this process
 
 
 @click.command("console")

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from identification.mismatch.diagnosis import Diagnosis
     from identification.mismatch.settle import Course, End
 
-OPENING = 8.0
-"""s that a run takes beside its plan: ports, preflight, mounting, closing the file; seen on the simulated bench."""
+OPENING = 20.0
+"""s of a run beside its plan: ports, preflight, mounting, closing, table; seen on a loaded two-core machine."""
 FLOW_PATIENCE = 300.0
 """s that a command may take to bring the water to its speed."""
 

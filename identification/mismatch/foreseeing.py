@@ -112,11 +112,16 @@ class Bench:
             within=np.zeros(driver.size),
             others=others,
             rate_per_driver=first.rate_per_driver,
+            spacing=first.spacing,
+            jitter=first.jitter,
+            rate_spacing=first.rate_spacing,
+            tick=first.tick,
         )
-        if not self.data.with_rate:
+        if "rotation_rate" not in others:
             return history
         many = _counts(edges, self.rate_sampling)
-        return replace(history, rate=np.where(many > 0, 0.0, np.nan), rate_count=many, rate_sampled=history.sampled)
+        rate = np.where(many > 0, others["rotation_rate"], np.nan)
+        return replace(history, rate=rate, rate_count=many, rate_sampled=history.sampled)
 
     def outlook(self, fits: Sequence[Fit], runs: Sequence[Sequence[PlanStep]]) -> tuple[tuple[Outlook, ...], Floats]:
         """What each model says of these runs, all whitened alike, with the noise of the present answer.
