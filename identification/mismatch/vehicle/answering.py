@@ -9,10 +9,10 @@ from scipy.stats import chi2 as chi2_law
 
 from identification.mismatch.diagnosis import Curves, Finding, Mismatch, RivalFinding, Unexplained, Value, Where
 from identification.mismatch.vehicle.fitting import Fit
-from identification.mismatch.vehicle.left import ALARM, Left, Structure, place_of
+from identification.mismatch.vehicle.left import ALARM, BACK, Left, Structure, place_of
 from identification.mismatch.vehicle.naming import Named
 from identification.mismatch.vehicle.runs import Prepared
-from identification.mismatch.vehicle.search import State
+from identification.mismatch.vehicle.search import Found, State
 from identification.recording import Floats
 
 MOST_PLACES = 3
@@ -107,6 +107,24 @@ def places_of(left: Left, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
         )
         out.append(Mismatch(channel, where, structure.share, structure.p_value, says[0].upper() + says[1:]))
     return tuple(out)
+
+
+def place_of_findings(left: Left, found: Found, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
+    """Where no free force shows through slow noise, but named terms do: over the coordinate that the first shows in."""
+    own = found.after.terms[0].coordinates
+    structure = next((s for s in left.structures if s.coordinate.quantity in own), None)
+    structure = structure or next(iter(left.structures), None)
+    if structure is None:
+        return ()
+    gain = found.before.fit.chi2 - found.after.fit.chi2
+    count = sum(map(len, found.after.fit.layout.parts))
+    p = max(float(chi2_law.sf(gain, count)), BACK)
+    where, share = where_of(structure), gain / found.before.fit.chi2
+    says = (
+        f"What was found explains {100 * share:.2g} % of the whitened residual together; of a free force over "
+        f"{structure.coordinate.quantity} most would act at {_place(where, data)}."
+    )
+    return (Mismatch(channel, where, share, p, says),)
 
 
 def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Unexplained | None:

@@ -13,6 +13,7 @@ from identification.mismatch.vehicle.answering import (
     baseline_words,
     curves_of,
     findings_of,
+    place_of_findings,
     places_of,
     ties,
     unexplained_of,
@@ -138,7 +139,8 @@ def _places(found: Found, data: Prepared, channel: str, left: Left, rng: np.rand
     """Where the baseline fails; nothing when nothing was found and nothing is left."""
     if not found.after.terms:
         return places_of(left, data, channel)
-    return places_of(judge_left(found.before.fit, found.before.white, data, rng), data, channel)
+    seen = judge_left(found.before.fit, found.before.white, data, rng)
+    return places_of(seen, data, channel) or place_of_findings(seen, found, data, channel)
 
 
 def _added(after: State, data: Prepared, flexible: Structure | None) -> list[Floats]:
