@@ -162,7 +162,8 @@ def _bar(value: float, size: float) -> str:
 
 def _model(d: Diagnosis) -> Iterator[str]:
     terms = "".join(f" + {term}" for term in d.model_terms)
-    yield from _para(f"Model: {d.baseline_model.split(' (')[0]}{terms}; {_values(d.model)}")
+    named = {name: value for name, value in d.model.items() if not name.startswith("flexible:")}  # these have a table
+    yield from _para(f"Model: {d.baseline_model.split(' (')[0]}{terms}; {_values(named)}")
 
 
 def _fit(d: Diagnosis) -> Iterator[str]:
