@@ -16,21 +16,25 @@ COURSE: Final = frozenset({"time"})
 LOAD: Final = frozenset({"load_history", "motor_temperature", "time"})
 STEP: Final = frozenset({"time_since_step", "previous_voltage", "direction_of_change"})
 FLOW: Final = frozenset({"flow_speed"})
+SLIP: Final = frozenset({"rotation_rate"})
+"""Where the rotor leaves the command, a measured rate shows it."""
+UPSTREAM: Final = frozenset({"dead_band", "winding_resistance", "command_saturation", "supply_sag", "motor_lag"})
+"""Act before the rotor: with the rate recorded, "thrust follows the rate" (rotation_coupling) is as true of them."""
 
 PLACES: Final = {
-    "dead_band": LEVEL,
+    "dead_band": LEVEL | SLIP,
     "exponent": LEVEL,
     "linear_term": LEVEL,
-    "winding_resistance": LEVEL,
-    "command_saturation": LEVEL,
+    "winding_resistance": LEVEL | SLIP,
+    "command_saturation": LEVEL | SLIP,
     "load_cell_saturation": SIDE,
     "load_cell_nonlinearity": LEVEL,
     "cavitation": LEVEL,
     "asymmetry": SIDE,
     "torque_crosstalk": SIDE,
-    "supply_sag": LEVEL | LOAD | {"bus_voltage"},
+    "supply_sag": LEVEL | LOAD | SLIP | {"bus_voltage"},
     "heating": LOAD,
-    "motor_lag": STEP,
+    "motor_lag": STEP | SLIP,
     "time_skew": STEP,
     "stand_resonance": STEP | {"frequency"},
     "inflow_dynamics": STEP,
@@ -41,7 +45,7 @@ PLACES: Final = {
     "recirculation": STEP | {"load_history"},
     "load_cell_creep": STEP | {"load_history"},
     "thruster_interaction": COURSE | {"neighbour_thrust"},
-    "rotation_coupling": COURSE | {"rotation_rate", "current"},
+    "rotation_coupling": COURSE | SLIP | {"current"},
     "zero_drift": COURSE,
     "zero_offset": COURSE,
     "periodic_disturbance": COURSE | {"frequency"},

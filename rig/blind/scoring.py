@@ -20,7 +20,7 @@ import numpy as np
 from identification.recording import Floats
 from rig.blind.design import Order
 from rig.blind.meaning import true_values
-from rig.blind.places import PLACES
+from rig.blind.places import PLACES, UPSTREAM
 
 Table = Mapping[str, Any]
 
@@ -145,7 +145,6 @@ def scored(
         return Score(order, hidden, answer["error"], failed=True, seconds=answer["seconds"], case=described(truth))
     found = answer["diagnosis"]
     findings, unexplained = found["findings"], found["unexplained"]
-    twins = truth.get("twins") or [None]
     return Score(
         order=order,
         truth=hidden,
@@ -155,7 +154,7 @@ def scored(
         place=unexplained["where"]["quantity"] if unexplained else "",
         resembles=tuple(unexplained["resembles"]) if unexplained else (),
         statement=found["statement"],
-        near=Near(twins[0]["rival"], twins[0]["left"]) if twins[0] else None,
+        near=nearest(truth),
         held_out=held_out(*thrust, predicted) if thrust and predicted else None,
         intervals=intervals(findings, truth) if len(hidden) == 1 else (),
         seconds=answer["seconds"],
@@ -167,6 +166,14 @@ def concealed(truth: Table) -> tuple[str, ...]:
     """Ids of what is hidden in a case."""
     lie = ("channel_fault",) if truth["fault"] else ()
     return (*(effect["effect"] for effect in truth["effects"]), *lie)
+
+
+def nearest(truth: Table) -> Near | None:
+    """As the world measured it; a measured rate explains what happens before the rotor without knowing what it is."""
+    if truth["effects"] and truth["effects"][0]["effect"] in UPSTREAM and "rotation_rate" in truth["channels"]:
+        return Near("rotation_coupling", 0.0)
+    twins = truth.get("twins")
+    return Near(twins[0]["rival"], twins[0]["left"]) if twins else None
 
 
 def described(truth: Table) -> str:

@@ -146,6 +146,15 @@ def test_twins_are_not_counted_and_listed():
     assert shown["open world: a wrong name instead"].n == 0
 
 
+def test_what_a_measured_rate_explains_is_a_twin():
+    hidden = truth("motor_lag", twins=[{"rival": "time_skew", "form": "", "left": 30.0}])
+    with_rate = hidden | {"channels": ["rotation_rate"]}
+    said = answer("explained", finding("rotation_coupling"))
+    asked = order("removed/motor_lag/0", "motor_lag")
+    assert scored(asked, hidden, said).counted
+    assert not scored(asked, with_rate, said).counted
+
+
 def test_intervals_and_held_out_errors():
     asked, hidden = order("clear/dead_band/0"), truth("dead_band", form="shrink", half_width=0.5)
     told = answer("explained", finding("dead_band", form="shrink", half_width=(0.53, 0.01)))
