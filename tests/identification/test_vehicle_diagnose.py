@@ -74,7 +74,7 @@ def test_a_clean_vehicle_is_adequate() -> None:
 
 
 def test_added_mass_and_an_efficiency_of_all_thrusters_are_rivals() -> None:
-    _, runs, known = made("added_mass", surge_trials()[3:])
+    _, runs, known = made("added_mass", surge_trials()[2:])
     found = diagnosed(runs, known)
     assert found.verdict == "ambiguous"
     named = {f.effect for f in found.findings} | {r.effect for f in found.findings for r in f.rivals}

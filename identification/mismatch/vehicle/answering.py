@@ -13,7 +13,6 @@ from identification.mismatch.vehicle.left import ALARM, BACK, Left, Structure, p
 from identification.mismatch.vehicle.naming import Named
 from identification.mismatch.vehicle.runs import Prepared
 from identification.mismatch.vehicle.search import Found, State
-from identification.recording import Floats
 
 MOST_PLACES = 3
 LAGS = 20
@@ -161,13 +160,13 @@ def whiteness(state: State) -> float:
     return float(chi2_law.sf(statistic, dof)) if dof else 1.0
 
 
-def curves_of(before: Fit, after: Fit, data: Prepared, added: Sequence[Floats]) -> tuple[Curves, ...]:
-    """What a report draws; `added` (n,) per run: what a flexible force puts on top of the model."""
+def curves_of(before: Fit, after: Fit, data: Prepared) -> tuple[Curves, ...]:
+    """What a report draws."""
     out = []
-    for run, old, new, more in zip(data.runs, before.predicted, after.predicted, added, strict=True):
+    for run, old, new in zip(data.runs, before.predicted, after.predicted, strict=True):
         command = np.mean(np.sign(run.arms)[:, None] * run.moment.volts.mean(axis=2), axis=0)
         at = np.clip(((run.time - run.start) / run.moment.step).astype(int), 0, run.steps - 1)
-        out.append(Curves(run.recording_id, run.time, command[at], run.response, old, new + more))
+        out.append(Curves(run.recording_id, run.time, command[at], run.response, old, new))
     return tuple(out)
 
 

@@ -21,14 +21,15 @@ from identification.mismatch.vehicle.answering import (
     whiteness,
 )
 from identification.mismatch.vehicle.experiment import propose
-from identification.mismatch.vehicle.judging import free_force, held_out, only, residuals, rms
-from identification.mismatch.vehicle.left import ALARM, Left, Structure, free_columns, judge_left
+from identification.mismatch.vehicle.free_force import with_free_force
+from identification.mismatch.vehicle.judging import held_out, only, residuals, rms
+from identification.mismatch.vehicle.left import ALARM, Left, judge_left
 from identification.mismatch.vehicle.naming import EQUAL, Named, name
 from identification.mismatch.vehicle.runs import Prepared, prepare
 from identification.mismatch.vehicle.screening import applicable
 from identification.mismatch.vehicle.search import Found, State, search
 from identification.mismatch.vehicle.setup import VehicleSetup, axis_of, straight_ahead
-from identification.recording import Floats, Recording
+from identification.recording import Recording
 
 NO_SETUP = VehicleSetup()
 
@@ -91,9 +92,8 @@ def _diagnosed(
     found = replace(found, after=after)
     left = judge_left(after.fit, after.white, data, rng)
     earned, doubted = [n for n in named if not n.doubts], [n for n in named if n.doubts]
-    flexible = left.structures[0] if left.p_value < ALARM else None
+    last = with_free_force(after, data, left.structures[0]) if left.p_value < ALARM else after
     unexplained = unexplained_of(left, doubted, data)
-    added = _added(after, data, flexible)
     n, p = after.fit.residual.size, int(np.sum(after.fit.free))
     channel = _channel(data)
     return Diagnosis(
@@ -105,18 +105,18 @@ def _diagnosed(
         mismatch=_places(found, data, channel, left, rng),
         findings=findings_of(earned, after, data),
         unexplained=unexplained,
-        model_terms=tuple(term.id for term in after.terms),
-        model=values_of(after.fit, data),
+        model_terms=tuple(term.id for term in last.terms),
+        model=values_of(last.fit, data),
         train=Rmse(
             rms(residuals(found.before.fit, data)),
-            rms([r - a for r, a in zip(residuals(after.fit, data), added, strict=True)]),
+            rms(residuals(last.fit, data)),
         ),
-        heldout=held_out(found.before, after, data, unseen, flexible),
+        heldout=held_out(found.before, last, data, unseen),
         chi2_per_dof=after.fit.chi2 / max(n - p, 1),
         whiteness_p=whiteness(after),
         next_experiment=propose(after, earned, data) if unexplained is None else None,
         notes=(*ties(data, after.fit, unseen_effects), *_noise_note(after, data)),
-        curves=curves_of(found.before.fit, after.fit, data, added),
+        curves=curves_of(found.before.fit, last.fit, data),
         response=channel,
         unit=data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit,
         force_unit=data.scale.force_unit,
@@ -141,14 +141,6 @@ def _places(found: Found, data: Prepared, channel: str, left: Left, rng: np.rand
         return places_of(left, data, channel)
     seen = judge_left(found.before.fit, found.before.white, data, rng)
     return places_of(seen, data, channel) or place_of_findings(seen, found, data, channel)
-
-
-def _added(after: State, data: Prepared, flexible: Structure | None) -> list[Floats]:
-    """(n,) per run: what the flexible force changes, to first order."""
-    if flexible is None:
-        return [np.zeros(run.time.size) for run in data.runs]
-    beta = free_force(after.fit, data, flexible, after)
-    return [c @ beta for c in free_columns(after.fit, data, flexible.coordinate)]
 
 
 def _noise_note(after: State, data: Prepared) -> tuple[str, ...]:

@@ -132,7 +132,7 @@ def _measured(recording: Recording, axis: str) -> Measured | Refusal:
 def _finite(channel: Channel) -> tuple[Floats, Floats]:
     good = np.isfinite(channel.value) & np.isfinite(channel.time)
     time, value = channel.time[good], channel.value[good]
-    kept = np.append(True, np.diff(time) > 0)
+    kept = np.diff(time, prepend=-np.inf) > 0
     return time[kept], value[kept]
 
 
@@ -262,7 +262,15 @@ def _run(
         at.append(tuple(range(ends, ends + len(thruster.names))))
         ends += len(thruster.names)
     heading = np.full(middle.size, np.nan) if axis == "yaw" else _heading(recording, middle)
-    moment = Moment(scale, grid.step, np.array([grid.volts[name] for name in names]), active, heading, ballast)
+    moment = Moment(
+        scale,
+        grid.step,
+        np.array([grid.volts[name] for name in names]),
+        active,
+        heading,
+        ballast,
+        recording.recording_id,
+    )
     rows = Rows(time, count, np.ones(time.size), width)
     arms = np.array([t.arms[axis] for t in installation.thrusters])
     return Run(recording.recording_id, quantity, time, value, rows, grid.start, arms, tuple(at), moment, installation)

@@ -89,6 +89,8 @@ class Moment:
     heading: Floats
     """(g,) rad; NaN where it was not recorded."""
     ballast: str = ""
+    run: str = ""
+    """Recording id."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -104,8 +106,8 @@ class Body:
     """N/(m/s)^2 for each m of line paid out."""
     line_pull: float = 0.0
     """N/m towards where the line comes from."""
-    steady: float = 0.0
-    """N"""
+    steady: Floats | float = 0.0
+    """N; (g,) where it is not the same throughout."""
     water: Floats = field(default_factory=lambda: np.zeros(1))
     """(g,) or (1,) m/s of the water along the axis."""
 

@@ -1,0 +1,88 @@
+"""A force of any shape over one coordinate: what stands in the model for physics that no term carries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import ClassVar
+
+from identification.mismatch.vehicle.fitting import Fit, fit
+from identification.mismatch.vehicle.left import Coordinate, Structure, coordinates
+from identification.mismatch.vehicle.model import Layout, VehicleModel, layout_of, with_term
+from identification.mismatch.vehicle.runs import Prepared
+from identification.mismatch.vehicle.search import State
+from identification.physics.term import Parameter
+from identification.physics.vehicle.term import Body, Moment, Scale, Stage, Untouched
+from identification.recording import Floats
+
+MOST = 5.0
+"""Of the largest force."""
+LOCAL = ("time", "run")
+"""Coordinates that say nothing of other runs."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class FreeForce(Untouched):
+    """N at the knots, straight lines between."""
+
+    id: ClassVar[str] = "free_force"
+    stage: ClassVar[Stage] = "body"
+    physics: ClassVar[str] = "a force that no effect of the catalogue carries"
+    form: ClassVar[str] = ""
+    coordinate: Coordinate
+    bumps: Mapping[str, Floats]
+    """run -> (g, b)"""
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        return (self.coordinate.quantity,)
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        most = MOST * scale.force
+        return tuple(Parameter(f"at[{knot:.3g}]", scale.force_unit, -most, most, 0.0) for knot in self.coordinate.knots)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ((0.01 * scale.force,) * self.coordinate.knots.size,)
+
+    def on_body(self, body: Body, now: Moment, theta: tuple[float, ...]) -> Body:
+        bumps = self.bumps.get(now.run)
+        return body if bumps is None else replace(body, steady=body.steady + bumps @ theta)
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        most = max(map(abs, theta))
+        over_what = self.coordinate.quantity.replace("_", " ")
+        return (
+            f"A force over {over_what}, up to {most:.3g} {scale.force_unit}, that no effect of the catalogue carries."
+        )
+
+
+def over(coordinate: Coordinate, data: Prepared) -> FreeForce:
+    return FreeForce(coordinate, {run.recording_id: coordinate.bumps(j) for j, run in enumerate(data.runs)})
+
+
+def with_free_force(state: State, data: Prepared, structure: Structure) -> State:
+    """The model with a free force over the coordinate that is clearest, everything fitted anew."""
+    term = over(structure.coordinate, data)
+    zeros = [0.0] * structure.coordinate.knots.size
+    layout, theta = with_term(state.fit.layout, data, state.fit.theta, term, zeros)
+    found = fit(layout, theta, data, state.white, state.fit.motions)
+    return State(found, state.noise, state.white)
+
+
+def free_index(layout: Layout) -> int | None:
+    """Which term is a free force."""
+    return next((i for i, term in enumerate(layout.model.terms) if isinstance(term, FreeForce)), None)
+
+
+def carried(layout: Layout, index: int, bare: Fit, unseen: Prepared) -> Layout:
+    """The same model for other runs, whose coordinate is taken from `bare`: their motion without the free force."""
+    terms = list(layout.model.terms)
+    term = terms[index]
+    if not isinstance(term, FreeForce):
+        raise TypeError(f"term {index} is {term.id}, not a free force")
+    there = next((c for c in coordinates(bare, unseen) if c.quantity == term.coordinate.quantity), None)
+    known = there is not None and there.quantity not in LOCAL
+    terms[index] = (
+        over(replace(there, knots=term.coordinate.knots), unseen) if known and there else replace(term, bumps={})
+    )
+    return layout_of(VehicleModel(tuple(terms)), unseen)
