@@ -95,8 +95,13 @@ def integral(value: Floats, edges: Floats, at: Floats) -> Floats:
 
 def delayed(value: Floats, edges: Floats, delay: float) -> Floats:
     """Means over each interval of value(t - delay)."""
-    out: Floats = np.diff(integral(value, edges, edges - delay)) / np.diff(edges)
-    return out
+    dt = edges[1:] - edges[:-1]
+    if abs(delay) > float(dt.min()):
+        out: Floats = np.diff(integral(value, edges, edges - delay)) / dt
+        return out
+    # of each interval only a part beside its edge is the neighbour's
+    beside = np.concatenate([value[:1], value[:-1]]) if delay > 0 else np.concatenate([value[1:], value[-1:]])
+    return value + (beside - value) * (abs(delay) / dt)
 
 
 def reconstructed(mean: Floats, middle: Floats, at: Floats) -> Floats:

@@ -6,7 +6,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import welch
 
 from identification.mismatch.spectrum import averaged, smoothed
-from identification.physics.filters import lag, lowpass, play, reconstructed, recursion
+from identification.physics.filters import delayed, integral, lag, lowpass, play, reconstructed, recursion
 
 
 def _play(value, width):
@@ -85,3 +85,12 @@ def test_averaged_is_welch(segment):
 def test_smoothed_is_a_gaussian_filter(width):
     value = np.random.default_rng(4).normal(size=777) + 5.0
     np.testing.assert_allclose(smoothed(value, width), gaussian_filter1d(value, width, mode="nearest"), rtol=1e-10)
+
+
+@pytest.mark.parametrize("delay", [-0.02, -0.004, 0.0, 0.004, 0.02, 3.0])
+def test_delayed_is_the_mean_of_what_was_earlier(delay):
+    rng = np.random.default_rng(5)
+    edges = np.concatenate([[1.0], 1.0 + np.cumsum(rng.uniform(0.005, 0.1, 300))])
+    value = rng.normal(size=300)
+    expected = np.diff(integral(value, edges, edges - delay)) / np.diff(edges)
+    np.testing.assert_allclose(delayed(value, edges, delay), expected, atol=1e-9)
