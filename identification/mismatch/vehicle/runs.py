@@ -52,8 +52,7 @@ class Run:
     @property
     def edges(self) -> Floats:
         """(g + 1,) s."""
-        out: Floats = self.start + self.moment.step * np.arange(self.steps + 1)
-        return out
+        return np.asarray(self.start + self.moment.step * np.arange(self.steps + 1), dtype=np.float64)
 
 
 @dataclass(frozen=True, eq=False)
