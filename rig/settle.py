@@ -94,18 +94,11 @@ class Settling:
         """The plans of the next experiment: one for each flow speed, none when there is no experiment."""
         if found.next_experiment is None:
             return ()
-        if not found.baseline_model.endswith("V|V|"):
-            raise ConfigError(
-                f"{self.files[0]}: the recordings hold no command in V ({found.baseline_model}), so the rig cannot run "
-                "what they ask for; expected recordings with command_voltage"
-            )
         return write_next(found, self.campaign, self.folder / f"round-{number}.toml", attended=True)
 
     def _needs(self, plans: Sequence[Path]) -> float:
-        """S until the plans are run and diagnosed. Checks each as `rig check` does."""
-        from rig.check import check_campaign
-
-        return sum(check_campaign(plan).run.expected + OPENING for plan in plans) + self.thinking
+        """S until the plans are run and diagnosed."""
+        return sum(_expected(load_campaign(plan)) for plan in plans) + self.thinking
 
     def _run(self, plans: Sequence[Path]) -> list[Path]:
         """The recordings of the plans, each run as `rig run --headless` runs it. Raises RigError when one is aborted.
@@ -127,12 +120,18 @@ class Settling:
         return made
 
 
-def fixed_cost(campaign: CampaignConfig) -> float:
-    """S of a run beside its sweep: opening, watchdog proof, both tares and the rest before the last."""
+def _expected(campaign: CampaignConfig) -> float:
+    """S of one run of the plan, with its opening and the watchdog proof."""
     from rig.sequencer import settings_for
 
     proof = settings_for(campaign, "").proof
-    return OPENING + 2 * campaign.tare.duration + campaign.plan.rest + (proof.expected if proof else 0.0)
+    return OPENING + campaign.plan.duration().expected + (proof.expected if proof else 0.0)
+
+
+def fixed_cost(campaign: CampaignConfig) -> float:
+    """S of a run beside its sweep: opening, watchdog proof, both tares and the rest before the last."""
+    plan = campaign.plan
+    return _expected(campaign) - plan.duration().expected + 2 * campaign.tare.duration + plan.rest
 
 
 def bench_alone(bench: Path, thruster: str, folder: Path) -> CampaignConfig:
@@ -168,8 +167,6 @@ def _settling(
     files: Sequence[Path], campaign: Path | None, bench: Path | None, output: Path | None, budget: str, seed: int
 ) -> Settling:
     """Everything known wrong is said here, before anything is computed or opened."""
-    from rig.hdf5 import load
-
     if (campaign is None) == (bench is None):
         raise ConfigError("give either --campaign FILE (bench, pacing and tare) or --bench FILE (the rest by default)")
     time_left = seconds(budget, "--budget")
@@ -177,7 +174,12 @@ def _settling(
     given = None if campaign is None else load_campaign(campaign)
     if given is None and output is None:
         raise ConfigError("--bench needs --output, the folder for the recordings: there is no campaign that names one")
-    thruster = load(paths[0]).thruster
+    thruster = _thruster(paths[0])
+    if given is not None and thruster not in given.thrusters:
+        raise ConfigError(
+            f"{given.path}: the recordings are of thruster {thruster}, but the campaign has "
+            f"{', '.join(given.thrusters)}; give the campaign they were made with"
+        )
     where = output if output is not None or given is None else given.output
     assert where is not None
     folder = campaign_folder(where, f"settle {thruster}")
@@ -185,6 +187,19 @@ def _settling(
         assert bench is not None
         given = bench_alone(bench, thruster, folder)
     return Settling(given, folder, paths, time_left, seed)
+
+
+def _thruster(path: Path) -> str:
+    """Of a recording whose command the rig can give again. Raises ConfigError."""
+    from rig.hdf5 import load
+
+    recording = load(path)
+    if not any(recording.all_of(quantity) for quantity in ("command_voltage", "motor_voltage")):
+        raise ConfigError(
+            f"{path}: the recording holds no voltage, so the rig cannot run what a diagnosis asks for; expected a "
+            "recording with command_voltage"
+        )
+    return recording.thruster
 
 
 PATH = click.Path(path_type=Path)

@@ -1,0 +1,96 @@
+"""rig settle: what is refused before the bench is touched, and what it takes from bench and campaign."""
+
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from rig.cli import main
+from rig.errors import ConfigError, RigError
+from rig.hdf5 import RecordingFile
+from rig.loading import load_campaign
+from rig.recorder_messages import ChannelSpec, Rows, StreamSpec
+from rig.settle import Settling, bench_alone, by_command, fixed_cost
+
+RIGHT = Path(__file__).parent / "wrong" / "right.toml"
+BENCH = Path(__file__).parents[2] / "benches" / "simulated" / "bench.toml"
+
+
+@pytest.fixture
+def recording(tmp_path):
+    """One that two shapes describe: two levels of a thruster `thruster`, driven by `quantity`."""
+
+    def write(thruster="T1", quantity="command_voltage", unit="V"):
+        path = tmp_path / f"{thruster}-{quantity}.h5"
+        start, level = np.array([0.0, 3.0, 7.0, 11.0]), np.array([0.0, 10.0, 20.0, 0.0])
+        t = np.arange(0.0, 14.0, 0.05)
+        V = level[np.searchsorted(start, t, side="right") - 1]
+        F = 0.4 * np.maximum(V - 0.8, 0.0) ** 2 + 0.3 * np.random.default_rng(1).standard_normal(t.size)
+        specs = [("command", quantity, unit), ("load_cell", "thrust", "N")]
+        streams = [StreamSpec(name, "test", (ChannelSpec(q, q, u),)) for name, q, u in specs]
+        attributes = {"recording_id": "first", "thruster": thruster, "kind": "tunnel", "software": "test"}
+        file = RecordingFile(path, attributes, streams, t0_ns=0)
+        rows = [(start, level), (t, F)] if unit == "V" else [(t, V), (t, F)]
+        for k, (time, value) in enumerate(rows):
+            file.add_rows(Rows(k, np.rint(time * 1e9).astype(np.int64), value[:, None]))
+        file.close("completed", "", 14.0)
+        return path
+
+    return write
+
+
+def refused(capsys, *words):
+    assert main(["settle", *map(str, words)]) == 2
+    return capsys.readouterr().err
+
+
+def test_refusals_of_the_command_line(recording, tmp_path, capsys):
+    first = recording()
+    assert "give either --campaign" in refused(capsys, first)
+    assert "give either --campaign" in refused(capsys, first, "--campaign", RIGHT, "--bench", BENCH)
+    assert "--bench needs --output" in refused(capsys, first, "--bench", BENCH)
+    assert "--budget must be a time" in refused(capsys, first, "--campaign", RIGHT, "--budget", "soon")
+    assert "none.h5" in refused(capsys, tmp_path / "none.h5", "--campaign", RIGHT, "--output", tmp_path)
+
+
+def test_a_thruster_that_the_campaign_does_not_have_is_refused(recording, tmp_path, capsys):
+    said = refused(capsys, recording("T9"), "--campaign", RIGHT, "--output", tmp_path)
+    assert "the recordings are of thruster T9" in said
+
+
+def test_levels_in_revolutions_cannot_be_run(recording, tmp_path, capsys):
+    first = recording(quantity="rotation_rate", unit="rev/s")
+    assert "holds no voltage" in refused(capsys, first, "--campaign", RIGHT, "--output", tmp_path)
+
+
+def test_an_experiment_that_does_not_fit_leaves_its_plan_and_moves_nothing(recording, tmp_path, capsys):
+    folder = tmp_path / "out"
+    settling = Settling(load_campaign(RIGHT), folder, [recording()], budget=20.0)
+    folder.mkdir()
+    said = []
+    settling.say = said.append
+    _, course, end = settling.settle()
+    assert (end.reason, course.rounds) == ("budget", ())
+    assert said[0].startswith("first: ambiguous")
+    plan = load_campaign(folder / "round-1.toml")
+    assert not plan.unattended
+    assert plan.bench.path.resolve() == load_campaign(RIGHT).bench.path.resolve()
+
+
+def test_a_bench_alone_is_a_campaign_with_the_defaults(tmp_path):
+    found = bench_alone(BENCH, "T1", tmp_path)
+    assert (found.thrusters, found.plan.slew, found.unattended) == (("T1",), found.bench.slew, False)
+    assert fixed_cost(found) > 2 * found.tare.duration
+    with pytest.raises(ConfigError):
+        bench_alone(tmp_path / "none.toml", "T1", tmp_path)
+
+
+def test_the_flow_is_set_by_a_command(tmp_path):
+    out = tmp_path / "flow"
+    by_command(f"{sys.executable} -c \"open('{out}', 'w').write('{{speed}}')\"")(0.5)
+    assert out.read_text() == "0.5"
+    with pytest.raises(RigError, match="ended with status 3"):
+        by_command(f"{sys.executable} -c 'raise SystemExit(3)'")(0.5)
+    with pytest.raises(RigError, match="could not set 1 m/s"):
+        by_command(str(tmp_path / "no-such-program"))(1.0)
