@@ -127,7 +127,7 @@ def _flexible(f: FlexibleShape) -> Iterator[str]:
 
 
 def _formula(f: FormulaFound) -> Iterator[str]:
-    yield from _para(f"formula (not a physics): {f.text}", "  ")
+    yield from _para(f"formula (not a physics): {f.text} ({f.symbols})", "  ")
     yield from _para(
         f"{_values(f.coefficients)}; not fitted {f.heldout_before:.4g} -> {f.heldout_after:.4g} N; the same in both "
         f"halves with {rarity(f.halves_p)}",

@@ -16,7 +16,7 @@ import numpy as np
 
 from identification.mismatch.fitting import Fit, extended, fit
 from identification.mismatch.flexible import Extended, best_over, better, split
-from identification.mismatch.formula_words import told
+from identification.mismatch.formula_words import legend, told
 from identification.mismatch.judging import Score
 from identification.mismatch.model import Data, Theta, Weights, predict
 from identification.mismatch.remainder import FormulaFound
@@ -87,7 +87,7 @@ def find_formula(extended_by: Extended, data: Data, others: Sequence[History]) -
         if symbols not in same and len(equals) < MOST_EQUALS:
             same.add(symbols)
             equals.append(Formula(other, ()).form)
-    return FormulaFound(text, coefficients, near[plainest], before.rmse, after.rmse, p, tuple(equals))
+    return FormulaFound(text, legend(term), coefficients, near[plainest], before.rmse, after.rmse, p, tuple(equals))
 
 
 def without_flexible(found: Extended, data: Data) -> State:

@@ -38,6 +38,15 @@ def told(term: Formula, fitted: Fit, data: Data) -> tuple[str, dict[str, Value]]
     return "residual = " + "".join(parts), coefficients
 
 
+def legend(term: Formula) -> str:
+    """What its symbols stand for."""
+    symbols = dict.fromkeys(q for m in term.monomials for q, _ in m.powers)
+    words = {"V": "command or motor voltage", "t": "time since the recording began"}
+    known = {q: CHANNELS[q][0] if q in CHANNELS else words.get(q, "") for q in symbols}
+    known |= {q: f"low-pass of {q[q.index('(') + 1 : -1]}, {q[2 : q.index('(')]} s" for q in symbols if q[:2] == "lp"}
+    return ", ".join(f"{q}: {what}" for q, what in known.items())
+
+
 def _number(value: float, std: float) -> str:
     """To the error's second digit at most.
 

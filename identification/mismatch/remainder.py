@@ -51,6 +51,8 @@ class FormulaFound:
 
     text: str
     """`residual = ...`"""
+    symbols: str
+    """What its symbols stand for: `T_w: water_temperature`."""
     coefficients: Mapping[str, Value]
     bic_gain: float
     heldout_before: float
@@ -104,6 +106,7 @@ def _flexible_shape(f: FlexibleShape) -> dict[str, object]:
 def formula_json(f: FormulaFound) -> dict[str, object]:
     return {
         "text": f.text,
+        "symbols": f.symbols,
         "coefficients": _values(f.coefficients),
         "bic_gain": _number(f.bic_gain),
         "heldout": {"rmse_before": _number(f.heldout_before), "rmse_after": _number(f.heldout_after)},

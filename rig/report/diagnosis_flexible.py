@@ -37,7 +37,7 @@ def modelled_remarks(u: Unexplained) -> Iterator[Remark]:
         return
     f = u.formula
     told = "; ".join(f"{name} = {_told(value)}" for name, value in f.coefficients.items())
-    yield Remark(words(f"Formula, not a physics: {f.text}, with {told}."))
+    yield Remark(words(f"Formula, not a physics: {f.text}, with {told} ({f.symbols})."))
     yield Remark(
         f"Alone it takes the error on data that were not fitted from {f.heldout_before:.4g} to {f.heldout_after:.4g} "
         f"N; its coefficients are the same in both halves ({rarity(f.halves_p)})."
@@ -48,7 +48,7 @@ def modelled_remarks(u: Unexplained) -> Iterator[Remark]:
 
 def _told(value: Value) -> str:
     shown, _, unit = value_cells(value)
-    return f"{shown} {unit}".strip()
+    return f"{shown} {unit.replace('degC', '°C')}".strip()
 
 
 def flexible_pictures(u: Unexplained, driver: str) -> Iterator[Picture]:
