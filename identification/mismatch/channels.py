@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -60,10 +62,25 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
         return np.column_stack([np.ones(u.size), u, u**2, u**3, u**4, q / max(float(charge[-1]), 1e-12)])
 
     H = columns(then, drawn)
-    theta = np.linalg.lstsq(H, value, rcond=None)[0]
-    rest = value - H @ theta
-    out: Floats = columns(driven, charge) @ theta + np.interp(at, time, _calm(rest))
+    kept = _fewest(H, value)
+    theta = np.linalg.lstsq(H[:, kept], value, rcond=None)[0]
+    rest = value - H[:, kept] @ theta
+    out: Floats = columns(driven, charge)[:, kept] @ theta + np.interp(at, time, _calm(rest))
     return out
+
+
+def _fewest(H: Floats, value: Floats) -> list[int]:
+    """Columns (the first always) by BIC: every one more brings its share of the channel's noise into the voltage."""
+    n = value.size
+    best, least = [0], np.inf
+    for many in range(H.shape[1]):
+        for others in combinations(range(1, H.shape[1]), many):
+            tried = [0, *others]
+            left = value - H[:, tried] @ np.linalg.lstsq(H[:, tried], value, rcond=None)[0]
+            price = n * np.log(max(float(left @ left), 1e-300)) + len(tried) * np.log(n)
+            if price < least:
+                best, least = tried, price
+    return best
 
 
 def neighbour_at(recording: Recording, at: Floats) -> Floats | None:

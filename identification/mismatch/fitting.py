@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict
 from identification.physics.filters import delayed, reconstructed
-from identification.physics.term import Term
+from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 
 MOST_STEPS = 25
@@ -86,7 +86,7 @@ def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[lis
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
         prompt = promptness(model, theta, history.tick)
-        F = F + prompt * 2 * theta.C * np.abs(x) * history.lead
+        F = F + prompt * theta.C * (2 * np.abs(x) * history.lead + history.excess)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
         thrust.append(reconstructed(F, history.middle, history.sampled)[rows] + theta.tares[i])
@@ -217,13 +217,18 @@ def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:
         if other == term:
             break
         at += len(values)
-    for j, (p, value) in enumerate(zip(term.parameters(data.scale), values, strict=True)):
-        edge = 1e-3 * (p.high - p.low)
-        low = value <= p.low + edge and p.neutral != p.low
-        high = value >= p.high - edge and p.neutral != p.high
-        if (low or high) and (p.neutral is not None or abs(_push(at + j, fitted, data, weights)) > PRESSED):
-            return True
-    return False
+    known = term.parameters(data.scale)
+    ended = [_ends(p, value) for p, value in zip(known, values, strict=True)]
+    inner = [end for p, end in zip(known, ended, strict=True) if p.neutral is None]
+    if (inner and all(inner)) or any(e and p.neutral is not None for p, e in zip(known, ended, strict=True)):
+        return True
+    return any(e and abs(_push(at + j, fitted, data, weights)) > PRESSED for j, e in enumerate(ended))
+
+
+def _ends(p: Parameter, value: float) -> bool:
+    """Whether a value sits at a bound that does not mean that the term is absent."""
+    edge = 1e-3 * (p.high - p.low)
+    return (value <= p.low + edge and p.neutral != p.low) or (value >= p.high - edge and p.neutral != p.high)
 
 
 def _push(j: int, fitted: Fit, data: Data, weights: Weights) -> float:

@@ -24,6 +24,8 @@ GROWTH = 0.06
 """Length of an interval per time since the last change."""
 MOVES = 0.01
 """Share of the largest driver that counts as a change."""
+GAP = 5.0
+"""Spacings without a sample that are a gap."""
 STEP = 0.02
 """Share of the largest driver: a change of a command that is a step."""
 
@@ -80,6 +82,23 @@ class Held:
         out: Floats = np.diff(total) / np.diff(edges)
         return out
 
+    def excess(self, edges: Floats) -> Floats:
+        """(M,) mean of V|V| over each interval less that of the mean V: what a moving driver gives beside its mean."""
+        at = np.union1d(edges, self._knots[(self._knots > edges[0]) & (self._knots < edges[-1])])
+        middle, left, right = 0.5 * (at[1:] + at[:-1]), at[:-1], at[1:]
+        if self.stepwise:
+            index = np.searchsorted(self._knots, middle, side="right") - 1
+            v = np.where(index < 0, 0.0, self.value[np.clip(index, 0, self.time.size - 1)])
+            square = v * np.abs(v)
+        else:
+            a, m, b = (np.interp(t, self.time, self.value) for t in (left, middle, right))
+            square = (a * np.abs(a) + 4 * m * np.abs(m) + b * np.abs(b)) / 6
+        which = np.searchsorted(edges, middle, side="right") - 1
+        total = np.bincount(which, weights=square * (right - left), minlength=edges.size - 1)
+        mean = self.mean(edges)
+        out: Floats = total / np.diff(edges) - mean * np.abs(mean)
+        return out
+
     def changes(self) -> Floats:
         """Times at which it has moved by MOVES of its size since the last such time."""
         step = MOVES * float(np.max(np.abs(self.value)))
@@ -108,6 +127,9 @@ def edges_of(time: Floats, held: Held, most: int) -> Floats:
     number = np.floor(wanted * shrink + 1e-6)
     edges = candidates[np.concatenate([[True], np.diff(number) > 0])]
     edges[-1] = candidates[-1]
+    gap = np.flatnonzero(np.diff(time) > GAP * spacing)
+    if 0 < gap.size < most // 4:  # samples at the end of a long interval would stand for its middle
+        edges = np.union1d(edges, np.concatenate([time[gap] + 0.5 * spacing, time[gap + 1] - 0.5 * spacing]))
     return _with_windows(_with_steps(edges, held, spacing, most), time, held, spacing, most)
 
 

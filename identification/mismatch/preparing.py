@@ -158,8 +158,11 @@ def _within(time: Floats, value: Floats, edges: Floats, mean: Floats) -> Floats:
 
 
 def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, time: Floats, force: Floats) -> History:
+    _, whole, _ = _binned(time, force, edges)
     time, force = _clear_of_jumps(recording, time, force)
     mean, count, sampled = _binned(time, force, edges)
+    torn = count < 0.5 * whole  # what is left at one end of an interval does not stand for all of it
+    mean[torn], count[torn] = np.nan, 0
     within = _within(time, force, edges, mean)
     driven = held.mean(edges)
     others = _explaining(recording, driver, held, edges, driven)
@@ -178,6 +181,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         driver_quantity=held.quantity,
         edges=edges,
         driver=driven,
+        excess=held.excess(edges),
         thrust=mean,
         count=count,
         sampled=sampled,

@@ -23,7 +23,7 @@ NEXT_TERM = 0.006
 
 
 def corrections(fitted: Fit, data: Data, weights: Weights) -> list[Floats]:
-    """Whitened (n,) change that each term makes beside what C and the tares can follow; with the rate where it has weights."""
+    """Whitened (n,) change that each term makes beside what C and the tares can follow; the rate too if it counts."""
     n = fitted.residual.size if weights.rate else data.size
     basis = orthogonal_basis(fitted.jacobian[:n, ~_of_terms(fitted)])
     out = []

@@ -56,6 +56,8 @@ class History:
     jitter: float = 0.001
     """s by which the time stamps of the thrust may be off."""
     rate_spacing: float = 1.0
+    excess: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
+    """(M,) or (1,): mean of driver |driver| over the interval less that of the mean driver."""
     lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     """(M,) or (1,): driver at the samples less its mean over the interval: ticks may keep step with samples."""
     tick: float = 1.0

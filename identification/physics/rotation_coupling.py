@@ -14,7 +14,7 @@ from identification.recording import Floats
 
 
 def slip(history: History, x: Floats, k: float) -> Floats:
-    """(M,) measured rate / k minus x: a share of x that drifts, or an amount that does, whichever foretells it better."""
+    """(M,) measured rate / k minus x: a share of x that drifts or an amount that does, what foretells it better."""
     rows = history.rate_rows
     if history.rate is None or history.rate_sampled is None or rows.size < 2:
         return np.zeros_like(x)
@@ -23,11 +23,9 @@ def slip(history: History, x: Floats, k: float) -> Floats:
     gap = history.rate[rows] / k - there
     amount, missed = calmed(gap, np.ones_like(gap))
     share, missed_by_share = calmed(gap, there)
-    if missed_by_share < missed:
-        out: Floats = x * np.interp(history.middle, at, share)
-        return out
-    out = np.interp(history.middle, at, amount)
-    return out
+    by_share = missed_by_share < missed
+    out: Floats = np.interp(history.middle, at, share if by_share else amount)
+    return x * out if by_share else out
 
 
 def calmed(value: Floats, basis: Floats) -> tuple[Floats, float]:
@@ -41,7 +39,7 @@ def calmed(value: Floats, basis: Floats) -> tuple[Floats, float]:
     power = np.concatenate([[0.0], np.cumsum(basis**2)])
     product = np.concatenate([[0.0], np.cumsum(basis * value)])
     index = np.arange(value.size)
-    tiny = 1e-9 * power[-1] / value.size
+    tiny = max(1e-9 * float(power[-1]) / value.size, 1e-300)
     alone = value[1:-1] - 0.5 * (value[2:] + value[:-2])
     best = np.divide(value, basis, out=np.zeros_like(value), where=basis**2 > tiny)
     error = float(np.mean(alone**2)) if basis.std() == 0 else np.inf
