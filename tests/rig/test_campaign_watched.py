@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -30,7 +30,7 @@ from rig.watch_messages import Mismatch, Watched, WatchedStream
 from rig.watcher import Watcher, settings_of
 from tests.rig.virtual_bench import PLAN, VirtualBench, starter, virtual
 
-LEVELS = (6.0, -6.0, 9.0, -9.0) * 7
+LEVELS = (6.0, -6.0, 9.0, -9.0) * 6
 WATCHED = Plan(Levels(LEVELS), FixedDwell(1.2, 0.2), slew=24.0, rest=0.3, tare=PLAN.tare, zero_every=4)
 PROJECT = Path(__file__).parents[2]
 
@@ -49,14 +49,15 @@ def watched(folder: Path, **campaign) -> Iterator[tuple[VirtualBench, WatchLink,
             watcher._peer.close()
 
 
-def play(world: VirtualBench, watcher: Watcher) -> list:
+def play(world: VirtualBench, watch: Callable[[], None]) -> list:
+    """The whole campaign; `watch` is what the watcher does in each tick."""
     seen: list = []
     front = world.front()
     drive = starter(world, front, seen)
 
     def each(now: float) -> None:
         drive(now)
-        watcher.step()
+        watch()
 
     world.clock.each = each
     run(world.session)
@@ -75,8 +76,8 @@ def fouled_from(world: VirtualBench, seconds: float, share: float = 0.06) -> Non
 
 def test_alarm_is_on_the_screens_in_the_events_and_in_the_ledger_and_the_run_goes_on(tmp_path):
     with watched(tmp_path) as (world, _, watcher):
-        fouled_from(world, 32.0)
-        seen = play(world, watcher)
+        fouled_from(world, 28.0)
+        seen = play(world, watcher.step)
         assert world.session.status.outcome == "completed"
         events = [event for event in world.recorder.events if event.text.startswith("mismatch: thrust -")]
         assert events
@@ -84,9 +85,9 @@ def test_alarm_is_on_the_screens_in_the_events_and_in_the_ledger_and_the_run_goe
         assert "while running, in both directions, since" in events[0].text
         facts = [fact for fact in read(tmp_path) if fact["fact"] == "mismatch"]
         assert facts[0]["place"] == "running"
-        assert facts[0]["time"] < 31.0 + 15.0
-        assert abs(facts[0]["began"] - 31.0) < 6.0, "t = 0 is a second after the clock's"
-        assert facts[-1]["size_N"] == pytest.approx(-0.06 * 0.4 * 81, rel=0.3)
+        assert facts[0]["time"] < 27.0 + 15.0
+        assert abs(facts[0]["began"] - 27.0) < 6.0, "t = 0 is a second after the clock's"
+        assert -3.0 < facts[-1]["size_N"] < -0.5, "6 % of 32 N, seen a few holds after it began"
         shown = [snapshot.mismatch for snapshot in seen if snapshot.mismatch]
         assert shown
         assert shown[-1] == seen[-1].mismatch
@@ -95,37 +96,23 @@ def test_alarm_is_on_the_screens_in_the_events_and_in_the_ledger_and_the_run_goe
 def test_clean_campaign_of_two_thrusters_says_nothing_and_begins_anew_with_each(tmp_path):
     plan = replace(WATCHED, shape=Levels(LEVELS[:16]))
     with watched(tmp_path, thrusters=("T1", "T3"), plan=plan) as (world, _, watcher):
-        world.clock.each = lambda now: None
-        begun = []
 
-        def lighter() -> None:
-            world.cell.spoil = lambda value: 0.8 * value  # another thruster, another tare
+        def watch() -> None:
+            if world.session.status.thruster == "T3":
+                world.cell.spoil = lambda value: 0.8 * value  # another thruster, another tare
+            watcher.step()
 
-        def note(now: float) -> None:
-            if world.session.status.thruster == "T3" and not begun:
-                begun.append(now)
-                lighter()
-
-        world.cell.noise.seed(4)
-        front_each = play
-        original = watcher.step
-
-        def step() -> None:
-            note(world.clock.t_ns * 1e-9)
-            original()
-
-        watcher.step = step  # type: ignore[method-assign]  # the clock's hook, not a stand-in
-        front_each(world, watcher)
+        play(world, watch)
         assert world.session.status.outcome == "completed"
-        assert begun
+        assert len(world.recorder.of(Close)) == 2
         assert not [fact for fact in read(tmp_path) if fact["fact"] == "mismatch"]
         assert "not watched" not in world.texts
 
 
 def test_alarm_ends_the_campaign_where_that_is_asked_for(tmp_path):
     with watched(tmp_path, watch=WatchConfig(stop=True)) as (world, _, watcher):
-        fouled_from(world, 32.0)
-        play(world, watcher)
+        fouled_from(world, 28.0)
+        play(world, watcher.step)
         assert world.session.status.outcome == "aborted"
         assert "stopped by the watch (watch.stop = true): thrust -" in world.session.status.cause
         assert world.motor.volts == 0.0
@@ -135,8 +122,7 @@ def test_alarm_ends_the_campaign_where_that_is_asked_for(tmp_path):
 def test_watcher_that_dies_is_said_once_and_the_run_goes_on(tmp_path):
     with watched(tmp_path, plan=PLAN) as (world, link, watcher):
         watcher._peer.close()
-        watcher.step = lambda: None  # type: ignore[method-assign]  # it is gone
-        play(world, watcher)
+        play(world, lambda: None)
         assert world.session.status.outcome == "completed"
         assert world.texts.count("this run is not watched for mismatches") == 1
         assert "ended" in link.failed
