@@ -153,7 +153,8 @@ def clean(hours: float) -> None:
     costs, number = [], 0
     while sum(seconds.values()) < hours * 3600:
         kind = concealed.NOISE_KINDS[number % len(concealed.NOISE_KINDS)]
-        case = concealed.case(np.random.default_rng([number, 9]), noise=kind)
+        rng = np.random.default_rng([number, 9])
+        case = concealed.case(rng, noise=kind, sampling=float(np.exp(rng.uniform(np.log(20.0), np.log(120.0)))))
         found = watched(case)
         alarms[kind] += found.first is not None
         seconds[kind] += found.duration

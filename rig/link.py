@@ -25,9 +25,8 @@ from rig.messages import Request, Snapshot
 from rig.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Ready, Rows, StepRow
 from rig.watch_messages import Mismatch, Watched
 
-Message = (
-    Snapshot | Request | Open | Rows | StepRow | EventRow | Close | Ready | Ack | Closed | Failed | Watched | Mismatch
-)
+ToRecorder = Open | Rows | StepRow | EventRow | Close
+Message = Snapshot | Request | ToRecorder | Ready | Ack | Closed | Failed | Watched | Mismatch
 
 KINDS: Final[dict[int, type[Any]]] = {
     1: Snapshot,

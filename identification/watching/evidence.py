@@ -144,49 +144,68 @@ class Evidence:
     def posterior(self) -> Posterior | None:
         """None until LEAST_DOF more rows are there than static columns that they determine."""
         g, used = self._g, len(self.begun) * self._g
+        nothing = self._nothing()
+        if nothing is None or not used:
+            self._slot_evidence = np.zeros(len(self.begun))
+            return None
+        XS = np.einsum("pr,hpk->hrk", nothing.basis, self._XS[:, :, :used])
+        solved = np.linalg.solve(nothing.M, XS)
+        own, rss, dof = self._SS[:, :used], nothing.rss[:, None], nothing.dof
+        information = own - np.einsum("hrk,hrk->hk", XS, solved)
+        information = np.where(information > DETERMINED * own, information, 0.0)
+        gain = np.where(information > 0, self._Sy[:, :used] - np.einsum("hrk,hr->hk", XS, nothing.beta), 0.0)
+        A2 = np.array(SIZES)[:, None, None] ** 2
+        precision = information + 1 / A2
+        share = np.minimum(gain**2 / precision / rss, 1 - 1e-12)
+        log_ratio = -0.5 * np.log1p(A2 * information) - 0.5 * dof * np.log1p(-share)
+        log_ratio += (nothing.log_density - nothing.log_density.max())[:, None] + np.repeat(np.log(self.weights), g)
+        log_ratio -= np.log(rss.size * len(SIZES) * g)
+        top = float(log_ratio.max())
+        mass = np.exp(log_ratio - top)
+        column = np.maximum(mass.sum(axis=(0, 1)), 1e-300)
+        self._slot_evidence = np.log(column.reshape(-1, g).sum(axis=1)) - np.log(self.weights)
+        mean = (mass * gain / precision).sum(axis=(0, 1)) / column
+        variance = (mass * rss * (1 - share) / dof / precision).sum(axis=(0, 1)) / column
+        _, h, k = np.unravel_index(int(np.argmax(log_ratio)), log_ratio.shape)
+        return Posterior(
+            log_sum=top + float(np.log(mass.sum())),
+            weight=(column / column.sum()).reshape(-1, g),
+            amplitude=mean.reshape(-1, g),
+            std=np.sqrt(variance).reshape(-1, g),
+            static=nothing.basis @ (nothing.beta[h] - solved[h, :, k] * mean[k]),
+        )
+
+    def _nothing(self) -> _Nothing | None:
+        """The static columns fitted under every law; None while there is too little to judge by."""
         known = self._XX + np.diag(self.prior)
         scale = np.sqrt(np.maximum(np.diag(known[0]), 1e-300))
         values, vectors = np.linalg.eigh(known[0] / np.outer(scale, scale))
-        basis = vectors[:, values > DETERMINED] / scale[:, None]  # the directions that the rows so far tell apart
+        basis = vectors[:, values > DETERMINED] / scale[:, None]
         dof = self._rows - basis.shape[1] + int(np.count_nonzero(self.prior))
-        M = basis.T @ known @ basis
-        Xy = self._Xy @ basis
+        M, Xy = basis.T @ known @ basis, self._Xy @ basis
         beta = np.linalg.solve(M, Xy[:, :, None])[:, :, 0]
         rss = self._yy - np.einsum("hr,hr->h", beta, Xy)
-        if dof < LEAST_DOF or not used or np.any(rss <= 1e-12 * self._yy):
-            self._slot_evidence = np.zeros(len(self.begun))
+        if dof < LEAST_DOF or np.any(rss <= 1e-12 * self._yy):
             return None
-        XS = np.einsum("pr,hpk->hrk", basis, self._XS[:, :, :used])
-        solved = np.linalg.solve(M, XS)
-        own = self._SS[:, :used]
-        information = own - np.einsum("hrk,hrk->hk", XS, solved)
-        information = np.where(information > DETERMINED * own, information, 0.0)
-        gain = np.where(information > 0, self._Sy[:, :used] - np.einsum("hrk,hr->hk", XS, beta), 0.0)
-        determinant = np.linalg.slogdet(M)[1]
-        null = -0.5 * (self._logdet + determinant + dof * np.log(rss))
-        A2 = np.array(SIZES)[:, None, None] ** 2
-        precision = information + 1 / A2
-        share = np.minimum(gain**2 / precision / rss[:, None], 1 - 1e-12)
-        log_ratio = -0.5 * np.log1p(A2 * information) - 0.5 * dof * np.log1p(-share)
-        log_ratio += (null - null.max())[:, None] - np.log(null.size * len(SIZES) * g)
-        log_ratio += np.repeat(np.log(self.weights), g)
-        top = float(log_ratio.max())
-        mass = np.exp(log_ratio - top)
-        total = float(mass.sum())
-        column = mass.sum(axis=(0, 1))
-        self._slot_evidence = np.log(np.maximum(column.reshape(-1, g).sum(axis=1), 1e-300)) - np.log(self.weights)
-        mean = (mass * gain / precision).sum(axis=(0, 1)) / np.maximum(column, 1e-300)
-        variance = (mass * rss[:, None] * (1 - share) / dof / precision).sum(axis=(0, 1)) / np.maximum(column, 1e-300)
-        _, h, k = np.unravel_index(int(np.argmax(log_ratio)), log_ratio.shape)
-        static = basis @ (beta[h] - solved[h, :, k] * mean[k])
-        shape = (-1, g)
-        return Posterior(
-            top + float(np.log(total)),
-            column.reshape(shape) / total,
-            mean.reshape(shape),
-            np.sqrt(variance).reshape(shape),
-            static,
-        )
+        density = -0.5 * (self._logdet + np.linalg.slogdet(M)[1] + dof * np.log(rss))
+        return _Nothing(basis, M, beta, rss, float(dof), density)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Nothing:
+    """Nothing has changed: its fit under every law."""
+
+    basis: Floats
+    """(p, r) directions of the static columns that the rows so far tell apart."""
+    M: Floats
+    """(H, r, r) their information."""
+    beta: Floats
+    """(H, r) fitted."""
+    rss: Floats
+    """(H,) what they leave, whitened."""
+    dof: float
+    log_density: Floats
+    """(H,) of scale-free contrasts."""
 
 
 def level_of(v: float, bins: int) -> int | None:
