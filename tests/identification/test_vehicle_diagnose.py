@@ -14,11 +14,12 @@ import pytest
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "concealed"))
 from vehicles import DIVE, Case, case, levels_of, recordings, setup, surge_trials
 
+from identification.efficiency import Installation, Thruster
 from identification.mismatch.diagnose import diagnose
 from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
 from identification.mismatch.preparing import Refusal
 from identification.mismatch.vehicle.diagnose import diagnose_vehicle
-from identification.mismatch.vehicle.setup import VehicleSetup, straight_ahead
+from identification.mismatch.vehicle.setup import Stated, VehicleSetup, straight_ahead
 from identification.recording import Channel, Recording
 from rig.diagnose_text import diagnosis_text
 from sim_devices.vehicle import Trial
@@ -85,14 +86,38 @@ def test_added_mass_and_an_efficiency_of_all_thrusters_are_rivals() -> None:
     assert any("given the other" in note for note in found.notes)
 
 
-def test_a_taken_out_effect_is_left_over_and_located() -> None:
-    _, runs, known = made("buoyancy_offset", [levels_of("dive", "heave", DIVE)])
-    found = diagnose_vehicle(runs, setup=known, without=("buoyancy_offset", "tether_drag", "quadratic_drag"))
-    assert isinstance(found, Diagnosis)
+def boat(seed: int) -> Recording:
+    """m = 100 kg, k2 = 40 N/(m/s)^2; 8 V ahead gives 20 N less than C V|V|, which no effect has."""
+    rng, h = np.random.default_rng(seed), 0.02
+    t = np.arange(0.0, 96.0, h)
+    level = rng.permutation([3.0, 8.0, 12.0, -8.0, -12.0, 8.0, -3.0, 10.0])[(t / 12).astype(int)]
+    v = np.zeros(t.size)
+    for i in range(t.size - 1):
+        push = 0.4 * level[i] * abs(level[i]) - (20.0 if level[i] == 8 else 0.0)
+        v[i + 1] = v[i] + h * (push - 40 * abs(v[i]) * v[i]) / 100
+    speed = v[::10] + 0.01 * rng.standard_normal(t[::10].size)
+    channels = (
+        Channel("command", "command", "command_voltage", "V", t[::10], level[::10], thruster="T1", axis="surge"),
+        Channel("speed", "log", "speed", "m/s", t[::10], speed, axis="surge"),
+    )
+    return Recording(f"boat-{seed}", "boat", channels, kind="vehicle")
+
+
+def test_what_is_in_no_catalogue_is_located_and_its_force_predicts_other_runs() -> None:
+    installation = Installation((Thruster("T1", np.array([0.4]), {"surge": 1.0}),), np.zeros((1, 1)))
+    known = VehicleSetup(installation, {"surge": Stated(100.0, 1.0)}, current=False)
+    found = diagnosed([boat(seed) for seed in range(3)], known)
     assert found.verdict == "unexplained"
     assert found.unexplained is not None
-    assert len(found.unexplained.shape) > 2
-    assert found.train.after < found.train.before
+    assert found.unexplained.where.quantity == "command_voltage"
+    assert found.unexplained.where.low <= 8.0 <= found.unexplained.where.high
+    at, force, _ = np.array(found.unexplained.shape).T
+    assert force[np.argmin(np.abs(at - 8.0))] == min(force)
+    assert found.model_terms == ("free_force",)
+    assert found.findings == ()
+    assert any("takes its place" in text for text in found.unexplained.resembles)
+    assert "each run in turn" in found.heldout.what
+    assert found.heldout.after < 0.5 * found.heldout.before
 
 
 def test_without_thrusters_and_mass_everything_is_per_kg() -> None:

@@ -21,13 +21,13 @@ from identification.mismatch.vehicle.answering import (
     whiteness,
 )
 from identification.mismatch.vehicle.experiment import propose
-from identification.mismatch.vehicle.free_force import with_free_force
+from identification.mismatch.vehicle.free_force import free_index, with_free_force
 from identification.mismatch.vehicle.judging import held_out, only, residuals, rms
 from identification.mismatch.vehicle.left import ALARM, Left, judge_left
 from identification.mismatch.vehicle.naming import EQUAL, Named, name
 from identification.mismatch.vehicle.runs import Prepared, prepare
 from identification.mismatch.vehicle.screening import applicable
-from identification.mismatch.vehicle.search import Found, State, search
+from identification.mismatch.vehicle.search import Found, State, pruned, search
 from identification.mismatch.vehicle.setup import VehicleSetup, axis_of, straight_ahead
 from identification.recording import Recording
 
@@ -91,10 +91,11 @@ def _diagnosed(
     after, named = name(found.after, data, candidates, rng)
     found = replace(found, after=after)
     left = judge_left(after.fit, after.white, data, rng)
-    earned, doubted = [n for n in named if not n.doubts], [n for n in named if n.doubts]
-    last = with_free_force(after, data, left.structures[0]) if left.p_value < ALARM else after
-    unexplained = unexplained_of(left, doubted, data)
-    n, p = after.fit.residual.size, int(np.sum(after.fit.free))
+    last = pruned(with_free_force(after, data, left.structures[0]), data) if left.p_value < ALARM else after
+    standing = [_beside(n, last, left) for n in named]
+    earned, doubted = [n for n in standing if not n.doubts], [n for n in standing if n.doubts]
+    unexplained = unexplained_of(_as_fitted(left, last), doubted, data)
+    n, p = last.fit.residual.size, int(np.sum(last.fit.free))
     channel = _channel(data)
     return Diagnosis(
         recordings=tuple(r.recording_id for r in recordings),
@@ -103,7 +104,7 @@ def _diagnosed(
         baseline_model=baseline_words(data),
         baseline=values_of(found.before.fit, data),
         mismatch=_places(found, data, channel, left, rng),
-        findings=findings_of(earned, after, data),
+        findings=findings_of(earned, last, data),
         unexplained=unexplained,
         model_terms=tuple(term.id for term in last.terms),
         model=values_of(last.fit, data),
@@ -112,15 +113,34 @@ def _diagnosed(
             rms(residuals(last.fit, data)),
         ),
         heldout=held_out(found.before, last, data, unseen),
-        chi2_per_dof=after.fit.chi2 / max(n - p, 1),
-        whiteness_p=whiteness(after),
+        chi2_per_dof=last.fit.chi2 / max(n - p, 1),
+        whiteness_p=whiteness(last),
         next_experiment=propose(after, earned, data) if unexplained is None else None,
-        notes=(*ties(data, after.fit, unseen_effects), *_noise_note(after, data)),
+        notes=(*ties(data, last.fit, unseen_effects), *_noise_note(last, data)),
         curves=curves_of(found.before.fit, last.fit, data),
         response=channel,
         unit=data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit,
         force_unit=data.scale.force_unit,
     )
+
+
+def _beside(n: Named, last: State, left: Left) -> Named:
+    """A name beside the free force: where the term stands now, or what took its place."""
+    if n.term in last.terms:
+        return replace(n, index=last.terms.index(n.term))
+    instead = f"a free force over {left.structures[0].coordinate.quantity} takes its place"
+    return replace(n, doubts=(*n.doubts, instead))
+
+
+def _as_fitted(left: Left, last: State) -> Left:
+    """The clearest structure with the free force as it was fitted, everything else free beside it."""
+    at = free_index(last.fit.layout)
+    if at is None:
+        return left
+    begin, count = last.fit.layout.first_of[at], len(last.fit.layout.parts[at])
+    force = last.fit.theta[begin : begin + count]
+    std = np.sqrt(np.diag(last.fit.cov)[begin : begin + count])
+    return replace(left, structures=(replace(left.structures[0], force=force, std=std), *left.structures[1:]))
 
 
 def _verdict(earned: Sequence[Named]) -> Verdict:

@@ -10,7 +10,7 @@ from identification.mismatch.vehicle.fitting import Fit, fit
 from identification.mismatch.vehicle.left import Coordinate, Structure, coordinates
 from identification.mismatch.vehicle.model import Layout, VehicleModel, layout_of, with_term
 from identification.mismatch.vehicle.runs import Prepared
-from identification.mismatch.vehicle.search import State
+from identification.mismatch.vehicle.search import State, refreshed
 from identification.physics.term import Parameter
 from identification.physics.vehicle.term import Body, Moment, Scale, Stage, Untouched
 from identification.recording import Floats
@@ -65,8 +65,7 @@ def with_free_force(state: State, data: Prepared, structure: Structure) -> State
     term = over(structure.coordinate, data)
     zeros = [0.0] * structure.coordinate.knots.size
     layout, theta = with_term(state.fit.layout, data, state.fit.theta, term, zeros)
-    found = fit(layout, theta, data, state.white, state.fit.motions)
-    return State(found, state.noise, state.white)
+    return refreshed(fit(layout, theta, data, state.white, state.fit.motions), data, ())
 
 
 def free_index(layout: Layout) -> int | None:

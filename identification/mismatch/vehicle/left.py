@@ -186,7 +186,7 @@ class Place:
 def place_of(structure: Structure) -> Place:
     """From the knot before to the one after the stretch with most force, in standard errors."""
     knots = structure.coordinate.knots
-    weight = np.abs(structure.force) / np.maximum(structure.std, 1e-300)
+    weight = np.abs(structure.force) / np.where(structure.std > 0, structure.std, np.inf)
     i = int(np.argmax(weight))
     last = knots.size - 1
     low, high = float(knots[max(i - 1, 0)]), float(knots[min(i + 1, last)])

@@ -18,6 +18,8 @@ from identification.physics.term import Parameter
 from identification.physics.vehicle.term import STAGES, Body, VehicleTerm
 from identification.recording import Floats
 
+FASTEST = 2.0
+"""Times the largest speed measured."""
 DIFFERENCE = 1e-5
 """Of a parameter's size: step of the differences over the forces (the motion's slopes are exact)."""
 
@@ -49,6 +51,8 @@ class Layout:
     parts: tuple[tuple[Parameter, ...], ...]
     """Parameters of each term."""
     runs: int
+    fastest: float
+    """Speed beyond which no run can have begun: a wild start would pass for a shift of the place."""
 
     @property
     def first_of(self) -> tuple[int, ...]:
@@ -72,8 +76,8 @@ class Layout:
 
     def bounds(self) -> tuple[Floats, Floats]:
         inside = [*self.base, *(p for part in self.parts for p in part)]
-        low = [p.low for p in inside] + [-np.inf] * (2 * self.runs)
-        high = [p.high for p in inside] + [np.inf] * (2 * self.runs)
+        low = [p.low for p in inside] + [-self.fastest, -np.inf] * self.runs
+        high = [p.high for p in inside] + [self.fastest, np.inf] * self.runs
         return np.array(low), np.array(high)
 
 
@@ -88,7 +92,7 @@ def layout_of(model: VehicleModel, data: Prepared) -> Layout:
         if any(data.installation.cov[i, i] > 0 for i in at):
             base.append(Parameter(f"C[{thruster.name}]", "1", 0.0, 1e3 if np.any(values[list(at)] != 0) else 1.0))
     parts = tuple(term.parameters(scale) for term in model.terms)
-    return Layout(model, tuple(base), parts, len(data.runs))
+    return Layout(model, tuple(base), parts, len(data.runs), FASTEST * scale.speed)
 
 
 def _coefficients(data: Prepared) -> tuple[tuple[int, ...], ...]:

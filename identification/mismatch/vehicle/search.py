@@ -10,16 +10,19 @@ from scipy.stats import chi2 as chi2_law
 
 from identification.mismatch.noise import Noise
 from identification.mismatch.vehicle.fitting import Fit, Weights, fit, noise_of, weights
-from identification.mismatch.vehicle.model import VehicleModel, begin, layout_of, with_term, without_term
+from identification.mismatch.vehicle.model import Layout, VehicleModel, begin, layout_of, with_term, without_term
 from identification.mismatch.vehicle.runs import Prepared
 from identification.mismatch.vehicle.screening import Screened, screen, trials
 from identification.physics.vehicle.term import VehicleTerm
+from identification.recording import Floats
 
 MOST_TERMS = 5
 FITTED = 4
 """Candidates of a round that are fitted."""
 WORTH = 0.2
 """Of the best candidate's gain: what promises less is not fitted."""
+LIGHT = 0.1
+"""Of the mass that a first guess takes."""
 QUICK = 10
 """Steps of a candidate's fit."""
 
@@ -78,7 +81,7 @@ def _baseline(data: Prepared, candidates: Sequence[VehicleTerm]) -> State:
     spread = np.concatenate([np.diff(run.response, 2) for run in data.runs])
     white = float(np.median(np.abs(spread)) / 0.6745) ** 2 / 6 or 1e-6 * float(np.var(data.runs[0].response))
     noise = Noise(white, 0.0)
-    rough = fit(layout, begin(layout, data), data, weights(noise, data))
+    rough = min((fit(layout, start, data, weights(noise, data)) for start in _starts(layout, data)), key=_chi2)
     for _ in range(1):
         noise = noise_of(rough, data, _columns(rough, data, candidates))
         white_of = weights(noise, data)
@@ -86,7 +89,22 @@ def _baseline(data: Prepared, candidates: Sequence[VehicleTerm]) -> State:
     return State(rough, noise, white_of)
 
 
-def _columns(fitted: Fit, data: Prepared, terms: Sequence[VehicleTerm]) -> list[np.ndarray]:
+def _chi2(fitted: Fit) -> float:
+    return fitted.chi2
+
+
+def _starts(layout: Layout, data: Prepared) -> list[Floats]:
+    """A heavy vehicle and a light one, where the mass is not stated."""
+    heavy = begin(layout, data)
+    names = [p.name for p in layout.base]
+    if "m" not in names or data.mass is not None:
+        return [heavy]
+    light = heavy.copy()
+    light[names.index("m")] *= LIGHT
+    return [heavy, light]
+
+
+def _columns(fitted: Fit, data: Prepared, terms: Sequence[VehicleTerm]) -> list[Floats]:
     """What the catalogue could change: the noise must not hold it."""
     found = trials(fitted, data, terms, most=1)
     return [
