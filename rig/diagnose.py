@@ -189,6 +189,8 @@ def diagnose_command(
         limits = limits_of(bench, budget)
         vehicle = VehicleFiles(thrusters, installation, mass, mass_std, axis or "")
         found = diagnose_files(files, held, seed, twin, any_thruster=any_thruster, limits=limits, vehicle=vehicle)
+        if plan is not None and found.response != "thrust":
+            raise RecordingError("--plan writes a campaign of the bench; these are recordings of a vehicle")
         tell(found, json_path, report, save_twin, recordings_in(files))
         if plan is not None and bench is not None:
             for file in write_next(found, bench, plan):
