@@ -99,6 +99,21 @@ def still_wrong(found: Collected) -> str:
     return "\n".join([*rows, f"{len(found.scores) - len(rows)} of {len(found.scores)} came out right this time"])
 
 
+def leave(found: Collected, seeds: int, json_path: Path | None, report: Path | None) -> None:
+    """Write figures and page where they are wanted. Raises OSError."""
+    from rig.blind.figures import tables
+
+    figures = tables(found.scores, seeds, found.versions, found.undrawn)
+    if json_path is not None:
+        json_path.parent.mkdir(parents=True, exist_ok=True)
+        json_path.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n", encoding="utf-8")
+    if report is not None:
+        from rig.report.page import write
+        from rig.report.proof import proof_page
+
+        write(proof_page(found, figures), report)
+
+
 def one_case(name: str, limit: float, *, verbose: bool) -> str:
     """Make and answer one order anew, and tell truth and answer. Raises ProofError."""
     from rig.blind.collecting import collected
@@ -185,7 +200,6 @@ def prove_command(
     Exit status 0 whatever the figures are, 2 when the proof cannot be run.
     """
     from rig.blind.collecting import collected, not_good
-    from rig.blind.figures import tables
     from rig.blind.store import Store
 
     try:
@@ -199,15 +213,7 @@ def prove_command(
             run(kept, jobs, lanes or os.cpu_count() or 1, limit, renew=renew, keep=keep)
         found = collected(kept, jobs)
         click.echo(still_wrong(found) if failures else summary(found))
-        figures = tables(found.scores, seeds, found.versions, found.undrawn)
-        if json_path is not None:
-            json_path.parent.mkdir(parents=True, exist_ok=True)
-            json_path.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n", encoding="utf-8")
-        if report is not None:
-            from rig.report.page import write
-            from rig.report.proof import proof_page
-
-            write(proof_page(found, figures), report)
+        leave(found, seeds, json_path, report)
     except (RigError, OSError) as error:
         click.echo(f"rig prove: {error}", err=True)
         raise SystemExit(2) from error

@@ -80,13 +80,13 @@ def taken_for(counts: Mapping[str, Mapping[str, int]], others: Sequence[str]) ->
     total = {truth: sum(row.values()) for truth, row in counts.items()}
     wrong = {t: sorted(((n, a) for a, n in row.items() if a != t), reverse=True) for t, row in counts.items()}
     told = "; ".join(f"{t}: " + ", ".join(f"{a} {n} of {total[t]}" for n, a in w) for t, w in wrong.items() if w)
+    said = told or "every answer names what was concealed"
 
     def whole(axes: Axes) -> None:
         share = np.array([[counts[t].get(a, 0) / total[t] for a in answers] for t in effects])
         for (i, j), value in np.ndenumerate(share):
             if value > 0:
-                right = answers[j] == effects[i]
-                colour = DATA if right else MODEL
+                colour = DATA if answers[j] == effects[i] else MODEL
                 axes.plot(j, i, "s", color=colour, markersize=3.0 + 9.0 * float(np.sqrt(value)))
         axes.set_xticks(range(len(answers)), answers, rotation=90)
         axes.set_xlim(-0.7, len(answers) - 0.3)
@@ -112,7 +112,6 @@ def taken_for(counts: Mapping[str, Mapping[str, int]], others: Sequence[str]) ->
             short(figure, axes)
 
     height = max(1.2 + ROW * len(effects), LEAST)
-    said = told or "every answer names what was concealed"
     return Plot(draw, f"What was concealed and what was answered: {said}.", (NARROW[0], height), (9.0, height + 1.9))
 
 
