@@ -85,14 +85,14 @@ def setup_of(files: VehicleFiles, recordings: Mapping[Path, Recording]) -> Vehic
     fits = read_fits(files.thrusters)
     mass = {} if files.mass is None else {ANY_AXIS: Stated(files.mass, files.mass_std)}
     file = _file(files, fits, recordings)
-    if file is None:
-        return VehicleSetup(mass=mass, axis=files.axis)
     ids = {path.stem: recording.recording_id for path, recording in recordings.items()}
+    if file is None:
+        return VehicleSetup(mass=mass, axis=files.axis, ballast={one: name for name, one in ids.items()})
     said = matched(ids, file.trials)
     return VehicleSetup(
         installation=installed(file, fits),
         mass={**_masses(file), **mass},
-        ballast={ids[name]: one.ballast for name, one in said.items() if one.ballast},
+        ballast={one: said[name].ballast if name in said and said[name].ballast else name for name, one in ids.items()},
         axis=files.axis,
         axes={ids[name]: one.axis for name, one in said.items() if one.axis},
         current=file.vehicle.current,

@@ -32,6 +32,8 @@ from identification.mismatch.vehicle.setup import VehicleSetup, axis_of, straigh
 from identification.recording import Recording
 
 NO_SETUP = VehicleSetup()
+NOT_WHITE = 1e-3
+"""p-value."""
 
 
 def diagnose_vehicle(
@@ -140,6 +142,8 @@ def _as_fitted(left: Left, last: State) -> Left:
     begin, count = last.fit.layout.first_of[at], len(last.fit.layout.parts[at])
     force = last.fit.theta[begin : begin + count]
     std = np.sqrt(np.diag(last.fit.cov)[begin : begin + count])
+    if not np.all(np.isfinite(std) & (std > 0)):  # a steady force of another term and this one's mean are one
+        return left
     return replace(left, structures=(replace(left.structures[0], force=force, std=std), *left.structures[1:]))
 
 
@@ -165,12 +169,19 @@ def _places(found: Found, data: Prepared, channel: str, left: Left, rng: np.rand
 
 def _noise_note(after: State, data: Prepared) -> tuple[str, ...]:
     """Slow noise is where a disturbance (waves, wind, a hand on the cable) goes that no term carries."""
+    out = []
+    if whiteness(after) < NOT_WHITE:
+        out.append(
+            "what remains is not white: white and slow noise do not describe this sensor (a filter, steps of its own); "
+            "standard errors may be too small"
+        )
     slow = float(np.sqrt(sum(after.noise.slow)))
     white = float(np.sqrt(after.noise.white))
     if slow < 2 * white:
-        return ()
+        return tuple(out)
     unit = data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit
-    return (
+    out.append(
         f"what remains is {slow:.3g} {unit} of slow disturbance beside {white:.3g} {unit} of white noise: errors and "
-        "p-values allow for it, and what is weaker than it cannot be seen",
+        "p-values allow for it, and what is weaker than it cannot be seen"
     )
+    return tuple(out)
