@@ -183,7 +183,7 @@ class Evidence:
         basis = vectors[:, values > DETERMINED] / scale[:, None]
         dof = self._rows - basis.shape[1] + int(np.count_nonzero(self.prior))
         M, Xy = basis.T @ known @ basis, self._Xy @ basis
-        beta: Floats = np.linalg.solve(M, Xy[:, :, None])[:, :, 0]
+        beta = np.asarray(np.linalg.solve(M, Xy[:, :, None])[:, :, 0], dtype=np.float64)
         rss = self._yy - np.einsum("hr,hr->h", beta, Xy)
         if dof < LEAST_DOF or np.any(rss <= 1e-12 * self._yy):
             return None
