@@ -16,7 +16,7 @@ QUANTUM = 200.0
 """Levels are multiples of a round number that is about the largest driver divided by this."""
 REST = 3.0
 """s at 0 V with which a sweep begins and ends."""
-LEVELS = (0.04, 0.07, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.65, 0.75, 0.81, 0.87, 0.93, 1.0)
+LEVELS = (0.04, 0.07, 0.1, 0.15, 0.2, 0.27, 0.35, 0.45, 0.55, 0.65, 0.75, 0.81, 0.87, 0.93, 0.97, 0.985, 1.0)
 """Shares of the largest driver that are held singly, both ways."""
 HOLD = 3.0
 """s of each."""
