@@ -83,15 +83,21 @@ def ours(puzzle: Puzzle) -> tuple[tuple[str, ...], tuple[str, ...], float]:
     return named, rivals, found.heldout.after
 
 
-def answered(kind: str, effect: str, seed: int) -> Iterator[Answer]:
+def answered(kind: str, effect: str, seed: int, methods: set[str]) -> Iterator[Answer]:
+    if not methods:
+        return
     puzzle, truth = made(kind, effect, seed)
-    began = process_time()
-    named, rivals, error = ours(puzzle)
-    yield Answer(OURS, kind, effect, seed, named, rivals, error / truth.noise, process_time() - began)
+    if OURS in methods:
+        began = process_time()
+        named, rivals, error = ours(puzzle)
+        yield Answer(OURS, kind, effect, seed, named, rivals, error / truth.noise, process_time() - began)
+    if methods == {OURS}:
+        return
     p = problem(puzzle)
-    yield Answer(BARE, kind, effect, seed, (), (), p.held_out([]) / truth.noise, 0.0)
-    for method, setting in TUNED.items():
-        yield _answer(method, p, setting, kind, effect, seed, truth.noise)
+    if BARE in methods:
+        yield Answer(BARE, kind, effect, seed, (), (), p.held_out([]) / truth.noise, 0.0)
+    for method in methods & set(TUNED):
+        yield _answer(method, p, TUNED[method], kind, effect, seed, truth.noise)
 
 
 def _answer(
@@ -113,16 +119,14 @@ def kept_answers() -> list[Answer]:
 def run(number: int) -> list[Answer]:
     STORE.parent.mkdir(exist_ok=True)
     answers = kept_answers()
-    done = {(a.kind, a.effect, a.seed) for a in answers if a.method == list(TUNED)[-1]}
+    done = {(a.kind, a.effect, a.seed, a.method) for a in answers}
     with STORE.open("a", encoding="utf-8") as store:
-        for kind, effect, seed in drawn(number, 1000):
-            if (kind, effect, seed) in done:
-                continue
-            new = list(answered(kind, effect, seed))
+        for one in drawn(number, 1000):
+            new = list(answered(*one, {m for m in (OURS, BARE, *TUNED) if (*one, m) not in done}))
             store.writelines(json.dumps(asdict(a)) + "\n" for a in new)
             store.flush()
             answers += new
-            print(f"{kind} {effect} {seed}: " + "; ".join(f"{a.method} {a.outcome}" for a in new), file=sys.stderr)
+            print(*one, "; ".join(f"{a.method} {a.outcome}" for a in new), file=sys.stderr)
     wanted = set(drawn(number, 1000))
     return [a for a in answers if (a.kind, a.effect, a.seed) in wanted]
 

@@ -10,7 +10,8 @@ same for all. Three ways to the same sigmas of each candidate:
 - projected: every candidate at every sample, whitened, projected and multiplied, one at a time;
 - refitted: numpy.linalg.lstsq of C V|V|, tare and the candidate at every sample, whitened, one at a time.
 
-The columns of the last two are ours, laid on the straight lines between intervals; making them is not in their time.
+The columns of the last two are those of the same terms, evaluated on an interval for each sample; making them is not in
+their time.
 Each is a process of its own, with one BLAS thread: CPU time, and peak memory above that with the recording loaded.
 """
 
@@ -22,6 +23,7 @@ import subprocess
 import sys
 import tempfile
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from resource import RUSAGE_SELF, getrusage
 from time import process_time
@@ -30,12 +32,13 @@ import h5py
 import numpy as np
 
 from identification.mismatch.fitting import extended
+from identification.mismatch.grid import Held
 from identification.mismatch.model import Data, Model, Theta, predict
-from identification.mismatch.noise import Rows, Whitener
+from identification.mismatch.noise import Whitener
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.screening import directions
 from identification.mismatch.search import State, available, refresh, start
-from identification.physics.filters import delayed, within_intervals
+from identification.physics.filters import delayed
 from identification.physics.history import History
 from identification.recording import Recording
 from rig.hdf5 import load
@@ -89,21 +92,24 @@ def ours(recording: Recording) -> tuple[list[str], list[float], float, int]:
 
 
 def by_samples(recording: Recording, *, refit: bool) -> tuple[list[str], list[float], float, int]:
-    history, data, state = prepared(recording)
-    whitener, base, left = _at_samples(history, state)
+    """Everything at every sample: the terms are evaluated on one interval per sample."""
+    _, data, state = prepared(recording)
+    sampled = replace(data, histories=(_each_sample(recording, data.histories[0]),))
+    whitener, base, left = _at_samples(sampled, state)
     Q, _ = np.linalg.qr(base)
     names, sigmas, took, at_rest = [], [], 0.0, peak()
-    for name, change in _candidates(history, data, state.fit.theta):
+    for name, change in _candidates(sampled, state.fit.theta):
         began = process_time()
         column = whitener.whiten(change)
         rest = column - Q @ (Q.T @ column)
-        sigma = float(rest @ left / np.linalg.norm(rest))
+        size = float(np.linalg.norm(rest))
+        sigma = float(rest @ left) / max(size, 1e-300)
         if refit:
             began = process_time()
             column = whitener.whiten(change)
             x = np.linalg.lstsq(np.column_stack([base, column]), left, rcond=None)[0]
             took += process_time() - began
-            sigma = float(x[-1] * np.linalg.norm(rest))  # the coefficient over its standard error
+            sigma = float(x[-1]) * size  # the coefficient over its standard error
         else:
             took += process_time() - began
         names.append(name)
@@ -111,37 +117,53 @@ def by_samples(recording: Recording, *, refit: bool) -> tuple[list[str], list[fl
     return names, sigmas, took, peak() - at_rest
 
 
-def _at_samples(history: History, state: State) -> tuple[Whitener, np.ndarray, np.ndarray]:
-    """Whitener, whitened columns of the baseline (C, tare and, where it is free, the shift of the clocks), residual."""
-    theta = state.fit.theta
-    F = theta.C * history.driver * np.abs(history.driver)
-    late = _laid(delayed(F, history.edges, theta.shift), history)
-    n = history.sample_time.size
-    rows = Rows(history.sample_time, np.ones(n), np.ones(n), np.full(n, history.spacing))
-    whitener = Whitener(state.noise, rows, np.abs(late))
-    base = [late, np.ones(n)]
-    if state.fit.free[-3]:
-        base.append((_laid(delayed(F, history.edges, theta.shift + SLIGHT), history) - late) / SLIGHT)
-    return (
-        whitener,
-        whitener.whiten(np.column_stack(base)),
-        whitener.whiten(history.sample_thrust - late - theta.tares[0]),
+def _each_sample(recording: Recording, coarse: History) -> History:
+    """An interval for every sample of the thrust; those that ours leaves out beside steps do not count here either."""
+    command, thrust = recording.first_of("command_voltage"), recording.first_of("thrust")
+    assert command is not None
+    assert thrust is not None
+    t = thrust.time
+    edges = np.concatenate([[1.5 * t[0] - 0.5 * t[1]], 0.5 * (t[1:] + t[:-1]), [1.5 * t[-1] - 0.5 * t[-2]]])
+    counts = np.isin(t, coarse.sample_time)
+    return History(
+        recording_id=coarse.recording_id,
+        driver_quantity=coarse.driver_quantity,
+        edges=edges,
+        driver=Held(command, float(t[-1])).mean(edges),
+        thrust=np.where(counts, thrust.value, np.nan),
+        count=counts.astype(np.int64),
+        sampled=t,
+        within=np.zeros(t.size),
+        others={k: np.interp(t, coarse.middle, v) for k, v in coarse.others.items()},
+        rate_per_driver=coarse.rate_per_driver,
+        spacing=coarse.spacing,
+        tick=coarse.tick,
     )
 
 
-def _laid(value: np.ndarray, history: History) -> np.ndarray:
-    return within_intervals(value, history.edges, history.sample_time)
+def _at_samples(data: Data, state: State) -> tuple[Whitener, np.ndarray, np.ndarray]:
+    """Whitener, whitened columns of the baseline (C, tare and, where it is free, the shift of the clocks), residual."""
+    (history,), theta = data.histories, state.fit.theta
+    F, _ = predict(Model(), theta, history, data.scale)
+    later = [delayed(F, history.edges, theta.shift + more)[history.rows] for more in (0.0, SLIGHT)]
+    whitener = Whitener(state.noise, data.thrust_rows[0], np.abs(later[0]))
+    base = [later[0], np.ones(later[0].size)]
+    if state.fit.free[-3]:
+        base.append((later[1] - later[0]) / SLIGHT)
+    left = history.thrust[history.rows] - later[0] - theta.tares[0]
+    return whitener, whitener.whiten(np.column_stack(base)), whitener.whiten(left)
 
 
-def _candidates(history: History, data: Data, theta: Theta) -> Iterator[tuple[str, np.ndarray]]:
+def _candidates(data: Data, theta: Theta) -> Iterator[tuple[str, np.ndarray]]:
     """Each trial's change of the thrust, at every sample."""
-    model = Model()
-    base = _laid(predict(model, theta, history, data.scale)[0], history)
+    model, (history,) = Model(), data.histories
+    base, _ = predict(model, theta, history, data.scale)
     for term in available(data):
         bigger = model.plus(term)
         for trial in term.trials(data.scale):
             new, _ = predict(bigger, extended(theta, model, term, trial, bigger), history, data.scale)
-            yield f"{term.id} {term.form} {trial}", _laid(new, history) - base
+            history.memo.clear()
+            yield f"{term.id} {term.form} {trial}", (new - base)[history.rows]
 
 
 def peak() -> int:

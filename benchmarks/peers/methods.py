@@ -141,7 +141,8 @@ TUNED: dict[str, dict[str, Any]] = {
     "SysIdentPy FROLS": {"criterion": "apress", "weight": 1000.0},
     "stepwise HAC": {"p_in": 1e-6, "lags": 30},
 }
-"""The best of each grid on 18 recordings: 7, 10, 6 and 13 right. Other settings: 6 to 7, 7 to 9, 2 to 5, 6 to 12."""
+"""The best of each grid on 18 recordings: STLSQ 7 right (its other settings 6 or 7), FROLS 10 (7 to 9), SysIdentPy 6
+(2 to 5), stepwise 13 (6 to 12)."""
 
 
 def names(p: Problem, method: str, setting: dict[str, Any]) -> tuple[frozenset[str], list[int]]:
