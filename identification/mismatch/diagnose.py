@@ -20,18 +20,19 @@ from identification.mismatch.diagnosis import (
     Where,
 )
 from identification.mismatch.faults import Fault, find_faults, repaired
-from identification.mismatch.fitting import Fit, raw
+from identification.mismatch.fitting import Fit, fit, raw
 from identification.mismatch.flexible import Extended, extend
 from identification.mismatch.flexible_shape import refitted_names, with_flexible, with_held
 from identification.mismatch.full_rate import look
 from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
 from identification.mismatch.lines import Line
-from identification.mismatch.model import Data, parameters
+from identification.mismatch.model import Data, Weights, parameters
 from identification.mismatch.naming import EQUAL, Named, Rival, Standing, name, settle_forms, with_doubts
 from identification.mismatch.next_experiment import propose
 from identification.mismatch.omnibus import Judged, Omnibus, judge_left, locate
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.search import Found, State, prune, search
+from identification.mismatch.shape_error import SHAPE_ERROR, corrections
 from identification.mismatch.sweeps import Limits
 from identification.mismatch.twinning import starting, unfit, with_twin
 from identification.physics.history import History
@@ -39,6 +40,8 @@ from identification.physics.term import Term
 from identification.recording import Recording
 from identification.twin import Twin
 
+COLOURED = 1e-12
+"""p-value of whiteness below which no noise model is blamed."""
 ALARM = 0.01
 """False-alarm rate of the omnibus tests, family-wise."""
 MOST_PLACES = 3
@@ -89,7 +92,7 @@ def diagnose(
         settled, standing = settle_forms(after, found.data, found.terms)
         after = prune(settled, found.data)
         standing = standing if after is settled else None
-    left = judge_left(after.fit, found.data, after.weights, rng)
+    left = _with_colour(judge_left(after.fit, found.data, after.weights, rng), after, found.data)
     measured = replace(found.data, histories=histories)
     answer, after = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
     answer = _with_channels(answer, lines, faults)
@@ -133,8 +136,9 @@ def _answer(
     earned = [n for n in named if not n.doubts]
     doubted = [n for n in named if n.doubts]
     open_ended = (structure or bool(doubted)) and bool(left.groups)
-    free = extend(after, data, _foremost(left, doubted), doubted, others, rng) if open_ended else None
-    unexplained = _unexplained(left, after, data, doubted, free, others) if open_ended else None
+    bare, place = _located(after, data, left, doubted, rng) if open_ended else (after, left)
+    free = extend(after, data, _foremost(place, doubted), doubted, others, rng) if open_ended else None
+    unexplained = _unexplained(place, bare, data, doubted, free, others) if open_ended else None
     verdict = _verdict(earned, unexplained)
     if free is not None:
         after, earned = free.state, refitted_names(earned, free.state)
@@ -297,6 +301,32 @@ def _places(found: Found, rng: np.random.Generator) -> tuple[Mismatch, ...]:
         what = judged.coordinate.what
         out.append(Mismatch("thrust", where, share, judged.p_value, _says(where, share, what)))
     return tuple(out)
+
+
+def _with_colour(left: Omnibus, after: State, data: Data) -> Omnibus:
+    """What is left counts as structure too when it is far from white, and more than the terms' shapes may leave."""
+    colour = whiteness(after.fit, data)
+    if not after.fit.model.terms or colour > COLOURED or left.p_value < ALARM:
+        return left
+    changes = corrections(after.fit, data, Weights(after.weights.thrust))
+    spared = SHAPE_ERROR**2 * float(sum(change @ change for change in changes))
+    excess = float(after.fit.residual[: data.size] @ after.fit.residual[: data.size]) - data.size
+    return replace(left, p_value=colour) if excess > spared else left
+
+
+def _located(
+    after: State, data: Data, left: Omnibus, doubted: Sequence[Named], rng: np.random.Generator
+) -> tuple[State, Omnibus]:
+    """What is left without the terms whose names were not earned: they are no physics, and would hide its place."""
+    if not doubted:
+        return after, left
+    model, theta = after.fit.model, after.fit.theta
+    terms = {n.term for n in doubted}
+    kept = tuple(v for t, v in zip(model.terms, theta.terms, strict=True) if t not in terms)
+    smaller = replace(model, terms=tuple(t for t in model.terms if t not in terms))
+    bare = replace(after, fit=fit(smaller, replace(theta, terms=kept), data, after.weights))
+    seen = judge_left(bare.fit, data, after.weights, rng)
+    return (bare, seen) if seen.p_value < ALARM else (after, left)
 
 
 def _foremost(left: Omnibus, doubted: Sequence[Named]) -> str:

@@ -20,6 +20,11 @@ from identification.mismatch.shape_error import allowed_in, corrections
 from identification.recording import Floats
 from identification.tails import chi2_sf, noncentral_chi2_sf
 
+FAR = 4.0
+"""Sigmas beyond which a row counts no more: one outlier is no structure."""
+PLAIN_P = 1e-7
+"""Of one group: what is plainly no noise, whatever its kind."""
+
 
 @dataclass(frozen=True, eq=False)
 class Judged:
@@ -49,7 +54,7 @@ def judge_left(
     found = tuple(looked_at) if looked_at is not None else coordinates(fit, data)
     n = data.size
     basis = orthogonal_basis(fit.jacobian[:n])
-    residual = fit.residual[:n]
+    residual = np.clip(fit.residual[:n], -FAR, FAR)
     changes = corrections(fit, data, Weights(weights.thrust))
     groups, spans = [], []
     for c in found:
@@ -64,10 +69,14 @@ def judge_left(
         p = _tail(stat, dof, extra)
         groups.append(Judged(c, stat, dof, p, max(stat - dof, 0.0) / max(float(residual @ residual), 1e-300)))
         spans.append(Q)
-    order = np.argsort([g.p_value for g in groups])
+    order = sorted(range(len(groups)), key=lambda i: (groups[i].p_value, groups[i].dof - groups[i].statistic))
     if not groups:
         return Omnibus((), 1.0)
     clean = quiet(residual, np.column_stack(spans))
+    plain = [Q for Q, g in zip(spans, groups, strict=True) if g.p_value < PLAIN_P]
+    if plain:  # a structure of many small parts would be in the draws, and hide itself
+        known = orthogonal_basis(np.column_stack(plain))
+        clean = clean - known @ (known.T @ clean)
     ends = np.cumsum([Q.shape[1] for Q in spans])[:-1]
     scores = np.split(surrogate_scores(np.column_stack(spans), clean, rng) ** 2, ends, axis=1)
     nulls = [chi2_sf(s.sum(axis=1), s.shape[1]) for s in scores]
