@@ -16,11 +16,11 @@ from time import process_time
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "concealed"))
-from vehicles import PLAIN, case, recordings, setup
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.vehicle.diagnose import diagnose_vehicle
+from tests.concealed.vehicles import PLAIN, case, recordings, setup
 
 
 def judged(effect: str, found: Diagnosis) -> str:

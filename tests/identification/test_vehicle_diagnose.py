@@ -3,16 +3,11 @@
 from __future__ import annotations
 
 import json
-import sys
 from dataclasses import replace
 from math import isfinite
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "concealed"))
-from vehicles import DIVE, Case, case, levels_of, recordings, setup, surge_trials
 
 from identification.efficiency import Installation, Thruster
 from identification.mismatch.diagnose import diagnose
@@ -23,6 +18,7 @@ from identification.mismatch.vehicle.setup import Stated, VehicleSetup, straight
 from identification.recording import Channel, Recording
 from rig.diagnose_text import diagnosis_text
 from sim_devices.vehicle import Trial
+from tests.concealed.vehicles import DIVE, Case, case, levels_of, recordings, setup, surge_trials
 
 
 def made(name: str, trials: list[Trial], seed: int = 5) -> tuple[Case, list[Recording], VehicleSetup]:

@@ -21,7 +21,7 @@ from identification.mismatch.vehicle.answering import (
     whiteness,
 )
 from identification.mismatch.vehicle.experiment import propose
-from identification.mismatch.vehicle.free_force import free_index, with_free_force
+from identification.mismatch.vehicle.free_force import FreeForce, free_index, with_free_force
 from identification.mismatch.vehicle.judging import held_out, only, residuals, rms
 from identification.mismatch.vehicle.left import ALARM, Left, judge_left
 from identification.mismatch.vehicle.naming import EQUAL, Named, name
@@ -142,7 +142,10 @@ def _as_fitted(left: Left, last: State) -> Left:
     begin, count = last.fit.layout.first_of[at], len(last.fit.layout.parts[at])
     force = last.fit.theta[begin : begin + count]
     std = np.sqrt(np.diag(last.fit.cov)[begin : begin + count])
-    if not np.all(np.isfinite(std) & (std > 0)):  # a steady force of another term and this one's mean are one
+    term = last.terms[at]
+    if isinstance(term, FreeForce) and term.reference is not None:
+        force, std = np.insert(force, term.reference, 0.0), np.insert(std, term.reference, np.inf)
+    if not np.all(std > 0):  # a steady force of another term and this one's mean are one
         return left
     return replace(left, structures=(replace(left.structures[0], force=force, std=std), *left.structures[1:]))
 

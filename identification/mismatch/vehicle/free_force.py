@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar
 
+import numpy as np
+
 from identification.mismatch.vehicle.fitting import Fit, fit
 from identification.mismatch.vehicle.left import Coordinate, Structure, coordinates
 from identification.mismatch.vehicle.model import Layout, VehicleModel, layout_of, with_term
@@ -31,7 +33,15 @@ class FreeForce(Untouched):
     form: ClassVar[str] = ""
     coordinate: Coordinate
     bumps: Mapping[str, Floats]
-    """run -> (g, b)"""
+    """run -> (g, b), or (g, b - 1) with a reference"""
+    reference: int | None = None
+    """Knot at which the force is 0: beside a steady force of another term the two would be one. None: there is none."""
+
+    @property
+    def knots(self) -> Floats:
+        """Those with a parameter."""
+        at = self.coordinate.knots
+        return at if self.reference is None else np.delete(at, self.reference)
 
     @property
     def coordinates(self) -> tuple[str, ...]:
@@ -39,10 +49,10 @@ class FreeForce(Untouched):
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         most = MOST * scale.force
-        return tuple(Parameter(f"at[{knot:.3g}]", scale.force_unit, -most, most, 0.0) for knot in self.coordinate.knots)
+        return tuple(Parameter(f"at[{knot:.3g}]", scale.force_unit, -most, most, 0.0) for knot in self.knots)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return ((0.01 * scale.force,) * self.coordinate.knots.size,)
+        return ((0.01 * scale.force,) * self.knots.size,)
 
     def on_body(self, body: Body, now: Moment, theta: tuple[float, ...]) -> Body:
         bumps = self.bumps.get(now.run)
@@ -56,14 +66,19 @@ class FreeForce(Untouched):
         )
 
 
-def over(coordinate: Coordinate, data: Prepared) -> FreeForce:
-    return FreeForce(coordinate, {run.recording_id: coordinate.bumps(j) for j, run in enumerate(data.runs)})
+def over(coordinate: Coordinate, data: Prepared, reference: int | None = None) -> FreeForce:
+    """A free force over a coordinate of these runs."""
+    bumps = {run.recording_id: coordinate.bumps(j) for j, run in enumerate(data.runs)}
+    if reference is not None:
+        bumps = {name: np.delete(one, reference, axis=1) for name, one in bumps.items()}
+    return FreeForce(coordinate, bumps, reference)
 
 
 def with_free_force(state: State, data: Prepared, structure: Structure) -> State:
     """The model with a free force over the coordinate that is clearest, everything fitted anew."""
-    term = over(structure.coordinate, data)
-    zeros = [0.0] * structure.coordinate.knots.size
+    steady = any(term.id == "buoyancy_offset" for term in state.terms)
+    term = over(structure.coordinate, data, structure.coordinate.knots.size // 2 if steady else None)
+    zeros = [0.0] * term.knots.size
     layout, theta = with_term(state.fit.layout, data, state.fit.theta, term, zeros)
     return refreshed(fit(layout, theta, data, state.white, state.fit.motions), data, ())
 
@@ -82,6 +97,8 @@ def carried(layout: Layout, index: int, bare: Fit, unseen: Prepared) -> Layout:
     there = next((c for c in coordinates(bare, unseen) if c.quantity == term.coordinate.quantity), None)
     known = there is not None and there.quantity not in LOCAL
     terms[index] = (
-        over(replace(there, knots=term.coordinate.knots), unseen) if known and there else replace(term, bumps={})
+        over(replace(there, knots=term.coordinate.knots), unseen, term.reference)
+        if known and there
+        else replace(term, bumps={})
     )
     return layout_of(VehicleModel(tuple(terms)), unseen)

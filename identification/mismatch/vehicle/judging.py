@@ -49,7 +49,9 @@ def held_out(before: State, after: State, data: Prepared, unseen: Prepared | Non
     if unseen is not None:
         old, new = _elsewhere(before.fit, data, unseen), _elsewhere(after.fit, data, unseen)
         names = ", ".join(run.recording_id for run in unseen.runs)
-        return HeldOutRmse(rms(old), rms(new), noise, f"whole runs not fitted ({names}); only {_starts(data)} fitted")
+        return HeldOutRmse(
+            rms(old), rms(new), noise, f"whole runs not fitted ({names}); only {_starts(after, data)} fitted"
+        )
     if len(data.runs) < LEAST_RUNS:
         return _by_blocks(before, after, data)
     folds = min(FOLDS, len(data.runs))
@@ -61,12 +63,18 @@ def held_out(before: State, after: State, data: Prepared, unseen: Prepared | Non
         olds += _elsewhere(_refitted(before, data, kept), kept, back)
         news += _elsewhere(_refitted(after, data, kept), kept, back)
     share = "each run" if folds == len(data.runs) else f"the runs, {folds} groups"
-    what = f"{share} in turn simulated by a model fitted to the others; only {_starts(data)} fitted; terms: on all"
+    what = (
+        f"{share} in turn simulated by a model fitted to the others; only {_starts(after, data)} fitted; terms: on all"
+    )
     return HeldOutRmse(rms(olds), rms(news), noise, what)
 
 
-def _starts(data: Prepared) -> str:
-    return "its speed at the start is" if data.runs[0].quantity == "speed" else "its speed and place at the start are"
+def _starts(after: State, data: Prepared) -> str:
+    """What is found on a held-out run itself."""
+    own = " and a buoyancy of its own" if any(term.form == "by_ballast" for term in after.terms) else ""
+    if data.runs[0].quantity == "speed" and not own:
+        return "its speed at the start is"
+    return f"its speed{' and place' if data.runs[0].quantity == 'position' else ''} at the start{own} are"
 
 
 def _refitted(state: State, data: Prepared, kept: Prepared) -> Fit:
