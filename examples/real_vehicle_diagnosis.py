@@ -40,10 +40,8 @@ def diagnosed(root: Path, name: str, pattern: str, curve: str, folder: Path) -> 
 
 def short(name: str, found: Diagnosis) -> str:
     held = found.heldout
-    return (
-        f"{name}: {found.verdict}\n  {found.statement}\n  not fitted: {held.before:.4g} -> {held.after:.4g} {found.unit} "
-        f"rms of {found.response} (noise {held.noise:.3g}); {held.what}"
-    )
+    error = f"{held.before:.4g} -> {held.after:.4g} {found.unit} rms of {found.response} (noise {held.noise:.3g})"
+    return f"{name}: {found.verdict}\n  {found.statement}\n  not fitted: {error}; {held.what}"
 
 
 def main(root: Path, *, whole: bool) -> None:
