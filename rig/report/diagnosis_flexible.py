@@ -26,8 +26,8 @@ ORDINATES: Mapping[str, tuple[str, float]] = {
 
 def modelled_remarks(u: Unexplained) -> Iterator[Remark]:
     """What takes the place of physics, and how well it does on data that it has not seen."""
-    for f in u.flexible:
-        yield Remark(words(f.statement))
+    for shape in u.flexible:
+        yield Remark(words(shape.statement))
     if u.flexible and u.replaces:
         names = ", ".join(map(effect_name, u.replaces))
         yield Remark(f"It stands in the place of {names}, whose name was not earned.")
