@@ -149,7 +149,7 @@ def test_a_recorded_quantity_is_needed():
 @pytest.fixture(scope="module")
 def wave():
     """A gain that comes and goes."""
-    recording = run(lambda t, _V, F: F * (1 + 0.05 * np.sin(2 * np.pi * t / 80)), seconds=150.0, rate=15.0)
+    recording = run(lambda t, _V, F: F * (1 + 0.05 * np.sin(2 * np.pi * t / 80)), seconds=150.0, rate=10.0)
     return recording, diagnosed(recording)
 
 
@@ -236,7 +236,7 @@ def test_water_temperature_squared_is_a_formula():
     def colder(t, _V, F):
         return F * (1 - 0.003 * (np.interp(t, water.time, water.value) - 13.0) ** 2)
 
-    found = diagnosed(run(colder, extra=(water,), rate=15.0))
+    found = diagnosed(run(colder, extra=(water,), rate=10.0))
     left = found.unexplained
     assert found.findings == ()
     assert left.where.quantity == "water_temperature"
@@ -255,8 +255,21 @@ def test_water_temperature_squared_is_a_formula():
     assert any("not a physics" in str(part) for s in diagnosis_page(found).sections for part in s.parts)
 
 
+def dented(seed):
+    """20 % less at +8 V only."""
+    return run(lambda _t, V, F: F * (1 - 0.2 * ((V > 7) & (V < 9))), seed=seed, seconds=80.0, rate=10.0)
+
+
+def test_a_run_that_was_not_fitted_judges_the_flexible_term():
+    found = diagnosed(dented(0), holdout=(dented(1),))
+    left = found.unexplained
+    assert left.flexible[0].covariate == "command_voltage"
+    assert found.heldout.after < 0.5 * left.heldout_without
+    assert "whole runs" in found.heldout.what
+
+
 def test_a_step_in_gain_is_no_formula():
-    found = diagnosed(run(lambda t, _V, F: F * np.where(t < 70, 1.0, 0.93), rate=15.0, extra=(warming(),)))
+    found = diagnosed(run(lambda t, _V, F: F * np.where(t < 70, 1.0, 0.93), rate=20.0))
     left = found.unexplained
     assert found.findings == ()
     assert left.where.quantity == "time"
