@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.mismatch.coordinates import FOLLOWED, LOADS
 from identification.mismatch.fitting import Fit, extended, fit
+from identification.mismatch.flexible_kinds import UNITS, shapes_over
 from identification.mismatch.judging import Score, blocks, judge_blocks, judge_runs, refitted
 from identification.mismatch.knots import Moments, choose, heights, nodes_of
 from identification.mismatch.model import Data, Weights, predict, weights
@@ -37,7 +37,6 @@ EQUAL = 10.0
 LOCATED = 0.8
 """Share of the best coordinate's gain at which the located one is kept."""
 FIT_STEPS = 10
-UNITS = dict(FOLLOWED)
 WORTH = 6.0
 """By which chi-square must fall on what was not fitted, beside 2 for each parameter."""
 SLACK = 1.002
@@ -215,37 +214,6 @@ def best_of(shapes: Sequence[Flexible], state: State, data: Data) -> Candidate |
     """The best of several kinds of flexible term, their knots chosen."""
     found = [chosen for shape in shapes if (chosen := with_knots(shape, state, data)) is not None]
     return max(found, key=lambda c: c.gain, default=None)
-
-
-def shapes_over(quantity: str, data: Data) -> list[Flexible]:
-    """What a flexible term over this coordinate may multiply; knots to be chosen."""
-    driver = data.histories[0].driver_quantity
-    units = {"time": "s", "time_since_step": "s", "previous_voltage": data.scale.driver_unit, **UNITS}
-
-    def over(*times: tuple[Multiplier, ...], unit: str = "1", memory: float = 0.0) -> list[Flexible]:
-        unit = units.get(quantity, unit)
-        return [Flexible(quantity, unit, (0.0,), (), each, memory=memory) for each in times]
-
-    match quantity:
-        case _ if quantity == driver:
-            return over(("force",), ("gain",), unit=data.scale.driver_unit)
-        case "direction":
-            return over(("gain",), ("force",))
-        case "time":
-            return over(("gain",), ("force",), ("gain", "force"))
-        case "time_since_step":
-            return over(("step",), ("gain",), ("step", "gain"))
-        case "previous_voltage" | "direction_of_change":
-            return over(("gain",), ("even",), ("force",), ("gain", "even"))
-        case "load_history":
-            memories = [tau for tau in LOADS if tau < 0.5 * data.scale.duration]
-            return [each for tau in memories for each in over(("gain",), ("force",), memory=tau)]
-        case "rotation_rate":
-            return over(("drive",), unit=data.scale.driver_unit)
-        case _ if quantity in UNITS:
-            return over(("gain",), ("force",), ("rate",), ("gain", "even"), ("gain", "force"))
-        case _:
-            return []
 
 
 def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
