@@ -22,6 +22,9 @@ JITTER_SHARE = 0.1
 JITTERS = 3.0
 """Standard deviations of the time between samples that a stamp may be off."""
 MOST_INTERVALS = 6000
+MOST_MOVING = 10000
+"""The same where the driver hardly ever stands still: within an interval a kink of the curve is not seen."""
+MANY_CHANGES = 1500
 AFTER_UNKNOWN = 1.0
 """s after a stretch of unknown command before thrust counts again."""
 LEAST_DWELL = 0.5
@@ -63,7 +66,7 @@ def history_of(recording: Recording, most_intervals: int = MOST_INTERVALS) -> Hi
     time, force = _clear_of_steps(time, force, held)
     if time.size < LEAST_SAMPLES:
         return Refusal(f"{name}: almost every thrust sample coincides with a change of the driver")
-    edges = edges_of(time, held, most_intervals)
+    edges = edges_of(time, held, MOST_MOVING if held.changes().size > MANY_CHANGES else most_intervals)
     return _filled(recording, driver, held, edges, time, force)
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.mismatch.fitting import Fit, extended, raw
+from identification.mismatch.jumps import likeliest_jumps
 from identification.mismatch.model import Data, Weights
 from identification.physics.term import Term
 from identification.recording import Floats
@@ -25,6 +26,7 @@ BLOCKS = 120
 PLAIN = 4.0
 """Sigmas at which a direction is taken out before surrogates are made, and before noise is estimated."""
 MOST_PLAIN = 10
+MOST_JUMPS = 4
 LEAST_DIRECTION = 1e-6
 """Share of a direction that must remain when the present model is projected out."""
 
@@ -103,6 +105,7 @@ def directions(
     """Of all trials (their own, or those given) of all terms whose channels were recorded."""
     with_rate = bool(weights.rate)
     base_thrust, base_rate = raw(fit.model, fit.theta, data, with_rate=with_rate)
+    basis = orthogonal_basis(fit.jacobian)
     used: list[Term] = []
     values: list[tuple[float, ...]] = []
     sided: list[bool] = []
@@ -111,7 +114,7 @@ def directions(
     for term in terms:
         first = term.parameters(data.scale)[0]
         bigger = fit.model.plus(term)
-        for trial in term.trials(data.scale) if trials is None else trials:
+        for trial in _trials(term, fit, data, weights, basis) if trials is None else trials:
             theta = extended(fit.theta, fit.model, term, trial, bigger)
             new_thrust, new_rate = raw(bigger, theta, data, with_rate=with_rate)
             for i, (new, base) in enumerate(zip(new_thrust, base_thrust, strict=True)):
@@ -124,7 +127,6 @@ def directions(
     if not used:
         return Directions((), (), (), np.empty((fit.residual.size, 0)), np.empty(0))
     columns = weights.whiten([np.column_stack(c) for c in thrust], [np.column_stack(c) for c in rate if c])
-    basis = orthogonal_basis(fit.jacobian)
     before = np.linalg.norm(columns, axis=0)
     columns = columns - basis @ (basis.T @ columns)
     size = np.linalg.norm(columns, axis=0)
@@ -137,6 +139,14 @@ def directions(
         columns[:, keep] / size[keep],
         size[keep],
     )
+
+
+def _trials(term: Term, fit: Fit, data: Data, weights: Weights, basis: Floats) -> list[tuple[float, ...]]:
+    """The term's own; for a jump of the zero also those that the data point to."""
+    found = list(term.trials(data.scale))
+    if term.id == "zero_offset":
+        found += [(found[0][0], at) for at in likeliest_jumps(fit, data, weights, basis, MOST_JUMPS)]
+    return found
 
 
 def screen(

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from identification.physics.filters import lowpass
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
@@ -45,6 +46,39 @@ class SupplySag:
 
 
 @dataclass(frozen=True, slots=True)
+class Buffered:
+    """The supply as the thruster feels it: an output capacitor follows the load a little later than a meter shows."""
+
+    id: ClassVar[str] = "supply_sag"
+    stage: ClassVar[Stage] = "command"
+    physics: ClassVar[str] = "the command is a fraction of a buffered supply voltage that moves"
+    needs: ClassVar[tuple[str, ...]] = ("bus_voltage",)
+    coordinates: ClassVar[tuple[str, ...]] = ("bus_voltage",)
+    form: ClassVar[str] = "buffered"
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("exponent", "1", 0.0, 3.0, 0.0), Parameter("time_constant", "s", 0.001, 0.3))
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ((1.0, 0.02), (1.0, 0.08))
+
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        bus = now.history.others["bus_voltage"]
+        felt = lowpass(bus, now.history.dt, theta[1], float(bus[0]))[1]
+        out: Floats = value * np.maximum(felt / np.nanmax(bus), 1e-3) ** theta[0]
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return (
+            "Supply sag: the thruster sees the command times (bus voltage / its "
+            f"highest)^{theta[0]:.2f}, {1000 * theta[1]:.3g} ms later than the load draws on it; keep the supply up."
+        )
+
+
+@dataclass(frozen=True, slots=True)
 class Discharge:
     """The proxy where no bus voltage was recorded: V_eff = V (1 - d q), q the energy drawn so far, |V|^3 over time."""
 
@@ -76,4 +110,4 @@ class Discharge:
         )
 
 
-FORMS = (SupplySag(), Discharge())
+FORMS = (SupplySag(), Buffered(), Discharge())

@@ -145,7 +145,11 @@ def test_unexplained_shows_shapes_and_what_it_resembles():
         *("What is left over time", "Left out over time since step", "Left out over command voltage")
     ]
     section = next(s for s in page.sections if s.title == "What is not explained")
-    assert [r.tone for r in section.parts[0].remarks] == ["bad", "doubt"]
+    assert [r.tone for r in section.parts[0].remarks] == [
+        "bad",
+        "doubt",
+        "doubt",
+    ]  # what it resembles; no flexible term
     assert "located here" in svg(section.parts[1].plot)
     assert page.lead == "Something is left at time 5 to 20 s."
 
