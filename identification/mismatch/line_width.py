@@ -30,7 +30,7 @@ def peak_p_value(time: Floats, residual: Floats, f: float) -> float:
     with_line, _ = _best(_near(time, left, f))
     without, width = _best(_near(time, residual, f))
     gain = max(without - with_line, 0.0)
-    return float(min(1.0, (2 * width + 1) * chi2_sf(2 * gain, 3)))
+    return float(min(1.0, (2 * width + 1) * float(chi2_sf(2 * gain, 3))))
 
 
 def _near(time: Floats, residual: Floats, f: float) -> Floats:

@@ -238,7 +238,7 @@ def name(
                 tuple(float(s) for s in std[at : at + len(values)]),
                 gain,
                 gain - len(values) * logn,
-                float(max(chi2_sf(max(gain, 0.0), len(values)), 1e-300)),
+                max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
                 float(probability),
                 tuple(unique.values()),
                 doubts(state, term, data, many),

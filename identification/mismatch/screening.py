@@ -229,6 +229,6 @@ def _p_value(largest: float, null: Floats, normal: Floats) -> float:
             continue
         # tail of the normal maximum: as of one normal deviate, times the number of independent ones it acts like
         at = max(float(np.quantile(draws, 0.95)), 1e-6)
-        many = 0.05 / max(normal_sf(at), 1e-300)
-        found.append(float(min(many * normal_sf(largest), share)))
+        many = 0.05 / max(float(normal_sf(at)), 1e-300)
+        found.append(min(many * float(normal_sf(largest)), float(share)))
     return max(found)

@@ -288,7 +288,7 @@ def changed_constant(twin: Twin, state: State, known: str, unit: str) -> Finding
     if not isfinite(both) or both <= 0:
         return None
     z = (value - was) / both
-    p = float(max(2 * normal_sf(abs(z)), 1e-300))
+    p = max(2 * float(normal_sf(abs(z))), 1e-300)
     if p >= ALARM:
         return None
     share = 100 * (value - was) / abs(was)

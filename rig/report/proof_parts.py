@@ -96,13 +96,13 @@ def models_section(scores: Sequence[Score], figures: dict[str, Any]) -> Section 
         cells = tuple((text, *(f"{v:.3f}" for v in figures["held_out"][key].values())) for key, text in names.items())
         parts.append(Table("Held-out errors below which so many runs are", head, cells))
     if figures["coverage"]:
-        head = ("parameter", "intervals that hold the truth", "median z")
+        columns = ("parameter", "intervals that hold the truth", "median z")
         cells = tuple(
             (f"{r['effect']}: {r['parameter']}", Rate(r["hits"], r["n"]).told, f"{r['median_z']:.2f}")
             for r in figures["coverage"]
         )
         parts.append(
-            Table("95 % intervals of parameters that mean the same in world and catalogue", head, cells, folded=True)
+            Table("95 % intervals of parameters that mean the same in world and catalogue", columns, cells, folded=True)
         )
     return Section("The models", tuple(parts)) if parts else None
 
