@@ -279,3 +279,8 @@ def _spread(known: Weights, data: Data, spread: Spread) -> Floats | None:
     u, s, _ = np.linalg.svd(known.whiten(thrust, spread.rate if known.rate else ()), full_matrices=False)
     kept = s > 1e-6
     return u[:, kept] * s[kept] if kept.any() else None
+
+
+def price(term: Term, data: Data) -> int:
+    """Parameters that a term adds: a delay takes the place of the small one that the clocks are allowed."""
+    return len(term.parameters(data.scale)) - int(term.id == "time_skew" and data.most_shift > 0)

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
 from identification.mismatch.fitting import Fit, at_bound, extended, fit, raw
-from identification.mismatch.model import Data, Weights, predict
+from identification.mismatch.model import Data, Weights, predict, price
 from identification.mismatch.omnibus import Omnibus
 from identification.mismatch.preparing import DRIVERS
 from identification.mismatch.screening import directions, orthogonal_basis, refined
@@ -25,6 +26,8 @@ LIKELY = 40.0
 """Chi-square that a rival may lose by the tangent alone and is still refitted: its inner parameters may move."""
 PRESSED_SHARE = 0.3
 """Of its gain: a rival may be worse by this than a term whose parameters end at what is possible."""
+MOST_MERGERS = 3
+"""Terms tried in the place of each pair."""
 RIVAL_STEPS = 15
 MOST_REFITS = 7
 SAME = 0.1
@@ -98,10 +101,42 @@ def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> tuple[State
                 loss = rival.bic_loss - price
                 if loss < -BETTER and (best is None or loss < best[0]):
                     best = (loss, rival.fit)
+        best = _one_for_two(state, data, terms, best)
         if best is None:
             return state, standing
         state = refresh(best[1].model, best[1].theta, data, None, state)
     return state, None
+
+
+def _one_for_two(
+    state: State, data: Data, terms: Sequence[Term], best: tuple[float, Fit] | None
+) -> tuple[float, Fit] | None:
+    """The better of `best` and one term in the place of two: a search that goes step by step may miss it."""
+    now = state.fit
+    logn = float(np.log(max(now.residual.size, 2)))
+    for pair in combinations(now.model.terms, 2):
+        less = now
+        for term in pair:
+            less = without(replace(state, fit=less), term, data)
+        others = [t for t in terms if t.id not in {u.id for u in less.model.terms} and t not in pair]
+        found = directions(less, data, state.weights, others)
+        score = found.columns.T @ less.residual
+        tried: set[Term] = set()
+        for j in np.argsort(-np.where(found.one_sided, score, np.abs(score))):
+            other = found.terms[j]
+            if other in tried:
+                continue
+            if len(tried) == MOST_MERGERS:
+                break
+            tried.add(other)
+            values = mirrored(other, found.values[j], data) if score[j] < 0 else found.values[j]
+            bigger = less.model.plus(other)
+            begin = refined(less, data, state.weights, other, values)
+            new = fit(bigger, extended(less.theta, less.model, other, begin, bigger), data, state.weights, RIVAL_STEPS)
+            loss = new.chi2 - now.chi2 + (price(other, data) - sum(price(t, data) for t in pair)) * logn
+            if loss < -BETTER and (best is None or loss < best[0]) and not at_bound(other, new, data, state.weights):
+                best = (float(loss), new)
+    return best
 
 
 def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> list[Rival]:
@@ -128,14 +163,14 @@ def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]
             best[other] = (float(rho[j]), mirrored(other, found.values[j], data) if against[j] else found.values[j])
     ranked = sorted(best.items(), key=lambda item: -item[1][0])
     out = []
-    extra_now = len(dict(zip(now.model.terms, now.theta.terms, strict=True))[term])
+    extra_now = price(term, data)
     logn = float(np.log(max(now.residual.size, 2)))
     for other, (r, values) in ranked[:MOST_REFITS]:
         if (1 - r**2) * gain > LIKELY and r < 0.9:
             break
         bigger = less.model.plus(other)
         begin = refined(less, data, state.weights, other, values)
-        more = len(values) - extra_now
+        more = price(other, data) - extra_now
         extra = more * logn
         begun = extended(less.theta, less.model, other, begin, bigger)
         new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - min(extra, 2.0 * more))

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.mismatch.coordinates import coordinates
 from identification.mismatch.fitting import Fit, at_bound, bounds_of, columns_of, extended, fit, raw
-from identification.mismatch.model import Data, Model, Theta, Weights, scale_of, weights
+from identification.mismatch.model import Data, Model, Theta, Weights, price, scale_of, weights
 from identification.mismatch.noise import Noise, Rows
 from identification.mismatch.noise_likelihood import fit_noise
 from identification.mismatch.screening import (
@@ -314,9 +314,9 @@ def _best_addition(state: State, judged: Screening, data: Data) -> Fit | None:
         theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
         new = fit(bigger, theta, data, state.weights)
         gain = state.fit.chi2 - new.chi2
-        price = len(values) * np.log(new.residual.size)
-        if gain > price:
-            fits.append((at_bound(term, new, data, state.weights), gain - price, len(values), new))
+        cost = price(term, data) * np.log(new.residual.size)
+        if gain > max(cost, np.log(new.residual.size)):
+            fits.append((at_bound(term, new, data, state.weights), gain - cost, len(values), new))
     if not fits:
         return None
     possible = [each for each in fits if not each[0]] or fits
