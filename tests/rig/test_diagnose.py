@@ -328,7 +328,9 @@ def test_every_term_of_the_catalogue_that_the_world_knows_builds_its_effect():
             left.append((effect, form))
     assert set(left) <= {
         ("supply_sag", ""),
+        ("supply_sag", "buffered"),
         ("supply_sag", "discharge"),
+        ("motor_lag", "mixed"),
         ("rotation_coupling", ""),
         ("thruster_interaction", ""),
         ("reversal_loss", "step"),
