@@ -39,7 +39,7 @@ def test_watchdog_longer_than_the_limit_is_refused_at_preflight(tmp_path):
 def test_motor_that_ignores_stop_is_never_called_idle(tmp_path):
     """Promise 11: neither command 0 nor release is obeyed, and the device's own watchdog is off."""
     with live_bench(tmp_path, lambda text: text.replace("timeout = 0.5 ", "timeout = 0.0 ")) as bench:
-        front = attach(bench.start())
+        front = attach(bench.start(dwell=15.0))  # still this hold when the fault arrives, however late
         front.until(turning(10.0))
         bench.tell("fault", "motor", "ignores_commands")
         front.peer.send(Request("stop", "a test"))
