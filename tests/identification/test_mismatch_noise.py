@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from identification.mismatch.noise import OUTLIER, Noise, Rows, Whitener, with_outliers
-from identification.mismatch.noise_likelihood import _cost, fit_noise
+from identification.mismatch.noise_likelihood import fit_noise
+from identification.mismatch.restricted import Response, likelihood
 
 MIXED = Noise(0.04, 0.0009, (0.15, 4.0), (0.05, 0.3), ((3.0, 4.0),), (0.2,))
 SLOW = Noise(0.04, 0.0009, (0.15, 4.0), (0.05, 0.3))
@@ -146,13 +147,21 @@ def test_the_restricted_likelihood_and_its_slope(noise, p):
         return 0.5 * (np.linalg.slogdet(K)[1] + inner_det + left @ np.linalg.solve(K, left))
 
     v = noise.variances
-    value, slope = _cost(noise, runs, residuals, columns, size)
+    responses = [Response(*each) for each in zip(runs, residuals, columns, size, strict=True)]
+    found = likelihood(noise, responses)
+    value, slope = found.value, found.slope
     assert value == pytest.approx(by_definition(v), rel=1e-8)
     for j in range(v.size):
         step = np.zeros(v.size)
         step[j] = 1e-4 * v[j]
         expected = (by_definition(v + step) - by_definition(v - step)) / (2e-4 * v[j])
         assert slope[j] == pytest.approx(expected, rel=1e-4, abs=1e-3)
+        moved = likelihood(noise.with_variances(v + step), responses).squares - found.squares
+        assert -moved / (2e-4 * v[j]) == pytest.approx(found.information[j], rel=1e-3, abs=1e-6 / v[j])
+    larger = likelihood(noise.with_variances(1.7 * v), responses)
+    assert found.scaled(1.7).value == pytest.approx(larger.value, rel=1e-10)
+    assert found.scaled(1.7).slope == pytest.approx(larger.slope, rel=1e-8)
+    assert found.scaled(1.7).information == pytest.approx(larger.information, rel=1e-8)
 
 
 # ---------------------------------------------------------------- variances that were put in
