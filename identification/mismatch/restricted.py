@@ -158,7 +158,8 @@ def _over_variances(noise: Noise, response: Response, ba: Floats, bU: Floats) ->
 def _solved(time: Floats, f: _Factored, z: Floats) -> Floats:
     """(n,) K^-1 of what L^-1 made z."""
     Y = np.ascontiguousarray((z / f.d)[:, None])
-    return driver.solve_upper(time, f.c, f.U, f.W, Y, np.empty_like(Y))[:, 0]
+    out: Floats = driver.solve_upper(time, f.c, f.U, f.W, Y, np.empty_like(Y))[:, 0]
+    return out
 
 
 def _moved(noise: Noise, response: Response, s: Floats) -> tuple[Floats, Floats]:
@@ -180,5 +181,6 @@ def _times(time: Floats, shape: Shape, component: int, group: slice, s: Floats) 
     U, V = np.ascontiguousarray(shape.U[:, group]), np.ascontiguousarray(shape.V[:, group])
     Y = np.ascontiguousarray(s[:, None])
     out = Y * shape.gain2[:, component, None]
-    out = driver.matmul_lower(time, c, U, V, Y, out)
-    return driver.matmul_upper(time, c, U, V, Y, out)[:, 0]
+    driver.matmul_lower(time, c, U, V, Y, out)
+    driver.matmul_upper(time, c, U, V, Y, out)
+    return out[:, 0]
