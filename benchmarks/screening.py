@@ -31,13 +31,15 @@ from time import process_time
 import h5py
 import numpy as np
 
+from identification.mismatch.baseline import start
 from identification.mismatch.fitting import extended
 from identification.mismatch.grid import Held
 from identification.mismatch.model import Data, Model, Theta, predict
 from identification.mismatch.noise import Whitener
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.screening import directions
-from identification.mismatch.search import State, available, refresh, start
+from identification.mismatch.search import available
+from identification.mismatch.state import State, refresh
 from identification.physics.filters import delayed
 from identification.physics.history import History
 from identification.recording import Recording

@@ -16,11 +16,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.mismatch.baseline import raw_directions, start
 from identification.mismatch.fitting import Fit, fit, raw
 from identification.mismatch.model import Data, Model, Theta, weights
 from identification.mismatch.noise import Noise
 from identification.mismatch.preparing import Refusal, history_of
-from identification.mismatch.search import available, raw_directions, start
+from identification.mismatch.search import available
 from identification.physics.term import Term
 from peers.cases import Puzzle
 

@@ -8,32 +8,38 @@ from dataclasses import replace
 import numpy as np
 
 from identification.mismatch.diagnosis import (
-    Curves,
     Diagnosis,
-    Finding,
-    Mismatch,
-    RivalFinding,
     Rmse,
     Unexplained,
-    Value,
     Verdict,
-    Where,
 )
 from identification.mismatch.faults import Fault, find_faults, repaired
-from identification.mismatch.fitting import Fit, fit, raw
+from identification.mismatch.fitting import fit
 from identification.mismatch.flexible import Extended, extend
 from identification.mismatch.flexible_shape import refitted_names, with_flexible, with_held
 from identification.mismatch.full_rate import look
 from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
 from identification.mismatch.lines import Line
-from identification.mismatch.model import Data, Weights, parameters
-from identification.mismatch.naming import EQUAL, Named, Rival, Standing, name, settle_forms, with_doubts
+from identification.mismatch.model import Data, Weights
+from identification.mismatch.naming import Named, name, with_doubts
 from identification.mismatch.next_experiment import propose
-from identification.mismatch.omnibus import Judged, Omnibus, judge_left, locate
+from identification.mismatch.omnibus import ALARM, Omnibus, judge_left
 from identification.mismatch.preparing import Refusal, history_of
-from identification.mismatch.search import Found, State, prune, search
+from identification.mismatch.rivals import EQUAL, Standing, settle_forms
+from identification.mismatch.search import Found, prune, search
 from identification.mismatch.shape_error import SHAPE_ERROR, corrections
+from identification.mismatch.state import State
 from identification.mismatch.sweeps import Limits
+from identification.mismatch.telling import (
+    curves_of,
+    fault_finding,
+    finding_of,
+    line_finding,
+    places_of,
+    says,
+    values_of,
+    where_of,
+)
 from identification.mismatch.twinning import starting, unfit, with_twin
 from identification.physics.history import History
 from identification.physics.term import Term
@@ -42,10 +48,6 @@ from identification.twin import Twin
 
 COLOURED = 1e-25
 """p-value of whiteness below which no noise is blamed; 1/f noise alone was seen to reach 1e-21."""
-ALARM = 0.01
-"""False-alarm rate of the omnibus tests, family-wise."""
-MOST_PLACES = 3
-LEAST_P = 1e-300
 DRIVER_NAMES = {"command_voltage": "V|V|", "motor_voltage": "V|V|", "rotation_rate": "n|n|"}
 
 
@@ -150,12 +152,12 @@ def _answer(
         thruster=recordings[0].thruster,
         verdict=verdict,
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
-        baseline=_values(before.fit, data),
-        mismatch=_places(found, rng),
-        findings=tuple(_finding(n, data) for n in earned),
+        baseline=values_of(before.fit, data),
+        mismatch=places_of(found, rng),
+        findings=tuple(finding_of(n, data) for n in earned),
         unexplained=unexplained,
         model_terms=tuple(t.id for t in after.fit.model.terms),
-        model=_values(after.fit, data),
+        model=values_of(after.fit, data),
         train=Rmse(
             rmse(before.fit.model, before.fit.theta, measured, every),
             rmse(after.fit.model, after.fit.theta, data, every),
@@ -164,7 +166,7 @@ def _answer(
         chi2_per_dof=after.fit.chi2 / max(n - p, 1),
         whiteness_p=whiteness(after.fit, data),
         next_experiment=propose(found.after, data, earned, limits) if _equals(earned) else None,
-        curves=_curves(before, after, data),
+        curves=curves_of(before, after, data),
     )
     return answer, after
 
@@ -202,105 +204,12 @@ def _faulty(
 def _with_channels(answer: Diagnosis, lines: Sequence[Line], faults: Sequence[Fault]) -> Diagnosis:
     """The answer with periodic disturbances and channel faults among its findings, faults first."""
     grave = [f for f in faults if f.grave and f.kind != "nan"]
-    found = (*map(_fault_finding, grave), *answer.findings, *map(_line_finding, lines))
+    found = (*map(fault_finding, grave), *answer.findings, *map(line_finding, lines))
     notes = [f"{f.recording_id}: {f.statement}" for f in faults if f not in grave]
     notes += [f"for the model this was put right: {f.statement}" for f in grave if f.repairable]
     verdict = "explained" if answer.verdict == "adequate" and found else answer.verdict
     terms = (*answer.model_terms, *("periodic_disturbance" for _ in lines))
     return replace(answer, verdict=verdict, findings=found, notes=(*answer.notes, *notes), model_terms=terms)
-
-
-def _fault_finding(fault: Fault) -> Finding:
-    values = {k: Value(v.value, v.std, v.unit) for k, v in fault.parameters.items()}
-    p = max(fault.p_value, LEAST_P)
-    return Finding("channel_fault", fault.kind, fault.statement, values, p, -2 * float(np.log(p)), 1.0, ())
-
-
-def _line_finding(line: Line) -> Finding:
-    values = {
-        "amplitude": Value(line.amplitude, line.amplitude_std, "N"),
-        "frequency": Value(line.frequency, line.frequency_std, "Hz"),
-    }
-    if line.ratio is not None and line.ratio_std is not None:
-        values["periods_per_turn"] = Value(line.ratio, line.ratio_std, "1")
-    if line.phase is not None and line.phase_std is not None:
-        values["phase"] = Value(line.phase, line.phase_std, "rad")
-    p = max(line.p_value, LEAST_P)
-    return Finding("periodic_disturbance", line.kind, line.statement, values, p, line.gain, 1.0, ())
-
-
-def _values(fitted: Fit, data: Data) -> dict[str, Value]:
-    """C, tares and all parameters of the terms with their standard errors."""
-    std = fitted.std
-    unit = data.scale.driver_unit
-    out = {"C": Value(fitted.theta.C, float(std[0]), f"N/{unit}^2" if unit == "V" else "N s^2/rev^2")}
-    at = 1
-    for term, values, known in zip(
-        fitted.model.terms, fitted.theta.terms, parameters(fitted.model, data.scale), strict=True
-    ):
-        for p, value in zip(known, values, strict=True):
-            out[f"{term.id}.{p.name}"] = Value(value, float(std[at]), p.unit)
-            at += 1
-    for history, tare in zip(data.histories, fitted.theta.tares, strict=True):
-        key = "tare" if len(data.histories) == 1 else f"tare[{history.recording_id}]"
-        out[key] = Value(tare, float(std[at]), "N")
-        at += 1
-    return out
-
-
-def _term_values(term: Term, theta: Sequence[float], std: Sequence[float], data: Data) -> dict[str, Value]:
-    known = term.parameters(data.scale)
-    return {p.name: Value(v, s, p.unit) for p, v, s in zip(known, theta, std, strict=True)}
-
-
-def _finding(named: Named, data: Data) -> Finding:
-    return Finding(
-        named.term.id,
-        named.term.form,
-        named.term.statement(named.theta, data.scale),
-        _term_values(named.term, named.theta, named.std, data),
-        named.p_value,
-        named.bic_gain,
-        named.probability,
-        tuple(_rival(r, data) for r in named.rivals),
-    )
-
-
-def _rival(rival: Rival, data: Data) -> RivalFinding:
-    fitted, at = rival.fit, 1
-    for term, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
-        if term == rival.term:
-            std = fitted.std[at : at + len(values)]
-            known = _term_values(term, values, [float(s) for s in std], data)
-            return RivalFinding(term.id, term.form, known, rival.bic_loss, term.statement(values, data.scale))
-        at += len(values)
-    raise ValueError(f"{rival.term.id} is not in its own fit")
-
-
-def _where(judged: Judged, fitted: Fit, data: Data) -> tuple[Where, float, tuple[tuple[float, float, float], ...]]:
-    place = locate(judged, fitted, data)
-    return Where(place.quantity, place.low, place.high, place.unit), place.share, place.table
-
-
-def _says(where: Where, share: float, what: str) -> str:
-    unit = "" if where.unit == "1" else f" {where.unit}"
-    place = f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
-    return f"{100 * share:.0f} % of the residual lies at {place}: {what}."
-
-
-def _places(found: Found, rng: np.random.Generator) -> tuple[Mismatch, ...]:
-    """Where the baseline fails, the clearest coordinates first."""
-    seen = judge_left(found.before.fit, found.data, found.before.weights, rng)
-    if seen.p_value >= ALARM and not found.after.fit.model.terms:
-        return ()
-    out: list[Mismatch] = []
-    for judged in seen.groups[:MOST_PLACES]:
-        if out and judged.p_value > ALARM / 10:
-            break
-        where, share, _ = _where(judged, found.before.fit, found.data)
-        what = judged.coordinate.what
-        out.append(Mismatch("thrust", where, share, judged.p_value, _says(where, share, what)))
-    return tuple(out)
 
 
 def _with_colour(left: Omnibus, after: State, data: Data) -> Omnibus:
@@ -347,18 +256,9 @@ def _unexplained(
 ) -> Unexplained:
     quantity = _foremost(left, doubted) if free is None else free.terms[0].quantity
     judged = next((g for g in left.groups if g.coordinate.quantity == quantity), left.groups[0])
-    where, share, table = _where(judged, after.fit, data)
+    where, share, table = where_of(judged, after.fit, data)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in doubted)
-    says = f"Something is left that no term of the catalogue carries: {_says(where, share, judged.coordinate.what)}"
+    text = f"Something is left that no term of the catalogue carries: {says(where, share, judged.coordinate.what)}"
     if doubted:
-        says += f" It resembles {', '.join(n.term.id for n in doubted)}, but {doubted[0].doubts[0]}."
-    return with_flexible(Unexplained(where, judged.share, left.p_value, table, says, resembles), free, data, others)
-
-
-def _curves(before: State, after: State, data: Data) -> tuple[Curves, ...]:
-    old, _ = raw(before.fit.model, before.fit.theta, data, with_rate=False)
-    new, _ = raw(after.fit.model, after.fit.theta, data, with_rate=False)
-    return tuple(
-        Curves(h.recording_id, h.sampled[r], h.driver[r], y, a, b)
-        for h, r, y, a, b in zip(data.histories, data.rows, data.thrust, old, new, strict=True)
-    )
+        text += f" It resembles {', '.join(n.term.id for n in doubted)}, but {doubted[0].doubts[0]}."
+    return with_flexible(Unexplained(where, judged.share, left.p_value, table, text, resembles), free, data, others)

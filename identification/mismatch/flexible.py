@@ -19,16 +19,14 @@ from identification.mismatch.judging import Score, blocks, judge_blocks, judge_r
 from identification.mismatch.knots import Moments, choose, heights, nodes_of
 from identification.mismatch.model import Data, Weights, predict, weights
 from identification.mismatch.naming import Named
-from identification.mismatch.omnibus import judge_left
+from identification.mismatch.omnibus import ALARM, judge_left
 from identification.mismatch.screening import orthogonal_basis
-from identification.mismatch.search import State, forces, refresh
+from identification.mismatch.state import State, forces, refresh
 from identification.physics.free_form import Flexible, Multiplier, spline
 from identification.physics.history import History
 from identification.physics.term import Term
 from identification.recording import Floats
 
-ALARM = 0.01
-"""False-alarm rate below which a further coordinate is taken to hold structure."""
 MOST_TERMS = 3
 MOST_COORDINATES = 3
 """Coordinates tried for each term, the clearest first."""

@@ -15,7 +15,7 @@ from identification.mismatch.judging import HeldOut
 from identification.mismatch.model import Data, Weights
 from identification.mismatch.naming import Named
 from identification.mismatch.remainder import FlexibleShape, Spline
-from identification.mismatch.search import State
+from identification.mismatch.state import State
 from identification.physics.free_form import WORDS, Flexible, Multiplier, spline
 from identification.physics.history import History
 from identification.recording import Floats

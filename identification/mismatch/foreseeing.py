@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from identification.mismatch.diagnosis import PlanStep
 from identification.mismatch.fitting import Fit, bounds_of, columns_of, raw
 from identification.mismatch.model import Data, Theta, weights
-from identification.mismatch.search import State, forces
+from identification.mismatch.state import State, forces
 from identification.physics.filters import lowpass
 from identification.physics.history import History
 from identification.recording import Floats

@@ -21,7 +21,7 @@ from identification.mismatch.judging import Score
 from identification.mismatch.model import Data, Theta, Weights, predict
 from identification.mismatch.remainder import FormulaFound
 from identification.mismatch.screening import orthogonal_basis
-from identification.mismatch.search import State
+from identification.mismatch.state import State
 from identification.physics.formula_form import CHANNELS, MEMORIES, Formula, Monomial, Times, driver_symbol, quantity
 from identification.physics.formula_form import times as multiplied
 from identification.physics.free_form import Flexible

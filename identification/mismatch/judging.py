@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from identification.mismatch.fitting import Fit, fit, raw
 from identification.mismatch.model import Data, Model, Theta, weights
 from identification.mismatch.noise import Noise
-from identification.mismatch.search import State, forces
+from identification.mismatch.state import State, forces
 from identification.physics.history import History
 from identification.tails import chi2_sf
 

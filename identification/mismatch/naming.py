@@ -4,60 +4,30 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
 
 import numpy as np
 
-from identification.mismatch.fitting import Fit, at_bound, extended, fit, raw
-from identification.mismatch.model import Data, Weights, predict, price
+from identification.mismatch.fitting import Fit, at_bound
+from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.omnibus import Omnibus
 from identification.mismatch.preparing import DRIVERS
-from identification.mismatch.screening import directions, orthogonal_basis, refined
-from identification.mismatch.search import STATIC, State, refresh
+from identification.mismatch.rivals import NEAR, Rival, Standing, swaps, without
+from identification.mismatch.screening import orthogonal_basis
+from identification.mismatch.search import STATIC
+from identification.mismatch.state import State
 from identification.physics.term import Term
 from identification.recording import Floats
 from identification.tails import chi2_sf, noncentral_chi2_sf
 
-NEAR = 9.0
-"""BIC units: a rival this near is stated."""
-EQUAL = 4.0
-"""BIC units: nearer than this two answers are equally good."""
-LIKELY = 40.0
-"""Chi-square that a rival may lose by the tangent alone and is still refitted: its inner parameters may move."""
-PRESSED_SHARE = 0.3
-"""Of its gain: a rival may be worse by this than a term whose parameters end at what is possible."""
-MOST_MERGERS = 3
-"""Terms tried in the place of each pair."""
-RIVAL_STEPS = 15
-MOST_REFITS = 7
 SAME = 0.1
 """Parts of a run whose parameters differ by less count as the same."""
 OWN_SHARE = 0.01
 """Of what a term explains: less than this left over its own coordinate is the textbook's fault, not the name's."""
 INCONSTANT = 1e-3
 """p-value, after all tests of a term, below which its parameter is not the same everywhere."""
-BETTER = 0.5
-"""BIC units by which a rival must be better to take the place."""
 OWN_COORDINATE = 1e-4
 """p-value of what is left over a term's own coordinate below which its name is not earned."""
 MANY_SHAPES = 3
-ROUNDS = 3
-
-
-@dataclass(frozen=True, eq=False)
-class Rival:
-    """Another term in the place of one, refitted."""
-
-    term: Term
-    fit: Fit
-    bic_loss: float
-    """By how much its BIC is worse."""
-    aic_loss: float
-    """By how much its AIC is worse: BIC alone would hide a rival with more parameters than the data can tell apart."""
-
-
-Standing = tuple[Fit, list[Rival]]
-"""The fit without a term, and the rivals in its place."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,130 +45,6 @@ class Named:
     """Other effects within NEAR, best first."""
     doubts: tuple[str, ...]
     """Why the name is not earned; empty when it is."""
-
-
-def without(state: State, term: Term, data: Data) -> Fit:
-    """The model without one term, refitted with the same noise."""
-    smaller = state.fit.model.without(term)
-    known = dict(zip(state.fit.model.terms, state.fit.theta.terms, strict=True))
-    theta = replace(state.fit.theta, terms=tuple(known[t] for t in smaller.terms))
-    return fit(smaller, theta, data, state.weights)
-
-
-def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> tuple[State, dict[Term, Standing] | None]:
-    """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end."""
-    for _ in range(ROUNDS):
-        best: tuple[float, Fit] | None = None
-        standing: dict[Term, Standing] = {}
-        for term in state.fit.model.terms:
-            less = without(state, term, data)
-            standing[term] = (less, swaps(state, term, less, data, terms))
-            # a value that is not possible explains nothing: whatever does nearly as well goes before it
-            price = 0.0
-            if at_bound(term, state.fit, data, state.weights):
-                price = PRESSED_SHARE * (less.chi2 - state.fit.chi2)
-            for rival in standing[term][1]:
-                loss = rival.bic_loss - price
-                if loss < -BETTER and (best is None or loss < best[0]):
-                    best = (loss, rival.fit)
-        best = _one_for_two(state, data, terms, best)
-        if best is None:
-            return state, standing
-        state = refresh(best[1].model, best[1].theta, data, None, state)
-    return state, None
-
-
-def _one_for_two(
-    state: State, data: Data, terms: Sequence[Term], best: tuple[float, Fit] | None
-) -> tuple[float, Fit] | None:
-    """The better of `best` and one term in the place of two: a search that goes step by step may miss it."""
-    now = state.fit
-    logn = float(np.log(max(now.residual.size, 2)))
-    for pair in combinations(now.model.terms, 2):
-        less = now
-        for term in pair:
-            less = without(replace(state, fit=less), term, data)
-        others = [t for t in terms if t.id not in {u.id for u in less.model.terms} and t not in pair]
-        found = directions(less, data, state.weights, others)
-        score = found.columns.T @ less.residual
-        tried: set[Term] = set()
-        for j in np.argsort(-np.where(found.one_sided, score, np.abs(score))):
-            other = found.terms[j]
-            if other in tried:
-                continue
-            if len(tried) == MOST_MERGERS:
-                break
-            tried.add(other)
-            values = mirrored(other, found.values[j], data) if score[j] < 0 else found.values[j]
-            bigger = less.model.plus(other)
-            begin = refined(less, data, state.weights, other, values)
-            new = fit(bigger, extended(less.theta, less.model, other, begin, bigger), data, state.weights, RIVAL_STEPS)
-            loss = new.chi2 - now.chi2 + (price(other, data) - sum(price(t, data) for t in pair)) * logn
-            if loss < -BETTER and (best is None or loss < best[0]) and not at_bound(other, new, data, state.weights):
-                best = (float(loss), new)
-    return best
-
-
-def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> list[Rival]:
-    """Every other term (and form) that could do what this one does, refitted in its place; best first."""
-    now = state.fit
-    gain = less.chi2 - now.chi2
-    inside = {t.id for t in now.model.terms} - {term.id}
-    others = [t for t in terms if t.id not in inside and t != term]
-    found = directions(less, data, state.weights, others)
-    if not found.terms:
-        return []
-    change = _effect(now, term, data, state)
-    basis = orthogonal_basis(less.jacobian)
-    change = change - basis @ (basis.T @ change)
-    size = float(np.linalg.norm(change))
-    if size == 0:
-        return []
-    rho = found.columns.T @ (change / size)
-    against = (rho < 0) & ~np.array(found.one_sided)
-    rho = np.where(found.one_sided, np.maximum(rho, 0.0), np.abs(rho))
-    best: dict[Term, tuple[float, tuple[float, ...]]] = {}
-    for j, other in enumerate(found.terms):
-        if other not in best or rho[j] > best[other][0]:
-            best[other] = (float(rho[j]), mirrored(other, found.values[j], data) if against[j] else found.values[j])
-    ranked = sorted(best.items(), key=lambda item: -item[1][0])
-    out = []
-    extra_now = price(term, data)
-    logn = float(np.log(max(now.residual.size, 2)))
-    for other, (r, values) in ranked[:MOST_REFITS]:
-        if (1 - r**2) * gain > LIKELY and r < 0.9:
-            break
-        bigger = less.model.plus(other)
-        begin = refined(less, data, state.weights, other, values)
-        more = price(other, data) - extra_now
-        extra = more * logn
-        begun = extended(less.theta, less.model, other, begin, bigger)
-        new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - min(extra, 2.0 * more))
-        if at_bound(other, new, data, state.weights):
-            continue
-        loss = new.chi2 - now.chi2 + extra
-        out.append(Rival(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))
-    return sorted(out, key=lambda rival: rival.bic_loss)
-
-
-def mirrored(term: Term, values: tuple[float, ...], data: Data) -> tuple[float, ...]:
-    """The amount on the other side of neutral."""
-    first = term.parameters(data.scale)[0]
-    assert first.neutral is not None
-    return (min(max(2 * first.neutral - values[0], first.low), first.high), *values[1:])
-
-
-def _effect(now: Fit, term: Term, data: Data, state: State) -> Floats:
-    """(n,) whitened change that the term makes at its fitted values; the rate's rows with it."""
-    with_rate = bool(state.weights.rate)
-    smaller = now.model.without(term)
-    known = dict(zip(now.model.terms, now.theta.terms, strict=True))
-    theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
-    full, full_rate = raw(now.model, now.theta, data, with_rate=with_rate)
-    less, less_rate = raw(smaller, theta, data, with_rate=with_rate)
-    return state.weights.whiten(
-        [a - b for a, b in zip(full, less, strict=True)], [a - b for a, b in zip(full_rate, less_rate, strict=True)]
-    )
 
 
 def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:

@@ -18,9 +18,10 @@ from identification.mismatch.diagnosis import NextExperiment, PlanStep
 from identification.mismatch.fitting import Fit
 from identification.mismatch.foreseeing import Bench, Outlook, ending, one_zero, stretches
 from identification.mismatch.model import Data
-from identification.mismatch.naming import EQUAL, Named
-from identification.mismatch.search import State
+from identification.mismatch.naming import Named
+from identification.mismatch.rivals import EQUAL
 from identification.mismatch.separating import Pieces, distances, pieces, power
+from identification.mismatch.state import State
 from identification.mismatch.sweeps import REST, SHORT, Block, Limits, blocks, put_together
 from identification.recording import Floats
 

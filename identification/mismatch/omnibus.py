@@ -20,6 +20,8 @@ from identification.mismatch.shape_error import allowed_in, corrections
 from identification.recording import Floats
 from identification.tails import chi2_sf, noncentral_chi2_sf
 
+ALARM = 0.01
+"""False-alarm rate of what is left, family-wise."""
 FAR = 4.0
 """Sigmas beyond which a row counts no more: one outlier is no structure."""
 PLAIN_P = 1e-7

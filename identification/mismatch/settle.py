@@ -11,7 +11,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment, Verdict
-from identification.mismatch.naming import EQUAL
+from identification.mismatch.rivals import EQUAL
 from identification.mismatch.sweeps import BUDGET
 
 PATIENCE = 2

@@ -12,7 +12,7 @@ from identification.mismatch.diagnosis import Diagnosis, Finding, Value
 from identification.mismatch.fitting import raw
 from identification.mismatch.model import Data, Given, Model, Spread, Theta, acting
 from identification.mismatch.preparing import FEW_SAMPLES, Refusal
-from identification.mismatch.search import State
+from identification.mismatch.state import State
 from identification.physics.free_form import Flexible
 from identification.physics.history import CHANGED, History
 from identification.recording import Floats, Recording

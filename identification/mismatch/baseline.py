@@ -1,0 +1,108 @@
+"""Where a search begins: C V|V| and tares, with the noise that is left when what is plainly no noise is taken out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.mismatch.coordinates import coordinates
+from identification.mismatch.fitting import Fit, extended, fit, raw
+from identification.mismatch.model import Data, Model, Theta, Weights, scale_of
+from identification.mismatch.screening import (
+    MOST_PLAIN,
+    PLAIN,
+    matching_pursuit,
+    orthogonal_basis,
+)
+from identification.mismatch.state import State, by_run, refresh, unweighted
+from identification.physics.history import History
+from identification.physics.term import Term
+from identification.recording import Floats
+
+CLOCKS = 0.001
+"""s: clocks of two devices are not trusted to agree better, unless stamps are dense and even."""
+NOISE_ROUNDS = 5
+
+
+def start(histories: Sequence[History]) -> tuple[Data, Theta]:
+    """Ordinary least squares of C and the tares, without any weights."""
+    gram, right = 0.0, 0.0
+    means = []
+    for h in histories:
+        r = h.rows
+        f = h.driver[r] * np.abs(h.driver[r])
+        y = h.thrust[r]
+        fm, ym = f.mean(), y.mean()
+        gram += float(np.sum((f - fm) ** 2))
+        right += float(np.sum((f - fm) * (y - ym)))
+        means.append((fm, ym))
+    C = right / gram if gram > 0 else 0.0
+    with_rate = all(h.rate is not None and h.rate_rows.size > 20 for h in histories)
+    moving = histories[0].driver_quantity == "command_voltage" and not any(h.static for h in histories)
+    most = min(CLOCKS, max(h.jitter for h in histories)) if moving else 0.0
+    data = Data(tuple(histories), scale_of(histories, C or 1e-12), with_rate=with_rate, most_shift=most)
+    return data, Theta(C, (), tuple(float(ym - C * fm) for fm, ym in means), k=_k(histories))
+
+
+def _k(histories: Sequence[History]) -> float:
+    return float(np.mean([h.rate_per_driver for h in histories]))
+
+
+def every_shape(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
+    """(n, k) raw columns: all trials of the catalogue's terms, and any shape over each coordinate."""
+    columns = np.column_stack(
+        [raw_directions(fit_now, data, terms)] + [np.concatenate(c.columns) for c in coordinates(fit_now, data)]
+    )
+    out: Floats = columns[:, np.linalg.norm(columns, axis=0) > 0]
+    return out
+
+
+def pursue(fit_now: Fit, data: Data, judged: Weights, raw_columns: Floats) -> Floats:
+    """(n, k) those of `every_shape` that together take what is plainly no noise.
+
+    Orthogonal matching pursuit. Noise is estimated beside these columns, or a mismatch would be mistaken for it.
+    """
+    thrust_only = Weights(judged.thrust)
+    n = data.size
+    columns = thrust_only.whiten(by_run(raw_columns, data), [])
+    basis = orthogonal_basis(fit_now.jacobian[:n])
+    columns = columns - basis @ (basis.T @ columns)
+    first = np.linalg.norm(columns, axis=0)
+    columns = np.where(first > 1e-6 * np.median(first), columns / np.maximum(first, 1e-300), 0.0)
+    chosen, _ = matching_pursuit(columns, fit_now.residual[:n], PLAIN, MOST_PLAIN)
+    out: Floats = raw_columns[:, chosen]
+    return out
+
+
+def raw_directions(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
+    """(n, q) change of the thrust by each trial of each term."""
+    base, _ = raw(fit_now.model, fit_now.theta, data, with_rate=False)
+    columns = []
+    for term in terms:
+        bigger = fit_now.model.plus(term)
+        for trial in term.trials(data.scale):
+            theta = extended(fit_now.theta, fit_now.model, term, trial, bigger)
+            new, _ = raw(bigger, theta, data, with_rate=False)
+            columns.append(np.concatenate(new) - np.concatenate(base))
+    return np.column_stack(columns) if columns else np.empty((data.size, 0))
+
+
+def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> State:
+    """C V|V|, what is given and tares, with the noise that remains when what is plainly no noise is taken out.
+
+    The noise is first all that is left; what stands out of even that is taken out, and so on: slow noise has many
+    shapes by chance, and taken out at once they would make it look smaller than it is.
+    """
+    unit = unweighted(data)
+    first = fit(model, theta, data, unit)
+    state = refresh(model, first.theta, data, None, None)
+    taken = 0
+    shapes = every_shape(state.fit, data, terms)
+    for _ in range(NOISE_ROUNDS):
+        plain = pursue(state.fit, data, state.weights, shapes)
+        if plain.shape[1] <= taken:
+            break
+        taken = plain.shape[1]
+        state = refresh(model, state.fit.theta, data, plain, state)
+    return state

@@ -1,0 +1,96 @@
+"""A fit with the noise it was judged with, and how the noise is estimated anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.mismatch.fitting import Fit, bounds_of, columns_of, fit, raw
+from identification.mismatch.model import Data, Model, Theta, Weights, weights
+from identification.mismatch.noise import Noise, Rows
+from identification.mismatch.noise_likelihood import fit_noise
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A fit with the noise it was judged with."""
+
+    fit: Fit
+    noise: Noise
+    rate_noise: Noise | None
+    weights: Weights
+    rows: tuple[Rows, ...]
+
+    @property
+    def bic(self) -> float:
+        return self.fit.deviance + int(self.fit.free.sum()) * float(np.log(max(self.fit.residual.size, 2)))
+
+
+def forces(fit_model: Model, theta: Theta, data: Data) -> list[Floats]:
+    """Predicted F without tare at the rows."""
+    thrust, _ = raw(fit_model, theta, data, with_rate=False)
+    return [f - tare for f, tare in zip(thrust, theta.tares, strict=True)]
+
+
+def refresh(model: Model, theta: Theta, data: Data, extra: Floats | None, state: State | None) -> State:
+    """Noise by REML on what the model leaves, the columns of the model (and of what was pursued) taken as fitted."""
+    size = forces(model, theta, data)
+    thrust, rate = raw(model, theta, data, with_rate=data.with_rate)
+    left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
+    unit = unweighted(data)
+    may = np.ones(theta.vector.size, dtype=bool)
+    may[-2:] = False
+    low, high, _ = bounds_of(model, data, theta)
+    may[-3] = high[-3] > low[-3]
+    J = columns_of(model, theta, data, unit, may)
+    parts = by_run(J, data)
+    if extra is not None and extra.shape[1]:
+        parts = [np.column_stack([p, e]) for p, e in zip(parts, by_run(extra, data), strict=True)]
+    parts = _independent(parts)
+    rows = state.rows if state is not None else data.thrust_rows
+    noise = fit_noise(rows, left, parts, size, data.bands)
+    rate_noise = None
+    if data.with_rate:
+        left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=True)]
+        at = [f[:, None] for f in rate]
+        rate_noise = fit_noise(
+            data.rate_rows,
+            left_rate,
+            at,
+            [np.zeros(r.size) for r in left_rate],
+            start=state.rate_noise if state is not None else None,
+        )
+    w = weights(data, noise, size, rate_noise, rows)
+    fitted = fit(model, theta, data, w)
+    return State(fitted, noise, rate_noise, w, tuple(rows))
+
+
+def unweighted(data: Data) -> Weights:
+    white = Noise(1.0, 0.0)
+    return weights(
+        data,
+        white,
+        [np.zeros(r.size) for r in data.rows],
+        None,
+        [replace(r, count=np.ones(r.time.size)) for r in data.thrust_rows],
+        unit=True,
+    )
+
+
+def by_run(columns: Floats, data: Data) -> list[Floats]:
+    ends = np.cumsum([r.size for r in data.rows])
+    return list(np.split(columns[: ends[-1]], ends[:-1]))
+
+
+def _independent(parts: Sequence[Floats]) -> list[Floats]:
+    """The same span, orthonormal over all runs together."""
+    stacked = np.concatenate(parts)
+    size = np.linalg.norm(stacked, axis=0)
+    stacked = stacked[:, size > 0] / size[size > 0]
+    u, s, _ = np.linalg.svd(stacked, full_matrices=False)
+    u = u[:, s > 1e-7 * s[0]] * np.sqrt(stacked.shape[0])
+    ends = np.cumsum([p.shape[0] for p in parts])
+    return list(np.split(u, ends[:-1]))

@@ -1,0 +1,131 @@
+"""A fit and what was found, in the words and figures of the answer."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.mismatch.diagnosis import (
+    Curves,
+    Finding,
+    Mismatch,
+    RivalFinding,
+    Value,
+    Where,
+)
+from identification.mismatch.faults import Fault
+from identification.mismatch.fitting import Fit, raw
+from identification.mismatch.lines import Line
+from identification.mismatch.model import Data, parameters
+from identification.mismatch.naming import Named
+from identification.mismatch.omnibus import ALARM, Judged, judge_left, locate
+from identification.mismatch.rivals import Rival
+from identification.mismatch.search import Found
+from identification.mismatch.state import State
+from identification.physics.term import Term
+
+MOST_PLACES = 3
+LEAST_P = 1e-300
+
+
+def fault_finding(fault: Fault) -> Finding:
+    values = {k: Value(v.value, v.std, v.unit) for k, v in fault.parameters.items()}
+    p = max(fault.p_value, LEAST_P)
+    return Finding("channel_fault", fault.kind, fault.statement, values, p, -2 * float(np.log(p)), 1.0, ())
+
+
+def line_finding(line: Line) -> Finding:
+    values = {
+        "amplitude": Value(line.amplitude, line.amplitude_std, "N"),
+        "frequency": Value(line.frequency, line.frequency_std, "Hz"),
+    }
+    if line.ratio is not None and line.ratio_std is not None:
+        values["periods_per_turn"] = Value(line.ratio, line.ratio_std, "1")
+    if line.phase is not None and line.phase_std is not None:
+        values["phase"] = Value(line.phase, line.phase_std, "rad")
+    p = max(line.p_value, LEAST_P)
+    return Finding("periodic_disturbance", line.kind, line.statement, values, p, line.gain, 1.0, ())
+
+
+def values_of(fitted: Fit, data: Data) -> dict[str, Value]:
+    """C, tares and all parameters of the terms with their standard errors."""
+    std = fitted.std
+    unit = data.scale.driver_unit
+    out = {"C": Value(fitted.theta.C, float(std[0]), f"N/{unit}^2" if unit == "V" else "N s^2/rev^2")}
+    at = 1
+    for term, values, known in zip(
+        fitted.model.terms, fitted.theta.terms, parameters(fitted.model, data.scale), strict=True
+    ):
+        for p, value in zip(known, values, strict=True):
+            out[f"{term.id}.{p.name}"] = Value(value, float(std[at]), p.unit)
+            at += 1
+    for history, tare in zip(data.histories, fitted.theta.tares, strict=True):
+        key = "tare" if len(data.histories) == 1 else f"tare[{history.recording_id}]"
+        out[key] = Value(tare, float(std[at]), "N")
+        at += 1
+    return out
+
+
+def _term_values(term: Term, theta: Sequence[float], std: Sequence[float], data: Data) -> dict[str, Value]:
+    known = term.parameters(data.scale)
+    return {p.name: Value(v, s, p.unit) for p, v, s in zip(known, theta, std, strict=True)}
+
+
+def finding_of(named: Named, data: Data) -> Finding:
+    return Finding(
+        named.term.id,
+        named.term.form,
+        named.term.statement(named.theta, data.scale),
+        _term_values(named.term, named.theta, named.std, data),
+        named.p_value,
+        named.bic_gain,
+        named.probability,
+        tuple(_rival(r, data) for r in named.rivals),
+    )
+
+
+def _rival(rival: Rival, data: Data) -> RivalFinding:
+    fitted, at = rival.fit, 1
+    for term, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
+        if term == rival.term:
+            std = fitted.std[at : at + len(values)]
+            known = _term_values(term, values, [float(s) for s in std], data)
+            return RivalFinding(term.id, term.form, known, rival.bic_loss, term.statement(values, data.scale))
+        at += len(values)
+    raise ValueError(f"{rival.term.id} is not in its own fit")
+
+
+def where_of(judged: Judged, fitted: Fit, data: Data) -> tuple[Where, float, tuple[tuple[float, float, float], ...]]:
+    place = locate(judged, fitted, data)
+    return Where(place.quantity, place.low, place.high, place.unit), place.share, place.table
+
+
+def says(where: Where, share: float, what: str) -> str:
+    unit = "" if where.unit == "1" else f" {where.unit}"
+    place = f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
+    return f"{100 * share:.0f} % of the residual lies at {place}: {what}."
+
+
+def places_of(found: Found, rng: np.random.Generator) -> tuple[Mismatch, ...]:
+    """Where the baseline fails, the clearest coordinates first."""
+    seen = judge_left(found.before.fit, found.data, found.before.weights, rng)
+    if seen.p_value >= ALARM and not found.after.fit.model.terms:
+        return ()
+    out: list[Mismatch] = []
+    for judged in seen.groups[:MOST_PLACES]:
+        if out and judged.p_value > ALARM / 10:
+            break
+        where, share, _ = where_of(judged, found.before.fit, found.data)
+        what = judged.coordinate.what
+        out.append(Mismatch("thrust", where, share, judged.p_value, says(where, share, what)))
+    return tuple(out)
+
+
+def curves_of(before: State, after: State, data: Data) -> tuple[Curves, ...]:
+    old, _ = raw(before.fit.model, before.fit.theta, data, with_rate=False)
+    new, _ = raw(after.fit.model, after.fit.theta, data, with_rate=False)
+    return tuple(
+        Curves(h.recording_id, h.sampled[r], h.driver[r], y, a, b)
+        for h, r, y, a, b in zip(data.histories, data.rows, data.thrust, old, new, strict=True)
+    )
