@@ -30,7 +30,6 @@ FOLLOWED = (
     ("motor_temperature", "degC"),
     ("water_temperature", "degC"),
     ("neighbour_thrust", "N"),
-    ("torque", "N.m"),
 )
 
 

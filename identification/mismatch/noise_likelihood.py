@@ -17,7 +17,6 @@ from identification.recording import Floats
 SCALE_STEP = 8.0
 """Ratio of neighbouring time scales."""
 MOST_SCALES = 4
-"""celerite2 0.3.3 gives wrong slopes for more than four columns (its tests stop there)."""
 FEW_ROWS = 100
 """With fewer rows the noise is taken as white."""
 LEAST_SHARE = 1e-12
@@ -85,7 +84,7 @@ def fit_noise(
         return _likeliest(begin, responses, LEAST_SHARE * np.array([variance, variance / F2, *more]))
 
     if start is None or start.bands != bands:
-        scales = time_scales(runs)[: MOST_SCALES - 2 * len(bands)]
+        scales = time_scales(runs)
         quick = _differences(runs, residuals)
         slow = tuple([0.05 * variance / max(len(scales), 1)] * len(scales))
         start = Noise(quick, 0.02 * quick / F2, scales, slow, bands, tuple([0.05 * variance] * len(bands)))

@@ -45,6 +45,7 @@ MOVING = {
     "load_cell_creep",
     "zero_drift",
     "zero_offset",
+    "rotation_coupling",
 }
 """Not to be seen in a static table."""
 

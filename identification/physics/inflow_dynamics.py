@@ -1,27 +1,30 @@
-"""Water in the duct must be accelerated: T + C|x| share (x - u), u' = (x - u)/tau."""
+"""Water in the duct must be accelerated: T + C|x| share (x - u); u follows x with a lag, or by its momentum."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.filters import lowpass
+from identification.physics.filters import lag, lowpass
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
 
 @dataclass(frozen=True, slots=True)
 class InflowDynamics:
-    """Water in the duct must be accelerated: T + C|x| share (x - u), u' = (x - u)/tau."""
+    """Water in the duct must be accelerated: T + C|x| share (x - u).
+
+    First order: u' = (x - u)/tau. Momentum: u' = (x|x| - u|u|)/(2 tau x_max), which is slower at less.
+    """
 
     id: ClassVar[str] = "inflow_dynamics"
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "the water in the duct must be accelerated first, so thrust overshoots"
     needs: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
-    form: ClassVar[str] = ""
+    form: Literal["first_order", "momentum"] = "first_order"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (Parameter("share", "1", 0.0, 3.0, 0.0), Parameter("time_constant", "s", 0.05, 5.0))
@@ -33,15 +36,19 @@ class InflowDynamics:
         return ()
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        u = lowpass(now.x, now.history.dt, theta[1])[1]
+        if self.form == "first_order":
+            u = lowpass(now.x, now.history.dt, theta[1])[1]
+        else:
+            u = lag(now.x, now.history.dt, 0.5 / (theta[1] * now.scale.driver), 0.0)
         out: Floats = value + now.C * np.abs(now.x) * theta[0] * (now.x - u)
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        slower = "" if self.form == "first_order" else f" at {scale.driver:.3g} {scale.driver_unit}, slower at less"
         return (
             f"Inflow dynamics: after a step thrust overshoots by {100 * theta[0]:.0f} "
-            f"%, until the water has followed (time constant {theta[1]:.2g} s)."
+            f"%, until the water has followed (time constant {theta[1]:.2g} s{slower})."
         )
 
 
-FORMS = (InflowDynamics(),)
+FORMS = (InflowDynamics("first_order"), InflowDynamics("momentum"))

@@ -1,0 +1,101 @@
+"""What C V|V| leaves out of thrust recordings that others have made: fitted on one part, judged on another.
+
+    python examples/real_diagnosis.py [FOLDER] [--whole] [--only NAME] [--reports FOLDER]
+
+FOLDER holds the recordings; default: `../shared/recordings` beside the project. They are not part of the project. What
+is done here is `rig import` and then `rig diagnose FILES [--holdout FILE]`. Printed are verdict, statement and the error
+of what was not fitted: other runs where there are several, otherwise blocks of time (levels of a table) held out.
+`--whole` prints all that `rig diagnose` says. Boats and ROVs: `real_vehicle_diagnosis.py`.
+"""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from time import process_time
+
+import click
+
+from identification.mismatch.diagnosis import Diagnosis
+from rig.diagnose import diagnose_files
+from rig.diagnose_text import diagnosis_text
+from rig.errors import RecordingError
+from rig.importer import import_file
+from rig.importing.mapping import read_map
+from rig.report.diagnosis import write
+
+HERE = Path(__file__).resolve().parents[2] / "shared" / "recordings"
+
+
+@dataclass(frozen=True)
+class Case:
+    """Files of one folder, read by one shipped map: those that are fitted, and those that judge."""
+
+    name: str
+    folder: str
+    map: str
+    fitted: str
+    judged: str = ""
+    parameters: tuple[tuple[str, float], ...] = ()
+    any_thruster: bool = False
+    """The files do not say which thruster it was; their names differ."""
+
+
+CASES = (
+    Case("tank static", "rov_thruster_tank", "tank_static_levels", "Tach_RPM_Thrust_Data.csv"),
+    Case("tank forward-reverse", "rov_thruster_tank", "tank_six_axis", "Fwd_Rvrs_Set[13].csv", "Fwd_Rvrs_Set2.csv"),
+    Case("tank +2 V", "rov_thruster_tank", "tank_two_state", "2statep2V.csv"),
+    Case("tank -2 V", "rov_thruster_tank", "tank_two_state", "2statem2V.csv", parameters=(("direction", -1.0),)),
+    Case("stand, voltage sine", "voltage_sine_stand", "labview_voltage_sine", "*test[25].log", "*test6.log", any_thruster=True),
+    Case("supply sag", "propeller_supply_sag", "crazyflie_supply_sag", "cf21_stock2.csv", "cf2.1-stock-prop.csv"),
+    Case("M5 static", "m5_static", "effort_static", "json_nez_prop.csv"),
+    Case("M5 static, other propeller", "m5_static", "effort_static", "video_ray_prop_calibration.csv"),
+    Case("T200 at 18 V", "t200_18v_static", "blue_robotics_static", "*.csv"),
+)
+
+
+def diagnosed(root: Path, case: Case, folder: Path) -> Diagnosis:
+    """Imported into `folder` and diagnosed."""
+    plan = read_map(case.map)
+
+    def imported(pattern: str) -> list[Path]:
+        files = sorted((root / case.folder).glob(pattern)) if pattern else []
+        return [import_file(p, plan, folder / f"{p.stem}.h5", dict(case.parameters)).path for p in files]
+
+    return diagnose_files(imported(case.fitted), imported(case.judged), any_thruster=case.any_thruster)
+
+
+def short(case: Case, found: Diagnosis, took: float) -> str:
+    held = found.heldout
+    error = f"{held.before:.4g} -> {held.after:.4g} N rms (noise {held.noise:.3g})"
+    return f"{case.name}: {found.verdict}\n  {found.statement}\n  not fitted: {error}; {held.what}; {took:.0f} s"
+
+
+@click.command(help=__doc__)
+@click.argument("root", metavar="FOLDER", type=click.Path(path_type=Path), default=HERE)
+@click.option("--whole", is_flag=True)
+@click.option("--only", default="")
+@click.option("--reports", type=click.Path(path_type=Path))
+def main(root: Path, whole: bool, only: str, reports: Path | None) -> None:
+    if not root.is_dir():
+        print(f"{root} is not there; the real recordings are not part of the project")
+        return
+    for case in CASES:
+        if only not in case.name:
+            continue
+        begun = process_time()
+        with tempfile.TemporaryDirectory() as temporary:
+            try:
+                found = diagnosed(root, case, Path(temporary))
+            except RecordingError as error:
+                print(f"{case.name}: {error}\n", flush=True)
+                continue
+        print(diagnosis_text(found) if whole else short(case, found, process_time() - begun), end="\n\n", flush=True)
+        if reports is not None:
+            reports.mkdir(parents=True, exist_ok=True)
+            write(found, reports / f"{case.name.replace(' ', '_')}.html")
+
+
+if __name__ == "__main__":
+    main()
