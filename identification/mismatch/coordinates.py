@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.mismatch.fitting import Fit
+from identification.mismatch.fitting import Fit, raw
 from identification.mismatch.model import Data, predict
 from identification.physics.filters import lowpass
 from identification.physics.rotation_coupling import slip
@@ -102,10 +102,12 @@ def _knots(values: Sequence[Floats], most: int) -> Floats:
 def coordinates(fit: Fit, data: Data) -> tuple[Coordinate, ...]:
     """All that can be looked at in these runs."""
     whole = tuple(predict(fit.model, fit.theta, h, data.scale, i) for i, h in enumerate(data.histories))
+    # with the nuisances, or their slope would be a part of every gain
+    thrust, _ = raw(fit.model, fit.theta, data, with_rate=False)
     view = _View(
         fit,
         data,
-        tuple(f[r] / data.scale.thrust for (f, _), r in zip(whole, data.rows, strict=True)),
+        tuple((F - tare) / data.scale.thrust for F, tare in zip(thrust, fit.theta.tares, strict=True)),
         tuple(x[r] / data.scale.driver for (_, x), r in zip(whole, data.rows, strict=True)),
         tuple(h.driver[r] for h, r in zip(data.histories, data.rows, strict=True)),
         tuple(h.previous[r] for h, r in zip(data.histories, data.rows, strict=True)),

@@ -34,6 +34,8 @@ EQUAL = 10.0
 """BIC within which two coordinates do equally well."""
 LOCATED = 0.8
 """Share of the best coordinate's gain at which the located one is kept."""
+FOLLOW_LOAD = ("bus_voltage", "current", "load_history")
+"""Quantities that a thruster's own load moves."""
 FIT_STEPS = 10
 WORTH = 6.0
 """By which chi-square must fall on what was not fitted, beside 2 for each parameter."""
@@ -172,16 +174,22 @@ def _left(state: State, part: Data, rng: np.random.Generator) -> list[str]:
 
 def _candidates(state: State, part: Data, order: Sequence[str]) -> list[Candidate]:
     """The best over each of the first coordinates; the located one first unless others gain more, or a recorded
-    quantity gains as much: what a channel does, time can do too."""
+    quantity gains as much: what a channel does, time can do too. Where a quantity that follows the load is best, the
+    static curve itself goes before it when it gains nearly as much."""
     found = [best_over(quantity, state, part) for quantity in order[:MOST_COORDINATES]]
     gaining = [c for c in found if c is not None and c.gain > 0]
     if not gaining:
         return []
     most = max(c.gain for c in gaining)
 
-    def rank(c: Candidate) -> tuple[bool, bool, float]:
+    follows = max(gaining, key=lambda c: c.gain).term.quantity in FOLLOW_LOAD
+    static = (part.histories[0].driver_quantity, "direction")
+
+    def rank(c: Candidate) -> tuple[bool, bool, bool, float]:
+        near = c.gain > LOCATED * most
+        itself = follows and near and c.term.quantity in static
         recorded = c.term.quantity in UNITS and c.gain > most - EQUAL
-        return not recorded, c.term.quantity != order[0] or c.gain < LOCATED * most, -c.gain
+        return not itself, not recorded, c.term.quantity != order[0] or not near, -c.gain
 
     return sorted(gaining, key=rank)
 

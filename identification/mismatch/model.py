@@ -209,8 +209,14 @@ def scale_of(histories: Sequence[History], C: float) -> Scale:
     )
 
 
+MANY_SAMPLES = 100
+
+
 def _scatter(history: History) -> float:
-    """N: standard deviation of one sample, from neighbouring rows of a level, robust."""
+    """N: standard deviation of one sample, robust: from second differences, or of a table from neighbouring rows."""
+    if not history.static and history.sample_thrust.size > MANY_SAMPLES:
+        bent = np.abs(np.diff(history.sample_thrust, 2))
+        return float(np.median(bent[np.isfinite(bent)]) / 0.6745 / np.sqrt(6.0))
     rows = history.rows
     same = np.diff(history.level_start[rows]) == 0
     weight = np.sqrt(1 / history.count[rows][1:] + 1 / history.count[rows][:-1])
