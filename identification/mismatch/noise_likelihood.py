@@ -27,11 +27,16 @@ ENDED = 1e-3
 """Fall of half the restricted deviance at which the search for variances ends."""
 
 
+def longest_scale(runs: Sequence[Rows]) -> float:
+    """s: a quarter of the longest run. What is slower is a drift, and no noise."""
+    return 0.25 * max(float(r.time[-1] - r.time[0]) for r in runs)
+
+
 def time_scales(runs: Sequence[Rows]) -> tuple[float, ...]:
     """From two samples to a quarter of the longest run, MOST_SCALES of them at even ratios."""
-    longest = max(float(r.time[-1] - r.time[0]) for r in runs)
+    longest = 4 * longest_scale(runs)
     spacing = float(np.median(np.concatenate([r.width / r.count for r in runs])))
-    low, high = max(2 * spacing, 1e-3 * longest / MOST_SCALES), 0.25 * longest
+    low, high = max(2 * spacing, 1e-3 * longest / MOST_SCALES), longest_scale(runs)
     if high <= 2 * low:
         return (high,) if high > 0 else ()
     number = min(MOST_SCALES, 1 + int(np.ceil(np.log(high / low) / np.log(SCALE_STEP))))
@@ -49,7 +54,7 @@ def refined_scales(noise: Noise, rows: Sequence[Rows]) -> tuple[float, ...]:
     step = np.sqrt(T[1] / T[0]) if T.size > 1 else 2.0
     kept = list(T[used])
     for t in sorted(kept, key=lambda t: -spread[list(T).index(t)]):
-        for beside in (t / step, t * step):
+        for beside in (t / step, min(t * step, longest_scale(rows))):
             if free and all(abs(np.log(beside / k)) > 0.3 for k in kept):
                 kept.append(float(beside))
                 free -= 1

@@ -29,6 +29,9 @@ CANDIDATES = 5
 NEARLY = 0.93
 """Of the best gain: a candidate with fewer parameters that reaches it goes first; swaps come later (rivals.py)."""
 MOST_TERMS = 6
+HIDDEN = 2.0
+"""Sigmas from which a candidate is tried with noise of its own, where none passes."""
+MOST_HIDDEN = 3
 STATIC = ("command_voltage", "thrust")
 """Coordinates of the static curve."""
 MOST_STATIC = 2
@@ -117,19 +120,50 @@ def search(
                 f"{[t.id for t in state.fit.model.terms]} largest {judged.largest:.1f} of {judged.threshold:.2f} "
                 + str([(t.id, t.form, round(z, 1)) for t, _, z in judged.best(6)])
             )
-        if judged.largest <= judged.threshold or len(ids) >= MOST_TERMS:
+        if len(ids) >= MOST_TERMS:
             break
-        best = _best_addition(state, judged, data)
-        if best is None:
+        larger = (
+            _larger(state, judged, data, terms) if judged.largest > judged.threshold else _hidden(state, judged, data)
+        )
+        if larger is None:
             break
-        remaining = [t for t in terms if t.id not in {u.id for u in best.model.terms}]
-        plain = pursue(best, data, state.weights, every_shape(best, data, remaining))
-        state = refresh(best.model, best.theta, data, plain, state)
-        state = prune(state, data)
+        state = prune(larger, data)
         if frozenset(state.fit.model.terms) in seen:  # what was added was dropped again
             break
         seen.add(frozenset(state.fit.model.terms))
     return Found(data, terms, before, state, tuple(screenings), judged)
+
+
+def _larger(state: State, judged: Screening, data: Data, terms: Sequence[Term]) -> State | None:
+    """The model with one more term, its noise estimated anew."""
+    best = _best_addition(state, judged, data)
+    if best is None:
+        return None
+    remaining = [t for t in terms if t.id not in {u.id for u in best.model.terms}]
+    plain = pursue(best, data, state.weights, every_shape(best, data, remaining))
+    return refresh(best.model, best.theta, data, plain, state)
+
+
+def _hidden(state: State, judged: Screening, data: Data) -> State | None:
+    """The model with a term that the noise had taken for its own: they are told apart when estimated together."""
+    likely = [(t, v) for t, v, z in judged.best(MOST_HIDDEN) if z > HIDDEN]
+    if not likely:
+        return None
+    now = refresh(state.fit.model, state.fit.theta, data, None, None)
+    found = []
+    for term, values in likely:
+        bigger = state.fit.model.plus(term)
+        begin = refined(state.fit, data, state.weights, term, values)
+        theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
+        first = fit(bigger, theta, data, state.weights)
+        new = refresh(bigger, first.theta, data, None, None, now.noise)
+        gain = now.fit.deviance - new.fit.deviance
+        if gain > judged.threshold**2 + price(term, data) * np.log(data.size):
+            found.append((gain, new))
+    if not found:
+        return None
+    best = max(found, key=lambda each: each[0])[1].fit
+    return refresh(best.model, best.theta, data, None, None)
 
 
 def _best_addition(state: State, judged: Screening, data: Data) -> Fit | None:

@@ -35,8 +35,13 @@ def forces(fit_model: Model, theta: Theta, data: Data) -> list[Floats]:
     return [f - tare for f, tare in zip(thrust, theta.tares, strict=True)]
 
 
-def refresh(model: Model, theta: Theta, data: Data, extra: Floats | None, state: State | None) -> State:
-    """Noise by REML on what the model leaves, the columns of the model (and of what was pursued) taken as fitted."""
+def refresh(
+    model: Model, theta: Theta, data: Data, extra: Floats | None, state: State | None, like: Noise | None = None
+) -> State:
+    """Noise by REML on what the model leaves, the columns of the model (and of what was pursued) taken as fitted.
+
+    `like`: a noise whose time scales are kept, so that likelihoods can be compared.
+    """
     size = forces(model, theta, data)
     thrust, rate = raw(model, theta, data, with_rate=data.with_rate)
     left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
@@ -51,7 +56,7 @@ def refresh(model: Model, theta: Theta, data: Data, extra: Floats | None, state:
         parts = [np.column_stack([p, e]) for p, e in zip(parts, by_run(extra, data), strict=True)]
     parts = _independent(parts)
     rows = state.rows if state is not None else data.thrust_rows
-    noise = fit_noise(rows, left, parts, size, data.bands)
+    noise = fit_noise(rows, left, parts, size, data.bands, like)
     rate_noise = None
     if data.with_rate:
         left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=True)]
