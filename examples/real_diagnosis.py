@@ -3,15 +3,15 @@
     python examples/real_diagnosis.py [FOLDER] [--whole] [--only NAME] [--reports FOLDER]
 
 FOLDER holds the recordings; default: `../shared/recordings` beside the project. They are not part of the project. What
-is done here is `rig import` and then `rig diagnose FILES [--holdout FILE]`. Printed are verdict, statement and the error
-of what was not fitted: other runs where there are several, otherwise blocks of time (levels of a table) held out.
+is done here is `rig import` and then `rig diagnose FILES [--holdout FILE]`. Printed are verdict, statement and the
+error of what was not fitted: other runs where there are several, otherwise blocks of time (levels of a table).
 `--whole` prints all that `rig diagnose` says. Boats and ROVs: `real_vehicle_diagnosis.py`.
 """
 
 from __future__ import annotations
 
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from time import process_time
 
@@ -38,8 +38,8 @@ class Case:
     fitted: str
     judged: str = ""
     parameters: tuple[tuple[str, float], ...] = ()
-    any_thruster: bool = False
-    """The files do not say which thruster it was; their names differ."""
+    thruster: str = ""
+    """Where the files do not say which it was, and their names differ."""
 
 
 CASES = (
@@ -53,7 +53,7 @@ CASES = (
         "labview_voltage_sine",
         "*test[25].log",
         "*test6.log",
-        any_thruster=True,
+        thruster="the stand's",
     ),
     Case("supply sag", "propeller_supply_sag", "crazyflie_supply_sag", "cf21_stock2.csv", "cf2.1-stock-prop.csv"),
     Case("M5 static", "m5_static", "effort_static", "json_nez_prop.csv"),
@@ -65,12 +65,13 @@ CASES = (
 def diagnosed(root: Path, case: Case, folder: Path) -> Diagnosis:
     """Imported into `folder` and diagnosed."""
     plan = read_map(case.map)
+    plan = replace(plan, thruster=case.thruster or plan.thruster)
 
     def imported(pattern: str) -> list[Path]:
         files = sorted((root / case.folder).glob(pattern)) if pattern else []
         return [import_file(p, plan, folder / f"{p.stem}.h5", dict(case.parameters)).path for p in files]
 
-    return diagnose_files(imported(case.fitted), imported(case.judged), any_thruster=case.any_thruster)
+    return diagnose_files(imported(case.fitted), imported(case.judged))
 
 
 def short(case: Case, found: Diagnosis, took: float) -> str:

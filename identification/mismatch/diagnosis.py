@@ -170,7 +170,9 @@ class Diagnosis:
                 rivals = "; ".join(
                     f"{f.effect} or {' or '.join(r.effect for r in f.rivals)}" for f in self.findings if f.rivals
                 )
-                return f"These recordings cannot tell {rivals}: run the next experiment."
+                sure = " ".join(f.statement for f in self.findings if not f.rivals)
+                known = f" Left out besides: {sure}" if sure else ""
+                return f"These recordings cannot tell {rivals}: run the next experiment.{known}"
             case _:
                 assert self.unexplained is not None
                 known = " Known: " + " ".join(f.statement for f in self.findings) if self.findings else ""

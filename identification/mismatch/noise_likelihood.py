@@ -68,8 +68,13 @@ def fit_noise(
     sizes: Sequence[Floats],
     bands: tuple[tuple[float, float], ...] = (),
     start: Noise | None = None,
+    *,
+    in_time: bool = True,
+    least: float = 0.0,
 ) -> Noise:
-    """Restricted maximum likelihood of all variances, common to all runs.
+    """Restricted maximum likelihood of all variances, common to all runs; without slow noise if rows are not in time.
+
+    No white variance below `least`.
 
     `residuals` (n,) and `columns` (n, p) of what was fitted to them, `sizes` (n,) |F|, one of each per run.
     """
@@ -86,10 +91,13 @@ def fit_noise(
 
     def likeliest(begin: Noise) -> Noise:
         more = [variance] * (len(begin.scales) + len(begin.bands))
-        return _likeliest(begin, responses, LEAST_SHARE * np.array([variance, variance / F2, *more]))
+        floor = LEAST_SHARE * np.array([variance, variance / F2, *more])
+        begun = begin.with_variances(np.maximum(begin.variances, 1e3 * floor))
+        floor[0] = max(floor[0], least)
+        return _likeliest(begun, responses, floor)
 
     if start is None or start.bands != bands:
-        scales = time_scales(runs)
+        scales = time_scales(runs) if in_time else ()
         quick = _differences(runs, residuals)
         slow = tuple([0.05 * variance / max(len(scales), 1)] * len(scales))
         start = Noise(quick, 0.02 * quick / F2, scales, slow, bands, tuple([0.05 * variance] * len(bands)))
@@ -107,7 +115,7 @@ def _likeliest(start: Noise, responses: Sequence[Response], floor: Floats) -> No
 
     Newton's method with the average information, damped; the common factor of all variances in closed form.
     """
-    values, here = _levelled(start, np.maximum(start.variances, 1e3 * floor), responses, floor)
+    values, here = _levelled(start, np.maximum(start.variances, floor), responses, floor)
     damping = 1e-3
     for _ in range(MOST_STEPS):
         step = _step(values, here, floor, damping)

@@ -93,7 +93,7 @@ def likelihood(noise: Noise, responses: Sequence[Response]) -> Likelihood:
             slope += _over_variances(noise, response, *_backwards(response.rows.time, f, Z, turn))
         moved, square = _moved(noise, response, _solved(response.rows.time, f, Z[:, p]))
         squares += square
-        white = driver.solve_lower(response.rows.time, f.c, f.U, f.W, moved, np.empty_like(moved))
+        white = _whitened(response.rows.time, f, moved)
         weighted = white / f.d[:, None]
         inner += white.T @ weighted
         across += Z[:, :p].T @ weighted
@@ -144,8 +144,10 @@ def _factored(noise: Noise, response: Response) -> _Factored:
     time = response.rows.time
     c, a, U, V = noise.correlated(response.rows, response.size)
     n, J = U.shape
-    d, W, S = backprop.factor_fwd(time, c, a, U, V, np.empty(n), np.empty((n, J)), np.empty((n, J, J)))
     Y = np.ascontiguousarray(np.column_stack([response.columns, response.residual]))
+    if J == 0:  # celerite2 wants a column at least
+        return _Factored(c, a, U, V, a, V, np.empty((n, 0, 0)), Y, np.empty((n, 0, Y.shape[1])))
+    d, W, S = backprop.factor_fwd(time, c, a, U, V, np.empty(n), np.empty((n, J)), np.empty((n, J, J)))
     Z, F = backprop.solve_lower_fwd(time, c, U, W, Y, np.empty_like(Y), np.empty((n, J, Y.shape[1])))
     return _Factored(c, a, U, V, d, W, S, Z, F)
 
@@ -158,11 +160,13 @@ def _backwards(time: Floats, f: _Factored, Z: Floats, turn: Floats) -> tuple[Flo
     def none(*shape: int) -> Floats:
         return np.zeros(shape)  # celerite2 adds to what it is given
 
+    bd = 0.5 / f.d - 0.5 * np.sum(Z**2, axis=1) / f.d**2
+    if J == 0:
+        return bd, none(n, J)
     bZ = np.ascontiguousarray(Z @ turn.T / f.d[:, None])
     solved = backprop.solve_lower_rev(
         time, f.c, f.U, f.W, f.Z, f.Z, f.F, bZ, none(n), none(J), none(n, J), none(n, J), none(n, k)
     )
-    bd = 0.5 / f.d - 0.5 * np.sum(Z**2, axis=1) / f.d**2
     bW = np.ascontiguousarray(solved[3])
     factored = backprop.factor_rev(
         time, f.c, f.a, f.U, f.V, f.d, f.W, f.S, bd, bW, none(n), none(J), none(n), none(n, J), none(n, J)
@@ -182,8 +186,18 @@ def _over_variances(noise: Noise, response: Response, ba: Floats, bU: Floats) ->
     return np.array([*own, *(ba @ shape.gain2 + np.concatenate([moved[:J], by_band]))])
 
 
+def _whitened(time: Floats, f: _Factored, Y: Floats) -> Floats:
+    """(n, k) L^-1 Y."""
+    if f.U.shape[1] == 0:
+        return Y
+    out: Floats = driver.solve_lower(time, f.c, f.U, f.W, np.ascontiguousarray(Y), np.empty_like(Y))
+    return out
+
+
 def _solved(time: Floats, f: _Factored, z: Floats) -> Floats:
     """(n,) K^-1 of what L^-1 made z."""
+    if f.U.shape[1] == 0:
+        return z / f.d
     Y = np.ascontiguousarray((z / f.d)[:, None])
     out: Floats = driver.solve_upper(time, f.c, f.U, f.W, Y, np.empty_like(Y))[:, 0]
     return out

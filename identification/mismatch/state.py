@@ -56,7 +56,9 @@ def refresh(
         parts = [np.column_stack([p, e]) for p, e in zip(parts, by_run(extra, data), strict=True)]
     parts = _independent(parts)
     rows = state.rows if state is not None else data.thrust_rows
-    noise = fit_noise(rows, left, parts, size, data.bands, like)
+    in_time = not any(h.static for h in data.histories)  # rows of a table may stand in the order of their levels
+    least = 0.0 if in_time else max(reading_step(h.thrust[h.rows]) for h in data.histories) ** 2 / 12
+    noise = fit_noise(rows, left, parts, size, data.bands, like, in_time=in_time, least=least)
     rate_noise = None
     if data.with_rate:
         left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=True)]
@@ -83,6 +85,16 @@ def unweighted(data: Data) -> Weights:
         [replace(r, count=np.ones(r.time.size)) for r in data.thrust_rows],
         unit=True,
     )
+
+
+def reading_step(values: Floats) -> float:
+    """The step in which a table was written: its rounding is noise too, also where it says 0.00.
+
+    >>> reading_step(np.array([0.0, 0.1, 0.1, 0.4]))
+    0.1
+    """
+    steps = np.diff(np.unique(values))
+    return float(np.min(steps, initial=np.inf, where=steps > 0)) if steps.size else 0.0
 
 
 def by_run(columns: Floats, data: Data) -> list[Floats]:

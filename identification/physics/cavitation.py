@@ -25,12 +25,12 @@ class Cavitation:
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (
             Parameter("slope", f"1/{scale.driver_unit}", 0.0, 8.0 / scale.driver, 0.0),
-            Parameter("onset", scale.driver_unit, 0.2 * scale.driver, 0.98 * scale.driver),
+            Parameter("onset", scale.driver_unit, 0.4 * scale.driver, 0.98 * scale.driver),
         )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         slope = (0.3 if self.form == "linear" else 0.8) / scale.driver
-        return tuple((slope, share * scale.driver) for share in (0.4, 0.6, 0.75, 0.88))
+        return tuple((slope, share * scale.driver) for share in (0.45, 0.6, 0.75, 0.88))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()

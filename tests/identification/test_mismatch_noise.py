@@ -128,12 +128,13 @@ def two_runs(p=3, n=120):
 @pytest.mark.parametrize(
     "noise",
     [
+        replace(SLOW, scales=(), slow=()),
         SLOW,
         BAND,
         replace(MIXED, scales=(0.15,), slow=(0.05,)),
         replace(MIXED, scales=(0.02, 0.15, 0.5, 3.0), slow=(0.1, 0.05, 0.2, 0.1)),
     ],
-    ids=["slow", "band", "all", "many"],
+    ids=["white", "slow", "band", "all", "many"],
 )
 @pytest.mark.parametrize("p", [0, 3])
 def test_the_restricted_likelihood_and_its_slope(noise, p):
