@@ -24,7 +24,7 @@ class InflowDynamics:
     physics: ClassVar[str] = "the water in the duct must be accelerated first, so thrust overshoots"
     needs: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
-    form: Literal["first_order", "momentum"] = "first_order"
+    form: Literal["", "momentum"] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (Parameter("share", "1", 0.0, 3.0, 0.0), Parameter("time_constant", "s", 0.05, 5.0))
@@ -36,7 +36,7 @@ class InflowDynamics:
         return ()
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        if self.form == "first_order":
+        if not self.form:
             u = lowpass(now.x, now.history.dt, theta[1])[1]
         else:
             u = lag(now.x, now.history.dt, 0.5 / (theta[1] * now.scale.driver), 0.0)
@@ -44,11 +44,11 @@ class InflowDynamics:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        slower = "" if self.form == "first_order" else f" at {scale.driver:.3g} {scale.driver_unit}, slower at less"
+        slower = "" if not self.form else f" at {scale.driver:.3g} {scale.driver_unit}, slower at less"
         return (
             f"Inflow dynamics: after a step thrust overshoots by {100 * theta[0]:.0f} "
             f"%, until the water has followed (time constant {theta[1]:.2g} s{slower})."
         )
 
 
-FORMS = (InflowDynamics("first_order"), InflowDynamics("momentum"))
+FORMS = (InflowDynamics(), InflowDynamics("momentum"))

@@ -119,6 +119,12 @@ def _reversal(values: Values, form: str, _k: float, _driver: float) -> Table:
     return dict(values)
 
 
+def _inflow(values: Values, form: str, _k: float, _driver: float) -> Table:
+    if form:
+        raise WorldError(f"the world has inflow_dynamics of first order only, got the form {form!r}")
+    return dict(values)
+
+
 def _linear(values: Values, _form: str, _k: float, _driver: float) -> Table:
     return {"coefficient": values["slope"]}
 
@@ -160,7 +166,7 @@ TERMS: Mapping[str, Callable[[Values, str, float, float], Table]] = {
     "motor_lag": _lag,
     "exponent": _exponent,
     "asymmetry": _same,
-    "inflow_dynamics": _same,
+    "inflow_dynamics": _inflow,
     "cavitation": _cavitation,
     "heating": _heating,
     "reversal_loss": _reversal,

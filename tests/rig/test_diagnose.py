@@ -331,6 +331,7 @@ def test_every_term_of_the_catalogue_that_the_world_knows_builds_its_effect():
         ("supply_sag", "buffered"),
         ("supply_sag", "discharge"),
         ("motor_lag", "mixed"),
+        ("inflow_dynamics", "momentum"),
         ("rotation_coupling", ""),
         ("thruster_interaction", ""),
         ("reversal_loss", "step"),
