@@ -86,16 +86,17 @@ def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[lis
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
         prompt = promptness(model, theta, history.tick)
-        F = F + prompt * theta.C * (2 * np.abs(x) * history.lead + history.excess)
+        ahead = np.broadcast_to(prompt * theta.C * (2 * np.abs(x) * history.lead + history.excess), F.shape)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
-        thrust.append(reconstructed(F, history.middle, history.sampled)[rows] + theta.tares[i])
+        thrust.append((reconstructed(F, history.middle, history.sampled) + ahead)[rows] + theta.tares[i])
         if with_rate:
             assert history.rate_sampled is not None
-            x = x + prompt * history.rate_lead
+            lead = np.broadcast_to(prompt * history.rate_lead, x.shape)
             if theta.rate_shift:
                 x = delayed(x, history.edges, theta.rate_shift)
-            rate.append(theta.k * reconstructed(x, history.middle, history.rate_sampled)[history.rate_rows])
+            turning = reconstructed(x, history.middle, history.rate_sampled) + lead
+            rate.append(theta.k * turning[history.rate_rows])
     return thrust, rate
 
 
