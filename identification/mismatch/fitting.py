@@ -80,13 +80,20 @@ def bounds_of(model: Model, data: Data, theta: Theta) -> tuple[Floats, Floats, F
     return low, high, np.array(steps)
 
 
-def raw(model: Model, theta: Theta, data: Data, *, with_rate: bool) -> tuple[list[Floats], list[Floats]]:
-    """Predictions at the rows: thrust with tare, and rate; run by run."""
+def raw(
+    model: Model, theta: Theta, data: Data, *, with_rate: bool, near: Theta | None = None
+) -> tuple[list[Floats], list[Floats]]:
+    """Predictions at the rows: thrust with tare, and rate; run by run.
+
+    Ticks of the command come with the delay of `near`, else of `theta`: a small step moves none across a sample, and
+    would hide the slope.
+    """
     thrust, rate = [], []
+    late = sum(v[0] for t, v in zip(model.terms, (near or theta).terms, strict=True) if t.id == "time_skew")
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
         prompt = promptness(model, theta, history.tick)
-        ahead = np.broadcast_to(prompt * theta.C * (2 * np.abs(x) * history.lead + history.excess), F.shape)
+        ahead = np.broadcast_to(prompt * theta.C * (2 * np.abs(x) * history.lead_after(late) + history.excess), F.shape)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
         thrust.append((reconstructed(F, history.middle, history.sampled) + ahead)[rows] + theta.tares[i])
@@ -133,7 +140,8 @@ def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: 
         h = step[j] if vector[j] + step[j] <= high[j] else -step[j]
         moved = vector.copy()
         moved[j] += h
-        new_thrust, new_rate = raw(model, theta.with_vector(moved), data, with_rate=bool(weights.rate))
+        moved_theta = theta.with_vector(moved)
+        new_thrust, new_rate = raw(model, moved_theta, data, with_rate=bool(weights.rate), near=theta)
         for i in range(R):
             thrust[i].append((new_thrust[i] - base_thrust[i]) / h)
             if weights.rate:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from identification.mismatch.channels import followed, jumps, neighbour_at, supply
 from identification.mismatch.grid import STEP, Held, distinct, edges_of
 from identification.physics.filters import reconstructed, within_intervals
-from identification.physics.history import CHANGED, History
+from identification.physics.history import CHANGED, LARGEST_LEAD, History
 from identification.recording import Channel, Floats, Recording
 
 DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
@@ -192,6 +192,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         sample_lead=_sample_lead(held, time[inside], edges, driven),
         tick=max(float(np.median(np.diff(held.time))), 1e-6) if held.time.size > 1 else 1.0,
         lead=_lead(held, time, edges, driven, count),
+        ticks=(held.time, held.value) if held.stepwise else None,
         rate_lead=np.zeros(1) if rate_count is None else _lead(held, turning_time, edges, driven, rate_count),
         sample_time=time[inside],
         sample_thrust=force[inside],
@@ -257,7 +258,7 @@ def _lead(held: Held, time: Floats, edges: Floats, driven: Floats, count: NDArra
     now = held.value[np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)]
     mean, _, sampled = _binned(time, now, edges)
     lead = np.where(count > 0, mean - reconstructed(driven, 0.5 * (edges[1:] + edges[:-1]), sampled), 0.0)
-    out: Floats = np.where(np.abs(lead) < STEP * float(np.max(np.abs(driven))), lead, 0.0)
+    out: Floats = np.where(np.abs(lead) < LARGEST_LEAD * float(np.max(np.abs(driven))), lead, 0.0)
     return out
 
 
@@ -267,7 +268,7 @@ def _sample_lead(held: Held, time: Floats, edges: Floats, driven: Floats) -> Flo
         return np.zeros(1)
     now = held.value[np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)]
     lead = now - within_intervals(driven, edges, time)
-    out: Floats = np.where(np.abs(lead) < STEP * float(np.max(np.abs(driven))), lead, 0.0)
+    out: Floats = np.where(np.abs(lead) < LARGEST_LEAD * float(np.max(np.abs(driven))), lead, 0.0)
     return out
 
 

@@ -14,12 +14,17 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.physics.filters import delayed, reconstructed
 from identification.recording import Floats
 
 TURNING = 0.02
 """Share of the largest driver above which it counts as driving."""
 CHANGED = 0.01
 """Share of the largest driver: a smaller difference between neighbouring intervals is no step."""
+LARGEST_LEAD = 0.02
+"""Of the largest driver: what changes by more is a step, and no tick."""
+LEAST_DELAY = 0.02
+"""Of a tick: a shorter delay leaves what the driver does within its ticks where it was."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +68,8 @@ class History:
     tick: float = 1.0
     """s between changes of the command where it ticks on."""
     rate_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
+    ticks: tuple[Floats, Floats] | None = field(default=None, repr=False)
+    """s, driver: every change of a command that is held between."""
     sample_time: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     """(N,) s, every thrust sample that is in an interval."""
     sample_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
@@ -86,6 +93,24 @@ class History:
     def middle(self) -> Floats:
         out: Floats = 0.5 * (self.edges[1:] + self.edges[:-1])
         return out
+
+    def lead_after(self, delay: float) -> Floats:
+        """`lead` of a force that comes `delay` s after the driver."""
+        if self.ticks is None or abs(delay) < LEAST_DELAY * self.tick:
+            return self.lead
+        at, value = self.ticks
+        now = value[np.clip(np.searchsorted(at, self.sample_time - delay, side="right") - 1, 0, at.size - 1)]
+        mean = np.bincount(self._sample_index, weights=now, minlength=self.driver.size) / np.maximum(self.count, 1)
+        line = reconstructed(delayed(self.driver, self.edges, delay), self.middle, self.sampled)
+        lead = np.where(self.count > 0, mean - line, 0.0)
+        out: Floats = np.where(np.abs(lead) < LARGEST_LEAD * self.size, lead, 0.0)
+        return out
+
+    @cached_property
+    def _sample_index(self) -> NDArray[np.intp]:
+        """(N,) interval of each thrust sample."""
+        index = np.searchsorted(self.edges, self.sample_time, side="right") - 1
+        return np.clip(index, 0, self.driver.size - 1)
 
     @cached_property
     def rows(self) -> NDArray[np.intp]:
