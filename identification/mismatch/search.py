@@ -146,7 +146,7 @@ def _larger(state: State, judged: Screening, data: Data, terms: Sequence[Term]) 
 
 def _hidden(state: State, judged: Screening, data: Data) -> State | None:
     """The model with a term that the noise had taken for its own: they are told apart when estimated together."""
-    likely = [(t, v) for t, v, z in judged.best(MOST_HIDDEN) if z > HIDDEN]
+    likely = [(t, v) for t, v, z in judged.best(MOST_HIDDEN) if z > HIDDEN and "time" in t.coordinates]
     if not likely:
         return None
     now = refresh(state.fit.model, state.fit.theta, data, None, None)
