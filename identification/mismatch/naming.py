@@ -65,6 +65,8 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
     }
     if len(driver) > 1:
         splits["in all runs"] = [np.full(v.size, i >= len(driver) / 2) for i, v in enumerate(driver)]
+    if any(h.static for h in data.histories):
+        del splits["in both halves of the run"]  # a table may stand in the order of its levels
     weights = Weights(state.weights.thrust)
     for what, masks in splits.items():
         column = weights.whiten([c * m for c, m in zip(change, masks, strict=True)], [])

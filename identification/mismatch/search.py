@@ -36,6 +36,8 @@ STATIC = ("command_voltage", "thrust")
 """Coordinates of the static curve."""
 MOST_STATIC = 2
 """Shapes on the static curve: any curve can be made of more."""
+TWINS = {"asymmetry", "torque_crosstalk"}
+"""The same curve in other words: never both."""
 MOVING = {
     "motor_lag",
     "inflow_dynamics",
@@ -111,6 +113,8 @@ def search(
         left = [t for t in terms if t.id not in ids]
         if sum(set(t.coordinates) <= set(STATIC) for t in state.fit.model.terms) >= MOST_STATIC:
             left = [t for t in left if not set(t.coordinates) <= set(STATIC)]
+        if ids & TWINS:
+            left = [t for t in left if t.id not in TWINS]
         found = directions(state.fit, data, state.weights, left)
         spared = allowed(corrections(state.fit, data, state.weights), found.columns)
         judged = screen(state.fit, found, rng, ALARM, spared)
