@@ -47,7 +47,8 @@ def run(rate: float, dead: float, lag: float, seed: int) -> tuple[np.ndarray, np
     acting = np.sign(acting) * np.maximum(np.abs(acting) - dead, 0.0)
     rate_of_rotor, x, keep = np.empty(fine.size), 0.0, np.exp(-step / lag) if lag else 0.0
     for i, target in enumerate(acting.tolist()):
-        rate_of_rotor[i] = x = target + (x - target) * keep
+        rate_of_rotor[i] = x if lag else target
+        x = target + (x - target) * keep
     at = np.arange(0, fine.size, round(1 / rate / step))
     exact = 0.05 * rate_of_rotor[at] * np.abs(rate_of_rotor[at])
     return start, level, fine[at], exact - 1.3 + 0.4 * rng.standard_normal(at.size)
