@@ -9,6 +9,9 @@ from identification.physics.filters import lag, lowpass
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
+NEARLY_LINEAR = 0.9
+"""Linear share from which a lag is told as one that is the same at all levels."""
+
 
 @dataclass(frozen=True, slots=True)
 class MotorLag:
@@ -46,7 +49,8 @@ class MotorLag:
         return lag(value, now.history.dt, (1 - linear) / (2 * tau * now.scale.driver), linear / tau, start)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        slower = "" if self.form == "first_order" else f" at {scale.driver:.3g} {scale.driver_unit}, slower at less"
+        alike = self.form == "first_order" or (self.form == "mixed" and theta[1] > NEARLY_LINEAR)
+        slower = "" if alike else f" at {scale.driver:.3g} {scale.driver_unit}, slower at less"
         return f"Motor lag: the rotor follows the command with a time constant of {1000 * theta[0]:.3g} ms{slower}."
 
 
