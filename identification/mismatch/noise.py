@@ -16,8 +16,6 @@ from numpy.typing import NDArray
 
 from identification.recording import Floats
 
-OUTLIER = 4.0
-"""Whitened residuals beyond this get a variance of their own size."""
 MOST_REMEMBERED = 8
 """Sets of scales and bands whose matrices are kept with the rows."""
 
@@ -31,7 +29,7 @@ class Rows:
     count: Floats
     """(n,) samples in each row."""
     extra: Floats
-    """(n,) variance factor of the white part, above 1 for outliers."""
+    """(n,) variance factor of the white part, above 1 for rows that are trusted less."""
     width: Floats
     """(n,) s over which the samples of a row are spread."""
     memo: dict[object, Shape] = field(default_factory=dict, init=False, repr=False)
@@ -166,10 +164,3 @@ class Whitener:
             Y = driver.solve_lower(self.rows.time, self._c, self._U, self._W, Y, np.empty_like(Y))
         Z: Floats = Y / self._root[:, None]
         return Z[:, 0] if flat else Z
-
-
-def with_outliers(rows: Rows, whitened: Floats) -> Rows:
-    """Rows whose whitened residual is beyond OUTLIER get the variance that makes it OUTLIER/2."""
-    far = np.abs(whitened) > OUTLIER
-    extra = np.where(far, np.maximum((whitened / (0.5 * OUTLIER)) ** 2, 1.0), 1.0)
-    return replace(rows, extra=extra)

@@ -51,7 +51,7 @@ def answered(folder: Path, without: Sequence[str] = ()) -> tuple[dict[str, Any],
     start = perf_counter()
     try:
         found = diagnose(given, without=tuple(without))
-    except Exception as error:  # noqa: BLE001
+    except Exception as error:  # noqa: BLE001  # a crash of any kind is an answer, and counts against it
         told = f"{type(error).__name__}: {error}"
         return {"seconds": perf_counter() - start, "error": told, "trace": traceback.format_exc()}, {}
     seconds = perf_counter() - start
@@ -73,7 +73,7 @@ def predictions(found: Diagnosis, driven: Recording, at: Floats) -> tuple[str | 
     drive = Drive(command.time, command.value, others=others)
     try:
         model = simulate(found.twin, drive, at)
-    except Exception as error:  # noqa: BLE001
+    except Exception as error:  # noqa: BLE001  # so is one of the twin
         return f"{type(error).__name__}: {error}", {}
     if not isinstance(model, Prediction):
         return model.reason, {}

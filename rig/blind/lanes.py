@@ -203,6 +203,6 @@ def _drive(
         try:
             lane.carry_out(job, renew)
             done.put(job)
-        except BaseException as error:  # noqa: BLE001
+        except BaseException as error:  # noqa: BLE001  # raised again where the results are read
             done.put(error)
             return

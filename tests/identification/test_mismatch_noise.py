@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.noise import OUTLIER, Noise, Rows, Whitener, with_outliers
+from identification.mismatch.noise import Noise, Rows, Whitener
 from identification.mismatch.noise_likelihood import fit_noise
 from identification.mismatch.restricted import Response, likelihood
 
@@ -270,17 +270,3 @@ def test_a_short_run_has_one_slow_scale_at_most():
     r = Rows(np.linspace(0, 0.5, 120), np.ones(120), np.ones(120), np.full(120, 0.1))
     y = np.random.default_rng(13).standard_normal(120)
     assert len(fitted(r, y).scales) <= 1
-
-
-def test_outliers_get_a_variance_of_their_own_size():
-    r = replace(rows(), extra=np.ones(200))
-    y = 0.2 * np.random.default_rng(14).standard_normal(200) / np.sqrt(r.count)
-    y[50] = 0.2 * 9.0 / np.sqrt(r.count[50])
-    y[80] = -0.2 * 40.0 / np.sqrt(r.count[80])
-    law = Noise(0.04, 0.0)
-    z = Whitener(law, r, np.zeros(200)).whiten(y)
-    better = with_outliers(r, z)
-    assert np.flatnonzero(better.extra > 1).tolist() == [50, 80]
-    again = Whitener(law, better, np.zeros(200)).whiten(y)
-    assert np.abs(again[[50, 80]]) == pytest.approx(OUTLIER / 2)
-    assert np.delete(again, [50, 80]) == pytest.approx(np.delete(z, [50, 80]))
