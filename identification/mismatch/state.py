@@ -11,7 +11,10 @@ from identification.mismatch.fitting import Fit, bounds_of, columns_of, fit, raw
 from identification.mismatch.model import Data, Model, Theta, Weights, weights
 from identification.mismatch.noise import Noise, Rows
 from identification.mismatch.noise_likelihood import fit_noise
+from identification.physics.free_form import spline
 from identification.recording import Floats
+
+MOST_NODES = 17
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,13 +65,14 @@ def refresh(
     rate_noise = None
     if data.with_rate:
         left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=True)]
-        at = [f[:, None] for f in rate]
+        at = [f[:, None] for f in rate] if in_time else curves(data)
         rate_noise = fit_noise(
             data.rate_rows,
             left_rate,
             at,
             [np.zeros(r.size) for r in left_rate],
             start=state.rate_noise if state is not None else None,
+            in_time=in_time,
         )
     w = weights(data, noise, size, rate_noise, rows)
     fitted = fit(model, theta, data, w)
@@ -85,6 +89,14 @@ def unweighted(data: Data) -> Weights:
         [replace(r, count=np.ones(r.time.size)) for r in data.thrust_rows],
         unit=True,
     )
+
+
+def curves(data: Data) -> list[Floats]:
+    """Any smooth curve of the rate over the driver, run by run (m, p): a table's noise is what is left beside it."""
+    driver = [h.driver[h.rate_rows] for h in data.histories]
+    every = np.concatenate(driver)
+    nodes = np.quantile(np.unique(every), np.linspace(0, 1, max(3, min(MOST_NODES, every.size // 4))))
+    return [spline(v, nodes, np.eye(nodes.size), 1) for v in driver]
 
 
 def reading_step(values: Floats) -> float:
