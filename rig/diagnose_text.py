@@ -13,6 +13,8 @@ WIDTH = 100
 MOST_STEPS = 12
 BAR = 24
 """Characters of the longest bar in the table of a shape."""
+WORSE = 1.05
+"""Ratio of errors on what was not fitted from which a reader is warned."""
 
 
 def diagnosis_text(d: Diagnosis) -> str:
@@ -170,6 +172,8 @@ def _fit(d: Diagnosis) -> Iterator[str]:
     yield f"{f'RMSE per sample / {d.unit}':<24}{'before':>12}{'after':>12}{'noise':>12}"
     yield f"{'  fitted':<24}{d.train.before:>12.4g}{d.train.after:>12.4g}"
     yield f"{'  not fitted':<24}{d.heldout.before:>12.4g}{d.heldout.after:>12.4g}{d.heldout.noise:>12.4g}"
+    if d.heldout.after > WORSE * d.heldout.before:
+        yield "  the error on what was not fitted GROWS: this model describes the runs, it does not predict others"
     yield from _para(f"not fitted: {d.heldout.what}", "  ")
     yield from _para(
         f"chi2 per degree of freedom {d.chi2_per_dof:.3f}; what remains is white with {rarity(d.whiteness_p)}", "  "

@@ -262,6 +262,9 @@ def test_a_file_by_plain_h5py_is_diagnosed(tmp_path):
     assert abs(finding.parameters["half_width"].value - 1.5) < 0.05
     shaped = replace(found, notes=("A note.",))
     assert "- A note." in diagnosis_text(shaped)
+    worse = replace(shaped, heldout=replace(shaped.heldout, before=1.0, after=1.1))
+    assert "GROWS" in diagnosis_text(worse)
+    assert "GROWS" not in diagnosis_text(replace(worse, heldout=replace(worse.heldout, after=1.0)))
 
 
 def test_the_simulated_bench_runs_on_a_twin(dead, tmp_path):
