@@ -13,6 +13,8 @@ from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 
 MOST_STEPS = 25
+MOST_TRIES = 8
+"""Dampings tried for one step."""
 LEAST_REACH = 0.05
 """sigma: a parameter that changes less within its bounds is left where it is."""
 SLOW_FALLS = 3.0
@@ -173,28 +175,21 @@ def fit(
     damping = 1e-3
     J = columns_of(model, theta, data, weights, may)
     for _ in range(most_steps):
-        vector = theta.vector
-        slope = J.T @ residual
-        stuck = ((vector[may] <= low[may]) & (slope < 0)) | ((vector[may] >= high[may]) & (slope > 0))
-        size = np.linalg.norm(J, axis=0)
-        span = np.where(np.isfinite(high[may] - low[may]), high[may] - low[may], np.inf)
-        go = ~stuck & (size > 0) & (size * span > LEAST_REACH)
-        A = J[:, go] / size[go]
+        go = _movable(theta.vector[may], J, residual, low[may], high[may])
+        size = np.linalg.norm(J[:, go], axis=0)
+        A = J[:, go] / size
         gram, right = A.T @ A, A.T @ residual
-        improved = False
         chi2 = float(residual @ residual)
-        for _ in range(8):
-            step = np.linalg.solve(gram + damping * np.eye(gram.shape[0]), right) / size[go]
-            moved = vector.copy()
-            moved[np.flatnonzero(may)[go]] += step
+        for _ in range(MOST_TRIES):
+            moved = theta.vector
+            moved[np.flatnonzero(may)[go]] += np.linalg.solve(gram + damping * np.eye(gram.shape[0]), right) / size
             trial = theta.with_vector(np.clip(moved, low, high))
             new = residual_of(model, trial, data, weights)
             fall = chi2 - float(new @ new)
             if np.isfinite(fall) and fall > 0:
-                improved = True
                 break
             damping = max(damping, 1e-6) * 8
-        if not improved:
+        else:
             break
         theta, residual = trial, new
         if chi2 - (1 + SLOW_FALLS) * fall > hopeless:
@@ -203,11 +198,19 @@ def fit(
         J = columns_of(model, theta, data, weights, may)
         if fall < CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1)):
             break
-    vector = theta.vector
-    ended = (vector <= low) | (vector >= high)
+    ended = (theta.vector <= low) | (theta.vector >= high)
     free = may & ~ended
-    J = J[:, free[may]]
-    return Fit(model, theta, residual, J, free, weights.log_det)
+    return Fit(model, theta, residual, J[:, free[may]], free, weights.log_det)
+
+
+def _movable(vector: Floats, J: Floats, residual: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
+    """(p,) parameters that are not pressed against a bound and change something within their bounds."""
+    slope = J.T @ residual
+    stuck = ((vector <= low) & (slope < 0)) | ((vector >= high) & (slope > 0))
+    size = np.linalg.norm(J, axis=0)
+    span = np.where(np.isfinite(high - low), high - low, np.inf)
+    out: NDArray[np.bool_] = ~stuck & (size > 0) & (size * span > LEAST_REACH)
+    return out
 
 
 def extended(theta: Theta, model: Model, term: object, values: tuple[float, ...], bigger: Model) -> Theta:
