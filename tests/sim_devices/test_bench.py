@@ -124,10 +124,12 @@ def test_mounting_while_it_turns_is_refused_with_status_2(bench):
     words = [sys.executable, "-m", "sim_devices", "mount", str(bench.links / "control"), "T3"]
     with opened_bus(bench.links / "can0") as bus:
         keep_driving(bus, 5.0, lambda: bench.truth("state")[-1]["n"] > 4.0)
-        refused = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False)
-    # the motor may have let go while the child started: it coasts for more than a second from 5 rev/s
+        with subprocess.Popen(words, cwd=ROOT, stderr=subprocess.PIPE, text=True) as refused:
+            keep_driving(bus, 5.0, lambda: refused.poll() is not None)
+            assert refused.stderr is not None
+            said = refused.stderr.read()
     assert refused.returncode == 2
-    assert "T1 turns at" in refused.stderr
+    assert "T1 turns at" in said
     wait_for(lambda: abs(bench.truth("state")[-1]["n"]) < 0.4, "the rotor to stop")
     done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=PATIENCE, check=False)
     assert (done.returncode, done.stdout) == (0, "T3 is on the bench\n")
