@@ -246,6 +246,25 @@ def test_a_table_of_levels():
     assert bent.heldout.after < 0.1 * bent.heldout.before
 
 
+def test_a_measured_rate_tells_winding_resistance_from_an_exponent():
+    """V = n/k + r n|n|: thrust goes with n^2; written in steps of 0.1 N and in the order of its levels."""
+
+    def turning(volts):
+        n = 2.0 * np.abs(volts)
+        for _ in range(60):
+            n = 2.0 * (np.abs(volts) - 0.0015 * n**2)
+        return np.sign(volts) * n
+
+    flat = table(lambda v: np.round(0.1 * turning(v) * np.abs(turning(v)), 1), number=161, noise=0.0)
+    time, volts = flat.channels[1].time, flat.channels[0].value
+    noise = 0.02 * np.random.default_rng(1).standard_normal(volts.size)
+    rate = Channel("rate", "tachometer", "rotation_rate", "rev/s", time, turning(volts) + noise)
+    found = diagnosed(replace(flat, channels=(*flat.channels, rate)))
+    assert "winding_resistance" in found.model_terms
+    assert "exponent" not in found.model_terms
+    assert found.heldout.after < 0.03  # what rounding leaves
+
+
 def rotation(seed, seconds, k=2.0, noise=0.01):
     start, level = levels(seed, seconds)
     t = np.arange(0.01, seconds - 0.5, 0.1)
