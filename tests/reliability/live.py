@@ -28,6 +28,8 @@ TICK = 0.02
 """s, loop period of benches/simulated/bench.toml."""
 PATIENCE = 0.6
 """s, allowed age of a load cell sample; 0.2 s is the default, tried in virtual time in tests/rig."""
+NOT_BEGUN = "the run did not get where the test begins"
+"""Begins the message of a test that could not try its promise: the Makefile begins that test once more."""
 SLACK = 0.03
 """s of scheduling noise allowed on a loaded two-core machine."""
 
@@ -168,9 +170,12 @@ class FrontEnd:
     last: Snapshot | None = None
 
     def until(self, wanted: Callable[[Snapshot], bool], timeout: float = 40.0) -> Snapshot:
-        """Follow the run, start it when it waits for that, until a snapshot is as wanted."""
+        """Follow the run, start it when it waits for that, until a snapshot is as wanted.
+
+        A preflight that a stall of this machine has failed is started again a second later, as an operator would.
+        """
         deadline = time.monotonic() + timeout
-        asked = False
+        ask_at = 0.0
         while time.monotonic() < deadline and not self.peer.closed:
             self.peer.send(Request("lease"))
             select.select([self.peer], [], [], 0.1)
@@ -179,10 +184,26 @@ class FrontEnd:
                 self.last = message
                 if wanted(message):
                     return message
-                if message.state == "preflight" and not asked and len(message.checks) > 5:
-                    asked = True
+                if message.state == "preflight" and time.monotonic() >= ask_at and len(message.checks) > 5:
+                    ask_at = time.monotonic() + 1.0
                     self.peer.send(Request("start"))
-        raise AssertionError(f"not reached within {timeout} s; last: {self.last}")
+        closed = self.peer.closed
+        self.peer.close()
+        raise AssertionError(f"not reached within {timeout} s; closed before: {closed}; {_last(self.last)}")
+
+    def begin(self, wanted: Callable[[Snapshot], bool], timeout: float = 40.0) -> Snapshot:
+        """`until`, before the promise is tried."""
+        try:
+            return self.until(wanted, timeout)
+        except AssertionError as error:
+            raise AssertionError(f"{NOT_BEGUN}: {error}") from error
+
+
+def _last(snapshot: Snapshot | None) -> str:
+    if snapshot is None:
+        return "no snapshot came"
+    said = "; ".join(line.text for line in snapshot.log[-6:])
+    return f"last state {snapshot.state!r}, outcome {snapshot.outcome!r} {snapshot.cause!r}; log: {said}"
 
 
 def attach(run: Run) -> FrontEnd:
@@ -227,7 +248,7 @@ def kill_once(bench: LiveBench, after: float) -> Killed:
     """Start a run and kill -9 its controller `after` s after its first tare began."""
     run = bench.start(dwell=1.0)
     front = attach(run)
-    front.until(lambda s: s.state == "tare")
+    front.begin(lambda s: s.state == "tare")
     end = time.monotonic() + after
     seen = front.until(lambda s: time.monotonic() >= end or s.state == "done")
     os.kill(run.pid, signal.SIGKILL)

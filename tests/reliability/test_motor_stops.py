@@ -44,7 +44,7 @@ def under_way(bench: LiveBench, volts: float = 10.0, **options) -> tuple[FrontEn
     """A run whose propeller turns at `volts`."""
     run = bench.start(**options)
     front = attach(run)
-    front.until(turning(volts))
+    front.begin(turning(volts))
     return front, run.pid
 
 

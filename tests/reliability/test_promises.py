@@ -40,7 +40,7 @@ def test_motor_that_ignores_stop_is_never_called_idle(tmp_path):
     """Promise 11: neither command 0 nor release is obeyed, and the device's own watchdog is off."""
     with live_bench(tmp_path, lambda text: text.replace("timeout = 0.5 ", "timeout = 0.0 ")) as bench:
         front = attach(bench.start(dwell=15.0))  # still this hold when the fault arrives, however late
-        front.until(turning(10.0))
+        front.begin(turning(10.0))
         bench.tell("fault", "motor", "ignores_commands")
         front.peer.send(Request("stop", "a test"))
         last = front.until(lambda s: s.state == "done")
@@ -65,7 +65,7 @@ def test_sensor_that_lies(tmp_path, report, device, fault, amount, cause, within
     """Promise 8: each is found within its declared time, by the truth log."""
     with live_bench(tmp_path) as bench:
         front = attach(bench.start(dwell=4.0))
-        front.until(turning(10.0))
+        front.begin(turning(10.0))
         bench.tell("fault", device, fault, *amount)
         begun = next(line for line in reversed(bench.truth()) if line["event"] == "fault")
         last = front.until(lambda s: s.state == "done")
@@ -100,7 +100,7 @@ def test_resume_after_kill_9_gives_what_an_uninterrupted_campaign_gives(tmp_path
     """Promise 22."""
     with live_bench(tmp_path) as bench:
         front = attach(bench.start(thrusters=("T1", "T3"), dwell=1.0))
-        front.until(lambda s: s.thruster == "T3" and s.state == "hold", timeout=60.0)
+        front.begin(lambda s: s.thruster == "T3" and s.state == "hold", timeout=60.0)
         os.kill(bench.runs[0].pid, signal.SIGKILL)
         front.peer.close()
         bench.controllers[0].wait(15)
@@ -142,7 +142,7 @@ def test_recording_carries_what_came_before_it(tmp_path):
 def test_shutting_down_takes_no_longer_than_it_must(tmp_path, report):
     with live_bench(tmp_path) as bench:
         front = attach(bench.start())
-        front.until(lambda s: s.state == "tare")
+        front.begin(lambda s: s.state == "tare")
         front.peer.send(Request("stop", "a test"))
         front.until(lambda s: s.state == "done")
         front.peer.close()
