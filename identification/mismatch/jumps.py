@@ -5,6 +5,8 @@ Under slow noise a step is seen by what changes within seconds of it: a trial ha
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from identification.mismatch.fitting import Fit
@@ -13,6 +15,8 @@ from identification.recording import Floats
 
 TRIED = 600
 """Instants, evenly over the rows."""
+SIZED = 60
+"""Of these the sigmas are worked out, and of as many that look likeliest; between them the size is interpolated."""
 APART = 0.02
 """Share of the longest run between two that are told."""
 
@@ -24,16 +28,43 @@ def likeliest_jumps(fitted: Fit, data: Data, weights: Weights, basis: Floats, mo
     """
     runs = [h.sampled[r] for h, r in zip(data.histories, data.rows, strict=True)]
     when = np.unique(np.quantile(np.concatenate(runs), np.linspace(0.01, 0.99, TRIED)))
-    steps = [(at[:, None] >= when).astype(np.float64) for at in runs]
-    n = data.size
-    columns = Weights(weights.thrust).whiten(steps, [])
-    columns -= basis[:n] @ (basis[:n].T @ columns)
-    size = np.linalg.norm(columns, axis=0)
-    score = np.abs(columns.T @ fitted.residual[:n]) / np.where(size > 0, size, np.inf)
+    thrust = Weights(weights.thrust)
+    some = np.unique(np.linspace(0, when.size - 1, SIZED).astype(int))
+    size = np.interp(np.arange(when.size), some, np.sqrt(np.maximum(_sizes(runs, when[some], thrust, basis), 0.0)))
+    rough = np.abs(_products(runs, when, thrust, fitted.residual)) / np.where(size > 0, size, np.inf)
+    likely = np.sort(np.argsort(-_peaks(rough))[:SIZED])
+    exact = np.sqrt(np.maximum(_sizes(runs, when[likely], thrust, basis), 0.0))
+    score = rough[likely] * size[likely] / np.where(exact > 0, exact, np.inf)
     found: list[float] = []
-    for j in np.argsort(-score):
-        if all(abs(when[j] - other) > APART * data.scale.duration for other in found):
-            found.append(float(when[j]))
+    for at in when[likely[np.argsort(-score)]]:
+        if all(abs(at - other) > APART * data.scale.duration for other in found):
+            found.append(float(at))
         if len(found) == most:
             break
     return tuple(found)
+
+
+def _products(runs: Sequence[Floats], when: Floats, thrust: Weights, residual: Floats) -> Floats:
+    """Of the whitened residual with the whitened step at each instant, whose columns are never made."""
+    total = np.zeros(when.size)
+    begin = 0
+    for at, whitener in zip(runs, thrust.thrust, strict=True):
+        weighed = whitener.weighed(residual[begin : begin + at.size])
+        after = np.concatenate([np.cumsum(weighed[::-1])[::-1], [0.0]])
+        total += after[np.searchsorted(at, when, side="left")]
+        begin += at.size
+    return total
+
+
+def _sizes(runs: Sequence[Floats], when: Floats, thrust: Weights, basis: Floats) -> Floats:
+    """Squared length of the whitened step at each instant beside what the model can follow."""
+    columns = thrust.whiten([(at[:, None] >= when).astype(np.float64) for at in runs], [])
+    columns -= basis[: columns.shape[0]] @ (basis[: columns.shape[0]].T @ columns)
+    out: Floats = np.einsum("ij,ij->j", columns, columns)
+    return out
+
+
+def _peaks(score: Floats) -> Floats:
+    """The score where no neighbour's is larger, elsewhere next to nothing."""
+    beside = np.maximum(np.append(score[1:], 0.0), np.append(0.0, score[:-1]))
+    return np.where(score >= beside, score, 1e-3 * score)

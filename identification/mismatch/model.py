@@ -241,7 +241,7 @@ class Weights:
         """Columns of all runs, one under the other."""
         parts = [w.whiten(c) for w, c in zip(self.thrust, thrust, strict=True)]
         parts += [w.whiten(c) for w, c in zip(self.rate, rate, strict=True)]
-        out: Floats = np.concatenate(parts)
+        out: Floats = np.concatenate(parts) if len(parts) > 1 else parts[0]
         if self.spread is None or out.shape[0] != self.spread.shape[0]:
             return out
         # noise I + A A' with A = U diag(s): its inverse root is I + U diag(1/sqrt(1 + s^2) - 1) U'

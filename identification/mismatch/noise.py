@@ -162,5 +162,15 @@ class Whitener:
         Y = np.ascontiguousarray(columns[:, None] if flat else columns)
         if self._U.shape[1]:
             Y = driver.solve_lower(self.rows.time, self._c, self._U, self._W, Y, np.empty_like(Y))
-        Z: Floats = Y / self._root[:, None]
-        return Z[:, 0] if flat else Z
+            Y /= self._root[:, None]
+        else:
+            Y = Y / self._root[:, None]
+        return Y[:, 0] if flat else Y
+
+    def weighed(self, white: Floats) -> Floats:
+        """(n,) L'^-1 white: `whiten(column) @ white` is `column @ weighed(white)`, for any number of columns."""
+        scaled = np.ascontiguousarray((white / self._root)[:, None])
+        if self._U.shape[1]:
+            scaled = driver.solve_upper(self.rows.time, self._c, self._U, self._W, scaled, np.empty_like(scaled))
+        out: Floats = scaled[:, 0]
+        return out

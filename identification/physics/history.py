@@ -98,12 +98,16 @@ class History:
         """`lead` of a force that comes `delay` s after the driver."""
         if self.ticks is None or abs(delay) < LEAST_DELAY * self.tick:
             return self.lead
+        known = self.memo.get(("lead", delay))
+        if known is not None:
+            return known
         at, value = self.ticks
         now = value[np.clip(np.searchsorted(at, self.sample_time - delay, side="right") - 1, 0, at.size - 1)]
         mean = np.bincount(self._sample_index, weights=now, minlength=self.driver.size) / np.maximum(self.count, 1)
         line = reconstructed(delayed(self.driver, self.edges, delay), self.middle, self.sampled)
         lead = np.where(self.count > 0, mean - line, 0.0)
         out: Floats = np.where(np.abs(lead) < LARGEST_LEAD * self.size, lead, 0.0)
+        self.memo[("lead", delay)] = out
         return out
 
     @cached_property

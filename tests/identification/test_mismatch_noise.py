@@ -63,6 +63,8 @@ def test_whitening_is_the_inverse_of_the_dense_cholesky_factor(noise):
     assert fast.whiten(columns) == pytest.approx(slow, abs=1e-9 * np.abs(slow).max())
     assert fast.whiten(columns[:, 1]) == pytest.approx(slow[:, 1], abs=1e-9 * np.abs(slow).max())
     assert fast.log_det == pytest.approx(np.linalg.slogdet(K)[1], abs=1e-8)
+    white = np.random.default_rng(4).standard_normal(200)
+    assert columns.T @ fast.weighed(white) == pytest.approx(fast.whiten(columns).T @ white, abs=1e-9)
 
 
 @pytest.mark.parametrize("m", [1, 2, 7, 40])
