@@ -168,7 +168,7 @@ class Whitener:
         return Y[:, 0] if flat else Y
 
     def weighed(self, white: Floats) -> Floats:
-        """(n,) L'^-1 white: `whiten(column) @ white` is `column @ weighed(white)`, for any number of columns."""
+        """(n,) L'^-1 white, for products of any number of columns: `whiten(column) @ white` is `column @` this."""
         scaled = np.ascontiguousarray((white / self._root)[:, None])
         if self._U.shape[1]:
             scaled = driver.solve_upper(self.rows.time, self._c, self._U, self._W, scaled, np.empty_like(scaled))
