@@ -26,22 +26,29 @@ def likeliest_jumps(fitted: Fit, data: Data, weights: Weights, basis: Floats, mo
 
     `basis` (n, p): orthonormal, what the present model can follow.
     """
-    runs = [h.sampled[r] for h, r in zip(data.histories, data.rows, strict=True)]
-    when = np.unique(np.quantile(np.concatenate(runs), np.linspace(0.01, 0.99, TRIED)))
-    thrust = Weights(weights.thrust)
-    some = np.unique(np.linspace(0, when.size - 1, SIZED).astype(int))
-    size = np.interp(np.arange(when.size), some, np.sqrt(np.maximum(_sizes(runs, when[some], thrust, basis), 0.0)))
-    rough = np.abs(_products(runs, when, thrust, fitted.residual)) / np.where(size > 0, size, np.inf)
-    likely = np.sort(np.argsort(-_peaks(rough))[:SIZED])
-    exact = np.sqrt(np.maximum(_sizes(runs, when[likely], thrust, basis), 0.0))
-    score = rough[likely] * size[likely] / np.where(exact > 0, exact, np.inf)
+    when, _ = jumps(fitted.residual, data, weights, basis)
     found: list[float] = []
-    for at in when[likely[np.argsort(-score)]]:
+    for at in when:
         if all(abs(at - other) > APART * data.scale.duration for other in found):
             found.append(float(at))
         if len(found) == most:
             break
     return tuple(found)
+
+
+def jumps(residual: Floats, data: Data, weights: Weights, basis: Floats) -> tuple[Floats, Floats]:
+    """(k,) s and sigmas of steps of the reading, the largest first; `residual` and `basis` whitened."""
+    runs = [h.sampled[r] for h, r in zip(data.histories, data.rows, strict=True)]
+    when = np.unique(np.quantile(np.concatenate(runs), np.linspace(0.01, 0.99, TRIED)))
+    thrust = Weights(weights.thrust)
+    some = np.unique(np.linspace(0, when.size - 1, SIZED).astype(int))
+    size = np.interp(np.arange(when.size), some, np.sqrt(np.maximum(_sizes(runs, when[some], thrust, basis), 0.0)))
+    rough = np.abs(_products(runs, when, thrust, residual)) / np.where(size > 0, size, np.inf)
+    likely = np.sort(np.argsort(-_peaks(rough))[:SIZED])
+    exact = np.sqrt(np.maximum(_sizes(runs, when[likely], thrust, basis), 0.0))
+    score = rough[likely] * size[likely] / np.where(exact > 0, exact, np.inf)
+    order = np.argsort(-score)
+    return when[likely[order]], score[order]
 
 
 def _products(runs: Sequence[Floats], when: Floats, thrust: Weights, residual: Floats) -> Floats:

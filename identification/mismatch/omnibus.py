@@ -8,12 +8,13 @@ under drawn signs of blocks, as the screening is.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.mismatch.coordinates import Coordinate, coordinates
 from identification.mismatch.fitting import Fit
+from identification.mismatch.jumps import TRIED, jumps
 from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.screening import orthogonal_basis, quiet, surrogate_scores
 from identification.mismatch.shape_error import allowed_in, corrections
@@ -71,6 +72,8 @@ def judge_left(
         p = _tail(stat, dof, extra)
         groups.append(Judged(c, stat, dof, p, max(stat - dof, 0.0) / max(float(residual @ residual), 1e-300)))
         spans.append(Q)
+        if c.quantity == "time":
+            groups[-1] = min(groups[-1], _jump(c, residual, data, weights, basis), key=lambda g: g.p_value)
     order = sorted(range(len(groups)), key=lambda i: (groups[i].p_value, groups[i].dof - groups[i].statistic))
     if not groups:
         return Omnibus((), 1.0)
@@ -91,6 +94,19 @@ def judge_left(
         factor = max(0.05 / max(at, 1e-300), float(len(groups)))
         p_family = min(p_family, factor * least)
     return Omnibus(tuple(groups[i] for i in order), float(max(min(p_family, 1.0), min(1.0, least))))
+
+
+def _jump(time: Coordinate, residual: Floats, data: Data, weights: Weights, basis: Floats) -> Judged:
+    """The likeliest jump of the zero: under slow noise it shows for seconds only, and no smooth shape follows it.
+
+    Taken for one only where it is plainly no noise.
+    """
+    _, score = jumps(residual, data, weights, basis)
+    stat = float(score[0] ** 2) if score.size else 0.0
+    p = TRIED * _tail(stat, 1, 0.0)
+    return Judged(
+        time, stat, 1, p if p < PLAIN_P else 1.0, max(stat - 1, 0.0) / max(float(residual @ residual), 1e-300)
+    )
 
 
 def _tail(stat: float, dof: int, extra: float) -> float:
