@@ -20,12 +20,19 @@ def slip(history: History, x: Floats, k: float) -> Floats:
         return np.zeros_like(x)
     at = history.rate_sampled[rows]
     there = reconstructed(x, history.middle, history.rate_sampled)[rows]
-    gap = history.rate[rows] / k - there
+    gap = _without_ticks(history.rate[rows] / k - there, np.broadcast_to(history.rate_lead, x.shape)[rows])
     amount, missed = calmed(gap, np.ones_like(gap))
     share, missed_by_share = calmed(gap, there)
     by_share = missed_by_share < missed
     out: Floats = np.interp(history.middle, at, share if by_share else amount)
     return x * out if by_share else out
+
+
+def _without_ticks(gap: Floats, lead: Floats) -> Floats:
+    """The gap (n,) less what the ticks of the command do within an interval, as far as the rotor follows them."""
+    power = float(lead @ lead)
+    followed = min(max(float(gap @ lead) / power, 0.0), 1.0) if power > 0 else 0.0
+    return gap - followed * lead
 
 
 def calmed(value: Floats, basis: Floats) -> tuple[Floats, float]:
