@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict
+from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict, ticked
 from identification.physics.filters import delayed, reconstructed
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
@@ -119,7 +119,22 @@ def residual_of(model: Model, theta: Theta, data: Data, weights: Weights) -> Flo
     thrust, rate = raw(model, theta, data, with_rate=bool(weights.rate))
     left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
     left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=False)] if weights.rate else []
-    return weights.whiten(left, left_rate)
+    told = ticks_told(model, theta, data, weights)
+    return weights.whiten(left, left_rate, [rows.target - f for rows, f in zip(data.ticks, told, strict=False)])
+
+
+def change_of(
+    before: tuple[Model, Theta], after: tuple[Model, Theta], data: Data, weights: Weights
+) -> tuple[list[Floats], list[Floats], list[Floats]]:
+    """What `after` predicts less what `before` does: thrust, rate and ticks, as `Weights.whiten` takes them."""
+    old = (*raw(*before, data, with_rate=bool(weights.rate)), ticks_told(*before, data, weights))
+    new = (*raw(*after, data, with_rate=bool(weights.rate)), ticks_told(*after, data, weights))
+    thrust, rate, ticks = ([b - a for a, b in zip(x, y, strict=True)] for x, y in zip(old, new, strict=True))
+    return thrust, rate, ticks
+
+
+def ticks_told(model: Model, theta: Theta, data: Data, weights: Weights) -> list[Floats]:
+    return ticked(model, theta, data) if weights.ticks else []
 
 
 def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: NDArray[np.bool_]) -> Floats:
@@ -129,8 +144,10 @@ def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: 
     base_thrust, base_rate = raw(model, theta, data, with_rate=bool(weights.rate))
     vector = theta.vector
     R, q = len(theta.tares), vector.size
+    base_ticks = ticks_told(model, theta, data, weights)
     thrust: list[list[Floats]] = [[] for _ in data.histories]
     rate: list[list[Floats]] = [[] for _ in data.histories]
+    ticks: list[list[Floats]] = [[] for _ in base_ticks]
     for j in np.flatnonzero(which):
         run = j - (q - 3 - R)
         if 0 <= run < R:  # a tare moves its own run by one
@@ -138,6 +155,8 @@ def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: 
                 thrust[i].append(np.full(base_thrust[i].size, float(i == run)))
                 if weights.rate:
                     rate[i].append(np.zeros(base_rate[i].size))
+            for column, base in zip(ticks, base_ticks, strict=True):
+                column.append(np.zeros(base.size))
             continue
         h = step[j] if vector[j] + step[j] <= high[j] else -step[j]
         moved = vector.copy()
@@ -148,9 +167,12 @@ def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: 
             thrust[i].append((new_thrust[i] - base_thrust[i]) / h)
             if weights.rate:
                 rate[i].append((new_rate[i] - base_rate[i]) / h)
+        for column, base, new in zip(ticks, base_ticks, ticks_told(model, moved_theta, data, weights), strict=True):
+            column.append((new - base) / h)
     stacked = [np.column_stack(c) if c else np.empty((y.size, 0)) for c, y in zip(thrust, base_thrust, strict=True)]
     stacked_rate = [np.column_stack(c) for c in rate] if weights.rate and which.any() else []
-    return weights.whiten(stacked, stacked_rate)
+    stacked_ticks = [np.column_stack(c) if c else np.empty((y.size, 0)) for c, y in zip(ticks, base_ticks, strict=True)]
+    return weights.whiten(stacked, stacked_rate, stacked_ticks)
 
 
 def fit(

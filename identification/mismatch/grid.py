@@ -19,7 +19,11 @@ WINDOW = 0.0015
 WINDOW_ZONE = 0.1
 """s after a change of the command in which samples have windows."""
 LEAST_WINDOWED = 0.008
-"""s between samples: where they are denser, intervals are short enough."""
+"""s between samples: where they are denser, only those after a step have windows..."""
+DENSE_ZONE = 10.0
+"""...for so many samples."""
+WINDOW_SHARE = 0.3
+"""Of the spacing, at most, before and after a sample."""
 GROWTH = 0.06
 """Length of an interval per time since the last change."""
 MOVES = 0.01
@@ -159,13 +163,16 @@ def _with_steps(edges: Floats, held: Held, spacing: float, most: int) -> Floats:
 
 def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most: int) -> Floats:
     """Shortly after every change of a command, each sample gets a short interval of its own."""
-    if not held.stepwise or spacing < LEAST_WINDOWED:
+    if not held.stepwise:
         return edges
-    changes = held.time[1:][np.diff(held.value) != 0]
+    dense = spacing < LEAST_WINDOWED
+    least = STEP * float(np.max(np.abs(held.value))) if dense else 0.0
+    changes = held.time[1:][np.abs(np.diff(held.value)) > least]
     changes = changes[(changes > edges[0]) & (changes < edges[-1])]
     if not changes.size or changes.size > most:
         return edges
-    zone = max(WINDOW_ZONE, 5 * spacing)
+    zone = DENSE_ZONE * spacing if dense else max(WINDOW_ZONE, 5 * spacing)
+    half = min(WINDOW, WINDOW_SHARE * spacing)
     last = np.searchsorted(changes, time, side="right") - 1
     own = time[(last >= 0) & (time - changes[np.maximum(last, 0)] < zone)]
     if own.size > most:
@@ -173,8 +180,8 @@ def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most:
     nearest = np.searchsorted(changes, own)
     before = changes[np.maximum(nearest - 1, 0)]
     after = changes[np.minimum(nearest, changes.size - 1)]
-    low = np.where((before <= own) & (own - before < WINDOW), before, own - WINDOW)
-    high = np.where((after > own) & (after - own < WINDOW), after, own + WINDOW)
+    low = np.where((before <= own) & (own - before < half), before, own - half)
+    high = np.where((after > own) & (after - own < half), after, own + half)
     windows = np.column_stack([low, high])
     inside = np.searchsorted(windows[:, 0], edges, side="right") - 1
     covered = (inside >= 0) & (edges > windows[np.maximum(inside, 0), 0]) & (edges < windows[np.maximum(inside, 0), 1])

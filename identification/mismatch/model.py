@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch.noise import Noise, Rows, Whitener
+from identification.mismatch.tick_response import held_back
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.history import History
 from identification.physics.term import STAGES, Moment, Parameter, Scale, Term
+from identification.physics.tick_rows import TickRows
 from identification.recording import Floats
 
 ORDER = {term: i for i, term in enumerate(sorted(CATALOGUE, key=lambda t: STAGES.index(t.stage)))}
@@ -187,6 +189,13 @@ class Data:
             out.append(Rows(h.middle[r], n, np.ones(r.size), h.rate_spacing * n))
         return tuple(out)
 
+    @cached_property
+    def ticks(self) -> tuple[TickRows, ...]:
+        """Of the runs that have such; none where blocks of time are left out."""
+        if self.keep is not None:
+            return ()
+        return tuple(rows for h in self.histories if (rows := h.tick_rows) is not None)
+
     @property
     def size(self) -> int:
         return sum(r.size for r in self.rows)
@@ -202,7 +211,7 @@ def scale_of(histories: Sequence[History], C: float) -> Scale:
         driver_unit=unit,
         thrust=abs(C) * driver**2,
         duration=max(float(h.edges[-1] - h.edges[0]) for h in histories),
-        interval=float(min(np.median(np.sort(h.dt)[: max(h.dt.size // 4, 1)]) for h in histories)),
+        interval=min(_resolution(h) for h in histories),
         flow=max(flows, default=0.0),
         reading=max(float(np.nanmax(np.abs(h.thrust))) for h in histories),
         noise=float(np.median([_scatter(h) for h in histories])),
@@ -210,6 +219,12 @@ def scale_of(histories: Sequence[History], C: float) -> Scale:
 
 
 MANY_SAMPLES = 100
+
+
+def _resolution(history: History) -> float:
+    """s: the shorter intervals, or what the ticks of the command resolve."""
+    shortest = float(np.median(np.sort(history.dt)[: max(history.dt.size // 4, 1)]))
+    return shortest if history.tick_rows is None else min(shortest, history.tick_rows.width)
 
 
 def _scatter(history: History) -> float:
@@ -234,13 +249,16 @@ class Weights:
 
     thrust: tuple[Whitener, ...]
     rate: tuple[Whitener, ...] = ()
+    ticks: bool = False
+    """Whether what the ticks tell has rows, after all others."""
     spread: Floats | None = None
     """(n, k) whitened columns of a baseline's uncertainty, orthogonal, each as long as its variance is large."""
 
-    def whiten(self, thrust: Sequence[Floats], rate: Sequence[Floats]) -> Floats:
-        """Columns of all runs, one under the other."""
+    def whiten(self, thrust: Sequence[Floats], rate: Sequence[Floats], ticks: Sequence[Floats] = ()) -> Floats:
+        """Columns of all runs, one under the other; those of the ticks are white already."""
         parts = [w.whiten(c) for w, c in zip(self.thrust, thrust, strict=True)]
         parts += [w.whiten(c) for w, c in zip(self.rate, rate, strict=True)]
+        parts += ticks
         out: Floats = np.concatenate(parts) if len(parts) > 1 else parts[0]
         if self.spread is None or out.shape[0] != self.spread.shape[0]:
             return out
@@ -276,7 +294,17 @@ def weights(
     if rate_noise is not None:
         rate = tuple(Whitener(rate_noise, r, np.zeros(r.time.size)) for r in data.rate_rows)
     known = Weights(thrust, rate)
-    return known if data.spread is None or unit else replace(known, spread=_spread(known, data, data.spread))
+    if unit:
+        return known
+    if data.spread is None:
+        return replace(known, ticks=bool(data.ticks))
+    return replace(known, spread=_spread(known, data, data.spread))
+
+
+def ticked(model: Model, theta: Theta, data: Data) -> list[Floats]:
+    """What the model says of the rows of the ticks."""
+    terms = acting(model, theta, data.scale)
+    return [rows.predicted(theta.C, held_back(rows, terms, theta.shift)) for rows in data.ticks]
 
 
 def _spread(known: Weights, data: Data, spread: Spread) -> Floats | None:

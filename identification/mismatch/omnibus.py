@@ -101,12 +101,12 @@ def _jump(time: Coordinate, residual: Floats, data: Data, weights: Weights, basi
 
     Taken for one only where it is plainly no noise.
     """
-    _, score = jumps(residual, data, weights, basis)
-    stat = float(score[0] ** 2) if score.size else 0.0
+    when, score = jumps(residual, data, weights, basis)
+    stat = float(score[0] ** 2)
     p = TRIED * _tail(stat, 1, 0.0)
-    return Judged(
-        time, stat, 1, p if p < PLAIN_P else 1.0, max(stat - 1, 0.0) / max(float(residual @ residual), 1e-300)
-    )
+    told = replace(time, what=f"{time.what}; the reading jumps at {when[0]:.4g} s")
+    share = max(stat - 1, 0.0) / max(float(residual @ residual), 1e-300)
+    return Judged(told, stat, 1, p if p < PLAIN_P else 1.0, share)
 
 
 def _tail(stat: float, dof: int, extra: float) -> float:

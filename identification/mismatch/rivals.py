@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from identification.mismatch.fitting import Fit, at_bound, extended, fit, raw
+from identification.mismatch.fitting import Fit, at_bound, change_of, extended, fit
 from identification.mismatch.model import Data, price
 from identification.mismatch.screening import directions, orthogonal_basis, refined
 from identification.mismatch.state import State, refresh
@@ -161,12 +161,7 @@ def mirrored(term: Term, values: tuple[float, ...], data: Data) -> tuple[float, 
 
 def _effect(now: Fit, term: Term, data: Data, state: State) -> Floats:
     """(n,) whitened change that the term makes at its fitted values; the rate's rows with it."""
-    with_rate = bool(state.weights.rate)
     smaller = now.model.without(term)
     known = dict(zip(now.model.terms, now.theta.terms, strict=True))
     theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
-    full, full_rate = raw(now.model, now.theta, data, with_rate=with_rate)
-    less, less_rate = raw(smaller, theta, data, with_rate=with_rate)
-    return state.weights.whiten(
-        [a - b for a, b in zip(full, less, strict=True)], [a - b for a, b in zip(full_rate, less_rate, strict=True)]
-    )
+    return state.weights.whiten(*change_of((smaller, theta), (now.model, now.theta), data, state.weights))

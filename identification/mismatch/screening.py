@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.mismatch.fitting import Fit, extended, raw
+from identification.mismatch.fitting import Fit, extended, raw, ticks_told
 from identification.mismatch.jumps import likeliest_jumps
 from identification.mismatch.model import Data, Weights
 from identification.physics.term import Term
@@ -105,12 +105,14 @@ def directions(
     """Of all trials (their own, or those given) of all terms whose channels were recorded."""
     with_rate = bool(weights.rate)
     base_thrust, base_rate = raw(fit.model, fit.theta, data, with_rate=with_rate)
+    base_ticks = ticks_told(fit.model, fit.theta, data, weights)
     basis = orthogonal_basis(fit.jacobian)
     used: list[Term] = []
     values: list[tuple[float, ...]] = []
     sided: list[bool] = []
     thrust: list[list[Floats]] = [[] for _ in data.histories]
     rate: list[list[Floats]] = [[] for _ in data.histories]
+    ticks: list[list[Floats]] = [[] for _ in base_ticks]
     for term in terms:
         first = term.parameters(data.scale)[0]
         bigger = fit.model.plus(term)
@@ -121,12 +123,18 @@ def directions(
                 thrust[i].append(new - base)
             for i, (new, base) in enumerate(zip(new_rate, base_rate, strict=True)):
                 rate[i].append(new - base)
+            for column, new, base in zip(ticks, ticks_told(bigger, theta, data, weights), base_ticks, strict=True):
+                column.append(new - base)
             used.append(term)
             values.append(trial)
             sided.append(first.neutral in (first.low, first.high))
     if not used:
         return Directions((), (), (), np.empty((fit.residual.size, 0)), np.empty(0))
-    columns = weights.whiten([np.column_stack(c) for c in thrust], [np.column_stack(c) for c in rate if c])
+    columns = weights.whiten(
+        [np.column_stack(c) for c in thrust],
+        [np.column_stack(c) for c in rate if c],
+        [np.column_stack(c) for c in ticks],
+    )
     before = np.linalg.norm(columns, axis=0)
     columns = columns - basis @ (basis.T @ columns)
     size = np.linalg.norm(columns, axis=0)

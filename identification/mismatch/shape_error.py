@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.fitting import Fit, raw
+from identification.mismatch.fitting import Fit, change_of
 from identification.mismatch.model import Data, Weights
 from identification.mismatch.screening import orthogonal_basis
 from identification.recording import Floats
@@ -24,19 +24,14 @@ NEXT_TERM = 0.006
 
 def corrections(fitted: Fit, data: Data, weights: Weights) -> list[Floats]:
     """Whitened (n,) change that each term makes beside what C and the tares can follow; the rate too if it counts."""
-    n = fitted.residual.size if weights.rate else data.size
+    n = fitted.residual.size if weights.rate or weights.ticks else data.size
     basis = orthogonal_basis(fitted.jacobian[:n, ~_of_terms(fitted)])
     out = []
-    with_rate = bool(weights.rate)
-    full, full_rate = raw(fitted.model, fitted.theta, data, with_rate=with_rate)
     known = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))
     for term in fitted.model.terms:
         smaller = fitted.model.without(term)
         theta = replace(fitted.theta, terms=tuple(known[t] for t in smaller.terms))
-        less, less_rate = raw(smaller, theta, data, with_rate=with_rate)
-        change = weights.whiten(
-            [a - b for a, b in zip(full, less, strict=True)], [a - b for a, b in zip(full_rate, less_rate, strict=True)]
-        )
+        change = weights.whiten(*change_of((smaller, theta), (fitted.model, fitted.theta), data, weights))
         out.append(change - basis @ (basis.T @ change))
     return out
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.physics.filters import delayed, reconstructed
+from identification.physics.tick_rows import TickRows, tick_rows
 from identification.recording import Floats
 
 TURNING = 0.02
@@ -93,6 +94,11 @@ class History:
     def middle(self) -> Floats:
         out: Floats = 0.5 * (self.edges[1:] + self.edges[:-1])
         return out
+
+    @cached_property
+    def tick_rows(self) -> TickRows | None:
+        """What the ticks of the command tell within the intervals; None where they tell nothing."""
+        return tick_rows(self)
 
     def lead_after(self, delay: float) -> Floats:
         """`lead` of a force that comes `delay` s after the driver."""

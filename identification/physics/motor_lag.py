@@ -13,6 +13,18 @@ NEARLY_LINEAR = 0.9
 """Linear share from which a lag is told as one that is the same at all levels."""
 
 
+def torques(form: str, theta: tuple[float, ...], largest: float) -> tuple[float, float]:
+    """Coefficients of n' = quadratic (w|w| - n|n|) + linear (w - n), the time constant being that at the largest w."""
+    linear = {"first_order": 1.0, "quadratic": 0.0}.get(form, theta[-1])
+    return (1 - linear) / (2 * theta[0] * largest), linear / theta[0]
+
+
+def rate_at(form: str, theta: tuple[float, ...], level: float, largest: float) -> float:
+    """1/s at which small changes about a level are followed."""
+    quadratic, linear = torques(form, theta, largest)
+    return max(2 * quadratic * abs(level) + linear, 1e-3 / theta[0])
+
+
 @dataclass(frozen=True, slots=True)
 class MotorLag:
     """Rotor inertia: x' = a (V|V| - x|x|) + b (V - x); first order without a, the torque balance without b.
@@ -45,8 +57,8 @@ class MotorLag:
         start = float(value[0])
         if self.form == "first_order":
             return lowpass(value, now.history.dt, tau, start)[1]
-        linear = theta[1] if self.form == "mixed" else 0.0
-        return lag(value, now.history.dt, (1 - linear) / (2 * tau * now.scale.driver), linear / tau, start)
+        quadratic, linear = torques(self.form, theta, now.scale.driver)
+        return lag(value, now.history.dt, quadratic, linear, start)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         alike = self.form == "first_order" or (self.form == "mixed" and theta[1] > NEARLY_LINEAR)
