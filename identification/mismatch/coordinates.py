@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.mismatch.fitting import Fit, raw
 from identification.mismatch.model import Data, predict
-from identification.physics.filters import lowpass
+from identification.physics.filters import delayed, lowpass
 from identification.physics.rotation_coupling import slip
 from identification.recording import Floats
 
@@ -129,6 +129,10 @@ def _splines(
     return Coordinate(quantity, tuple(over), unit, tuple(columns), what)
 
 
+LATE = (1.0, 10.0, 100.0)
+"""Intervals of the finest kind."""
+
+
 def _levels(view: _View) -> Iterator[Coordinate]:
     data, V = view.data, view.driver
     most = MOST_HATS if data.size >= FEW_ROWS else max(3, data.size // 4)
@@ -147,12 +151,23 @@ def _times(view: _View) -> Iterator[Coordinate]:
     yield _splines("time", "s", t, knots, (view.force,), "zero or gain change in the course of the run")
     since = tuple(h.since_step[r] for h, r in zip(data.histories, data.rows, strict=True))
     knots = np.geomspace(max(1.5 * data.scale.interval, 0.02), max(3.0, 4 * data.scale.interval), 7)
+    at_once = min(h.spacing for h in data.histories)
+    knots = np.concatenate([[at_once], knots]) if at_once < 0.5 * knots[0] else knots
     columns = []
-    for s, f, before in zip(since, view.force, view.previous, strict=True):
+    for i, (s, f, before) in enumerate(zip(since, view.force, view.previous, strict=True)):
         basis = hats(np.log(np.maximum(s, knots[0])), np.log(knots))
         jump = f - before * np.abs(before) / data.scale.driver**2
-        columns.append(np.column_stack([basis * jump[:, None], basis * f[:, None]]))
+        columns.append(np.column_stack([basis * jump[:, None], basis * f[:, None], *_late(view, i)]))
     yield Coordinate("time_since_step", since, "s", tuple(columns), "it follows a step late, or overshoots")
+
+
+def _late(view: _View, run: int) -> Iterator[Floats]:
+    """(n,) each: what the force would be a little later, less what it is: on ramps and sines nothing is a step."""
+    history, rows = view.data.histories[run], view.data.rows[run]
+    force = view.whole[run][0] / view.data.scale.thrust
+    for delay in LATE:
+        if delay * view.data.scale.interval < 0.1 * view.data.scale.duration:
+            yield (delayed(force, history.edges, delay * view.data.scale.interval) - force)[rows]
 
 
 def _memories(view: _View) -> Iterator[Coordinate]:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch.noise import Noise, Rows, Whitener
-from identification.mismatch.tick_response import held_back
+from identification.mismatch.tick_response import told
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.history import History
 from identification.physics.term import STAGES, Moment, Parameter, Scale, Term
@@ -224,7 +224,7 @@ MANY_SAMPLES = 100
 def _resolution(history: History) -> float:
     """s: the shorter intervals, or what the ticks of the command resolve."""
     shortest = float(np.median(np.sort(history.dt)[: max(history.dt.size // 4, 1)]))
-    return shortest if history.tick_rows is None else min(shortest, history.tick_rows.width)
+    return shortest if history.tick_rows is None else min(shortest, history.tick_rows.resolution)
 
 
 def _scatter(history: History) -> float:
@@ -304,7 +304,7 @@ def weights(
 def ticked(model: Model, theta: Theta, data: Data) -> list[Floats]:
     """What the model says of the rows of the ticks."""
     terms = acting(model, theta, data.scale)
-    return [rows.predicted(theta.C, held_back(rows, terms, theta.shift)) for rows in data.ticks]
+    return [told(rows, terms, theta.C, theta.shift) for rows in data.ticks]
 
 
 def _spread(known: Weights, data: Data, spread: Spread) -> Floats | None:

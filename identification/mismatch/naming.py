@@ -27,6 +27,8 @@ INCONSTANT = 1e-3
 """p-value, after all tests of a term, below which its parameter is not the same everywhere."""
 OWN_COORDINATE = 1e-4
 """p-value of what is left over a term's own coordinate below which its name is not earned."""
+CANCELLED = 0.15
+"""Of what each of two terms does alone: less together, and neither is seen."""
 MANY_SHAPES = 3
 
 
@@ -52,7 +54,8 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
     out = []
     if at_bound(term, state.fit, data, state.weights):
         out.append("its parameters end at what is physically possible")
-    change = _raw_effect(state.fit, term, data)
+    change = _raw_effect(state.fit, (term,), data)
+    out += [f"it and {other.id} nearly cancel" for other in _cancelled(state.fit, term, change, data)]
     n = data.size
     basis = orthogonal_basis(state.fit.jacobian[:n])
     driver = [h.driver[r] for h, r in zip(data.histories, data.rows, strict=True)]
@@ -81,8 +84,23 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
     return tuple(out)
 
 
-def _raw_effect(now: Fit, term: Term, data: Data) -> list[Floats]:
-    smaller = now.model.without(term)
+def _cancelled(now: Fit, term: Term, change: list[Floats], data: Data) -> list[Term]:
+    """Terms that follow a step too and undo nearly all of what this one does: a large lag with a large lead."""
+    if "time_since_step" not in term.coordinates:
+        return []
+    found = []
+    for other in now.model.terms:
+        if other != term and "time_since_step" in other.coordinates:
+            both = np.concatenate(_raw_effect(now, (term, other), data))
+            alone = np.concatenate(_raw_effect(now, (other,), data))
+            least = min(float(np.linalg.norm(np.concatenate(change))), float(np.linalg.norm(alone)))
+            if float(np.linalg.norm(both)) < CANCELLED * least:
+                found.append(other)
+    return found
+
+
+def _raw_effect(now: Fit, terms: tuple[Term, ...], data: Data) -> list[Floats]:
+    smaller = replace(now.model, terms=tuple(t for t in now.model.terms if t not in terms))
     known = dict(zip(now.model.terms, now.theta.terms, strict=True))
     theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
     out = []

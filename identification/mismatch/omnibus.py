@@ -68,6 +68,9 @@ def judge_left(
             continue
         score = Q.T @ residual
         stat, dof = float(score @ score), Q.shape[1]
+        if weights.ticks and c.quantity == "time_since_step":
+            ticks = fit.residual[fit.residual.size - sum(rows.target.size for rows in data.ticks) :]
+            stat, dof = stat + float(ticks @ ticks), dof + ticks.size
         extra = allowed_in(changes, Q)
         p = _tail(stat, dof, extra)
         groups.append(Judged(c, stat, dof, p, max(stat - dof, 0.0) / max(float(residual @ residual), 1e-300)))

@@ -7,32 +7,35 @@ import numpy as np
 from identification.physics.filters import lowpass, resonant
 from identification.physics.motor_lag import MotorLag, rate_at
 from identification.physics.term import Scale, Term
-from identification.physics.tick_rows import BINS, TickRows
+from identification.physics.tick_rows import TickRows
 from identification.recording import Floats
 
-FINE = 4
-"""Points of a bin at which a model's response is averaged."""
 DYNAMIC = ("motor_lag", "stand_resonance", "time_skew")
 """What shows within a few ticks."""
 Acting = tuple[Term, tuple[float, ...], Scale]
 
 
+def told(rows: TickRows, acting: list[Acting], C: float, shift: float) -> Floats:
+    """The rows as a model foretells them."""
+    late = shift + sum(values[0] for term, values, _ in acting if term.id == "time_skew")
+    return rows.predicted(C, held_back(rows, acting, shift), late)
+
+
 def held_back(rows: TickRows, acting: list[Acting], shift: float) -> Floats:
-    """(B,) 1 - s of the terms that act, s the response to a unit step, averaged over the levels of the ticks.
+    """(B,) 1 - s at the nodes: s the response of the acting terms to a unit step, its mean over the levels.
 
     Less what the means over intervals have of it: a smooth rise to the last value.
     """
     terms = [each for each in acting if each[0].id in DYNAMIC]
     if not terms and shift == 0:
-        return np.zeros(BINS)
+        return np.zeros(rows.nodes.size - 1)
     levels = rows.levels if any(term.id == "motor_lag" for term, _, _ in terms) else rows.levels[:1]
-    dt = np.full(BINS * FINE, rows.width / FINE)
-    after = (np.arange(dt.size) + 0.5) * dt[0]
-    mean = np.mean([_later(_response(terms, float(level), dt, after), after, shift) for level in levels], axis=0)
-    back = 1 - mean
+    after = rows.after
+    dt = np.full(after.size, 2 * after[0])
+    back = 1 - np.mean([_later(_response(terms, float(level), dt, after), after, shift) for level in levels], axis=0)
     # what is not over yet goes on smoothly, and the means have it: without this it would seem to end in a jump
-    u = after / (after[-1] + 0.5 * dt[0])
-    out: Floats = (back - back[-1] * u**2 * (3 - 2 * u)).reshape(BINS, FINE).mean(axis=1)
+    u = after / rows.nodes[-1]
+    out: Floats = rows.hats @ (back - back[-1] * u**2 * (3 - 2 * u))
     return out
 
 

@@ -4,7 +4,7 @@ A ramp is a staircase: the console writes a new voltage every few hundredths of 
 of the thrust. Force samples that come at all phases of those ticks measure the response to a unit step at a finer
 resolution than their own spacing, as an oscilloscope in equivalent-time sampling does:
 
-    y(t) = sum over ticks m of C (V_m|V_m| - V_(m-1)|V_(m-1)|) s(t - t_m),   s constant in each of B narrow bins
+    y(t) = sum over ticks m of C (V_m|V_m| - V_(m-1)|V_(m-1)|) s(t - t_m),   1 - s a straight line between B nodes
 
 What the means over intervals can follow is taken out of both sides, so the rows made here are news beside them: the
 normal equations of s in their principal axes, each with unit noise. A lag, a delay and a resonance that leave the same
@@ -15,6 +15,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -27,11 +28,15 @@ if TYPE_CHECKING:
 
 DENSE = 0.008
 """s between samples: where they are farther apart, each has an interval of its own after a tick."""
-SPAN = 3.0
-"""Ticks after which the response to one is complete; slower parts are in the means."""
-LONGEST = 0.15
+SPAN = 2.0
+"""Ticks for which a response is followed; slower parts are in the means."""
+LONGEST = 0.12
 """s of response."""
-BINS = 60
+NODES = 60
+EARLY = 16
+"""Nodes in the first tenth, where lags and delays of a millisecond show."""
+FINE = 400
+"""Points at which a model's response is worked out."""
 LEAST_TICKS = 50
 REGULAR = 5.0
 """Median spacings after which a command no longer ticks."""
@@ -43,10 +48,12 @@ CHUNK = 400
 """Intervals at a time: memory, and blocks for the colour of the noise."""
 LEAST_POWER = 1e-6
 """Of a principal axis beside the largest."""
-LOUDEST = 50.0
-"""Sigma of a row: no static curve is known better than to one part in fifty here."""
+SHAPE = 0.01
+"""Of a step: how far a response is known between nodes, and a static curve from level to level."""
 GAIN_STD = 0.1
 """Relative: how far the slope of the static curve may be off C V|V| where the command ticks."""
+JUMP_STD = 0.3
+"""Of a step: how far the line between two nodes may be off a jump between them."""
 LEVELS = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Quantiles of |V| over the power of the ticks, for lags that depend on it."""
 
@@ -56,24 +63,52 @@ class TickRows:
     """Principal axes of the normal equations of one run."""
 
     design: Floats
-    """(r, B + 1) of V|V| within the intervals: all at once, and what each bin holds back; per sigma."""
+    """(r, B + 1) of V|V| within the intervals: all at once, and what each node holds back; per sigma."""
     seen: Floats
     """(r,) the same of the thrust."""
-    width: float
-    """s of a bin."""
+    nodes: Floats
+    """(B + 1,) s after a tick; at the last nothing is held back."""
     levels: Floats
     """(5,) |V| of the ticks."""
 
-    def predicted(self, C: float, held_back: Floats) -> Floats:
-        """(r + 1,) rows for 1 - s = held_back (B,), and how far the gain had to leave C, in its sigmas."""
+    def predicted(self, C: float, held_back: Floats, jump: float = 0.0) -> Floats:
+        """(r + 3,) rows for 1 - s = held_back (B,) at the nodes, and what was loose, in its own sigmas.
+
+        Loose are the gain, and where s jumps at `jump` s its values at the nodes on either side: no straight line
+        follows a jump.
+        """
         shape = self.design @ np.concatenate([[1.0], -held_back])
-        loose = GAIN_STD * abs(C) or 1.0
-        gain = (float(shape @ self.seen) + C / loose**2) / (float(shape @ shape) + 1 / loose**2)
-        return np.append(gain * shape, (gain - C) / loose)
+        columns = np.column_stack([shape, *(np.zeros_like(shape) for _ in range(2))])
+        if 0 < jump < self.nodes[-2]:
+            k = 1 + int(np.searchsorted(self.nodes, jump, side="right")) - 1
+            columns[:, 1:] = self.design[:, k : k + 2]
+        loose = np.array([GAIN_STD, JUMP_STD, JUMP_STD]) * (abs(C) or 1.0)
+        middle = np.array([C, 0.0, 0.0])
+        gram = columns.T @ columns + np.diag(1 / loose**2)
+        found = np.linalg.solve(gram, columns.T @ self.seen + middle / loose**2)
+        return np.concatenate([columns @ found, (found - middle) / loose])
+
+    @property
+    def resolution(self) -> float:
+        """Seconds between the earliest nodes."""
+        return float(self.nodes[1])
+
+    @cached_property
+    def after(self) -> Floats:
+        """(FINE,) s, evenly up to the last node: where a model's response is worked out."""
+        out: Floats = (np.arange(FINE) + 0.5) * (self.nodes[-1] / FINE)
+        return out
+
+    @cached_property
+    def hats(self) -> Floats:
+        """(B, FINE) weights that make values at `after` values at the nodes."""
+        hats = np.array([np.interp(self.after, self.nodes, one) for one in np.eye(self.nodes.size)[:-1]])
+        out: Floats = hats / hats.sum(axis=1)[:, None]
+        return out
 
     @property
     def target(self) -> Floats:
-        return np.append(self.seen, 0.0)
+        return np.concatenate([self.seen, np.zeros(3)])
 
 
 def tick_rows(history: History) -> TickRows | None:
@@ -88,12 +123,17 @@ def tick_rows(history: History) -> TickRows | None:
     if np.count_nonzero(small) < LEAST_TICKS:
         return None
     spacing = float(np.median(np.diff(at)))
-    width = min(SPAN * spacing, LONGEST) / BINS
+    nodes = _nodes(min(SPAN * spacing, LONGEST))
     used = _ticking(history, at, at[~small], REGULAR * spacing)
-    parts = list(_normal(history, at, change, width, used))
+    parts = list(_normal(history, at, change, nodes, used))
     if len(parts) < 4:
         return None
-    return _axes(parts, width, _levels(value[small], change[small]))
+    return _axes(parts, nodes, _levels(value[small], change[small]))
+
+
+def _nodes(longest: float) -> Floats:
+    early = np.linspace(0.0, 0.1 * longest, EARLY, endpoint=False)
+    return np.concatenate([early, np.linspace(0.1 * longest, longest, NODES - EARLY + 1)])
 
 
 def _ticking(history: History, at: Floats, steps: Floats, longest: float) -> NDArray[np.bool_]:
@@ -107,7 +147,7 @@ def _ticking(history: History, at: Floats, steps: Floats, longest: float) -> NDA
 
 
 def _normal(
-    history: History, at: Floats, change: Floats, width: float, used: NDArray[np.bool_]
+    history: History, at: Floats, change: Floats, nodes: Floats, used: NDArray[np.bool_]
 ) -> Iterator[tuple[Floats, Floats, float, int]]:
     """(gram, moment, square of the thrust, samples) of each stretch of CHUNK intervals."""
     index = np.clip(np.searchsorted(history.edges, history.sample_time, side="right") - 1, 0, used.size - 1)
@@ -121,20 +161,23 @@ def _normal(
         if t.size < 3:
             continue
         last = np.searchsorted(at, t, side="right") - 1
-        columns = np.zeros((t.size, BINS + 2))
+        columns = np.zeros((t.size, NODES + 3))
         columns[:, 0] = history.sample_thrust[begin:end]
         columns[:, 1] = np.where(last >= 0, total[np.maximum(last, 0)], 0.0)
         rows = np.arange(t.size)
-        for back in range(BINS):
+        for back in range(NODES):
             tick = last - back
-            bin_of = np.floor((t - at[np.maximum(tick, 0)]) / width).astype(np.intp)
-            near = (tick >= 0) & (bin_of < BINS)
+            since = t - at[np.maximum(tick, 0)]
+            near = (tick >= 0) & (since < nodes[-1])
             if not near.any():
                 break
-            columns[rows[near], 2 + bin_of[near]] += change[tick[near]]
+            i, r = np.searchsorted(nodes, since[near], side="right") - 1, rows[near]
+            share = (since[near] - nodes[i]) / (nodes[i + 1] - nodes[i])
+            columns[r, 2 + i] += (1 - share) * change[tick[near]]
+            columns[r, 3 + i] += share * change[tick[near]]
         kept = used[j] & (j >= first) & (j < first + CHUNK)
-        news = _beside_means(columns, t, j)[kept]
-        if news.shape[0] > BINS:
+        news = _beside_means(columns[:, :-1], t, j)[kept]
+        if news.shape[0] > NODES:
             X, y = news[:, 1:], news[:, 0]
             yield X.T @ X, X.T @ y, float(y @ y), int(y.size)
 
@@ -156,7 +199,7 @@ def _beside_means(columns: Floats, t: Floats, j: NDArray[np.intp]) -> Floats:
     return out
 
 
-def _axes(parts: list[tuple[Floats, Floats, float, int]], width: float, levels: Floats) -> TickRows | None:
+def _axes(parts: list[tuple[Floats, Floats, float, int]], nodes: Floats, levels: Floats) -> TickRows | None:
     """Rows of unit noise, whose colour the scatter between stretches tells."""
     gram = np.sum([p[0] for p in parts], axis=0)
     moment = np.sum([p[1] for p in parts], axis=0)
@@ -174,9 +217,10 @@ def _axes(parts: list[tuple[Floats, Floats, float, int]], width: float, levels: 
     scores = np.array([(axis.T @ (p[1] - p[0] @ response)) / np.sqrt(power) for p in parts])
     colour = np.maximum(np.sum(scores**2, axis=0) / variance * len(parts) / (len(parts) - 1), 1.0)
     seen = (axis.T @ moment) / np.sqrt(power * variance * colour)
-    quieter = 1 / np.sqrt(1 + (seen / LOUDEST) ** 2)
     design = np.sqrt(power / (variance * colour))[:, None] * axis.T
-    return TickRows(quieter[:, None] * design, quieter * seen, width, levels)
+    gain = float(response[0])
+    quieter = 1 / np.sqrt(1 + (SHAPE * gain) ** 2 * np.sum(design**2, axis=1))
+    return TickRows(quieter[:, None] * design, quieter * seen, nodes, levels)
 
 
 def _levels(value: Floats, change: Floats) -> Floats:
