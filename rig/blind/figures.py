@@ -38,6 +38,11 @@ def goals(scores: Sequence[Score]) -> list[Goal]:
         of_rate("clear: right alone", rate(s.alone for s in clean[0]), least=0.90),
         of_rate("plain: right or among stated rivals", rate(s.right for s in clean[1]), least=0.99),
         of_rate("plain: right alone", rate(s.alone for s in clean[1]), least=0.95),
+        of_rate(
+            "plain: right alone, of those that an oracle can tell",
+            rate(s.alone for s in clean[1] if s.counted),
+            least=0.95,
+        ),
         of_rate("wrong names, one effect", rate(s.wrong for s in alone), most=0.01),
         of_rate(f"pairs at {PAIR_STRENGTH:g}: both right", rate(s.right for s in cell(scores, "pair")), least=0.92),
         of_rate("other textbook forms at plain: right", rate(s.right for s in cell(scores, "variant")), least=0.90),
