@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.mismatch.coordinates import Coordinate, coordinates
 from identification.mismatch.fitting import Fit
-from identification.mismatch.jumps import TRIED, jumps
+from identification.mismatch.jumps import APART, TRIED, jumps
 from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.screening import orthogonal_basis, quiet, surrogate_scores
 from identification.mismatch.shape_error import allowed_in, corrections
@@ -76,7 +76,7 @@ def judge_left(
         groups.append(Judged(c, stat, dof, p, max(stat - dof, 0.0) / max(float(residual @ residual), 1e-300)))
         spans.append(Q)
         if c.quantity == "time":
-            groups[-1] = min(groups[-1], _jump(c, residual, data, weights, basis), key=lambda g: g.p_value)
+            groups[-1] = min(groups[-1], _jump(c, fit, residual, data, weights, basis), key=lambda g: g.p_value)
     order = sorted(range(len(groups)), key=lambda i: (groups[i].p_value, groups[i].dof - groups[i].statistic))
     if not groups:
         return Omnibus((), 1.0)
@@ -99,12 +99,15 @@ def judge_left(
     return Omnibus(tuple(groups[i] for i in order), float(max(min(p_family, 1.0), min(1.0, least))))
 
 
-def _jump(time: Coordinate, residual: Floats, data: Data, weights: Weights, basis: Floats) -> Judged:
+def _jump(time: Coordinate, fit: Fit, residual: Floats, data: Data, weights: Weights, basis: Floats) -> Judged:
     """The likeliest jump of the zero: under slow noise it shows for seconds only, and no smooth shape follows it.
 
     Taken for one only where it is plainly no noise.
     """
     when, score = jumps(residual, data, weights, basis)
+    known = [v[1] for t, v in zip(fit.model.terms, fit.theta.terms, strict=True) if t.id == "zero_offset"]
+    new = np.all([np.abs(when - at) > APART * data.scale.duration for at in known], axis=0)
+    when, score = (when[new], score[new]) if known else (when, score)
     stat = float(score[0] ** 2)
     p = TRIED * _tail(stat, 1, 0.0)
     told = replace(time, what=f"{time.what}; the reading jumps at {when[0]:.4g} s")

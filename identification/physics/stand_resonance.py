@@ -13,6 +13,12 @@ from identification.recording import Floats
 
 TRIED = 18
 """Frequencies to look for it with."""
+HIGHEST = 300.0
+"""Hz: what rings faster is not seen by a load cell."""
+TICKS = 0.0025
+"""s of resolution, of which only the ticks of a command are capable: a response of a tenth of a second, in which..."""
+APART = 4.0
+"""...frequencies in Hz so far apart are alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,12 +35,16 @@ class StandResonance:
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (
             Parameter("compliance", "1", 0.0, 1.0, 0.0),
-            Parameter("frequency", "Hz", 0.1, 0.45 / scale.interval),
+            Parameter("frequency", "Hz", 0.1, min(0.45 / scale.interval, HIGHEST)),
             Parameter("damping", "1", 0.005, 0.4),
         )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return tuple((1.0, float(f), 0.1) for f in np.geomspace(0.5, max(0.4 / scale.interval, 0.6), TRIED))
+        highest = min(0.4 / scale.interval, HIGHEST)
+        wide = tuple((1.0, float(f), 0.1) for f in np.geomspace(0.5, max(highest, 0.6), TRIED))
+        if scale.interval > TICKS:
+            return wide
+        return (*wide, *((1.0, float(f), 0.05) for f in np.arange(20.0, highest, APART)))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         # ringing that is out of phase after a cycle or two looks like nothing: no slope leads there
