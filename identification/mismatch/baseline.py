@@ -8,13 +8,14 @@ import numpy as np
 
 from identification.mismatch.coordinates import coordinates
 from identification.mismatch.fitting import Fit, extended, fit, raw
-from identification.mismatch.model import Data, Model, Theta, Weights, scale_of
+from identification.mismatch.model import Data, Model, Theta, Weights
 from identification.mismatch.screening import (
     MOST_PLAIN,
     PLAIN,
     matching_pursuit,
     orthogonal_basis,
 )
+from identification.mismatch.sizes import scale_of
 from identification.mismatch.state import State, by_run, refresh, unweighted
 from identification.physics.history import History
 from identification.physics.term import Term

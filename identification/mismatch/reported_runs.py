@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch.diagnosis import Curves, Diagnosis
-from identification.mismatch.model import Model, Theta, predict, scale_of
+from identification.mismatch.model import Model, Theta, predict
 from identification.mismatch.preparing import history_of
+from identification.mismatch.sizes import scale_of
 from identification.mismatch.twinning import given
 from identification.physics.history import TURNING, History
 from identification.recording import Floats, Recording

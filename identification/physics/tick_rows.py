@@ -80,7 +80,7 @@ class TickRows:
         shape = self.design @ np.concatenate([[1.0], -held_back])
         columns = np.column_stack([shape, *(np.zeros_like(shape) for _ in range(2))])
         if 0 < jump < self.nodes[-2]:
-            k = 1 + int(np.searchsorted(self.nodes, jump, side="right")) - 1
+            k = int(np.searchsorted(self.nodes, jump, side="right"))  # column 0 is all at once
             columns[:, 1:] = self.design[:, k : k + 2]
         loose = np.array([GAIN_STD, JUMP_STD, JUMP_STD]) * (abs(C) or 1.0)
         middle = np.array([C, 0.0, 0.0])

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from identification.mismatch.model import scale_of
 from identification.mismatch.preparing import history_of
+from identification.mismatch.sizes import scale_of
 from identification.mismatch.tick_response import told
 from identification.physics.motor_lag import MotorLag
 from identification.physics.stand_resonance import StandResonance
