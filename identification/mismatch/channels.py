@@ -8,11 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch.grid import Held
+from identification.physics.rotation_coupling import calmed
 from identification.recording import Channel, Floats, Recording
 
 CALMED = ("flow_speed", "motor_temperature", "water_temperature")
 CALM = 4
 """Samples on either side that are averaged."""
+REST_TOLD = 0.005
+"""Of the supply's variance beside its load: less foretold by the neighbours is noise."""
 LOADS = 6
 """Columns of the supply's load."""
 
@@ -65,8 +68,11 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     kept = _fewest(H, value)
     theta = np.linalg.lstsq(H[:, kept], value, rcond=None)[0]
     rest = value - H[:, kept] @ theta
-    out: Floats = columns(driven, charge)[:, kept] @ theta + np.interp(at, time, _calm(rest))
-    return out
+    calm, missed = calmed(rest, np.ones_like(rest))
+    by_load: Floats = columns(driven, charge)[:, kept] @ theta
+    if missed > (1 - REST_TOLD) * float(np.mean(rest**2)):
+        return by_load
+    return by_load + np.interp(at, time, calm)
 
 
 def _fewest(H: Floats, value: Floats) -> list[int]:

@@ -31,6 +31,8 @@ NEARLY = 0.93
 MOST_TERMS = 6
 HIDDEN = 2.0
 """Sigmas from which a candidate is tried with noise of its own, where none passes."""
+CLEARER = 3.0
+"""The same for an effect that takes its time only where the plan does: a staircase of minutes."""
 MOST_HIDDEN = 3
 STATIC = ("command_voltage", "thrust")
 """Coordinates of the static curve."""
@@ -150,7 +152,7 @@ def _larger(state: State, judged: Screening, data: Data, terms: Sequence[Term]) 
 
 def _hidden(state: State, judged: Screening, data: Data) -> State | None:
     """The model with a term that the noise had taken for its own: they are told apart when estimated together."""
-    likely = [(t, v) for t, v, z in judged.best(MOST_HIDDEN) if z > HIDDEN and "time" in t.coordinates]
+    likely = [(t, v) for t, v, z in judged.best(MOST_HIDDEN) if z > (HIDDEN if "time" in t.coordinates else CLEARER)]
     if not likely:
         return None
     now = refresh(state.fit.model, state.fit.theta, data, None, None)
