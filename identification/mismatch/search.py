@@ -32,7 +32,7 @@ MOST_TERMS = 6
 HIDDEN = 2.0
 """Sigmas from which a candidate is tried with noise of its own, where none passes."""
 CLEARER = 3.0
-"""The same for an effect that takes its time only where the plan does: a staircase of minutes."""
+"""The same of a first term that takes its time only where the plan does: a staircase of minutes."""
 MOST_HIDDEN = 3
 STATIC = ("command_voltage", "thrust")
 """Coordinates of the static curve."""
@@ -69,8 +69,8 @@ def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
             continue
         if term.id == "speed_of_advance" and data.scale.flow <= 0:
             continue
-        if (term.id, term.form) == ("supply_sag", "discharge") and (static or "bus_voltage" in have):
-            continue  # a proxy
+        if term.id == "supply_sag" and "bus_voltage" not in term.needs and (static or "bus_voltage" in have):
+            continue  # a proxy; a table is of one supply voltage
         out.append(term)
     return tuple(out)
 
@@ -152,7 +152,8 @@ def _larger(state: State, judged: Screening, data: Data, terms: Sequence[Term]) 
 
 def _hidden(state: State, judged: Screening, data: Data) -> State | None:
     """The model with a term that the noise had taken for its own: they are told apart when estimated together."""
-    likely = [(t, v) for t, v, z in judged.best(MOST_HIDDEN) if z > (HIDDEN if "time" in t.coordinates else CLEARER)]
+    least = CLEARER if not state.fit.model.terms else np.inf  # shape error would be taken for what is hidden
+    likely = [(t, v) for t, v, z in judged.best(MOST_HIDDEN) if z > (HIDDEN if "time" in t.coordinates else least)]
     if not likely:
         return None
     now = refresh(state.fit.model, state.fit.theta, data, None, None)

@@ -110,4 +110,36 @@ class Discharge:
         )
 
 
-FORMS = (SupplySag(), Buffered(), Discharge())
+@dataclass(frozen=True, slots=True)
+class Loaded:
+    """The proxy for a source that gives way at once: V_eff = V (1 - d |V/V_max|^3), its current times its own voltage
+    being the power, |V|^3."""
+
+    id: ClassVar[str] = "supply_sag"
+    stage: ClassVar[Stage] = "command"
+    physics: ClassVar[str] = "the supply gives way to the load"
+    needs: ClassVar[tuple[str, ...]] = ()
+    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    form: ClassVar[str] = "loaded"
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        return (Parameter("drop", "1", 0.0, 0.5, 0.0),)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ((0.03,),)
+
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        out: Floats = value * (1 - theta[0] * np.minimum(np.abs(value / now.scale.driver), 1.0) ** 3)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return (
+            f"Supply sag: at {scale.driver:.3g} {scale.driver_unit} the supply gives way by {100 * theta[0]:.2g} %; "
+            "power drawn stands for the bus voltage: record it."
+        )
+
+
+FORMS = (SupplySag(), Buffered(), Discharge(), Loaded())
