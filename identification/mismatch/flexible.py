@@ -22,7 +22,7 @@ from identification.mismatch.naming import Named
 from identification.mismatch.omnibus import ALARM, judge_left
 from identification.mismatch.screening import orthogonal_basis
 from identification.mismatch.state import State, forces, refresh
-from identification.physics.free_form import Flexible, Multiplier, spline
+from identification.physics.free_form import Flexible, Multiplier, lately, spline
 from identification.physics.history import History
 from identification.physics.term import Term
 from identification.recording import Floats
@@ -262,6 +262,8 @@ def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], lis
             "rate": np.abs(x) / data.scale.driver,
             "drive": 2 * fitted.theta.C * np.abs(x),
         }
+        if "late" in shape.times:
+            made["late"] = lately(F, h.dt, shape.memory)
         over.append(shape.covariate(h, x, data.scale)[r])
         columns.append(np.column_stack([made[m][r] for m in shape.times]))
     return over, columns

@@ -32,7 +32,7 @@ def shapes_over(quantity: str, data: Data) -> list[Flexible]:
             return over(("gain",), ("even",), ("force",), ("gain", "even"))
         case "load_history":
             memories = [tau for tau in LOADS if tau < 0.5 * data.scale.duration]
-            return [each for tau in memories for each in over(("gain",), ("force",), memory=tau)]
+            return [each for tau in memories for each in over(("gain",), ("force",), ("late",), memory=tau)]
         case "rotation_rate":
             return over(("drive",), unit=data.scale.driver_unit)
         case _ if quantity in UNITS:

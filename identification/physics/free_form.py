@@ -18,9 +18,10 @@ from identification.physics.rotation_coupling import slip
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
-Multiplier = Literal["force", "gain", "even", "step", "rate", "drive"]
-"""What the spline multiplies: 1, the thrust T, |T|, the change of T since the level before, |x|; or it adds to x."""
-MULTIPLIERS: tuple[Multiplier, ...] = ("force", "gain", "even", "step", "rate", "drive")
+Multiplier = Literal["force", "gain", "even", "step", "rate", "drive", "late"]
+"""What the spline multiplies: 1, the thrust T, |T|, the change of T since the level before, |x|, what T was lately less
+what it is; or it adds to x."""
+MULTIPLIERS: tuple[Multiplier, ...] = ("force", "gain", "even", "step", "rate", "drive", "late")
 WORDS: dict[Multiplier, str] = {
     "force": "adds a force",
     "gain": "multiplies the thrust",
@@ -28,6 +29,7 @@ WORDS: dict[Multiplier, str] = {
     "step": "acts on the change of thrust since the level before",
     "rate": "adds a force in proportion to the size of the drive",
     "drive": "adds to the drive",
+    "late": "lets a share of the thrust come late",
 }
 ALONE: tuple[Multiplier, ...] = ("force", "gain", "even", "drive")
 """Where a constant would be the tare, another C, an asymmetry or another rate: the spline is zero at `zero`."""
@@ -113,7 +115,9 @@ class Flexible:
             heights = np.zeros(len(self.knots))
             heights[list(free)] = theta[at : at + len(free)]
             at += len(free)
-            out = out + spline(over, self.axis(np.array(self.knots)), heights, self.degree) * multiplied(m, value, now)
+            out = out + spline(over, self.axis(np.array(self.knots)), heights, self.degree) * multiplied(
+                m, value, now, self.memory
+            )
         return out
 
     def covariate(self, history: History, x: Floats, scale: Scale) -> Floats:
@@ -152,7 +156,7 @@ class Flexible:
         return says + of_run
 
 
-def multiplied(multiplier: Multiplier, value: Floats, now: Moment) -> Floats:
+def multiplied(multiplier: Multiplier, value: Floats, now: Moment, memory: float) -> Floats:
     """(M,) what the spline is multiplied by."""
     match multiplier:
         case "force" | "drive":
@@ -167,6 +171,13 @@ def multiplied(multiplier: Multiplier, value: Floats, now: Moment) -> Floats:
             return out
         case "rate":
             return np.abs(now.x) / now.scale.driver
+        case "late":
+            return lately(value, now.history.dt, memory)
+
+
+def lately(force: Floats, dt: Floats, memory: float) -> Floats:
+    """(M,) low-pass of the force over `memory` s, less the force."""
+    return lowpass(force, dt, memory)[1] - force
 
 
 def spline(over: Floats, knots: Floats, heights: Floats, degree: int) -> Floats:

@@ -102,6 +102,19 @@ def history(M=40, **others):
 SCALE = Scale(8.0, "V", 32.0, 20.0, 0.5)
 
 
+def lagging(F, dt, tau, parts=2000):
+    """Means over intervals of y' = (F - y)/tau from 0, in small steps of the midpoint rule."""
+    y, out = 0.0, []
+    for f in F:
+        total = 0.0
+        for _ in range(parts):
+            middle = y + 0.5 * (dt / parts) * (f - y) / tau
+            y += (dt / parts) * (f - middle) / tau
+            total += middle
+        out.append(total / parts)
+    return np.array(out)
+
+
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 def test_what_a_spline_multiplies(multiplier):
     h = history()
@@ -113,13 +126,14 @@ def test_what_a_spline_multiplies(multiplier):
         "step": F - C * h.previous * np.abs(h.previous),
         "rate": np.abs(h.driver) / 8.0,
         "drive": np.ones_like(F),
+        "late": lagging(F, 0.5, 2.0) - F,
     }[multiplier]
-    term = Flexible("time", "s", (0.0, 5.0, 10.0), (0,), (multiplier,), degree=1)
+    term = Flexible("time", "s", (0.0, 5.0, 10.0), (0,), (multiplier,), degree=1, memory=2.0)
     known = term.parameters(SCALE)
     theta = tuple(0.1 * float(p.name.split("_")[-1]) for p in known)
     now = Moment(h, SCALE, C, 0.0, h.driver)
     moved = term.apply(F, now, theta) - F
-    assert moved == pytest.approx(0.1 * np.minimum(h.middle, 10.0) * expected), "constant beyond the knots"
+    assert moved == pytest.approx(0.1 * np.minimum(h.middle, 10.0) * expected, rel=1e-5), "constant beyond the knots"
     assert term.apply(F, now, (0.0,) * len(known)) == pytest.approx(F)
 
 
