@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict, ticked
 from identification.physics.filters import delayed, reconstructed
+from identification.physics.motor_lag import MotorLag, rate_at
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 
@@ -94,7 +95,7 @@ def raw(
     late = sum(v[0] for t, v in zip(model.terms, (near or theta).terms, strict=True) if t.id == "time_skew")
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
-        prompt = promptness(model, theta, history.tick)
+        prompt = promptness(model, theta, history.tick, x, data.scale.driver)
         ahead = np.broadcast_to(prompt * theta.C * (2 * np.abs(x) * history.lead_after(late) + history.excess), F.shape)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
@@ -109,10 +110,16 @@ def raw(
     return thrust, rate
 
 
-def promptness(model: Model, theta: Theta, tick: float) -> float:
-    """How far a tick of the command shows within itself: wholly without a lag, not at all with one of many ticks."""
-    lags = [v[0] for term, v in zip(model.terms, theta.terms, strict=True) if term.id == "motor_lag"]
-    return float(np.exp(-2 * sum(lags) / tick)) if lags else 1.0
+def promptness(model: Model, theta: Theta, tick: float, x: Floats, largest: float) -> Floats | float:
+    """How far a tick of the command shows within itself: wholly without a lag, not at all with one of many ticks.
+
+    Where the lag depends on the rate, so does this: (M,).
+    """
+    lag: Floats | float = 0.0
+    for term, values in zip(model.terms, theta.terms, strict=True):
+        if isinstance(term, MotorLag) and values[0] > 1e-6:
+            lag = lag + 1 / rate_at(term.form, values, x, largest)
+    return np.exp(-2 * lag / tick) if np.any(lag) else 1.0
 
 
 def residual_of(model: Model, theta: Theta, data: Data, weights: Weights) -> Floats:

@@ -44,7 +44,8 @@ def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
             F = delayed(F, h.edges, fitted.theta.shift)
         at = within_intervals(F, h.edges, h.sample_time)
         rate = np.abs(within_intervals(x, h.edges, h.sample_time))
-        at += promptness(fitted.model, fitted.theta, h.tick) * 2 * fitted.theta.C * rate * h.sample_lead
+        prompt = promptness(fitted.model, fitted.theta, h.tick, rate, data.scale.driver)
+        at += prompt * 2 * fitted.theta.C * rate * h.sample_lead
         residual = h.sample_thrust - at - fitted.theta.tares[i]
         speed = h.others.get("rotation_rate", x)
         out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time)))

@@ -32,18 +32,18 @@ def held_back(rows: TickRows, acting: list[Acting], shift: float) -> Floats:
     levels = rows.levels if any(term.id == "motor_lag" for term, _, _ in terms) else rows.levels[:1]
     after = rows.after
     dt = np.full(after.size, 2 * after[0])
-    back = 1 - np.mean([_later(_response(terms, float(level), dt, after), after, shift) for level in levels], axis=0)
+    back = 1 - np.mean([_later(_response(terms, level, dt, after), after, shift) for level in levels], axis=0)
     # what is not over yet goes on smoothly, and the means have it: without this it would seem to end in a jump
     u = after / rows.nodes[-1]
     out: Floats = rows.hats @ (back - back[-1] * u**2 * (3 - 2 * u))
     return out
 
 
-def _response(terms: list[Acting], level: float, dt: Floats, after: Floats) -> Floats:
+def _response(terms: list[Acting], level: Floats, dt: Floats, after: Floats) -> Floats:
     s = np.ones(dt.size)
     for term, values, sizes in terms:
         if isinstance(term, MotorLag) and values[0] > 1e-6:
-            s = lowpass(s, dt, 1 / rate_at(term.form, values, level, sizes.driver))[1]
+            s = lowpass(s, dt, float(1 / rate_at(term.form, values, level, sizes.driver)))[1]
         elif term.id == "stand_resonance":
             s = s + values[0] * (resonant(s, dt, values[1], values[2]) - s)
         elif term.id == "time_skew":

@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
+import numpy as np
+
 from identification.physics.filters import lag, lowpass
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
@@ -19,10 +21,10 @@ def torques(form: str, theta: tuple[float, ...], largest: float) -> tuple[float,
     return (1 - linear) / (2 * theta[0] * largest), linear / theta[0]
 
 
-def rate_at(form: str, theta: tuple[float, ...], level: float, largest: float) -> float:
-    """1/s at which small changes about a level are followed."""
+def rate_at(form: str, theta: tuple[float, ...], level: Floats, largest: float) -> Floats:
+    """1/s at which small changes about a level (any shape) are followed."""
     quadratic, linear = torques(form, theta, largest)
-    return max(2 * quadratic * abs(level) + linear, 1e-3 / theta[0])
+    return np.maximum(2 * quadratic * np.abs(level) + linear, 1e-3 / theta[0])
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,8 +26,8 @@ from identification.recording import Floats
 if TYPE_CHECKING:
     from identification.physics.history import History
 
-DENSE = 0.008
-"""s between samples: where they are farther apart, each has an interval of its own after a tick."""
+DENSE = 0.03
+"""s between samples: where they are farther apart, hardly any share an interval."""
 SPAN = 2.0
 """Ticks for which a response is followed; slower parts are in the means."""
 LONGEST = 0.12

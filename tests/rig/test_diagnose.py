@@ -333,6 +333,7 @@ def test_every_term_of_the_catalogue_that_the_world_knows_builds_its_effect():
         ("supply_sag", ""),
         ("supply_sag", "buffered"),
         ("supply_sag", "discharge"),
+        ("supply_sag", "loaded"),
         ("motor_lag", "mixed"),
         ("inflow_dynamics", "momentum"),
         ("rotation_coupling", ""),
