@@ -7,13 +7,14 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.grid import Held
-from identification.physics.rotation_coupling import calmed
+from identification.mismatch.grid import STEP, Held
 from identification.recording import Channel, Floats, Recording
 
 CALMED = ("flow_speed", "motor_temperature", "water_temperature")
 CALM = 4
 """Samples on either side that are averaged."""
+REACHES = (CALM, 16, 64, 256)
+"""The same for the supply's rest: the one whose neighbours foretell it best."""
 REST_TOLD = 0.005
 """Of the supply's variance beside its load: less foretold by the neighbours is noise."""
 LOADS = 6
@@ -26,7 +27,7 @@ def followed(channel: Channel, at: Floats) -> Floats | None:
     if np.count_nonzero(good) < 2:
         return None
     time, value = channel.time[good], channel.value[good]
-    out: Floats = np.interp(at, time, _calm(value) if channel.quantity in CALMED else value)
+    out: Floats = np.interp(at, time, _calm(value)[0] if channel.quantity in CALMED else value)
     return out
 
 
@@ -37,15 +38,19 @@ def jumps(value: Floats) -> NDArray[np.bool_]:
     return step > max(6 * noise, 1e-9 * float(np.max(np.abs(value), initial=0.0)))
 
 
-def _calm(value: Floats) -> Floats:
-    """Running mean over up to CALM samples on either side, never across a jump."""
-    starts = np.concatenate([[0], np.flatnonzero(jumps(value)) + 1, [value.size]])
+def _calm(value: Floats, reach: int = CALM, apart: NDArray[np.bool_] | None = None) -> tuple[Floats, float]:
+    """Running mean over up to `reach` samples on either side, never across a jump or where `apart` (n-1,); and the
+    mean square by which the others in the window miss each sample."""
+    cut = jumps(value) if apart is None else jumps(value) | apart
+    starts = np.concatenate([[0], np.flatnonzero(cut) + 1, [value.size]])
     index = np.arange(value.size)
     which = np.searchsorted(starts, index, side="right") - 1
-    reach = np.minimum(np.minimum(index - starts[which], starts[which + 1] - 1 - index), CALM)
+    width = np.minimum(np.minimum(index - starts[which], starts[which + 1] - 1 - index), reach)
     total = np.concatenate([[0.0], np.cumsum(value - value[0])])
-    out: Floats = value[0] + (total[index + reach + 1] - total[index - reach]) / (2 * reach + 1)
-    return out
+    out: Floats = value[0] + (total[index + width + 1] - total[index - width]) / (2 * width + 1)
+    others = width > 0
+    missed = (value - out)[others] * (1 + 0.5 / width[others])
+    return out, float(np.mean(missed**2)) if missed.size else np.inf
 
 
 def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats) -> Floats | None:
@@ -68,8 +73,9 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     kept = _fewest(H, value)
     theta = np.linalg.lstsq(H[:, kept], value, rcond=None)[0]
     rest = value - H[:, kept] @ theta
-    calm, missed = calmed(rest, np.ones_like(rest))
     by_load: Floats = columns(driven, charge)[:, kept] @ theta
+    apart = np.abs(np.diff(then)) > STEP * size
+    calm, missed = min((_calm(rest, reach, apart) for reach in REACHES), key=lambda each: each[1])
     if missed > (1 - REST_TOLD) * float(np.mean(rest**2)):
         return by_load
     return by_load + np.interp(at, time, calm)
