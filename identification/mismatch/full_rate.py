@@ -13,8 +13,8 @@ from identification.mismatch.fitting import Fit, promptness
 from identification.mismatch.lines import Line, find_lines
 from identification.mismatch.model import Data, predict
 from identification.mismatch.resonance_noise import find_bands
-from identification.mismatch.rotation_lines import turned
 from identification.mismatch.spectrum import Series
+from identification.mismatch.turns import turned
 from identification.physics.filters import delayed, within_intervals
 from identification.physics.history import History
 from identification.recording import Floats

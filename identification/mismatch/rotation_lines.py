@@ -25,7 +25,6 @@ from identification.mismatch.spectrum import (
     spacing_of,
     transform,
 )
-from identification.physics.filters import integral
 from identification.recording import Floats
 from identification.tails import gamma_median, gamma_sf
 
@@ -51,6 +50,8 @@ QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Of the speeds of a stretch, over which the noise is averaged."""
 SPEEDS = 12
 """Groups of speed: no single one of them may carry a line that is locked to the rotor."""
+ORDERS = 12
+"""Whole ratios that are looked at."""
 BESIDE = (-7, -6, -5, -4, 4, 5, 6, 7)
 """Independent ratios beside a line at which the noise is taken."""
 COHERENT = 0.6
@@ -85,24 +86,6 @@ class _Stretch:
     @property
     def speed(self) -> float:
         return float(self.speeds.mean())
-
-
-def turned(edges: Floats, speed: Floats, at: Floats) -> Floats:
-    """Angle turned at each time, from the mean speed (M,) in the intervals between `edges` (M+1,): integral of |n|."""
-    return integral(np.abs(speed), edges, at)
-
-
-def turned_by_rate(time: Floats, rate: Floats, at: Floats) -> Floats:
-    """Angle turned (rev) at each time, from samples of the rotation rate (rev/s), straight lines between them."""
-    good = np.isfinite(rate)
-    t, n = time[good], np.abs(rate[good])
-    total = np.concatenate([[0.0], np.cumsum(0.5 * (n[1:] + n[:-1]) * np.diff(t))])
-    index = np.clip(np.searchsorted(t, at, side="right") - 1, 0, t.size - 1)
-    since = at - t[index]
-    slope = np.append(np.diff(n) / np.maximum(np.diff(t), 1e-12), 0.0)[index]
-    inside = np.clip(since, 0.0, np.append(np.diff(t), 0.0)[index])
-    out: Floats = total[index] + n[index] * since + 0.5 * slope * inside**2
-    return out
 
 
 class _Colour:
@@ -192,21 +175,28 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float) -> Locked | No
 
 
 def _peak(by_group: Floats, z: Floats, longest: float, alarm: float) -> tuple[float | None, float]:
-    """Ratio of the highest sum of powers that no single group of speeds carries, and its family-wise p-value."""
+    """Ratio of the highest sum of powers that no single group of speeds carries, and its family-wise p-value.
+
+    Whole numbers are a family of their own: blades, and the bolts and bearings of a shaft, come so many to a turn.
+    """
     used = by_group.any(axis=1)
     if np.count_nonzero(used) < 2:
         return None, 1.0
     kept = by_group[used]
     total = kept.sum(axis=0)
-    trials = float(z[-1] - z[0]) * longest
-    at = int(np.argmax(_standing(total)[0]))
     strong, shape = _standing(total)
-    p = family_wise(float(gamma_sf(strong[at], shape)), float(strong[at]), trials)
+    at = int(np.argmax(strong))
+    p = family_wise(float(gamma_sf(strong[at], shape)), float(strong[at]), float(z[-1] - z[0]) * longest)
+    orders = [int(np.argmin(np.abs(z - k))) for k in range(1, ORDERS + 1) if z[0] <= k <= z[-1]]
+    if orders:
+        order = max(orders, key=lambda i: strong[i])
+        of_order = len(orders) * float(gamma_sf(strong[order], shape))
+        p, at = min((p, at), (of_order, order))
     without = total - kept[int(np.argmax(kept[:, at])), :]
     rest, rest_shape = _standing(without)
     around = slice(max(at - 2, 0), at + 3)
     p_rest = float(gamma_sf(np.max(rest[around]), rest_shape)) * 5
-    p = max(p, p_rest)
+    p = max(2 * p, p_rest)
     return (float(z[at]), p) if p < alarm else (None, 1.0)
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from identification.mismatch.lines import Line, alias_of_mains, find_lines
 from identification.mismatch.resonance_noise import find_bands
-from identification.mismatch.rotation_lines import turned, turned_by_rate
 from identification.mismatch.spectrum import Series
+from identification.mismatch.turns import turned, turned_by_rate
 from identification.recording import Floats
 from sim_devices.concealed.draw import NOISE_KINDS, noise_law
 from sim_devices.world.noise_law import drawn
