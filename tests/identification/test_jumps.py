@@ -6,6 +6,7 @@ import pytest
 from identification.mismatch.baseline import baseline, start
 from identification.mismatch.jumps import APART, TRIED, likeliest_jumps
 from identification.mismatch.model import Model
+from identification.mismatch.omnibus import judge_left
 from identification.mismatch.preparing import history_of
 from identification.mismatch.screening import orthogonal_basis
 from tests.identification.diagnosed_runs import run
@@ -45,3 +46,12 @@ def test_the_likeliest_are_those_of_all_steps_one_by_one(jumped):
     far = score[np.abs(when - found[0]) > APART * data.scale.duration]
     assert brute(data, state, basis, np.array(found[1:2]))[0] == pytest.approx(far.max(), rel=0.02)
     assert np.min(np.diff(np.sort(found))) > APART * data.scale.duration
+
+
+@pytest.mark.parametrize("jumped", [(101.9, 1.5, "wanders")], indirect=True)
+def test_a_jump_that_slow_noise_hides_is_located_in_time(jumped):
+    truth, data, state, _ = jumped
+    left = judge_left(state.fit, data, state.weights, np.random.default_rng(0))
+    first = left.groups[0]
+    assert (first.coordinate.quantity, left.p_value < 1e-6) == ("time", True)
+    assert float(first.coordinate.what.split("jumps at ")[1].split()[0]) == pytest.approx(truth, abs=0.3)

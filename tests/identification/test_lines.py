@@ -83,6 +83,19 @@ def test_line_locked_to_the_rotor_beyond_half_the_sampling_rate() -> None:
     assert np.std(left[speed > 0]) < 0.15
 
 
+def test_a_whole_number_of_periods_per_turn_is_found_fainter_than_any_other() -> None:
+    found = {}
+    for ratio in (4.0, 4.37):
+        hits = 0
+        for seed in range(4):
+            series, speed = run(seed)
+            assert series.turns is not None
+            wave = np.where(speed > 0, 0.14 * np.sin(2 * np.pi * ratio * series.turns + 1.0), 0.0)
+            hits += len(find_lines([Series(series.time, series.residual + wave, series.turns)]))
+        found[ratio] = hits
+    assert found[4.0] > found[4.37]
+
+
 def test_uneven_samples_with_a_gap() -> None:
     rng = np.random.default_rng(3)
     t = np.cumsum(rng.uniform(0.1, 0.3, 2000))

@@ -233,6 +233,37 @@ def test_doubts_say_why_a_name_is_not_earned():
     assert found.heldout.after < 0.5 * found.heldout.before, "the fit is better all the same"
 
 
+def test_a_lag_and_a_lead_that_undo_each_other_are_doubted():
+    from identification.mismatch.baseline import baseline, start
+    from identification.mismatch.fitting import fit
+    from identification.mismatch.model import Model
+    from identification.mismatch.naming import doubts
+    from identification.mismatch.preparing import history_of
+    from identification.physics.motor_lag import MotorLag
+    from identification.physics.time_skew import TimeSkew
+
+    t = np.arange(0.0, 120.0, 0.05)
+    volts = 10.0 * np.sin(2 * np.pi * t / 20)
+    force = C * volts * np.abs(volts) + 0.3 * np.random.default_rng(6).standard_normal(t.size)
+    channels = (
+        Channel("command_voltage", "command", "command_voltage", "V", t + 0.001, volts),
+        Channel("thrust", "cell", "thrust", "N", t, force),
+    )
+    data, theta = start([history_of(Recording("sine", "T1", channels, source="sine.h5"))])
+    state = baseline(data, theta, (), Model())
+    lag, skew = MotorLag("first_order"), TimeSkew()
+
+    def said(delay):
+        model = Model().plus(lag).plus(skew)
+        values = {lag: (0.3,), skew: (delay,)}
+        at = replace(state.fit.theta, terms=tuple(values[t] for t in model.terms))
+        known = replace(state, fit=replace(fit(model, at, data, state.weights, most_steps=0), theta=at))
+        return " ".join(doubts(known, lag, data, 2))
+
+    assert "time_skew nearly cancel" in said(-0.3)
+    assert "cancel" not in said(0.3)
+
+
 # ---------------------------------------------------------------- other kinds of recording
 
 

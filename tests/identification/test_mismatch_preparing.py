@@ -321,6 +321,21 @@ def test_a_supply_that_follows_the_load_is_known_between_its_samples():
     assert few.others["bus_voltage"] == pytest.approx(30 - 0.05 * few.middle)
 
 
+def test_the_noise_of_a_supply_is_averaged_but_not_across_a_change_of_the_load():
+    """A battery that recovers slowly after each change: neither the load alone nor a long mean tells it."""
+    t = np.arange(0.1, 40, 0.05)
+    noise = 0.05 * np.random.default_rng(4).standard_normal(t.size)
+
+    def error(bus):
+        h = history_of(with_others(channel("bus_voltage", t, bus(t) + noise)))
+        return float(np.sqrt(np.average((h.others["bus_voltage"] - bus(h.middle)) ** 2, weights=h.dt)))
+
+    by_load = error(lambda s: 30 - 0.02 * np.abs(held(s)) ** 3 / 12)
+    assert by_load < 0.01, "a fifth of the noise of a sample"
+    falls = error(lambda s: 30 - 0.02 * np.abs(held(s)) ** 3 / 12 - 0.01 * s + 0.2 * np.sin(s / 4))
+    assert falls < 0.025
+
+
 def test_channels_with_less_than_two_numbers_are_not_there():
     h = history_of(with_others(channel("current", [1.0, 2.0], [np.nan, 3.0]), channel("motor_temperature", [], [])))
     assert "current" not in h.others

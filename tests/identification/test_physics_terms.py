@@ -369,6 +369,15 @@ def test_thrust_follows_the_measured_rate_and_not_its_noise():
     assert half - H.driver == pytest.approx(0.5 * (x - H.driver))
 
 
+def test_what_ticks_do_within_an_interval_is_no_slip():
+    slip = 0.5 * np.sin(0.03 * H.middle)
+    lead = 0.4 * np.random.default_rng(11).uniform(-1, 1, H.driver.size)  # the rate is read between two ticks
+    for followed in (1.0, 0.3):
+        measured = replace(H, rate=2.0 * (H.driver + slip + followed * lead), rate_lead=lead)
+        x = term("rotation_coupling").apply(H.driver, moment(measured, S), (1.0,))
+        assert np.sqrt(np.mean((x - H.driver - slip) ** 2)) < 0.05
+
+
 def test_memories_end_where_the_formula_says():
     x = np.full(4000, 12.0)
     h = with_driver(x, np.full(4000, 0.25))
