@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch.leading import lead_of, promptness
 from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict, ticked
 from identification.physics.filters import delayed, reconstructed
-from identification.physics.motor_lag import MotorLag, rate_at
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 
@@ -96,7 +96,9 @@ def raw(
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
         prompt = promptness(model, theta, history.tick, x, data.scale.driver)
-        ahead = np.broadcast_to(prompt * theta.C * (2 * np.abs(x) * history.lead_after(late) + history.excess), F.shape)
+        ahead = np.broadcast_to(
+            prompt * theta.C * (2 * np.abs(x) * lead_of(model, theta, history, late) + history.excess), F.shape
+        )
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
         thrust.append((reconstructed(F, history.middle, history.sampled) + ahead)[rows] + theta.tares[i])
@@ -108,18 +110,6 @@ def raw(
             turning = reconstructed(x, history.middle, history.rate_sampled) + lead
             rate.append(theta.k * turning[history.rate_rows])
     return thrust, rate
-
-
-def promptness(model: Model, theta: Theta, tick: float, x: Floats, largest: float) -> Floats | float:
-    """How far a tick of the command shows within itself: wholly without a lag, not at all with one of many ticks.
-
-    Where the lag depends on the rate, so does this: (M,).
-    """
-    lag: Floats | float = 0.0
-    for term, values in zip(model.terms, theta.terms, strict=True):
-        if isinstance(term, MotorLag) and values[0] > 1e-6:
-            lag = lag + 1 / rate_at(term.form, values, x, largest)
-    return np.exp(-2 * lag / tick) if np.any(lag) else 1.0
 
 
 def residual_of(model: Model, theta: Theta, data: Data, weights: Weights) -> Floats:
@@ -269,7 +259,9 @@ def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:
 def _ends(p: Parameter, value: float) -> bool:
     """Whether a value sits at a bound that does not mean that the term is absent."""
     edge = 1e-3 * (p.high - p.low)
-    return (value <= p.low + edge and p.neutral != p.low) or (value >= p.high - edge and p.neutral != p.high)
+    return (value <= p.low + edge and p.neutral != p.low) or (
+        value >= p.high - edge and p.neutral != p.high and not p.whole
+    )
 
 
 def _push(j: int, fitted: Fit, data: Data, weights: Weights) -> float:

@@ -9,7 +9,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.fitting import Fit, promptness
+from identification.mismatch.fitting import Fit
+from identification.mismatch.leading import promptness
 from identification.mismatch.lines import Line, find_lines
 from identification.mismatch.model import Data, predict
 from identification.mismatch.resonance_noise import find_bands

@@ -30,6 +30,10 @@ MOVES = 0.01
 """Share of the largest driver that counts as a change."""
 GAP = 5.0
 """Spacings without a sample that are a gap."""
+TICKING = 5
+"""More steps than this part of the intervals are the ticks of ramps, unless they are..."""
+LARGEST_TICK = 0.08
+"""...larger than this share of the largest driver."""
 STEP = 0.02
 """Share of the largest driver: a change of a command that is a step."""
 
@@ -142,6 +146,9 @@ def _with_steps(edges: Floats, held: Held, spacing: float, most: int) -> Floats:
     size = float(np.max(np.abs(held.value)))
     steps = held.time[1:][np.abs(np.diff(held.value)) > STEP * size]
     steps = steps[(steps > edges[0]) & (steps < edges[-1])]
+    if steps.size > most // TICKING:  # a fast ramp, of which each tick would be a step
+        steps = held.time[1:][np.abs(np.diff(held.value)) > LARGEST_TICK * size]
+        steps = steps[(steps > edges[0]) & (steps < edges[-1])]
     if not (held.stepwise and steps.size):
         return edges
     after = [0.0]

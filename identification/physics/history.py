@@ -22,6 +22,10 @@ TURNING = 0.02
 """Share of the largest driver above which it counts as driving."""
 CHANGED = 0.01
 """Share of the largest driver: a smaller difference between neighbouring intervals is no step."""
+LED = 2.0
+"""Ticks for which the response to one is followed..."""
+LEDS = 61
+"""...at so many delays."""
 LARGEST_LEAD = 0.02
 """Of the largest driver: what changes by more is a step, and no tick."""
 LEAST_DELAY = 0.02
@@ -105,15 +109,27 @@ class History:
         if self.ticks is None or abs(delay) < LEAST_DELAY * self.tick:
             return self.lead
         known = self.memo.get(("lead", delay))
-        if known is not None:
-            return known
+        if known is None:
+            known = self.memo[("lead", delay)] = self._led(delay)
+        return known
+
+    def leads_after(self, delay: float) -> tuple[Floats, Floats]:
+        """(k,) s after `delay`, and (k, M) the leads of forces that come so much later: two ticks in fine steps."""
+        later = np.linspace(0.0, LED * self.tick, LEDS)
+        key = ("leads", round(delay, 4))
+        known = self.memo.get(key)
+        if known is None:
+            known = self.memo[key] = np.array([self._led(delay + d) for d in later])
+        return later, known
+
+    def _led(self, delay: float) -> Floats:
+        assert self.ticks is not None
         at, value = self.ticks
         now = value[np.clip(np.searchsorted(at, self.sample_time - delay, side="right") - 1, 0, at.size - 1)]
         mean = np.bincount(self._sample_index, weights=now, minlength=self.driver.size) / np.maximum(self.count, 1)
         line = reconstructed(delayed(self.driver, self.edges, delay), self.middle, self.sampled)
         lead = np.where(self.count > 0, mean - line, 0.0)
         out: Floats = np.where(np.abs(lead) < LARGEST_LEAD * self.size, lead, 0.0)
-        self.memo[("lead", delay)] = out
         return out
 
     @cached_property

@@ -34,7 +34,7 @@ class StandResonance:
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (
-            Parameter("compliance", "1", 0.0, 1.0, 0.0),
+            Parameter("compliance", "1", 0.0, 1.0, 0.0, whole=True),
             Parameter("frequency", "Hz", 0.1, min(0.45 / scale.interval, HIGHEST)),
             Parameter("damping", "1", 0.005, 0.4),
         )
@@ -44,7 +44,8 @@ class StandResonance:
         wide = tuple((1.0, float(f), 0.1) for f in np.geomspace(0.5, max(highest, 0.6), TRIED))
         if scale.interval > TICKS:
             return wide
-        return (*wide, *((1.0, float(f), 0.05) for f in np.arange(20.0, highest, APART)))
+        dull = tuple((1.0, float(f), 0.3) for f in np.geomspace(5.0, max(highest, 6.0), TRIED))
+        return (*wide, *dull, *((1.0, float(f), 0.05) for f in np.arange(20.0, highest, APART)))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         # ringing that is out of phase after a cycle or two looks like nothing: no slope leads there

@@ -47,6 +47,8 @@ class Parameter:
     low: float
     high: float
     neutral: float | None = None
+    whole: bool = False
+    """`high` is the textbook's own value: to lie there is no doubt."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

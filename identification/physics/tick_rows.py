@@ -41,7 +41,9 @@ LEAST_TICKS = 50
 REGULAR = 5.0
 """Median spacings after which a command no longer ticks."""
 STEP = 0.02
-"""Share of the largest driver: a larger change is a step, which has fine intervals of its own..."""
+USUAL = 2.0
+LARGEST = 0.08
+"""Shares of the largest driver, and median changes: a larger change is a step with fine intervals of its own..."""
 AFTER_STEP = 0.3
 """...for so many seconds."""
 CHUNK = 400
@@ -119,7 +121,8 @@ def tick_rows(history: History) -> TickRows | None:
     change = np.diff(value * np.abs(value), prepend=0.0)
     new = np.abs(np.diff(value, prepend=0.0)) > 1e-9 * history.size
     at, value, change = at[new], value[new], change[new]
-    small = np.abs(np.diff(value, prepend=0.0)) < STEP * history.size
+    moved = np.abs(np.diff(value, prepend=0.0))
+    small = moved < np.clip(USUAL * float(np.median(moved)), STEP * history.size, LARGEST * history.size)
     if np.count_nonzero(small) < LEAST_TICKS:
         return None
     spacing = float(np.median(np.diff(at)))
