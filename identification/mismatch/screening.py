@@ -16,6 +16,7 @@ import numpy as np
 from identification.mismatch.fitting import Fit, extended, raw, ticks_told
 from identification.mismatch.jumps import likeliest_jumps
 from identification.mismatch.model import Data, Weights
+from identification.mismatch.rings import likeliest_rings
 from identification.physics.term import Term
 from identification.recording import Floats
 from identification.tails import normal_sf
@@ -27,6 +28,7 @@ PLAIN = 4.0
 """Sigmas at which a direction is taken out before surrogates are made, and before noise is estimated."""
 MOST_PLAIN = 10
 MOST_JUMPS = 4
+MOST_RINGS = 4
 LEAST_DIRECTION = 1e-6
 """Share of a direction that must remain when the present model is projected out."""
 
@@ -150,10 +152,12 @@ def directions(
 
 
 def _trials(term: Term, fit: Fit, data: Data, weights: Weights, basis: Floats) -> list[tuple[float, ...]]:
-    """The term's own; for a jump of the zero also those that the data point to."""
+    """The term's own; for a jump of the zero and for ringing also those that the data point to."""
     found = list(term.trials(data.scale))
     if term.id == "zero_offset":
         found += [(found[0][0], at) for at in likeliest_jumps(fit, data, weights, basis, MOST_JUMPS)]
+    if term.id == "stand_resonance" and weights.ticks:
+        found += likeliest_rings(fit, data, term, MOST_RINGS)
     return found
 
 

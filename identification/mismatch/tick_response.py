@@ -12,6 +12,7 @@ from identification.recording import Floats
 
 DYNAMIC = ("motor_lag", "stand_resonance", "time_skew")
 """What shows within a few ticks."""
+MOST_REMEMBERED = 200
 Acting = tuple[Term, tuple[float, ...], Scale]
 
 
@@ -29,6 +30,15 @@ def held_back(rows: TickRows, acting: list[Acting], shift: float) -> Floats:
     terms = [each for each in acting if each[0].id in DYNAMIC]
     if not terms and shift == 0:
         return np.zeros(rows.nodes.size - 1)
+    key = (tuple((term, values, sizes.driver) for term, values, sizes in terms), shift)
+    if key not in rows.memo:
+        if len(rows.memo) >= MOST_REMEMBERED:
+            rows.memo.clear()
+        rows.memo[key] = _held_back(rows, terms, shift)
+    return rows.memo[key]
+
+
+def _held_back(rows: TickRows, terms: list[Acting], shift: float) -> Floats:
     levels = rows.levels if any(term.id == "motor_lag" for term, _, _ in terms) else rows.levels[:1]
     after = rows.after
     dt = np.full(after.size, 2 * after[0])

@@ -15,10 +15,6 @@ TRIED = 18
 """Frequencies to look for it with."""
 HIGHEST = 300.0
 """Hz: what rings faster is not seen by a load cell."""
-TICKS = 0.0025
-"""s of resolution, of which only the ticks of a command are capable: a response of a tenth of a second, in which..."""
-APART = 4.0
-"""...frequencies in Hz so far apart are alike."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +37,7 @@ class StandResonance:
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         highest = min(0.4 / scale.interval, HIGHEST)
-        wide = tuple((1.0, float(f), 0.1) for f in np.geomspace(0.5, max(highest, 0.6), TRIED))
-        if scale.interval > TICKS:
-            return wide
-        dull = tuple((1.0, float(f), 0.3) for f in np.geomspace(5.0, max(highest, 6.0), TRIED))
-        return (*wide, *dull, *((1.0, float(f), 0.05) for f in np.arange(20.0, highest, APART)))
+        return tuple((1.0, float(f), 0.1) for f in np.geomspace(0.5, max(highest, 0.6), TRIED))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         # ringing that is out of phase after a cycle or two looks like nothing: no slope leads there

@@ -14,7 +14,7 @@ means have different s.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -72,6 +72,8 @@ class TickRows:
     """(B + 1,) s after a tick; at the last nothing is held back."""
     levels: Floats
     """(5,) |V| of the ticks."""
+    memo: dict[object, Floats] = field(default_factory=dict, repr=False)
+    """Responses worked out lately: most parameters of a model move none."""
 
     def predicted(self, C: float, held_back: Floats, jump: float = 0.0) -> Floats:
         """(r + 3,) rows for 1 - s = held_back (B,) at the nodes, and what was loose, in its own sigmas.
@@ -79,8 +81,9 @@ class TickRows:
         Loose are the gain, and where s jumps at `jump` s its values at the nodes on either side: no straight line
         follows a jump.
         """
-        shape = self.design @ np.concatenate([[1.0], -held_back])
-        columns = np.column_stack([shape, *(np.zeros_like(shape) for _ in range(2))])
+        shape = self.design[:, 0] - self.design[:, 1:] @ held_back
+        columns = np.zeros((shape.size, 3))
+        columns[:, 0] = shape
         if 0 < jump < self.nodes[-2]:
             k = int(np.searchsorted(self.nodes, jump, side="right"))  # column 0 is all at once
             columns[:, 1:] = self.design[:, k : k + 2]
