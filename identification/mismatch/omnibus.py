@@ -108,6 +108,8 @@ def _jump(time: Coordinate, fit: Fit, residual: Floats, data: Data, weights: Wei
     known = [v[1] for t, v in zip(fit.model.terms, fit.theta.terms, strict=True) if t.id == "zero_offset"]
     new = np.all([np.abs(when - at) > APART * data.scale.duration for at in known], axis=0)
     when, score = (when[new], score[new]) if known else (when, score)
+    if not score.size:
+        return Judged(time, 0.0, 1, 1.0, 0.0)
     stat = float(score[0] ** 2)
     p = TRIED * _tail(stat, 1, 0.0)
     told = replace(time, what=f"{time.what}; the reading jumps at {when[0]:.4g} s")

@@ -26,6 +26,7 @@ LED = 2.0
 """Ticks for which the response to one is followed..."""
 LEDS = 61
 """...at so many delays."""
+MOST_LED = 8
 LARGEST_LEAD = 0.02
 """Of the largest driver: what changes by more is a step, and no tick."""
 LEAST_DELAY = 0.02
@@ -82,6 +83,8 @@ class History:
     sample_thrust: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     memo: OrderedDict[object, Floats] = field(default_factory=OrderedDict, repr=False)
     """Values behind the first terms of models predicted lately: a fit moves one parameter at a time."""
+    led: dict[float, Floats] = field(default_factory=dict, repr=False)
+    """`leads_after`, by delay."""
     static: bool = False
     """Levels without a course of time: nothing that moves can be seen."""
 
@@ -116,11 +119,12 @@ class History:
     def leads_after(self, delay: float) -> tuple[Floats, Floats]:
         """(k,) s after `delay`, and (k, M) the leads of forces that come so much later: two ticks in fine steps."""
         later = np.linspace(0.0, LED * self.tick, LEDS)
-        key = ("leads", round(delay, 4))
-        known = self.memo.get(key)
-        if known is None:
-            known = self.memo[key] = np.array([self._led(delay + d) for d in later])
-        return later, known
+        key = round(delay, 4)
+        if key not in self.led:
+            if len(self.led) >= MOST_LED:  # some megabytes each
+                self.led.clear()
+            self.led[key] = np.array([self._led(delay + d) for d in later])
+        return later, self.led[key]
 
     def _led(self, delay: float) -> Floats:
         assert self.ticks is not None
