@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch.fitting import Fit
-from identification.mismatch.leading import promptness
+from identification.mismatch.leading import sample_lead
 from identification.mismatch.lines import Line, find_lines
 from identification.mismatch.model import Data, predict
 from identification.mismatch.resonance_noise import find_bands
@@ -45,8 +45,7 @@ def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
             F = delayed(F, h.edges, fitted.theta.shift)
         at = within_intervals(F, h.edges, h.sample_time)
         rate = np.abs(within_intervals(x, h.edges, h.sample_time))
-        prompt = promptness(fitted.model, fitted.theta, h.tick, rate, data.scale.driver)
-        at += prompt * 2 * fitted.theta.C * rate * h.sample_lead
+        at += 2 * fitted.theta.C * rate * sample_lead(fitted.model, fitted.theta, h, data.scale.driver)
         residual = h.sample_thrust - at - fitted.theta.tares[i]
         speed = h.others.get("rotation_rate", x)
         out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time)))

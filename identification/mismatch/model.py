@@ -92,7 +92,7 @@ def acting(model: Model, theta: Theta, scale: Scale) -> list[tuple[Term, tuple[f
     return sorted([(g.term, g.values, g.scale) for g in model.given] + found, key=lambda each: _place(each[0]))
 
 
-def _remember(history: History, key: object, value: Floats) -> None:
+def remember(history: History, key: object, value: Floats) -> None:
     history.memo[key] = value
     if len(history.memo) > MOST_REMEMBERED:
         history.memo.popitem(last=False)
@@ -124,7 +124,7 @@ def predict(model: Model, theta: Theta, history: History, scale: Scale, run: int
         if known is None:
             moment = Moment(history, sizes, theta.C, theta.tares[run], x if stage >= HYDRO else value)
             value = term.apply(value, moment, values)
-            _remember(history, key, value)
+            remember(history, key, value)
         else:
             value = known
     if stage < HYDRO:

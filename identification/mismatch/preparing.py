@@ -196,6 +196,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         rate_lead=np.zeros(1) if rate_count is None else _lead(held, turning_time, edges, driven, rate_count),
         sample_time=time[inside],
         sample_thrust=force[inside],
+        rate_time=turning_time,
         rate=rate,
         rate_count=rate_count,
         rate_sampled=rate_sampled,

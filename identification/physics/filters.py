@@ -8,9 +8,11 @@ from scipy.linalg.lapack import dtbtrs, ztbtrs
 
 from identification.recording import Floats
 
-LAG_ITERATIONS = 8
-LAG_CLOSE = 1e-7
-"""Relative change of the rate at which the quadratic lag has converged."""
+LAG_STEPS = 20
+LAG_CLOSE = 1e-6
+"""Relative change of the rate after which the quadratic lag has converged: what is left is about its square."""
+LEAST_STEADY = 0.3
+"""Smallest slope of the equation of one end over that end that a step trusts."""
 LEAST_MOVE = 1e-12
 """Share of the largest value: means over intervals of a level differ by rounding."""
 
@@ -28,7 +30,7 @@ def recursion(keep: Floats, push: Floats, start: float) -> Floats:
     return out
 
 
-def lowpass(u: Floats, dt: Floats, tau: float, start: float = 0.0) -> tuple[Floats, Floats]:
+def lowpass(u: Floats, dt: Floats, tau: Floats | float, start: float = 0.0) -> tuple[Floats, Floats]:
     """First-order low-pass y' = (u - y)/tau for u constant in each interval: exact y at the ends, and exact means.
 
     >>> end, mean = lowpass(np.array([1.0, 1.0]), np.array([1.0, 1.0]), 1.0)
@@ -43,44 +45,59 @@ def lowpass(u: Floats, dt: Floats, tau: float, start: float = 0.0) -> tuple[Floa
     return end, mean
 
 
-def lag(w: Floats, dt: Floats, quadratic: float, linear: float, start: float = 0.0) -> Floats:
-    """Mean rate of n' = quadratic (w|w| - n|n|) + linear (w - n) in each interval (thesis, rotor equation).
+def lag(w: Floats, dt: Floats, quadratic: float, linear: float, start: float = 0.0) -> tuple[Floats, Floats]:
+    """Rate of n' = quadratic (w|w| - n|n|) + linear (w - n) at the ends of intervals, and its means (rotor equation).
 
-    The right side is lambda(n) (w - n) with lambda > 0; the linear recursion is solved again and again with the lambda
-    of the last answer.
+    The right side is lambda(n) (w - n) with lambda > 0, which each interval has at the middle of its two ends. All
+    ends at once by Newton's method: each step is one linear recursion.
     """
     much = np.abs(w)
     size = float(np.max(much, initial=0.0)) or 1.0
     end = w.copy()
     before = np.empty_like(w)
     before[0] = start
-    decay = np.zeros_like(w)
-    for _ in range(LAG_ITERATIONS):
+    for _ in range(LAG_STEPS):
         before[1:] = end[:-1]
-        n = 0.5 * (before + end)
-        slope = _secant(w, much, n)
-        decay = (quadratic * slope + linear) * dt
-        keep = np.exp(-decay)
-        new = recursion(keep, (1 - keep) * w, start)
-        moved = float(np.max(np.abs(new - end)))
-        end = new
-        if moved < LAG_CLOSE * size:
+        gap = before - w
+        slope, bend = _secant(w, much, 0.5 * (before + end))
+        keep = np.exp(-(quadratic * slope + linear) * dt)
+        left = gap * keep
+        own = 0.5 * quadratic * dt * bend * left  # d left / d end, less its sign
+        steady = np.maximum(1 + own, LEAST_STEADY)
+        move = recursion(np.clip((keep - own) / steady, 0.0, 1.0), (w + left - end) / steady, 0.0)
+        end = end + move
+        if float(np.max(np.abs(move))) < LAG_CLOSE * size:
             break
     before[1:] = end[:-1]
-    decay = np.maximum(decay, 1e-12)
-    out: Floats = w + (before - w) * -np.expm1(-decay) / decay
-    return out
+    slope, _ = _secant(w, much, 0.5 * (before + end))
+    decay = np.maximum((quadratic * slope + linear) * dt, 1e-12)
+    mean: Floats = w + (before - w) * -np.expm1(-decay) / decay
+    return end, mean
 
 
-def _secant(w: Floats, much: Floats, n: Floats) -> Floats:
-    """(w|w| - n|n|)/(w - n) without a difference of likes; `much` is |w|.
+def lagged(w: Floats, before: Floats, since: Floats, quadratic: float, linear: float) -> Floats:
+    """Rate of the same equation `since` s after it was `before`, w constant since then; any one shape."""
+    much = np.abs(w)
+    end = before
+    for _ in range(2):
+        slope, _ = _secant(w, much, 0.5 * (before + end))
+        end = w + (before - w) * np.exp(-(quadratic * slope + linear) * since)
+    return end
+
+
+def _secant(w: Floats, much: Floats, n: Floats) -> tuple[Floats, Floats]:
+    """(w|w| - n|n|)/(w - n) without a difference of likes, and its slope over n; `much` is |w|.
 
     |w| + |n| where both turn one way, (w^2 + n^2)/(|w| + |n|) where they do not.
     """
-    both = much + np.abs(n)
-    against = np.minimum(w * n, 0.0)
-    out: Floats = both + 2 * against / np.maximum(both, 1e-300)
-    return out
+    size = np.abs(n)
+    both = np.maximum(much + size, 1e-300)
+    share = np.minimum(w * n, 0.0) / both
+    slope: Floats = both + 2 * share
+    # against each other d/d|n| (both - 2 much size / both)
+    against = 1 - 2 * (much / both) ** 2
+    bend: Floats = np.copysign(np.where(share < 0, against, 1.0), n)
+    return slope, bend
 
 
 def integral(value: Floats, edges: Floats, at: Floats) -> Floats:
@@ -136,14 +153,15 @@ def resonant(value: Floats, dt: Floats, frequency: float, damping: float) -> Flo
     wd = w * np.sqrt(max(1 - damping**2, 1e-9))
     p = complex(-damping * w, wd)
     keep = np.exp(p * dt)
-    end = _complex_recursion(keep, value * (keep - 1) / p)
+    end = complex_recursion(keep, value * (keep - 1) / p)
     before = np.concatenate([[0.0], end[:-1]])
     mean = ((end - before) / dt - value) / p
     out: Floats = (w**2 / wd) * mean.imag
     return out
 
 
-def _complex_recursion(keep: NDArray[np.complex128], push: NDArray[np.complex128]) -> NDArray[np.complex128]:
+def complex_recursion(keep: NDArray[np.complex128], push: NDArray[np.complex128]) -> NDArray[np.complex128]:
+    """y_k = keep_k y_{k-1} + push_k, y_{-1} = 0; (M,)."""
     banded = np.empty((2, keep.size), dtype=np.complex128, order="F")
     np.negative(keep[1:], out=banded[1, :-1])
     solved, info = ztbtrs(banded, push[:, None], uplo="L", diag="U")

@@ -14,7 +14,6 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.physics.filters import delayed, reconstructed
 from identification.physics.tick_rows import TickRows, tick_rows
 from identification.recording import Floats
 
@@ -22,15 +21,36 @@ TURNING = 0.02
 """Share of the largest driver above which it counts as driving."""
 CHANGED = 0.01
 """Share of the largest driver: a smaller difference between neighbouring intervals is no step."""
-LED = 2.0
-"""Ticks for which the response to one is followed..."""
-LEDS = 61
-"""...at so many delays."""
-MOST_LED = 8
 LARGEST_LEAD = 0.02
 """Of the largest driver: what changes by more is a step, and no tick."""
-LEAST_DELAY = 0.02
-"""Of a tick: a shorter delay leaves what the driver does within its ticks where it was."""
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """When the samples of a channel were taken."""
+
+    time: Floats
+    """(N,) s."""
+    interval: NDArray[np.intp]
+    """(N,) index of the interval that each is in."""
+    count: NDArray[np.intp]
+    """(M,) samples in each interval."""
+    middle: Floats
+    """(M,) s, their mean time; the middle of the interval where there are none."""
+
+    def means(self, value: Floats) -> Floats:
+        """(M,) means of values (N,) over each interval; 0 where there are none."""
+        total = np.bincount(self.interval, weights=value, minlength=self.count.size)
+        out: Floats = total / np.maximum(self.count, 1)
+        return out
+
+
+def samples_in(time: Floats, edges: Floats) -> Samples:
+    time = time[(time >= edges[0]) & (time < edges[-1])]
+    interval = np.searchsorted(edges, time, side="right") - 1
+    count = np.bincount(interval, minlength=edges.size - 1)
+    when = np.bincount(interval, weights=time, minlength=edges.size - 1) / np.maximum(count, 1)
+    return Samples(time, interval, count, np.where(count > 0, when, 0.5 * (edges[1:] + edges[:-1])))
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,10 +101,10 @@ class History:
     sample_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     """(N,) or (1,): as `lead`, at each sample."""
     sample_thrust: Floats = field(default_factory=lambda: np.empty(0), repr=False)
+    rate_time: Floats = field(default_factory=lambda: np.empty(0), repr=False)
+    """(n,) s, every sample of the rotation rate."""
     memo: OrderedDict[object, Floats] = field(default_factory=OrderedDict, repr=False)
     """Values behind the first terms of models predicted lately: a fit moves one parameter at a time."""
-    led: dict[float, Floats] = field(default_factory=dict, repr=False)
-    """`leads_after`, by delay."""
     static: bool = False
     """Levels without a course of time: nothing that moves can be seen."""
 
@@ -107,40 +127,15 @@ class History:
         """What the ticks of the command tell within the intervals; None where they tell nothing."""
         return tick_rows(self)
 
-    def lead_after(self, delay: float) -> Floats:
-        """`lead` of a force that comes `delay` s after the driver."""
-        if self.ticks is None or abs(delay) < LEAST_DELAY * self.tick:
-            return self.lead
-        known = self.memo.get(("lead", delay))
-        if known is None:
-            known = self.memo[("lead", delay)] = self._led(delay)
-        return known
-
-    def leads_after(self, delay: float) -> tuple[Floats, Floats]:
-        """(k,) s after `delay`, and (k, M) the leads of forces that come so much later: two ticks in fine steps."""
-        later = np.linspace(0.0, LED * self.tick, LEDS)
-        key = round(delay, 4)
-        if key not in self.led:
-            if len(self.led) >= MOST_LED:  # some megabytes each
-                self.led.clear()
-            self.led[key] = np.array([self._led(delay + d) for d in later])
-        return later, self.led[key]
-
-    def _led(self, delay: float) -> Floats:
-        assert self.ticks is not None
-        at, value = self.ticks
-        now = value[np.clip(np.searchsorted(at, self.sample_time - delay, side="right") - 1, 0, at.size - 1)]
-        mean = np.bincount(self._sample_index, weights=now, minlength=self.driver.size) / np.maximum(self.count, 1)
-        line = reconstructed(delayed(self.driver, self.edges, delay), self.middle, self.sampled)
-        lead = np.where(self.count > 0, mean - line, 0.0)
-        out: Floats = np.where(np.abs(lead) < LARGEST_LEAD * self.size, lead, 0.0)
-        return out
+    @cached_property
+    def thrust_samples(self) -> Samples:
+        """Every thrust sample that is in an interval."""
+        return samples_in(self.sample_time, self.edges)
 
     @cached_property
-    def _sample_index(self) -> NDArray[np.intp]:
-        """(N,) interval of each thrust sample."""
-        index = np.searchsorted(self.edges, self.sample_time, side="right") - 1
-        return np.clip(index, 0, self.driver.size - 1)
+    def rate_samples(self) -> Samples:
+        """Every sample of the rotation rate that is in an interval."""
+        return samples_in(self.rate_time, self.edges)
 
     @cached_property
     def rows(self) -> NDArray[np.intp]:

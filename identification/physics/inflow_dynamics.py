@@ -39,7 +39,7 @@ class InflowDynamics:
         if not self.form:
             u = lowpass(now.x, now.history.dt, theta[1])[1]
         else:
-            u = lag(now.x, now.history.dt, 0.5 / (theta[1] * now.scale.driver), 0.0)
+            u = lag(now.x, now.history.dt, 0.5 / (theta[1] * now.scale.driver), 0.0)[1]
         out: Floats = value + now.C * np.abs(now.x) * theta[0] * (now.x - u)
         return out
 

@@ -60,7 +60,7 @@ class MotorLag:
         if self.form == "first_order":
             return lowpass(value, now.history.dt, tau, start)[1]
         quadratic, linear = torques(self.form, theta, now.scale.driver)
-        return lag(value, now.history.dt, quadratic, linear, start)
+        return lag(value, now.history.dt, quadratic, linear, start)[1]
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         alike = self.form == "first_order" or (self.form == "mixed" and theta[1] > NEARLY_LINEAR)

@@ -1,0 +1,75 @@
+"""What ticks of a command do at the samples beside the line through means, as a lag, ringing and a delay pass them on.
+
+Between two ticks the driver stands still: the rotor follows it by its own equation, and ringing is a decaying
+exponential that each tick adds to. So the response is known at any time, not only at the ends of intervals.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.physics.filters import complex_recursion, delayed, lag, lagged, recursion, resonant
+from identification.recording import Floats
+
+SLOWEST = 1e-3
+"""Rate of following, beside that at the largest driver, of a rotor that hardly turns."""
+
+
+@dataclass(frozen=True, slots=True)
+class Passed:
+    """Dynamics between the driver and a channel: first a rotor that follows, then a stand that rings, then a delay."""
+
+    rotor: tuple[float, float] | None = None
+    """Coefficients of n' = quadratic (w|w| - n|n|) + linear (w - n); None at once."""
+    ring: tuple[float, float, float] | None = None
+    """Compliance c, frequency w / 2 pi in Hz, damping z: transfer function 1 - c + c w^2/(p^2 + 2 z w p + w^2)."""
+    delay: float = 0.0
+    """s."""
+
+    def means(self, driver: Floats, edges: Floats) -> Floats:
+        """(M,) means over intervals, of a driver that stands still in each."""
+        dt = np.diff(edges)
+        out = driver
+        if self.rotor is not None:
+            out = lag(out, dt, *self.rotor, float(out[0]))[1]
+        if self.ring is not None:
+            moved = out - driver[0]
+            out = out + self.ring[0] * (resonant(moved, dt, *self.ring[1:]) - moved)
+        return delayed(out, edges, self.delay) if self.delay else out
+
+    def at(self, time: Floats, when: Floats, value: Floats) -> Floats:
+        """(N,) at any times, of a driver that takes the values (T,) at the ticks (T,) s; settled before the first."""
+        time = time - self.delay
+        last = np.maximum(np.searchsorted(when, time, side="right") - 1, 0)
+        since = np.maximum(time - when[last], 0.0)
+        out: Floats = value[last]
+        if self.rotor is not None:
+            end, _ = lag(value[:-1], np.diff(when), *self.rotor, float(value[0]))
+            out = lagged(out, np.concatenate([value[:1], end])[last], since, *self.rotor)
+        if self.ring is not None:
+            out = out + self._ringing(when, value, last, since)
+        return out
+
+    def _ringing(self, when: Floats, value: Floats, last: NDArray[np.intp], since: Floats) -> Floats:
+        """What the stand adds, (N,): modes of the linear response, the rotor taken as linear about each tick."""
+        assert self.ring is not None
+        c, f, z = self.ring
+        w = 2 * np.pi * f
+        pole = complex(-z * w, w * np.sqrt(max(1 - z**2, 1e-9)))
+        change, gap = np.diff(value, prepend=value[0]), np.diff(when, prepend=when[0])
+        share = c * w**2 / (2j * pole.imag * pole)
+        left = complex_recursion(np.exp(pole * gap), change.astype(np.complex128))
+        if self.rotor is None:
+            alone: Floats = 2 * np.real((share * left)[last] * np.exp(pole * since))
+            return alone
+        quadratic, linear = self.rotor
+        follow = 2 * quadratic * np.abs(value) + linear
+        follow = np.maximum(follow, SLOWEST * float(np.max(follow)))
+        lagging = recursion(np.exp(-follow * gap), change, 0.0)
+        lagging *= c * (1 - w**2 / (follow**2 - 2 * z * w * follow + w**2))
+        rung = 2 * np.real((share * follow / (pole + follow) * left)[last] * np.exp(pole * since))
+        out: Floats = lagging[last] * np.exp(-follow[last] * since) + rung
+        return out

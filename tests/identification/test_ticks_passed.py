@@ -1,0 +1,108 @@
+"""Ticks of a command as a rotor, a stand and a delay pass them on: closed forms of the response to each tick."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from identification.mismatch.baseline import start
+from identification.mismatch.fitting import raw
+from identification.mismatch.model import Model
+from identification.mismatch.preparing import history_of
+from identification.physics.filters import lag
+from identification.physics.motor_lag import MotorLag
+from identification.physics.ticks_passed import Passed
+from identification.recording import Channel, Recording
+
+TICK = 0.05
+TAU = 0.003
+AT = np.arange(0.0, 60.0, TICK) + 0.0031
+VOLTS = 2.0 + 8.0 * np.abs((AT / 10.0) % 2 - 1)
+
+
+def lagging(t):
+    return 1 - np.exp(-t / TAU)
+
+
+def ringing(t, f=30.0, damping=0.1):
+    w = 2 * np.pi * f
+    wd = w * np.sqrt(1 - damping**2)
+    return 1 - 0.6 * np.exp(-damping * w * t) * (np.cos(wd * t) + damping * w / wd * np.sin(wd * t))
+
+
+def both(t):
+    """The ringing as it comes out of a lag, in small steps."""
+    h = 1e-5
+    fine = np.arange(0.0, 1.0, h)
+    rung = ringing(fine)
+    keep = np.exp(-h / TAU)
+    late = np.concatenate([[0.0], lfilter([1 - keep], [1, -keep], 0.5 * (rung[1:] + rung[:-1]))])
+    return np.interp(t, fine, late)
+
+
+def answered(t, response, delay=0.0):
+    out = np.full(t.size, VOLTS[0])
+    for at, change in zip(AT[1:], np.diff(VOLTS), strict=True):
+        since = t - at - delay
+        out += change * np.where(since >= 0, response(np.maximum(since, 0.0)), 0.0)
+    return out
+
+
+@pytest.mark.parametrize(
+    ("response", "passed", "delay"),
+    [
+        (lagging, Passed((0.0, 1 / TAU)), 0.0),
+        (ringing, Passed(ring=(0.6, 30.0, 0.1)), 0.0013),
+        (both, Passed((0.0, 1 / TAU), (0.6, 30.0, 0.1)), 0.0),
+    ],
+    ids=["lag", "ringing, late", "lag and ringing"],
+)
+def test_each_tick_is_answered_as_the_dynamics_do(response, passed, delay):
+    t = np.arange(0.0, 12.0, 0.01)
+    found = replace(passed, delay=delay).at(t, AT, VOLTS)
+    assert found == pytest.approx(answered(t, response, delay), abs=2e-4 if response is both else 1e-9)
+
+
+def test_a_rotor_that_turns_round_follows_the_torque_balance():
+    """n' = q (w|w| - n|n|) from n0 < 0 to w > 0: n = w tan(q w t + atan(n0/w)) until it stands, then w tanh(q w t)."""
+    q, w, n0 = 2.0, 3.0, -0.6
+    stands = -np.arctan(n0 / w) / (q * w)
+    t = np.linspace(0.0, 0.4, 81)
+    when = np.concatenate([[-1.0], np.linspace(0.0, 0.4, 41)])
+    found = Passed((q, 0.0)).at(t, when, np.concatenate([[n0], np.full(41, w)]))
+    turned = w * np.where(t < stands, np.tan(q * w * t + np.arctan(n0 / w)), np.tanh(q * w * (t - stands)))
+    assert found == pytest.approx(turned, abs=2e-3)
+
+
+def test_lag_ends_where_its_own_equation_says_at_every_step_through_zero():
+    rng = np.random.default_rng(0)
+    w = np.repeat(rng.uniform(-10, 10, 200), 30)
+    dt = rng.uniform(0.005, 0.05, w.size)
+    end, _ = lag(w, dt, 0.8, 0.1)
+    before = np.concatenate([[0.0], end[:-1]])
+    n = 0.5 * (before + end)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        slope = np.where(w == n, 2 * np.abs(w), (w * np.abs(w) - n * np.abs(n)) / (w - n))
+    assert end == pytest.approx(w + (before - w) * np.exp(-(0.8 * slope + 0.1) * dt), abs=1e-5)
+
+
+def test_samples_in_step_with_the_ticks_of_a_ramp_are_foretold():
+    """100 Hz: five samples a tick, the first 6.9 ms after it."""
+    t = np.arange(0.0, 60.0, 0.01)
+    x = answered(t, lagging)
+    channels = (
+        Channel("command_voltage", "command", "command_voltage", "V", AT, VOLTS),
+        Channel("thrust", "cell", "thrust", "N", t, 0.5 * x * np.abs(x)),
+    )
+    history = history_of(Recording("ramps", "T1", channels, source="ramps.h5"))
+    data, theta = start([history])
+    theta = replace(theta, C=0.5, tares=(0.0,))
+
+    def missed(tau):
+        model = Model((MotorLag("first_order"),))
+        (told,), _ = raw(model, replace(theta, terms=((tau,),)), data, with_rate=False)
+        return float(np.sqrt(np.mean((told - data.thrust[0])[50:-50] ** 2)))
+
+    assert missed(TAU) < 0.002
+    assert missed(TAU) < 0.2 * min(missed(0.8 * TAU), missed(1.25 * TAU))
