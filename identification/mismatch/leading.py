@@ -42,7 +42,7 @@ def sample_lead(model: Model, theta: Theta, history: History, largest: float) ->
     passed = Passed(_rotor(model, theta, largest), _ring(model, theta), late)
     if not _changes(passed, history):
         return history.sample_lead
-    line = within_intervals(passed.means(history.driver, history.edges), history.edges, history.sample_time)
+    line = within_intervals(_means(history, passed), history.edges, history.sample_time)
     return _small(_at(history, passed, history.thrust_samples) - line, history)
 
 
@@ -66,13 +66,22 @@ def _remembered(history: History, channel: Literal["thrust", "rate"], passed: Pa
 
 def _lead(history: History, passed: Passed, samples: Samples) -> Floats:
     mean = samples.means(_at(history, passed, samples))
-    line = reconstructed(passed.means(history.driver, history.edges), history.middle, samples.middle)
+    line = reconstructed(_means(history, passed), history.middle, samples.middle)
     return _small(np.where(samples.count > 0, mean - line, 0.0), history)
+
+
+def _means(history: History, passed: Passed) -> Floats:
+    known = history.memo.get(passed)
+    if known is None:
+        known = passed.means(history)
+        remember(history, passed, known)
+    return known
 
 
 def _at(history: History, passed: Passed, samples: Samples) -> Floats:
     assert history.ticks is not None
-    return passed.at(samples.time, *history.ticks)
+    when, value = history.ticks
+    return passed.at(*samples.after(when, passed.delay), when, value)
 
 
 def _small(lead: Floats, history: History) -> Floats:

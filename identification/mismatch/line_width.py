@@ -8,7 +8,6 @@ been taken out. Twice the difference is chi-square of three parameters (two of t
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import minimize
 
 from identification.recording import Floats
 from identification.tails import chi2_sf
@@ -56,6 +55,8 @@ def _best(power: Floats) -> tuple[float, float]:
         x = (j - q[3]) / np.exp(q[4])
         density = np.exp(q[0] + q[1] * j / ROUND) + np.exp(q[2]) / (1 + x**2)
         return float(np.sum(np.log(density) + power / density))
+
+    from scipy.optimize import minimize  # a quarter of a second, and few recordings come here
 
     base = float(np.log(floor))
     low = np.array([base - 7, -6, base - 12, -6, np.log(NARROWEST)])

@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.optimize import minimize_scalar
 
 from identification.mismatch.line_width import peak_p_value
 from identification.mismatch.rotation_lines import Locked, find_locked
@@ -170,6 +169,8 @@ def _fitted(
     runs: Sequence[tuple[int, Series]], spectra: Sequence[Spectrum], at: int, trials: float, spacing: float
 ) -> Line | None:
     """Frequency by least squares round a grid point, coefficients run by run; None beyond the searched band."""
+    from scipy.optimize import minimize_scalar  # a quarter of a second, and few recordings come here
+
     step = spectra[0].step
     noise = [float(s.noise[at]) for s in spectra]
     values = [clipped(r.residual) for _, r in runs]

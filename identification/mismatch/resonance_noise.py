@@ -11,7 +11,6 @@ from collections.abc import Sequence
 
 import numpy as np
 from scipy.fft import rfft
-from scipy.optimize import minimize
 
 from identification.mismatch.spectrum import Series, averaged, clipped, finite, spacing_of
 from identification.recording import Floats
@@ -125,6 +124,8 @@ def _powers(grids: Sequence[tuple[Floats, float]], low: float, high: float) -> t
 
 def _fitted(grids: Sequence[tuple[Floats, float]], f0: float, width: float) -> tuple[float, float] | None:
     """Frequency and quality of the peak near `f0` (Hz), None where a sloping floor does as well or it is a line."""
+    from scipy.optimize import minimize  # a quarter of a second, and few recordings come here
+
     reach = min(max(10 * width, 0.1 * f0), 0.7 * f0)
     f, power, count, finest = _powers(grids, f0 - reach, f0 + reach)
     if f.size < 16:

@@ -8,8 +8,8 @@ from scipy.linalg.lapack import dtbtrs, ztbtrs
 
 from identification.recording import Floats
 
-LAG_STEPS = 20
-LAG_CLOSE = 1e-6
+LAG_STEPS = 12
+LAG_CLOSE = 1e-5
 """Relative change of the rate after which the quadratic lag has converged: what is left is about its square."""
 LEAST_STEADY = 0.3
 """Smallest slope of the equation of one end over that end that a step trusts."""
@@ -45,15 +45,19 @@ def lowpass(u: Floats, dt: Floats, tau: Floats | float, start: float = 0.0) -> t
     return end, mean
 
 
-def lag(w: Floats, dt: Floats, quadratic: float, linear: float, start: float = 0.0) -> tuple[Floats, Floats]:
+def lag(
+    w: Floats, dt: Floats, quadratic: float, linear: float, start: float = 0.0, near: Floats | None = None
+) -> tuple[Floats, Floats]:
     """Rate of n' = quadratic (w|w| - n|n|) + linear (w - n) at the ends of intervals, and its means (rotor equation).
 
     The right side is lambda(n) (w - n) with lambda > 0, which each interval has at the middle of its two ends. All
-    ends at once by Newton's method: each step is one linear recursion.
+    ends at once by Newton's method: each step is one linear recursion. `near`: ends of a lag that is not far off.
     """
+    if quadratic == 0:
+        return lowpass(w, dt, 1 / linear, start)
     much = np.abs(w)
     size = float(np.max(much, initial=0.0)) or 1.0
-    end = w.copy()
+    end = w if near is None else near
     before = np.empty_like(w)
     before[0] = start
     for _ in range(LAG_STEPS):
@@ -96,7 +100,7 @@ def _secant(w: Floats, much: Floats, n: Floats) -> tuple[Floats, Floats]:
     slope: Floats = both + 2 * share
     # against each other d/d|n| (both - 2 much size / both)
     against = 1 - 2 * (much / both) ** 2
-    bend: Floats = np.copysign(np.where(share < 0, against, 1.0), n)
+    bend: Floats = np.copysign(1.0, n) * np.where(share < 0, against, 1.0)
     return slope, bend
 
 

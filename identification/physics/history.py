@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.physics.filters import lag
 from identification.physics.tick_rows import TickRows, tick_rows
 from identification.recording import Floats
 
@@ -38,11 +39,26 @@ class Samples:
     middle: Floats
     """(M,) s, their mean time; the middle of the interval where there are none."""
 
+    known: dict[float, tuple[NDArray[np.intp], Floats]] = field(default_factory=dict, repr=False)
+    """`after`, by the delay asked for last."""
+
+    def after(self, when: Floats, delay: float) -> tuple[NDArray[np.intp], Floats]:
+        """(N,) the last of the ticks `when` that is `delay` s ago or longer, else the first, and s since then."""
+        if delay not in self.known:
+            self.known.clear()
+            self.known[delay] = ticks_before(self.time - delay, when)
+        return self.known[delay]
+
     def means(self, value: Floats) -> Floats:
         """(M,) means of values (N,) over each interval; 0 where there are none."""
         total = np.bincount(self.interval, weights=value, minlength=self.count.size)
         out: Floats = total / np.maximum(self.count, 1)
         return out
+
+
+def ticks_before(time: Floats, when: Floats) -> tuple[NDArray[np.intp], Floats]:
+    last = np.maximum(np.searchsorted(when, time, side="right") - 1, 0)
+    return last, np.maximum(time - when[last], 0.0)
 
 
 def samples_in(time: Floats, edges: Floats) -> Samples:
@@ -126,6 +142,12 @@ class History:
     def tick_rows(self) -> TickRows | None:
         """What the ticks of the command tell within the intervals; None where they tell nothing."""
         return tick_rows(self)
+
+    def followed(self, value: Floats, rotor: tuple[float, float]) -> Floats:
+        """(M,) means of the rate of a rotor that follows (filters.lag), sought from the last one: it is seldom far."""
+        end, mean = lag(value, self.dt, *rotor, float(value[0]), self.memo.get("rotor"))
+        self.memo["rotor"] = end
+        return mean
 
     @cached_property
     def thrust_samples(self) -> Samples:

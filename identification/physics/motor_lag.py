@@ -7,7 +7,6 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.filters import lag, lowpass
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
@@ -56,11 +55,7 @@ class MotorLag:
         tau = theta[0]
         if tau <= 1e-6:
             return value
-        start = float(value[0])
-        if self.form == "first_order":
-            return lowpass(value, now.history.dt, tau, start)[1]
-        quadratic, linear = torques(self.form, theta, now.scale.driver)
-        return lag(value, now.history.dt, quadratic, linear, start)[1]
+        return now.history.followed(value, torques(self.form, theta, now.scale.driver))
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         alike = self.form == "first_order" or (self.form == "mixed" and theta[1] > NEARLY_LINEAR)

@@ -12,8 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.physics.filters import complex_recursion, delayed, lag, lagged, recursion, resonant
+from identification.physics.history import History
 from identification.recording import Floats
 
+SETTLED = 25.0
+"""Time constants after which a rotor has followed."""
 SLOWEST = 1e-3
 """Rate of following, beside that at the largest driver, of a rotor that hardly turns."""
 
@@ -29,26 +32,28 @@ class Passed:
     delay: float = 0.0
     """s."""
 
-    def means(self, driver: Floats, edges: Floats) -> Floats:
+    def means(self, history: History) -> Floats:
         """(M,) means over intervals, of a driver that stands still in each."""
-        dt = np.diff(edges)
-        out = driver
+        out = history.driver
         if self.rotor is not None:
-            out = lag(out, dt, *self.rotor, float(out[0]))[1]
+            out = history.followed(out, self.rotor)
         if self.ring is not None:
-            moved = out - driver[0]
-            out = out + self.ring[0] * (resonant(moved, dt, *self.ring[1:]) - moved)
-        return delayed(out, edges, self.delay) if self.delay else out
+            moved = out - history.driver[0]
+            out = out + self.ring[0] * (resonant(moved, history.dt, *self.ring[1:]) - moved)
+        return delayed(out, history.edges, self.delay) if self.delay else out
 
-    def at(self, time: Floats, when: Floats, value: Floats) -> Floats:
-        """(N,) at any times, of a driver that takes the values (T,) at the ticks (T,) s; settled before the first."""
-        time = time - self.delay
-        last = np.maximum(np.searchsorted(when, time, side="right") - 1, 0)
-        since = np.maximum(time - when[last], 0.0)
+    def at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
+        """(N,) `since` s + delay after the tick `last`, of a driver that takes `value` (T,) at the ticks `when` (T,) s.
+
+        It was settled before the first.
+        """
         out: Floats = value[last]
         if self.rotor is not None:
-            end, _ = lag(value[:-1], np.diff(when), *self.rotor, float(value[0]))
-            out = lagged(out, np.concatenate([value[:1], end])[last], since, *self.rotor)
+            quadratic, linear = self.rotor
+            follows = np.flatnonzero(since * (quadratic * np.abs(value) + linear)[last] < SETTLED)
+            end, _ = lag(value[:-1], np.diff(when), quadratic, linear, float(value[0]))
+            begun = np.concatenate([value[:1], end])[last[follows]]
+            out[follows] = lagged(out[follows], begun, since[follows], quadratic, linear)
         if self.ring is not None:
             out = out + self._ringing(when, value, last, since)
         return out

@@ -11,6 +11,7 @@ from identification.mismatch.fitting import raw
 from identification.mismatch.model import Model
 from identification.mismatch.preparing import history_of
 from identification.physics.filters import lag
+from identification.physics.history import ticks_before
 from identification.physics.motor_lag import MotorLag
 from identification.physics.ticks_passed import Passed
 from identification.recording import Channel, Recording
@@ -60,7 +61,7 @@ def answered(t, response, delay=0.0):
 )
 def test_each_tick_is_answered_as_the_dynamics_do(response, passed, delay):
     t = np.arange(0.0, 12.0, 0.01)
-    found = replace(passed, delay=delay).at(t, AT, VOLTS)
+    found = passed.at(*ticks_before(t - delay, AT), AT, VOLTS)
     assert found == pytest.approx(answered(t, response, delay), abs=2e-4 if response is both else 1e-9)
 
 
@@ -70,7 +71,7 @@ def test_a_rotor_that_turns_round_follows_the_torque_balance():
     stands = -np.arctan(n0 / w) / (q * w)
     t = np.linspace(0.0, 0.4, 81)
     when = np.concatenate([[-1.0], np.linspace(0.0, 0.4, 41)])
-    found = Passed((q, 0.0)).at(t, when, np.concatenate([[n0], np.full(41, w)]))
+    found = Passed((q, 0.0)).at(*ticks_before(t, when), when, np.concatenate([[n0], np.full(41, w)]))
     turned = w * np.where(t < stands, np.tan(q * w * t + np.arctan(n0 / w)), np.tanh(q * w * (t - stands)))
     assert found == pytest.approx(turned, abs=2e-3)
 
@@ -84,7 +85,9 @@ def test_lag_ends_where_its_own_equation_says_at_every_step_through_zero():
     n = 0.5 * (before + end)
     with np.errstate(invalid="ignore", divide="ignore"):
         slope = np.where(w == n, 2 * np.abs(w), (w * np.abs(w) - n * np.abs(n)) / (w - n))
-    assert end == pytest.approx(w + (before - w) * np.exp(-(0.8 * slope + 0.1) * dt), abs=1e-5)
+    again, _ = lag(w, dt, 0.8, 0.1, near=lag(w, dt, 0.1, 0.0)[0])
+    assert again == pytest.approx(end, abs=1e-7)
+    assert end == pytest.approx(w + (before - w) * np.exp(-(0.8 * slope + 0.1) * dt), abs=1e-7)
 
 
 def test_samples_in_step_with_the_ticks_of_a_ramp_are_foretold():
