@@ -16,7 +16,7 @@ from identification.physics.history import History
 from identification.recording import Floats
 
 SETTLED = 25.0
-"""Time constants after which a rotor has followed."""
+"""Time constants after which a rotor has followed and ringing has died away."""
 SLOWEST = 1e-3
 """Rate of following, beside that at the largest driver, of a rotor that hardly turns."""
 
@@ -65,16 +65,17 @@ class Passed:
         w = 2 * np.pi * f
         pole = complex(-z * w, w * np.sqrt(max(1 - z**2, 1e-9)))
         change, gap = np.diff(value, prepend=value[0]), np.diff(when, prepend=when[0])
-        share = c * w**2 / (2j * pole.imag * pole)
-        left = complex_recursion(np.exp(pole * gap), change.astype(np.complex128))
-        if self.rotor is None:
-            alone: Floats = 2 * np.real((share * left)[last] * np.exp(pole * since))
-            return alone
-        quadratic, linear = self.rotor
-        follow = 2 * quadratic * np.abs(value) + linear
-        follow = np.maximum(follow, SLOWEST * float(np.max(follow)))
-        lagging = recursion(np.exp(-follow * gap), change, 0.0)
-        lagging *= c * (1 - w**2 / (follow**2 - 2 * z * w * follow + w**2))
-        rung = 2 * np.real((share * follow / (pole + follow) * left)[last] * np.exp(pole * since))
-        out: Floats = lagging[last] * np.exp(-follow[last] * since) + rung
+        share: NDArray[np.complex128] = np.full(value.size, c * w**2 / (2j * pole.imag * pole))
+        out = np.zeros(since.size)
+        if self.rotor is not None:
+            quadratic, linear = self.rotor
+            follow = 2 * quadratic * np.abs(value) + linear
+            follow = np.maximum(follow, SLOWEST * float(np.max(follow)))
+            share *= follow / (pole + follow)
+            lagging = recursion(np.exp(-follow * gap), change, 0.0)
+            lagging *= c * (1 - w**2 / (follow**2 - 2 * z * w * follow + w**2))
+            out += lagging[last] * np.exp(-follow[last] * since)
+        rings = np.flatnonzero(z * w * since < SETTLED)
+        left = share * complex_recursion(np.exp(pole * gap), change.astype(np.complex128))
+        out[rings] += 2 * np.real(left[last[rings]] * np.exp(pole * since[rings]))
         return out
