@@ -18,6 +18,7 @@ from identification.mismatch.fitting import fit
 from identification.mismatch.flexible import Extended, extend
 from identification.mismatch.flexible_shape import refitted_names, with_flexible, with_held
 from identification.mismatch.full_rate import look
+from identification.mismatch.intervals import intervals
 from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
 from identification.mismatch.lines import Line
 from identification.mismatch.model import Data, Weights
@@ -144,6 +145,7 @@ def _answer(
     verdict = _verdict(earned, unexplained)
     if free is not None:
         after, earned = free.state, refitted_names(earned, free.state)
+    known = intervals(after.fit, data, after.weights, [n.term for n in earned])
     every = [np.ones(r.size, dtype=bool) for r in data.rows]
     held = by_runs(before, after, data, others) if others else by_blocks(before, after, data, measured)
     n, p = after.fit.residual.size, int(after.fit.free.sum())
@@ -154,10 +156,10 @@ def _answer(
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
         mismatch=places_of(found, rng),
-        findings=tuple(finding_of(n, data) for n in earned),
+        findings=tuple(finding_of(n, data, known) for n in earned),
         unexplained=unexplained,
         model_terms=tuple(t.id for t in after.fit.model.terms),
-        model=values_of(after.fit, data),
+        model=values_of(after.fit, data, known),
         train=Rmse(
             rmse(before.fit.model, before.fit.theta, measured, every),
             rmse(after.fit.model, after.fit.theta, data, every),

@@ -11,6 +11,9 @@ from identification.mismatch.remainder import FlexibleShape, FormulaFound, flexi
 from identification.recording import Floats
 from identification.twin import Twin
 
+QUANTILE = 1.959964
+"""Standard errors to the end of a 95 % interval."""
+
 Verdict = Literal["adequate", "explained", "ambiguous", "unexplained"]
 
 
@@ -18,7 +21,16 @@ Verdict = Literal["adequate", "explained", "ambiguous", "unexplained"]
 class Value:
     value: float
     std: float
+    """Such that value +- 1.96 std holds the whole 95 % interval."""
     unit: str
+    ends: tuple[float, float] | None = None
+    """Of the 95 % interval, where it is not value +- 1.96 std."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """The 95 % interval; NaN where the data do not determine the value."""
+        half = QUANTILE * self.std
+        return self.ends or (self.value - half, self.value + half)
 
 
 @dataclass(frozen=True, slots=True)
@@ -233,7 +245,12 @@ def _number(x: float) -> float | None:
 
 
 def _values(values: Mapping[str, Value]) -> dict[str, object]:
-    return {k: {"value": _number(v.value), "std": _number(v.std), "unit": v.unit} for k, v in values.items()}
+    out: dict[str, object] = {}
+    for name, v in values.items():
+        low, high = v.interval
+        told = {"value": _number(v.value), "std": _number(v.std), "low": _number(low), "high": _number(high)}
+        out[name] = {**told, "unit": v.unit}
+    return out
 
 
 def _where(w: Where) -> dict[str, object]:

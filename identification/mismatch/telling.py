@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from identification.mismatch.diagnosis import (
+    QUANTILE,
     Curves,
     Finding,
     Mismatch,
@@ -16,8 +17,9 @@ from identification.mismatch.diagnosis import (
 )
 from identification.mismatch.faults import Fault
 from identification.mismatch.fitting import Fit, raw
+from identification.mismatch.intervals import Interval
 from identification.mismatch.lines import Line
-from identification.mismatch.model import Data, parameters
+from identification.mismatch.model import Data
 from identification.mismatch.naming import Named
 from identification.mismatch.omnibus import ALARM, Judged, judge_left, locate
 from identification.mismatch.rivals import Rival
@@ -48,18 +50,19 @@ def line_finding(line: Line) -> Finding:
     return Finding("periodic_disturbance", line.kind, line.statement, values, p, line.gain, 1.0, ())
 
 
-def values_of(fitted: Fit, data: Data) -> dict[str, Value]:
-    """C, tares and all parameters of the terms with their standard errors."""
+Intervals = Mapping[Term, tuple[Interval, ...]]
+
+
+def values_of(fitted: Fit, data: Data, known: Intervals | None = None) -> dict[str, Value]:
+    """C, tares and all parameters of the terms with their standard errors, or their intervals where they are known."""
     std = fitted.std
     unit = data.scale.driver_unit
     out = {"C": Value(fitted.theta.C, float(std[0]), f"N/{unit}^2" if unit == "V" else "N s^2/rev^2")}
     at = 1
-    for term, values, known in zip(
-        fitted.model.terms, fitted.theta.terms, parameters(fitted.model, data.scale), strict=True
-    ):
-        for p, value in zip(known, values, strict=True):
-            out[f"{term.id}.{p.name}"] = Value(value, float(std[at]), p.unit)
-            at += 1
+    for term, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
+        told = _term_values(term, values, std[at : at + len(values)].tolist(), data, (known or {}).get(term))
+        out |= {f"{term.id}.{name}": value for name, value in told.items()}
+        at += len(values)
     for history, tare in zip(data.histories, fitted.theta.tares, strict=True):
         key = "tare" if len(data.histories) == 1 else f"tare[{history.recording_id}]"
         out[key] = Value(tare, float(std[at]), "N")
@@ -67,17 +70,30 @@ def values_of(fitted: Fit, data: Data) -> dict[str, Value]:
     return out
 
 
-def _term_values(term: Term, theta: Sequence[float], std: Sequence[float], data: Data) -> dict[str, Value]:
-    known = term.parameters(data.scale)
-    return {p.name: Value(v, s, p.unit) for p, v, s in zip(known, theta, std, strict=True)}
+def _term_values(
+    term: Term,
+    theta: Sequence[float],
+    std: Sequence[float],
+    data: Data,
+    known: Sequence[Interval] | None = None,
+) -> dict[str, Value]:
+    told = term.parameters(data.scale)
+    if known is None:
+        return {p.name: Value(v, s, p.unit) for p, v, s in zip(told, theta, std, strict=True)}
+    return {p.name: _within(v, p.unit, i) for p, v, i in zip(told, theta, known, strict=True)}
 
 
-def finding_of(named: Named, data: Data) -> Finding:
+def _within(value: float, unit: str, interval: Interval) -> Value:
+    far = max(interval.high - value, value - interval.low)
+    return Value(value, far / QUANTILE, unit, (interval.low, interval.high))
+
+
+def finding_of(named: Named, data: Data, known: Intervals) -> Finding:
     return Finding(
         named.term.id,
         named.term.form,
         named.term.statement(named.theta, data.scale),
-        _term_values(named.term, named.theta, named.std, data),
+        _term_values(named.term, named.theta, named.std, data, known.get(named.term)),
         named.p_value,
         named.bic_gain,
         named.probability,

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 import numpy as np
 
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+
+EDGE = 2e-3
+"""Of the largest command: a ramp this narrow keeps the prediction of a jump continuous in the parameter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +26,8 @@ class DeadBand:
     form: Literal["shrink", "jump"] = "shrink"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("half_width", scale.driver_unit, 0.0, 0.6 * scale.driver, 0.0),)
+        known = Parameter("half_width", scale.driver_unit, 0.0, 0.6 * scale.driver, 0.0)
+        return (replace(known, jumps=True, blur=EDGE * scale.driver) if self.form == "jump" else known,)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((share * scale.driver,) for share in (0.01, 0.03, 0.07, 0.15, 0.3))
@@ -38,8 +42,9 @@ class DeadBand:
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         size = np.abs(value)
         if self.form == "jump":
-            # a ramp this narrow keeps the prediction continuous in the parameter
-            edge = 2e-3 * now.scale.driver
+            # a command that moves within an interval passes the threshold in a part of it; its variance tells how far
+            moved = np.sqrt(12 * np.abs(now.history.excess))
+            edge = np.maximum(EDGE * now.scale.driver, moved)
             out: Floats = value * np.clip((size - theta[0]) / edge + 0.5, 0.0, 1.0) if theta[0] > 0 else value
             return out
         shrunk: Floats = np.sign(value) * np.maximum(size - theta[0], 0.0)

@@ -49,6 +49,10 @@ class Parameter:
     neutral: float | None = None
     whole: bool = False
     """`high` is the textbook's own value: to lie there is no doubt."""
+    jumps: bool = False
+    """The prediction jumps at this value (an instant, a threshold): chi-square rises in stairs, not as a parabola."""
+    blur: float = 0.0
+    """Over which the term spreads a threshold, so that its prediction is continuous: none is told more closely."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -27,8 +27,6 @@ Table = Mapping[str, Any]
 OPEN_CELLS: Final = ("outside", "removed")
 TELLABLE: Final = 8.0
 """sigma that the best neighbour must leave to an oracle; below, nobody can tell it from that recording."""
-COVERED: Final = 1.959964
-"""Standard errors of a 95 % interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,10 +57,8 @@ class Interval:
     parameter: str
     z: float
     """(estimate - truth) / stated standard error; infinite where none is stated."""
-
-    @property
-    def covers(self) -> bool:
-        return abs(self.z) <= COVERED
+    covers: bool
+    """Whether the truth is within the interval that was told."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -228,7 +224,11 @@ def intervals(findings: list[Table], truth: Table) -> tuple[Interval, ...]:
             told = finding["parameters"].get(name)
             if told is not None and told["value"] is not None:
                 std = told["std"] or 0.0
-                found.append(
-                    Interval(finding["effect"], name, (told["value"] - value) / std if std > 0.0 else float("inf"))
-                )
+                z = (told["value"] - value) / std if std > 0.0 else float("inf")
+                found.append(Interval(finding["effect"], name, z, _holds(told, value)))
     return tuple(found)
+
+
+def _holds(told: Table, value: float) -> bool:
+    low, high = told["low"], told["high"]
+    return low is not None and high is not None and bool(low <= value <= high)

@@ -132,9 +132,8 @@ def value_cells(value: Value) -> tuple[str, str, str]:
         return f"{value.value:.4g}".replace("-", "−"), "–", unit
     if value.std > LOST * abs(value.value) > 0:
         return f"{value.value:.3g}".replace("-", "−"), "not determined", unit
-    half = 1.96 * value.std
     shown, error, low, high = (
-        digits(x, value.std).replace("-", "−") for x in (value.value, value.std, value.value - half, value.value + half)
+        digits(x, value.std).replace("-", "−") for x in (value.value, value.std, *value.interval)
     )
     return f"{shown} ± {error}", f"{low} to {high}", unit
 

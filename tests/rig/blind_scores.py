@@ -34,7 +34,10 @@ def finding(effect, rivals=(), form="", **parameters):
         "effect": effect,
         "form": form,
         "rivals": list(rivals),
-        "parameters": {name: {"value": v, "std": s, "unit": ""} for name, (v, s) in parameters.items()},
+        "parameters": {
+            name: {"value": v, "std": s, "low": v - 1.96 * s, "high": v + 1.96 * s, "unit": ""}
+            for name, (v, s) in parameters.items()
+        },
     }
 
 
@@ -61,7 +64,8 @@ def _one(job, order, rng, skill):
         named = () if good else ("motor_lag",)
         return Score(order, (), "explained" if named else "adequate", named, case=order.label)
     named = truth if good else (str(rng.choice(sorted(CATALOGUE))),)
-    z = (Interval(truth[0], "share", float(rng.standard_normal())),)
+    off = float(rng.standard_normal())
+    z = (Interval(truth[0], "share", off, abs(off) < 1.96),)
     return Score(order, truth, "explained", named, statement="It is so.", held_out=held, intervals=z, seconds=2.0)
 
 

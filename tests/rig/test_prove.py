@@ -164,6 +164,9 @@ def test_intervals_and_held_out_errors():
     (interval,) = found.intervals
     assert interval.z == pytest.approx(3.0)
     assert not interval.covers
+    wide = answer("explained", finding("dead_band", form="shrink", half_width=(0.53, 0.01)))
+    wide["diagnosis"]["findings"][0]["parameters"]["half_width"]["low"] = 0.49
+    assert scored(asked, hidden, wide).intervals[0].covers, "as it was told, lopsided"
     assert found.held_out.model == pytest.approx(1.0, abs=0.01)  # a constant is a tare, not an error
     assert found.held_out.baseline > 2.0
     other = scored(asked, hidden, answer("explained", finding("dead_band", form="jump", half_width=(0.5, 0.1))))
