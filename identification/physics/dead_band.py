@@ -12,6 +12,8 @@ from identification.recording import Floats
 
 EDGE = 2e-3
 """Of the largest command: a ramp this narrow keeps the prediction of a jump continuous in the parameter."""
+LEAST_MOVE = 1e-6
+"""Of the largest command: what moves less within an interval stands still."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,19 +42,25 @@ class DeadBand:
         return tuple((min(float(share) * values[0], most),) for share in np.geomspace(0.3, 3.0, 48))
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        size = np.abs(value)
+        # a command that moves within an interval passes the threshold in a part of it; its variance tells how far
+        moved = np.sqrt(12 * np.abs(now.history.excess))
         if self.form == "jump":
-            # a command that moves within an interval passes the threshold in a part of it; its variance tells how far
-            moved = np.sqrt(12 * np.abs(now.history.excess))
             edge = np.maximum(EDGE * now.scale.driver, moved)
-            out: Floats = value * np.clip((size - theta[0]) / edge + 0.5, 0.0, 1.0) if theta[0] > 0 else value
+            out: Floats = value * np.clip((np.abs(value) - theta[0]) / edge + 0.5, 0.0, 1.0) if theta[0] > 0 else value
             return out
-        shrunk: Floats = np.sign(value) * np.maximum(size - theta[0], 0.0)
+        half = 0.5 * np.maximum(LEAST_MOVE * now.scale.driver, moved)
+        shrunk: Floats = (_integral(value + half, theta[0]) - _integral(value - half, theta[0])) / (2 * half)
         return shrunk
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         what = "thrust begins with a jump" if self.form == "jump" else "only the voltage beyond it acts"
         return f"Dead band: within +-{theta[0]:.3g} {scale.driver_unit} the rotor does not turn, and {what}."
+
+
+def _integral(value: Floats, half_width: float) -> Floats:
+    """Of the voltage that acts where only what is beyond the band does, from 0 to `value` (M,)."""
+    out: Floats = 0.5 * np.maximum(np.abs(value) - half_width, 0.0) ** 2
+    return out
 
 
 FORMS = (

@@ -326,7 +326,7 @@ def test_dead_bands():
     assert term("dead_band", "jump").apply(V, m, (1.2,)).tolist() == pytest.approx([-12, -2, 0, 0, 0, 1.5, 3])
 
 
-def test_a_moving_command_passes_the_jump_of_a_dead_band_within_an_interval():
+def test_a_moving_command_passes_the_edge_of_a_dead_band_within_an_interval():
     """A ramp through the threshold in ticks far finer than the intervals."""
     ends = np.linspace(0.0, 6.0, 31)
     fine = np.linspace(ends[:-1], ends[1:], 1001).T
@@ -334,6 +334,8 @@ def test_a_moving_command_passes_the_jump_of_a_dead_band_within_an_interval():
     moving = replace(H, edges=np.arange(31.0), driver=mean, excess=np.mean(fine**2, axis=1) - mean**2)
     got = term("dead_band", "jump").apply(mean, moment(moving, S), (3.07,))
     assert got == pytest.approx(np.where(fine > 3.07, fine, 0.0).mean(axis=1), abs=0.04)
+    shrunk = term("dead_band", "shrink").apply(mean, moment(moving, S), (3.07,))
+    assert shrunk == pytest.approx(np.maximum(fine - 3.07, 0.0).mean(axis=1), abs=1e-4)
 
 
 def test_static_forms_of_the_propeller():
