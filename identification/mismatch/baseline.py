@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.mismatch.coordinates import coordinates
 from identification.mismatch.fitting import Fit, extended, fit, raw
+from identification.mismatch.jumps import jumps
 from identification.mismatch.model import Data, Model, Theta, Weights
 from identification.mismatch.screening import (
     MOST_PLAIN,
@@ -24,6 +25,8 @@ from identification.recording import Floats
 CLOCKS = 0.001
 """s: clocks of two devices are not trusted to agree better, unless stamps are dense and even."""
 NOISE_ROUNDS = 5
+PLAIN_JUMP = 5.0
+"""Sigmas of a jump that is plainly no noise: hundreds of instants were looked at."""
 
 
 def start(histories: Sequence[History]) -> tuple[Data, Theta]:
@@ -52,9 +55,8 @@ def _k(histories: Sequence[History]) -> float:
 
 def every_shape(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
     """(n, k) raw columns: all trials of the catalogue's terms, and any shape over each coordinate."""
-    columns = np.column_stack(
-        [raw_directions(fit_now, data, terms)] + [np.concatenate(c.columns) for c in coordinates(fit_now, data)]
-    )
+    shapes = [np.concatenate(c.columns) for c in coordinates(fit_now, data)]
+    columns = np.column_stack([raw_directions(fit_now, data, terms), *shapes])
     out: Floats = columns[:, np.linalg.norm(columns, axis=0) > 0]
     return out
 
@@ -89,6 +91,15 @@ def raw_directions(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
     return np.column_stack(columns) if columns else np.empty((data.size, 0))
 
 
+def plain_jumps(state: State, data: Data) -> list[Floats]:
+    """(n, 1) each: steps of the reading that are plainly no noise; slow noise would follow them."""
+    if any(h.static for h in data.histories):
+        return []
+    when = np.concatenate([h.sampled[r] for h, r in zip(data.histories, data.rows, strict=True)])
+    at, score = jumps(state.fit.residual, data, state.weights, orthogonal_basis(state.fit.jacobian[: data.size]))
+    return [(when[:, None] >= t).astype(np.float64) for t in at[score > PLAIN_JUMP][:1]]
+
+
 def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> State:
     """C V|V|, what is given and tares, with the noise that remains when what is plainly no noise is taken out.
 
@@ -101,7 +112,7 @@ def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> S
     taken = 0
     shapes = every_shape(state.fit, data, terms)
     for _ in range(NOISE_ROUNDS):
-        plain = pursue(state.fit, data, state.weights, shapes)
+        plain = pursue(state.fit, data, state.weights, np.column_stack([shapes, *plain_jumps(state, data)]))
         if plain.shape[1] <= taken:
             break
         taken = plain.shape[1]

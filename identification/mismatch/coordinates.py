@@ -157,7 +157,8 @@ def _times(view: _View) -> Iterator[Coordinate]:
     for i, (s, f, before) in enumerate(zip(since, view.force, view.previous, strict=True)):
         basis = hats(np.log(np.maximum(s, knots[0])), np.log(knots))
         jump = f - before * np.abs(before) / data.scale.driver**2
-        columns.append(np.column_stack([basis * jump[:, None], basis * f[:, None], *_late(view, i)]))
+        kinds = (jump, f, np.where(view.rate[i] * before < 0, f, 0.0))
+        columns.append(np.column_stack([*(basis * kind[:, None] for kind in kinds), *_late(view, i)]))
     yield Coordinate("time_since_step", since, "s", tuple(columns), "it follows a step late, or overshoots")
 
 
@@ -176,7 +177,10 @@ def _memories(view: _View) -> Iterator[Coordinate]:
     knots = _knots(view.previous, 9)
     yield _splines("previous_voltage", unit, view.previous, knots, (view.force,), "it remembers the level before")
     up = tuple(np.sign(v - b) for v, b in zip(view.driver, view.previous, strict=True))
-    columns = tuple(np.column_stack([u, u * np.abs(f), u * f]) for u, f in zip(up, view.force, strict=True))
+    columns = tuple(
+        u[:, None] * np.column_stack([np.ones_like(f), np.abs(x), np.abs(f), f])
+        for u, f, x in zip(up, view.force, view.rate, strict=True)
+    )
     yield Coordinate("direction_of_change", up, "1", columns, "up- and down-steps differ")
     loads = tuple(_loads(view, i) for i in range(len(data.histories)))
     yield Coordinate("load_history", tuple(np.abs(f) for f in view.force), "1", loads, "it remembers long loads")

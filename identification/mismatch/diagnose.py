@@ -15,7 +15,7 @@ from identification.mismatch.diagnosis import (
 )
 from identification.mismatch.faults import Fault, find_faults, repaired
 from identification.mismatch.fitting import fit
-from identification.mismatch.flexible import Extended, extend
+from identification.mismatch.flexible import Extended, extend, foremost
 from identification.mismatch.flexible_shape import refitted_names, with_flexible, with_held
 from identification.mismatch.full_rate import look
 from identification.mismatch.intervals import intervals
@@ -256,7 +256,10 @@ def _unexplained(
     free: Extended | None,
     others: Sequence[History],
 ) -> Unexplained:
-    quantity = _foremost(left, doubted) if free is None else free.terms[0].quantity
+    quantity = free.terms[0].quantity if free is not None else _foremost(left, doubted)
+    if free is None and left.p_value < ALARM:
+        clear = [g.coordinate.quantity for g in left.groups if g.p_value < ALARM]
+        quantity = foremost(after, data, clear or [quantity])
     judged = next((g for g in left.groups if g.coordinate.quantity == quantity), left.groups[0])
     where, share, table = where_of(judged, after.fit, data)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in doubted)

@@ -15,6 +15,7 @@ import numpy as np
 
 from identification.mismatch.fitting import Fit, extended, fit
 from identification.mismatch.flexible_kinds import UNITS, shapes_over
+from identification.mismatch.jumps import likeliest_jumps
 from identification.mismatch.judging import Score, blocks, judge_blocks, judge_runs, refitted
 from identification.mismatch.knots import Moments, choose, heights, nodes_of
 from identification.mismatch.model import Data, Weights, predict, weights
@@ -37,6 +38,8 @@ LOCATED = 0.8
 FOLLOW_LOAD = ("bus_voltage", "current", "load_history")
 """Quantities that a thruster's own load moves."""
 FIT_STEPS = 10
+JUMPS = 3
+"""Instants at which the reading may have jumped; a spline over time may have knots beside them."""
 WORTH = 6.0
 """By which chi-square must fall on what was not fitted, beside 2 for each parameter."""
 SLACK = 1.002
@@ -94,6 +97,13 @@ def extend(
     whole, final = _anew(whole, terms, data)
     dropped = tuple(t for t in after.fit.model.terms if t not in state.fit.model.terms)
     return Extended(whole, tuple(final), dropped, first.rmse, held.rmse)
+
+
+def foremost(state: State, data: Data, order: Sequence[str]) -> str:
+    """The coordinate, of those in `order`, over which a flexible term gains most; the first when none gains."""
+    found = [c for quantity in order[:MOST_COORDINATES] if (c := best_over(quantity, state, data)) is not None]
+    best = max(found, key=lambda c: c.gain, default=None)
+    return order[0] if best is None or best.gain <= 0 else best.term.quantity
 
 
 def better(new: Score, old: Score, parameters: int) -> bool:
@@ -226,12 +236,12 @@ def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
     """Knots and degree by BIC, from the whitened residual of the state, its own parameters free to follow."""
     over, columns = seen_at(shape, state.fit, data)
     if shape.quantity == "time_since_step":
-        shape = replace(shape, knots=(max(1.5 * data.scale.interval, 0.02),))
+        shape = replace(shape, knots=(min(1.5 * data.scale.interval, *(h.spacing for h in data.histories)),))
     axis = [shape.axis(v) for v in over]
     every = np.concatenate(axis)
     if float(np.ptp(every)) <= 1e-9 * max(float(np.max(np.abs(every))), 1e-12):
         return None
-    nodes = nodes_of(every, (0.0,) if every.min() < 0 < every.max() and shape.quantity != "time_since_step" else ())
+    nodes = nodes_of(every, _must(shape, every, state, data))
     if nodes.size < 2:
         return None
     moments = _moments(shape, nodes, axis, columns, state, data)
@@ -248,6 +258,15 @@ def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
     return Candidate(term, tuple(map(float, start)), found.gain)
 
 
+def _must(shape: Flexible, over: Floats, state: State, data: Data) -> tuple[float, ...]:
+    """Places between which a knot may be needed: zero, and the instants beside which the reading may have jumped."""
+    if shape.quantity == "time" and "force" in shape.times:
+        basis = orthogonal_basis(state.fit.jacobian[: data.size])
+        jumps = likeliest_jumps(state.fit, data, state.weights, basis, JUMPS)
+        return tuple(float(t) for at in jumps for t in (np.max(over[over < at], initial=over.min()), at))
+    return (0.0,) if over.min() < 0 < over.max() and shape.quantity != "time_since_step" else ()
+
+
 def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], list[Floats]]:
     """Per run at its thrust rows: the coordinate (n,), and what each multiplier makes of 1 (n, multipliers)."""
     over, columns = [], []
@@ -259,6 +278,7 @@ def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], lis
             "gain": F,
             "even": np.abs(F),
             "step": F - fitted.theta.C * before * np.abs(before),
+            "reversed": np.where(x * before < 0, F, 0.0),
             "rate": np.abs(x) / data.scale.driver,
             "drive": 2 * fitted.theta.C * np.abs(x),
         }

@@ -27,9 +27,11 @@ def shapes_over(quantity: str, data: Data) -> list[Flexible]:
         case "time":
             return over(("gain",), ("force",), ("gain", "force"))
         case "time_since_step":
-            return over(("step",), ("gain",), ("step", "gain"))
-        case "previous_voltage" | "direction_of_change":
+            return over(("step",), ("gain",), ("reversed",), ("step", "gain"))
+        case "previous_voltage":
             return over(("gain",), ("even",), ("force",), ("gain", "even"))
+        case "direction_of_change":
+            return over(("gain",), ("even",), ("force",), ("rate",), ("gain", "even"))
         case "load_history":
             memories = [tau for tau in LOADS if tau < 0.5 * data.scale.duration]
             return [each for tau in memories for each in over(("gain",), ("force",), ("late",), memory=tau)]

@@ -25,6 +25,10 @@ LEAST_NEW = 1e-12
 MOST_NODES = 65
 EVEN = (2, 3, 4, 5, 7, 9, 13)
 """Knots at even shares of the data to begin with."""
+FEW_NODES = 17
+"""At least as many between and beyond common levels."""
+ENDS = (0.03, 0.1, 0.3)
+"""Of the outermost share of the data: where a limit shows, within the last of a sine."""
 MOST_KNOTS = 24
 SMOOTH = 10.0
 """BIC by which a broken line must be better to be preferred to a cubic."""
@@ -66,19 +70,29 @@ def nodes_of(values: Floats, must: Sequence[float] = ()) -> Floats:
     [0.0, 1.0, 4.0]
     """
     size = float(np.max(np.abs(values), initial=0.0)) or 1.0
-    levels, count = np.unique(np.round(values / size, 4), return_counts=True)
-    common = levels[count > max(LEAST_SHARE * values.size, 2)] * size
-    if 2 <= common.size <= MOST_NODES and count[count > max(LEAST_SHARE * values.size, 2)].sum() > 0.6 * values.size:
-        found = common
+    levels, at, count = np.unique(np.round(values / size, 4), return_inverse=True, return_counts=True)
+    common = count > max(LEAST_SHARE * values.size, 2)
+    if 2 <= np.count_nonzero(common) <= MOST_NODES and count[common].sum() > 0.6 * values.size:
+        rest = max(MOST_NODES - np.count_nonzero(common), FEW_NODES)
+        found = np.concatenate([levels[common] * size, _shares(values[~common[at]], rest)])
     else:
-        half = MOST_NODES // 2
-        shares = np.quantile(values, np.linspace(0, 1, half))
-        found = np.concatenate([shares, np.linspace(values.min(), values.max(), MOST_NODES - half)])
+        found = _shares(values, MOST_NODES)
     found = np.array([float(f"{x:.6g}") for x in np.unique(np.concatenate([found, np.array(must)]))])
     found = np.unique(found)
     apart = np.concatenate([[True], np.diff(found) > 1e-4 * float(np.ptp(found))])
     out: Floats = found[apart | np.isin(found, np.array(must))]
     return out
+
+
+def _shares(values: Floats, many: int) -> Floats:
+    """(at most `many`,) shares of the values and even places together, closer to both ends."""
+    if values.size < many:
+        return values
+    half = many // 2
+    even = np.linspace(0, 1, half - 2 * len(ENDS))
+    ends = even[1] * np.array(ENDS)
+    shares = np.quantile(values, np.concatenate([even, ends, 1 - ends]))
+    return np.concatenate([shares, np.linspace(values.min(), values.max(), many - half)])
 
 
 def choose(moments: Moments, must: tuple[int, ...] = (), degrees: Sequence[Degree] = (3, 1)) -> Chosen | None:

@@ -57,6 +57,10 @@ MOVING = {
 """Not to be seen in a static table."""
 
 
+PROXIES = {"supply_sag": "bus_voltage", "heating": "motor_temperature"}
+"""Effects with forms that do without the channel that shows them; where it was recorded they must use it."""
+
+
 def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
     """Terms of the catalogue whose channels were recorded in every run, but for the effects `without`."""
     have = set.intersection(*(set(h.others) for h in data.histories))
@@ -69,8 +73,10 @@ def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
             continue
         if term.id == "speed_of_advance" and data.scale.flow <= 0:
             continue
-        if term.id == "supply_sag" and "bus_voltage" not in term.needs and (static or "bus_voltage" in have):
-            continue  # a proxy; a table is of one supply voltage
+        if PROXIES.get(term.id, "") in have - set(term.needs):
+            continue
+        if term.id == "supply_sag" and static and not term.needs:
+            continue  # a table is of one supply voltage
         out.append(term)
     return tuple(out)
 

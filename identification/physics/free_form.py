@@ -17,15 +17,16 @@ from identification.physics.rotation_coupling import slip
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
-Multiplier = Literal["force", "gain", "even", "step", "rate", "drive", "late"]
-"""What the spline multiplies: 1, the thrust T, |T|, the change of T since the level before, |x|, what T was lately less
-what it is; or it adds to x."""
-MULTIPLIERS: tuple[Multiplier, ...] = ("force", "gain", "even", "step", "rate", "drive", "late")
+Multiplier = Literal["force", "gain", "even", "step", "reversed", "rate", "drive", "late"]
+"""What the spline multiplies: 1, the thrust T, |T|, the change of T since the level before, T where the level before
+had the other sign, |x|, what T was lately less what it is; or it adds to x."""
+MULTIPLIERS: tuple[Multiplier, ...] = ("force", "gain", "even", "step", "reversed", "rate", "drive", "late")
 WORDS: dict[Multiplier, str] = {
     "force": "adds a force",
     "gain": "multiplies the thrust",
     "even": "adds a force in proportion to the size of the thrust",
     "step": "acts on the change of thrust since the level before",
+    "reversed": "multiplies the thrust where the level before had the other sign",
     "rate": "adds a force in proportion to the size of the drive",
     "drive": "adds to the drive",
     "late": "lets a share of the thrust come late",
@@ -168,6 +169,8 @@ def multiplied(multiplier: Multiplier, value: Floats, now: Moment, memory: float
             before = now.history.previous
             out: Floats = value - now.C * before * np.abs(before)
             return out
+        case "reversed":
+            return np.where(now.x * now.history.previous < 0, value, 0.0)
         case "rate":
             return np.abs(now.x) / now.scale.driver
         case "late":

@@ -67,6 +67,14 @@ def _line(p: Table, _form: str, _k: float, _truth: Table) -> Table:
     return known | ({"frequency": p["frequency"]} if p.get("frequency") else {"periods_per_turn": p["blades"]})
 
 
+def _heating(p: Table, form: str, _k: float, truth: Table) -> Table:
+    world = p.get("form")
+    if form == f"measured_{world}":
+        late = {"magnet_time_constant": p["time_constant"]} if world == "magnet" else {}
+        return {"loss_per_kelvin": p["loss_per_kelvin"]} | late
+    return {"time_constant": truth["thruster"]["heating_time"]} if form == world == "winding" else {}
+
+
 SAME: Final[Mapping[str, Callable[[Table, str, float, Table], Table]]] = {
     "dead_band": _in_form(half_width="half_width"),
     "asymmetry": _direct(ratio="ratio"),
@@ -80,9 +88,7 @@ SAME: Final[Mapping[str, Callable[[Table, str, float, Table], Table]]] = {
     ),
     "inflow_dynamics": _direct(share="share", time_constant="time_constant"),
     "cavitation": _cavitation,
-    "heating": lambda p, form, _k, truth: (
-        {"time_constant": truth["thruster"]["heating_time"]} if form == p.get("form") == "winding" else {}
-    ),
+    "heating": _heating,
     "reversal_loss": lambda p, form, _k, _truth: (
         {name: p[name] for name in ("loss", "time_constant")} if form == "wake" else {}
     ),
