@@ -86,7 +86,9 @@ SAME: Final[Mapping[str, Callable[[Table, str, float, Table], Table]]] = {
     "motor_lag": lambda p, form, _k, _truth: (
         {"time_constant": p["time_constant"]} if form == p.get("form") == "first_order" else {}
     ),
-    "inflow_dynamics": _direct(share="share", time_constant="time_constant"),
+    "inflow_dynamics": lambda p, form, _k, _truth: (
+        {} if form else {name: p[name] for name in ("share", "time_constant")}
+    ),
     "cavitation": _cavitation,
     "heating": _heating,
     "reversal_loss": lambda p, form, _k, _truth: (
