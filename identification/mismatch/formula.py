@@ -22,7 +22,16 @@ from identification.mismatch.model import Data, Theta, Weights, predict
 from identification.mismatch.remainder import FormulaFound
 from identification.mismatch.screening import orthogonal_basis
 from identification.mismatch.state import State
-from identification.physics.formula_form import CHANNELS, MEMORIES, Formula, Monomial, Times, driver_symbol, quantity
+from identification.physics.formula_form import (
+    CHANNELS,
+    MEMORIES,
+    Formula,
+    Monomial,
+    Times,
+    driver_symbol,
+    product_of,
+    quantity,
+)
 from identification.physics.formula_form import times as multiplied
 from identification.physics.free_form import Flexible
 from identification.physics.history import History
@@ -70,7 +79,7 @@ def find_formula(extended_by: Extended, data: Data, others: Sequence[History]) -
     if not near:
         return None
     plainest = min(near, key=_plainness)
-    term = Formula(plainest, tuple((q, s) for q, s in grid.sizes if any(q == p for m in plainest for p, _ in m.powers)))
+    term = term_of(plainest, dict(grid.sizes), data)
     before, after = judge(begin.fit), judge(_with(term, begin, part).fit)
     free = judge(_fitted_shapes(extended_by, begin, part))
     if not _predicts(before, after, free):
@@ -88,6 +97,15 @@ def find_formula(extended_by: Extended, data: Data, others: Sequence[History]) -
             same.add(symbols)
             equals.append(Formula(other, ()).form)
     return FormulaFound(text, legend(term), coefficients, near[plainest], before.rmse, after.rmse, p, tuple(equals))
+
+
+def term_of(monomials: tuple[Monomial, ...], sizes: dict[str, float], data: Data) -> Formula:
+    """As a term, its gain counted from the middle of the data. `sizes`: of each symbol."""
+    symbols = dict.fromkeys(q for m in monomials for q, _ in m.powers)
+    rows = list(zip(data.histories, data.rows, strict=True))
+    unit = {q: np.concatenate([quantity(q, h)[r] for h, r in rows]) / sizes[q] for q in symbols}
+    middles = tuple(float(np.mean(product_of(m, unit))) for m in monomials)
+    return Formula(monomials, tuple((q, sizes[q]) for q in symbols), middles)
 
 
 def without_flexible(found: Extended, data: Data) -> State:
@@ -182,10 +200,7 @@ def _grid(state: State, data: Data) -> _Grid | None:
 
 
 def _column(m: Monomial, unit: dict[str, Floats], force: Floats) -> Floats:
-    out = multiplied(m.times, force)
-    for q, p in m.powers:
-        out = out * unit[q] ** p
-    return out
+    return multiplied(m.times, force) * product_of(m, unit)
 
 
 def _near(grid: _Grid) -> dict[tuple[Monomial, ...], float]:

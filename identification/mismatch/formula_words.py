@@ -26,14 +26,14 @@ def told(term: Formula, fitted: Fit, data: Data) -> tuple[str, dict[str, Value]]
         unit = _symbol_unit(symbol, data)
         factor = _factor(term.monomials[0], fitted, term, data)
         a, std = float(values[high]), sqrt(float(covariance[high, high]))
-        text = f"residual = {_number(a, std)} ({symbol} - {_number(middle, middle_std)} {unit})^2{factor}"
+        text = f"residual = {_with_error(a, std)} ({symbol} - {_with_error(middle, middle_std)} {unit})^2{factor}"
         return text, {"a": Value(a, std, units[high]), f"{symbol}_0": Value(middle, middle_std, unit)}
     parts: list[str] = []
     coefficients: dict[str, Value] = {}
     for i, (m, name) in enumerate(zip(term.monomials, names, strict=True)):
         c, std = float(values[i]), sqrt(float(covariance[i, i]))
         sign = "" if not parts else " + "
-        parts.append(f"{sign}{_number(c, std)} {name}{_factor(m, fitted, term, data)}")
+        parts.append(f"{sign}{_with_error(c, std)} {name}{_factor(m, fitted, term, data)}")
         coefficients["ab"[i]] = Value(c, std, units[i])
     return "residual = " + "".join(parts), coefficients
 
@@ -55,6 +55,15 @@ def _number(value: float, std: float) -> str:
     """
     digits = 3 if std <= 0 or value == 0 else min(max(int(np.ceil(np.log10(abs(value) / std))) + 2, 2), 6)
     return f"{value:.{digits}g}"
+
+
+def _with_error(value: float, std: float) -> str:
+    """In brackets, where there is an error.
+
+    >>> _with_error(-0.0021234, 0.0004), _with_error(18.12, 0.0)
+    ('(-0.00212 +- 0.0004)', '18.1')
+    """
+    return f"({_number(value, std)} +- {std:.2g})" if std > 0 else _number(value, std)
 
 
 def _coefficients(term: Formula, fitted: Fit) -> tuple[Floats, Floats]:

@@ -53,6 +53,9 @@ class Formula:
     monomials: tuple[Monomial, ...]
     sizes: tuple[tuple[str, float], ...]
     """(symbol, size)"""
+    middles: tuple[float, ...] = ()
+    """Of each product of powers in the data; empty: 0. A gain is counted from there, so that C stays what the thruster
+    does and not what it would do at 0 degC: the response to a tick of the command is told from C."""
 
     @property
     def form(self) -> str:
@@ -77,15 +80,19 @@ class Formula:
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         sizes, out = dict(self.sizes), value
-        for c, m in zip(theta, self.monomials, strict=True):
-            part = times(m.times, value)
-            for q, p in m.powers:
-                part = part * (quantity(q, now.history) / sizes[q]) ** p
-            out = out + c * part
+        middles = self.middles or (0.0,) * len(self.monomials)
+        for c, m, middle in zip(theta, self.monomials, middles, strict=True):
+            product = product_of(m, {q: quantity(q, now.history) / sizes[q] for q, _ in m.powers})
+            out = out + c * times(m.times, value) * (product - middle if m.times == "F" else product)
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return f"A formula, {self.form}; no physics is claimed for it."
+
+
+def product_of(m: Monomial, unit: Mapping[str, Floats]) -> Floats:
+    """(M,) of the powers; `unit`: symbol -> (M,) in units of its size."""
+    return np.asarray(np.prod([unit[q] ** p for q, p in m.powers], axis=0))
 
 
 def _told(m: Monomial) -> str:

@@ -9,9 +9,13 @@ from diagnosed_runs import C, run
 
 from identification.mismatch.diagnose import diagnose
 from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
-from identification.mismatch.formula import monomials_of
+from identification.mismatch.formula import monomials_of, term_of
 from identification.mismatch.knots import Moments, choose, heights, nodes_of
+from identification.mismatch.model import Data
+from identification.mismatch.preparing import history_of
 from identification.mismatch.simulating import Drive, Prediction, others_of, simulate
+from identification.mismatch.sizes import scale_of
+from identification.physics.formula_form import Monomial
 from identification.physics.free_form import MULTIPLIERS, Flexible, spline
 from identification.physics.history import History
 from identification.physics.term import Moment, Scale
@@ -261,12 +265,26 @@ def test_water_temperature_squared_is_a_formula():
     assert "V|V|" in formula.text
     a, middle = formula.coefficients["a"], formula.coefficients["T_w_0"]
     assert abs(a.value + 0.003 * C) < 4 * a.std
-    assert abs(middle.value - 13.0) < 4 * middle.std
+    assert abs(middle.value - 13.0) < 3 * middle.std < 1.0
+    assert f"+- {middle.std:.2g}) degC)^2" in formula.text
     assert formula.heldout_after < formula.heldout_before
     told = diagnosis_json(found)["unexplained"]["formula"]
     assert told["text"] == formula.text
     assert "formula (not a physics)" in diagnosis_text(found)
     assert any("not a physics" in str(part) for s in diagnosis_page(found).sections for part in s.parts)
+
+
+def test_a_formula_counts_its_gain_from_the_middle_of_the_data():
+    """Counted from 0 degC it would make C another, and with it the response to a tick of the command."""
+    history = history_of(run(lambda _t, _V, F: F, extra=(warming(),)))
+    monomials = (Monomial((("T_w", 1),), "F"), Monomial((("T_w", 2),), "F"))
+    data = Data((history,), scale_of((history,), C))
+    term = term_of(monomials, {"T_w": 20.0}, data)
+    size = data.scale.driver
+    now = Moment(history, data.scale, C, 0.0, np.full(history.driver.size, size))
+    gain = term.apply(np.ones(history.driver.size), now, (3.0, -2.0))[data.rows[0]]
+    assert abs(np.mean(gain) - 1) < 1e-9
+    assert np.ptp(gain) > 0.1
 
 
 def dented(seed):
