@@ -25,6 +25,7 @@ from identification.mismatch.model import Data, Weights
 from identification.mismatch.naming import Named, name, with_doubts
 from identification.mismatch.next_experiment import propose
 from identification.mismatch.omnibus import ALARM, Omnibus, judge_left
+from identification.mismatch.predicting import less, predicting
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.rivals import EQUAL, Standing, settle_forms
 from identification.mismatch.search import Found, prune, search
@@ -143,8 +144,9 @@ def _answer(
     free = extend(after, data, _foremost(place, doubted), doubted, others, rng) if open_ended else None
     unexplained = _unexplained(place, bare, data, doubted, free, others) if open_ended else None
     verdict = _verdict(earned, unexplained)
-    if free is not None:
-        after, earned = free.state, refitted_names(earned, free.state)
+    unnamed = [n.term for n in doubted]
+    after = predicting(after, data, found.terms, unnamed, others) if free is None else free.state
+    earned = refitted_names(earned, after)
     known = intervals(after.fit, data, after.weights, [n.term for n in earned])
     every = [np.ones(r.size, dtype=bool) for r in data.rows]
     held = by_runs(before, after, data, others) if others else by_blocks(before, after, data, measured)
@@ -231,11 +233,7 @@ def _located(
     """What is left without the terms whose names were not earned: they are no physics, and would hide its place."""
     if not doubted:
         return after, left
-    model, theta = after.fit.model, after.fit.theta
-    terms = {n.term for n in doubted}
-    kept = tuple(v for t, v in zip(model.terms, theta.terms, strict=True) if t not in terms)
-    smaller = replace(model, terms=tuple(t for t in model.terms if t not in terms))
-    bare = replace(after, fit=fit(smaller, replace(theta, terms=kept), data, after.weights))
+    bare = replace(after, fit=fit(*less(after, [n.term for n in doubted]), data, after.weights))
     seen = judge_left(bare.fit, data, after.weights, rng)
     return (bare, seen) if seen.p_value < ALARM else (after, left)
 

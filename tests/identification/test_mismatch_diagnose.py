@@ -9,7 +9,12 @@ from diagnosed_runs import NOISE, TOP, C, dead_band, levels, run, table
 
 from identification.mismatch.diagnose import diagnose
 from identification.mismatch.diagnosis import Diagnosis, Where, diagnosis_json
-from identification.mismatch.preparing import Refusal
+from identification.mismatch.fitting import extended, fit
+from identification.mismatch.predicting import predicting
+from identification.mismatch.preparing import Refusal, history_of
+from identification.mismatch.search import search
+from identification.physics.dead_band import DeadBand
+from identification.physics.zero_offset import ZeroOffset
 from identification.recording import Channel, Recording
 from sim_devices import concealed
 from tests.concealed.recordings import recordings
@@ -453,3 +458,27 @@ def test_unexplained_is_told_with_its_table(bump):
     assert left.keys() >= {"where", "share", "p_value", "shape", "statement", "resembles"}
     assert all(row.keys() == {"at", "residual", "std"} for row in left["shape"])
     assert 0 < left["share"] <= 1
+
+
+# ---------------------------------------------------------------- what has no name must predict
+
+
+def unnamed(recording, term, values):
+    """The model that `predicting` leaves of C V|V| with one term whose name was not earned."""
+    found = search((history_of(recording),), np.random.default_rng(0))
+    first = found.before.fit
+    bigger = first.model.plus(term)
+    fitted = fit(bigger, extended(first.theta, first.model, term, values, bigger), found.data, found.before.weights)
+    return predicting(replace(found.before, fit=fitted), found.data, found.terms, [term], ())
+
+
+def test_a_term_without_a_name_stays_where_it_predicts():
+    after = unnamed(run(volts=dead_band(0.8)), DeadBand(), (0.5,))
+    assert [t.id for t in after.fit.model.terms] == ["dead_band"]
+
+
+def test_a_term_without_a_name_goes_where_it_only_describes():
+    """The zero is back where it was in the last block of time, which judges."""
+    knocked = run(lambda t, _V, F: F + 3.0 * ((t > 128.0) & (t < 144.0)))
+    after = unnamed(knocked, ZeroOffset(), (3.0, 128.0))
+    assert after.fit.model.terms == ()

@@ -1,0 +1,37 @@
+"""What has no name stays in the model only where it predicts what was not fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+from identification.mismatch.baseline import baseline
+from identification.mismatch.flexible import better, split
+from identification.mismatch.model import Data, Model, Theta
+from identification.mismatch.state import State
+from identification.physics.history import History
+from identification.physics.term import Term
+
+
+def predicting(
+    after: State, data: Data, terms: Sequence[Term], doubted: Collection[Term], others: Sequence[History]
+) -> State:
+    """The model, without the terms whose name was not earned where these make the prediction no better.
+
+    Both are fitted to a part of the data and judged on the rest; with `others`, on those runs. `terms`: whose shapes
+    are taken out of the noise of the smaller one, as before any was found.
+    """
+    if not doubted:
+        return after
+    smaller, theta = less(after, doubted)
+    bare = baseline(data, theta, terms, smaller)
+    _, judge, full = split(after, data, others)
+    _, _, begin = split(bare, data, others)
+    return after if better(judge(full.fit), judge(begin.fit), 0) else bare
+
+
+def less(state: State, terms: Collection[Term]) -> tuple[Model, Theta]:
+    """The rest of the model, its values as they were."""
+    model, theta = state.fit.model, state.fit.theta
+    kept = tuple(v for t, v in zip(model.terms, theta.terms, strict=True) if t not in terms)
+    return replace(model, terms=tuple(t for t in model.terms if t not in terms)), replace(theta, terms=kept)
