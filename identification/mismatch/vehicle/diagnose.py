@@ -22,12 +22,12 @@ from identification.mismatch.vehicle.answering import (
 )
 from identification.mismatch.vehicle.experiment import propose
 from identification.mismatch.vehicle.free_force import FreeForce, free_index, with_free_force
-from identification.mismatch.vehicle.judging import held_out, only, residuals, rms
+from identification.mismatch.vehicle.judging import better_predicting, held_out, only, residuals, rms
 from identification.mismatch.vehicle.left import ALARM, Left, judge_left
 from identification.mismatch.vehicle.naming import EQUAL, Named, name
 from identification.mismatch.vehicle.runs import Prepared, prepare
 from identification.mismatch.vehicle.screening import applicable
-from identification.mismatch.vehicle.search import Found, State, pruned, search
+from identification.mismatch.vehicle.search import Found, State, less, pruned, search
 from identification.mismatch.vehicle.setup import VehicleSetup, axis_of, straight_ahead
 from identification.recording import Recording
 
@@ -93,9 +93,16 @@ def _diagnosed(
     after, named = name(found.after, data, candidates, rng)
     found = replace(found, after=after)
     left = judge_left(after.fit, after.white, data, rng)
-    last = pruned(with_free_force(after, data, left.structures[0]), data) if left.p_value < ALARM else after
+    held, last = held_out(found.before, after, data, unseen), after
+    if left.p_value < ALARM:
+        free = pruned(with_free_force(after, data, left.structures[0]), data)
+        held, last = better_predicting(found.before, (held, after), free, data, unseen)
     standing = [_beside(n, last, left) for n in named]
-    earned, doubted = [n for n in standing if not n.doubts], [n for n in standing if n.doubts]
+    doubted = [n for n in standing if n.doubts]
+    unnamed = [n.term for n in doubted if n.term in last.terms]
+    if unnamed:
+        held, last = better_predicting(found.before, (held, last), less(last, data, unnamed), data, unseen)
+    earned = [_beside(n, last, left) for n in standing if not n.doubts]
     unexplained = unexplained_of(_as_fitted(left, last), doubted, data)
     n, p = last.fit.residual.size, int(np.sum(last.fit.free))
     channel = _channel(data)
@@ -114,7 +121,7 @@ def _diagnosed(
             rms(residuals(found.before.fit, data)),
             rms(residuals(last.fit, data)),
         ),
-        heldout=held_out(found.before, last, data, unseen),
+        heldout=held,
         chi2_per_dof=last.fit.chi2 / max(n - p, 1),
         whiteness_p=whiteness(last),
         next_experiment=propose(after, earned, data) if unexplained is None else None,

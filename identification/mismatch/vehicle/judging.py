@@ -69,6 +69,17 @@ def held_out(before: State, after: State, data: Prepared, unseen: Prepared | Non
     return HeldOutRmse(rms(olds), rms(news), noise, what)
 
 
+def better_predicting(
+    before: State, known: tuple[HeldOutRmse, State], other: State, data: Prepared, unseen: Prepared | None
+) -> tuple[HeldOutRmse, State]:
+    """A model with its error on what was not fitted, or another where that has a smaller one.
+
+    What has no name, a free force or a term that is doubted, stays only where it predicts.
+    """
+    held = held_out(before, other, data, unseen)
+    return (held, other) if held.after < known[0].after else known
+
+
 def _starts(after: State, data: Prepared) -> str:
     """What is found on a held-out run itself."""
     own = " and a buoyancy of its own" if any(term.form == "by_ballast" for term in after.terms) else ""

@@ -158,6 +158,13 @@ def pruned(state: State, data: Prepared) -> State:
     return state
 
 
+def less(state: State, data: Prepared, terms: Sequence[VehicleTerm]) -> State:
+    """The model without these, everything else fitted anew."""
+    for term in terms:
+        state = State(dropped(state, data, state.terms.index(term)), state.noise, state.white)
+    return state
+
+
 def dropped(state: State, data: Prepared, i: int, steps: int = QUICK) -> Fit:
     """Everything but term i, fitted anew."""
     layout, theta = without_term(state.fit.layout, data, state.fit.theta, i)
