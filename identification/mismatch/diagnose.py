@@ -136,7 +136,8 @@ def _answer(
     """The answer, and the final model: with flexible terms where no physics carries what is left."""
     data, before, after = found.data, found.before, found.after
     structure = left.p_value < ALARM
-    named = with_doubts(name(after, data, found.terms, standing), left if structure else None)
+    every_name = name(after, data, found.terms, standing)
+    named = with_doubts(every_name, left if structure else None, measured=data.with_rate)
     earned = [n for n in named if not n.doubts]
     doubted = [n for n in named if n.doubts]
     open_ended = (structure or bool(doubted)) and bool(left.groups)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -13,7 +14,7 @@ from identification.mismatch.omnibus import Omnibus
 from identification.mismatch.preparing import DRIVERS
 from identification.mismatch.rivals import NEAR, Rival, Standing, swaps, without
 from identification.mismatch.screening import orthogonal_basis
-from identification.mismatch.search import STATIC
+from identification.mismatch.search import STATIC, static_curve
 from identification.mismatch.state import State
 from identification.physics.term import Term
 from identification.recording import Floats
@@ -149,13 +150,13 @@ def name(
     return tuple(sorted(out, key=lambda n: -n.chi2_gain))
 
 
-def with_doubts(named: Sequence[Named], left: Omnibus | None) -> tuple[Named, ...]:
+def with_doubts(named: Sequence[Named], left: Omnibus | None, *, measured: bool) -> tuple[Named, ...]:
     """Doubts that only show when all terms and what is left are seen together.
 
     Something left over a term's own coordinate: its shape is not the textbook's. Many static shapes on one curve: any
-    curve can be made of enough of them.
+    curve can be made of enough of them. `measured`: the rate, as a response.
     """
-    static = [n for n in named if set(n.term.coordinates) <= set(STATIC)]
+    shapes = Counter(static_curve(n.term, measured=measured) for n in named)
     clear = {g.coordinate.quantity: g for g in left.groups if g.p_value < OWN_COORDINATE} if left is not None else {}
     out = []
     for n in named:
@@ -164,7 +165,8 @@ def with_doubts(named: Sequence[Named], left: Omnibus | None) -> tuple[Named, ..
         own = [q for q, g in clear.items() if q in names and g.statistic - g.dof > OWN_SHARE * n.chi2_gain]
         if own:
             more.append(f"more is left over its own coordinate, {own[0]}")
-        if len(static) >= MANY_SHAPES and n in static:
-            more.append(f"{len(static)} shapes on one static curve make any curve")
+        curve = static_curve(n.term, measured=measured)
+        if curve and shapes[curve] >= MANY_SHAPES:
+            more.append(f"{shapes[curve]} shapes on one static curve make any curve")
         out.append(replace(n, doubts=(*n.doubts, *more)))
     return tuple(out)

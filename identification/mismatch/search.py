@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 
@@ -37,7 +38,7 @@ MOST_HIDDEN = 3
 STATIC = ("command_voltage", "thrust")
 """Coordinates of the static curve."""
 MOST_STATIC = 2
-"""Shapes on the static curve: any curve can be made of more."""
+"""Shapes on one static curve: any curve can be made of more."""
 TWINS = {"asymmetry", "torque_crosstalk"}
 """The same curve in other words: never both."""
 MOVING = {
@@ -93,6 +94,13 @@ class Found:
     last: Screening
 
 
+def static_curve(term: Term, *, measured: bool) -> str:
+    """On which static curve a term is a shape; none: "". A measured rate makes two of one, V to n and n to thrust."""
+    if not set(term.coordinates) <= set(STATIC):
+        return ""
+    return "rate" if measured and term.stage in ("command", "rotor") else "thrust"
+
+
 def accept_threshold(extra: int) -> float:
     return chi2_isf(ALARM / 50, extra)
 
@@ -119,8 +127,8 @@ def search(
     while True:
         ids = {t.id for t in state.fit.model.terms}
         left = [t for t in terms if t.id not in ids]
-        if sum(set(t.coordinates) <= set(STATIC) for t in state.fit.model.terms) >= MOST_STATIC:
-            left = [t for t in left if not set(t.coordinates) <= set(STATIC)]
+        shapes = Counter(static_curve(t, measured=data.with_rate) for t in state.fit.model.terms)
+        left = [t for t in left if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < MOST_STATIC]
         if ids & TWINS:
             left = [t for t in left if t.id not in TWINS]
         found = directions(state.fit, data, state.weights, left)

@@ -282,15 +282,16 @@ def test_a_table_of_levels():
     assert bent.heldout.after < 0.1 * bent.heldout.before
 
 
+def turning(volts):
+    """V = n/2 + 0.0015 n|n|, in rev/s."""
+    n = 2.0 * np.abs(volts)
+    for _ in range(60):
+        n = 2.0 * (np.abs(volts) - 0.0015 * n**2)
+    return np.sign(volts) * n
+
+
 def test_a_measured_rate_tells_winding_resistance_from_an_exponent():
     """V = n/k + r n|n|: thrust goes with n^2; written in steps of 0.1 N and in the order of its levels."""
-
-    def turning(volts):
-        n = 2.0 * np.abs(volts)
-        for _ in range(60):
-            n = 2.0 * (np.abs(volts) - 0.0015 * n**2)
-        return np.sign(volts) * n
-
     flat = table(lambda v: np.round(0.1 * turning(v) * np.abs(turning(v)), 1), number=161, noise=0.0)
     time, volts = flat.channels[1].time, flat.channels[0].value
     noise = 0.02 * np.random.default_rng(1).standard_normal(volts.size)
@@ -299,6 +300,24 @@ def test_a_measured_rate_tells_winding_resistance_from_an_exponent():
     assert "winding_resistance" in found.model_terms
     assert "exponent" not in found.model_terms
     assert found.heldout.after < 0.03  # what rounding leaves
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_measured_rate_makes_two_static_curves_of_one(measured):
+    """Dead band and winding bend V to n, the blade n to thrust: three shapes on the curve of V to thrust are any."""
+    flat = table(lambda v: blade(turning(dead_band(1.0)(v))), number=161, noise=0.05)
+    time, volts = flat.channels[1].time, flat.channels[0].value
+    noise = 0.02 * np.random.default_rng(1).standard_normal(volts.size)
+    rate = Channel("rate", "tachometer", "rotation_rate", "rev/s", time, turning(dead_band(1.0)(volts)) + noise)
+    found = diagnosed(replace(flat, channels=(*flat.channels, rate)) if measured else flat)
+    assert (effects(found) == {"winding_resistance", "dead_band", "exponent"}) == measured
+    if measured:
+        within(value(found, "dead_band", "half_width"), 1.0)
+
+
+def blade(n):
+    """Reynolds: less than n^2."""
+    return 0.2 * n * np.abs(n) ** 0.8
 
 
 def rotation(seed, seconds, k=2.0, noise=0.01):

@@ -184,5 +184,3 @@ def test_thrusters_push_where_their_commands_say() -> None:
     found = straight_ahead([simple()])
     assert not isinstance(found, Refusal)
     assert found.thrusters[0].arms == {"surge": 1.0}
-
-
