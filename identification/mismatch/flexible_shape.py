@@ -9,7 +9,8 @@ import numpy as np
 
 from identification.mismatch.diagnosis import HeldOutRmse, Unexplained, Value
 from identification.mismatch.fitting import Fit, raw
-from identification.mismatch.flexible import Extended, seen_at
+from identification.mismatch.flexible import Extended
+from identification.mismatch.flexible_knots import seen_at
 from identification.mismatch.formula import find_formula
 from identification.mismatch.judging import HeldOut
 from identification.mismatch.model import Data, Weights

@@ -15,7 +15,8 @@ from itertools import combinations
 import numpy as np
 
 from identification.mismatch.fitting import Fit, extended, fit
-from identification.mismatch.flexible import Extended, best_over, better, split
+from identification.mismatch.flexible import Extended, better, split
+from identification.mismatch.flexible_knots import best_over
 from identification.mismatch.formula_words import legend, told
 from identification.mismatch.judging import Score
 from identification.mismatch.model import Data, Theta, Weights, predict

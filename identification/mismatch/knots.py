@@ -73,7 +73,7 @@ def nodes_of(values: Floats, must: Sequence[float] = ()) -> Floats:
     levels, at, count = np.unique(np.round(values / size, 4), return_inverse=True, return_counts=True)
     common = count > max(LEAST_SHARE * values.size, 2)
     if 2 <= np.count_nonzero(common) <= MOST_NODES and count[common].sum() > 0.6 * values.size:
-        rest = max(MOST_NODES - np.count_nonzero(common), FEW_NODES)
+        rest = max(MOST_NODES - int(np.count_nonzero(common)), FEW_NODES)
         found = np.concatenate([levels[common] * size, _shares(values[~common[at]], rest)])
     else:
         found = _shares(values, MOST_NODES)

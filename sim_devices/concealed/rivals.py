@@ -38,7 +38,8 @@ def twins(case: Case, effect: str, rivals: Sequence[str], rng: np.random.Generat
     """Each rival's best stand-in for `effect`, nearest first. Noise taken as stationary (`projection.Screen`).
 
     A rival is scaled as a linear column, by an amount of its own sign, near the strength of the effect: exact in the
-    limit of small amounts. Inner parameters are drawn, those of the nearest rivals then searched. A rival that needs a flow or a water temperature that this run does not change leaves everything.
+    limit of small amounts. Inner parameters are drawn, those of the nearest rivals then searched. A rival that needs a
+    flow or a water temperature that this run does not change leaves everything.
     """
     without = signals(case, frozenset({effect}))
     screen = Screen(case, without)

@@ -1,0 +1,129 @@
+"""The best flexible term over one coordinate: what it multiplies, its degree and its knots."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.mismatch.fitting import Fit
+from identification.mismatch.flexible_kinds import shapes_over
+from identification.mismatch.jumps import likeliest_jumps
+from identification.mismatch.knots import Moments, choose, heights, nodes_of
+from identification.mismatch.model import Data, Weights, predict
+from identification.mismatch.screening import orthogonal_basis
+from identification.mismatch.state import State
+from identification.physics.free_form import Flexible, Multiplier, lately, spline
+from identification.recording import Floats
+
+JUMPS = 3
+"""Instants at which the reading may have jumped; a spline over time may have knots beside them."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One flexible term with its linear estimate."""
+
+    term: Flexible
+    start: tuple[float, ...]
+    gain: float
+    """Of BIC."""
+
+
+def best_over(quantity: str, state: State, data: Data) -> Candidate | None:
+    """The best flexible term over a coordinate by BIC; None where there is none that could be."""
+    return best_of(shapes_over(quantity, data), state, data)
+
+
+def best_of(shapes: Sequence[Flexible], state: State, data: Data) -> Candidate | None:
+    """The best of several kinds of flexible term, their knots chosen."""
+    found = [chosen for shape in shapes if (chosen := with_knots(shape, state, data)) is not None]
+    return max(found, key=lambda c: c.gain, default=None)
+
+
+def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
+    """Knots and degree by BIC, from the whitened residual of the state, its own parameters free to follow."""
+    over, columns = seen_at(shape, state.fit, data)
+    if shape.quantity == "time_since_step":
+        shape = replace(shape, knots=(min(1.5 * data.scale.interval, *(h.spacing for h in data.histories)),))
+    axis = [shape.axis(v) for v in over]
+    every = np.concatenate(axis)
+    if float(np.ptp(every)) <= 1e-9 * max(float(np.max(np.abs(every))), 1e-12):
+        return None
+    nodes = nodes_of(every, _must(shape, every, state, data))
+    if nodes.size < 2:
+        return None
+    moments = _moments(shape, nodes, axis, columns, state, data)
+    zero = _zero_nodes(shape, nodes, data)
+    found = choose(moments, zero)
+    if found is None:
+        return None
+    at = nodes[list(found.knots)]
+    at = np.exp(at) if shape.quantity == "time_since_step" else at
+    knots = tuple(float(f"{x:.6g}") for x in at)
+    zeros = tuple(i for i, k in enumerate(found.knots) if k in zero)
+    term = replace(shape, knots=knots, zero=zeros, degree=found.degree)
+    start = heights(moments, found.knots, found.degree, [term.free(m) for m in term.times])
+    return Candidate(term, tuple(map(float, start)), found.gain)
+
+
+def _must(shape: Flexible, over: Floats, state: State, data: Data) -> tuple[float, ...]:
+    """Places between which a knot may be needed: zero, and the instants beside which the reading may have jumped."""
+    if shape.quantity == "time" and "force" in shape.times:
+        basis = orthogonal_basis(state.fit.jacobian[: data.size])
+        jumps = likeliest_jumps(state.fit, data, state.weights, basis, JUMPS)
+        return tuple(float(t) for at in jumps for t in (np.max(over[over < at], initial=over.min()), at))
+    return (0.0,) if over.min() < 0 < over.max() and shape.quantity != "time_since_step" else ()
+
+
+def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], list[Floats]]:
+    """Per run at its thrust rows: the coordinate (n,), and what each multiplier makes of 1 (n, multipliers)."""
+    over, columns = [], []
+    for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
+        F, x = predict(fitted.model, fitted.theta, h, data.scale, i)
+        before = h.previous
+        made: dict[Multiplier, Floats] = {
+            "force": np.ones_like(F),
+            "gain": F,
+            "even": np.abs(F),
+            "step": F - fitted.theta.C * before * np.abs(before),
+            "reversed": np.where(x * before < 0, F, 0.0),
+            "rate": np.abs(x) / data.scale.driver,
+            "drive": 2 * fitted.theta.C * np.abs(x),
+        }
+        if "late" in shape.times:
+            made["late"] = lately(F, h.dt, shape.memory)
+        over.append(shape.covariate(h, x, data.scale)[r])
+        columns.append(np.column_stack([made[m][r] for m in shape.times]))
+    return over, columns
+
+
+def _moments(
+    shape: Flexible, nodes: Floats, axis: Sequence[Floats], columns: Sequence[Floats], state: State, data: Data
+) -> Moments:
+    n = data.size
+    raw = []
+    for values, times in zip(axis, columns, strict=True):
+        hats = spline(values, nodes, np.eye(nodes.size), 1)
+        raw.append(np.column_stack([hats * times[:, [j]] for j in range(times.shape[1])]))
+    white = Weights(state.weights.thrust).whiten(raw, [])
+    basis = orthogonal_basis(state.fit.jacobian[:n])
+    white = white - basis @ (basis.T @ white)
+    constant = tuple(not replace(shape, zero=(0,)).zeros(m) for m in shape.times)
+    return Moments(nodes, white.T @ white, white.T @ state.fit.residual[:n], n, constant)
+
+
+def _zero_nodes(shape: Flexible, nodes: Floats, data: Data) -> tuple[int, ...]:
+    """Nodes at which the spline is nothing by definition: at rest, at zero, at the beginning, long after a step."""
+    nearest = int(np.argmin(np.abs(nodes)))
+    match shape.quantity:
+        case "time" | "direction_of_change":
+            return (0,)
+        case "direction" | "time_since_step":
+            return (nodes.size - 1,)
+        case quantity if quantity == data.histories[0].driver_quantity:
+            largest = int(np.argmax(np.abs(nodes)))
+            return tuple(sorted({nearest, largest})) if shape.times == ("force",) else (largest,)
+        case _:
+            return (nearest,)
