@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
@@ -11,10 +12,8 @@ from identification.mismatch.grid import STEP, Held
 from identification.recording import Channel, Floats, Recording
 
 CALMED = ("flow_speed", "motor_temperature", "water_temperature")
-CALM = 4
-"""Samples on either side that are averaged."""
-REACHES = (CALM, 16, 64, 256)
-"""The same for the supply's rest: the one whose neighbours foretell it best."""
+REACHES = (4, 16, 64, 256)
+"""Samples on either side that are averaged: as many as let the neighbours foretell each sample best."""
 REST_TOLD = 0.005
 """Of the supply's variance beside its load: less foretold by the neighbours is noise."""
 LOADS = 6
@@ -27,7 +26,9 @@ def followed(channel: Channel, at: Floats) -> Floats | None:
     if np.count_nonzero(good) < 2:
         return None
     time, value = channel.time[good], channel.value[good]
-    out: Floats = np.interp(at, time, _calm(value)[0] if channel.quantity in CALMED else value)
+    if channel.quantity in CALMED:
+        value = _calmest(value, (1, *REACHES))[0]
+    out: Floats = np.interp(at, time, value)
     return out
 
 
@@ -38,7 +39,12 @@ def jumps(value: Floats) -> NDArray[np.bool_]:
     return step > max(6 * noise, 1e-9 * float(np.max(np.abs(value), initial=0.0)))
 
 
-def _calm(value: Floats, reach: int = CALM, apart: NDArray[np.bool_] | None = None) -> tuple[Floats, float]:
+def _calmest(value: Floats, reaches: Sequence[int], apart: NDArray[np.bool_] | None = None) -> tuple[Floats, float]:
+    """`_calm` with the reach whose windows miss their samples least."""
+    return min((_calm(value, reach, apart) for reach in reaches), key=lambda each: each[1])
+
+
+def _calm(value: Floats, reach: int, apart: NDArray[np.bool_] | None) -> tuple[Floats, float]:
     """Running mean over up to `reach` samples on either side, never across a jump or where `apart` (n-1,); and the
     mean square by which the others in the window miss each sample."""
     cut = jumps(value) if apart is None else jumps(value) | apart
@@ -75,7 +81,7 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     rest = value - H[:, kept] @ theta
     by_load: Floats = columns(driven, charge)[:, kept] @ theta
     apart = np.abs(np.diff(then)) > STEP * size
-    calm, missed = min((_calm(rest, reach, apart) for reach in REACHES), key=lambda each: each[1])
+    calm, missed = _calmest(rest, REACHES, apart)
     if missed > (1 - REST_TOLD) * float(np.mean(rest**2)):
         return by_load
     return by_load + np.interp(at, time, calm)
