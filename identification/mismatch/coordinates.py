@@ -176,12 +176,12 @@ def _memories(view: _View) -> Iterator[Coordinate]:
     unit = data.scale.driver_unit
     knots = _knots(view.previous, 9)
     yield _splines("previous_voltage", unit, view.previous, knots, (view.force,), "it remembers the level before")
-    up = tuple(np.sign(v - b) for v, b in zip(view.driver, view.previous, strict=True))
+    up = tuple(h.direction_of_change[r] for h, r in zip(data.histories, data.rows, strict=True))
     columns = tuple(
         u[:, None] * np.column_stack([np.ones_like(f), np.abs(x), np.abs(f), f])
         for u, f, x in zip(up, view.force, view.rate, strict=True)
     )
-    yield Coordinate("direction_of_change", up, "1", columns, "up- and down-steps differ")
+    yield Coordinate("direction_of_change", up, "1", columns, "up and down differ")
     loads = tuple(_loads(view, i) for i in range(len(data.histories)))
     yield Coordinate("load_history", tuple(np.abs(f) for f in view.force), "1", loads, "it remembers long loads")
 

@@ -55,6 +55,8 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
     out = []
     if at_bound(term, state.fit, data, state.weights):
         out.append("its parameters end at what is physically possible")
+    if _unseen(state.fit, term, data):
+        out.append("it is faster than the samples can show")
     change = _raw_effect(state.fit, (term,), data)
     out += [f"it and {other.id} nearly cancel" for other in _cancelled(state.fit, term, change, data)]
     n = data.size
@@ -83,6 +85,13 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
         if p * len(splits) * many < INCONSTANT:
             out.append(f"its parameter is not the same {what} ({abs(score) / size * 100:.0f} % apart)")
     return tuple(out)
+
+
+def _unseen(now: Fit, term: Term, data: Data) -> bool:
+    """Ringing beyond half the sampling rate: between the samples it may be any other delay."""
+    values = dict(zip(now.model.terms, now.theta.terms, strict=True))[term]
+    named = dict(zip((p.name for p in term.parameters(data.scale)), values, strict=True))
+    return term.id == "stand_resonance" and named["frequency"] > 0.5 / min(h.spacing for h in data.histories)
 
 
 def _cancelled(now: Fit, term: Term, change: list[Floats], data: Data) -> list[Term]:

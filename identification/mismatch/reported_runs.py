@@ -94,7 +94,7 @@ def _run(curves: Curves, recording: Recording | None, twin: Twin | None, C: floa
             "time_since_reversal": _since_reversal(history, turning)[rows],
             "previous_voltage": before,
             "direction": turning[rows],
-            "direction_of_change": np.sign(curves.driver - before),
+            "direction_of_change": history.direction_of_change[rows],
         },
         effects,
     )

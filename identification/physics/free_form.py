@@ -132,7 +132,7 @@ class Flexible:
             case "direction":
                 return np.where(np.abs(history.driver) > TURNING * scale.driver, np.sign(history.driver), 0.0)
             case "direction_of_change":
-                return np.sign(history.driver - history.previous)
+                return history.direction_of_change
             case "load_history":
                 return lowpass((x / scale.driver) ** 2, history.dt, self.memory)[1]
             case "rotation_rate" if "drive" in self.times:

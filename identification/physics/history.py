@@ -22,6 +22,8 @@ TURNING = 0.02
 """Share of the largest driver above which it counts as driving."""
 CHANGED = 0.01
 """Share of the largest driver: a smaller difference between neighbouring intervals is no step."""
+BACK = 0.005
+"""Share of the largest driver by which it must come back to have turned round."""
 LARGEST_LEAD = 0.02
 """Of the largest driver: what changes by more is a step, and no tick."""
 
@@ -190,6 +192,19 @@ class History:
     def since_step(self) -> Floats:
         """(M,) s since the driver changed, at the middle of the interval."""
         out: Floats = self.middle - self.edges[self.level_start]
+        return out
+
+    @cached_property
+    def direction_of_change(self) -> Floats:
+        """(M,) 1 where the driver last went up, -1 where it went down, 0 before its first change; also while it moves."""
+        out = np.zeros(self.driver.size)
+        way, furthest, play = 0.0, float(self.driver[0]), BACK * self.size
+        for i, value in enumerate(self.driver.tolist()):
+            if (value - furthest) * way > 0:
+                furthest = value
+            elif abs(value - furthest) > play:
+                way, furthest = (1.0 if value > furthest else -1.0), value
+            out[i] = way
         return out
 
     @cached_property
