@@ -16,7 +16,7 @@ from identification.mismatch.coordinates import Coordinate, coordinates
 from identification.mismatch.fitting import Fit
 from identification.mismatch.jumps import APART, TRIED, jumps
 from identification.mismatch.model import Data, Weights, predict
-from identification.mismatch.screening import orthogonal_basis, quiet, surrogate_scores
+from identification.mismatch.screening import normal_scores, orthogonal_basis, quiet, surrogate_scores
 from identification.mismatch.shape_error import allowed_in, corrections
 from identification.recording import Floats
 from identification.tails import chi2_sf, noncentral_chi2_sf
@@ -85,18 +85,26 @@ def judge_left(
     if plain:  # a structure of many small parts would be in the draws, and hide itself
         known = orthogonal_basis(np.column_stack(plain))
         clean = clean - known @ (known.T @ clean)
-    ends = np.cumsum([Q.shape[1] for Q in spans])[:-1]
-    scores = np.split(surrogate_scores(np.column_stack(spans), clean, rng) ** 2, ends, axis=1)
-    nulls = [chi2_sf(s.sum(axis=1), s.shape[1]) for s in scores]
-    smallest = np.min(np.array(nulls), axis=0)
+    every = np.column_stack(spans)
     least = groups[order[0]].p_value
-    # scaled so that the family behaves as its draws do: heavy tails and colour within a block are in them
-    at = float(np.quantile(smallest, 0.05))
-    p_family = (1 + np.count_nonzero(smallest <= least)) / (1 + smallest.size)
-    if p_family < 20 / smallest.size:
-        factor = max(0.05 / max(at, 1e-300), float(len(groups)))
-        p_family = min(p_family, factor * least)
+    # of blocks' signs: heavy tails and colour within a block are in them; of white normal noise: few blocks are not
+    draws = (surrogate_scores(every, clean, rng), normal_scores(every, rng))
+    p_family = max(_of_family(least, scores, [Q.shape[1] for Q in spans]) for scores in draws)
     return Omnibus(tuple(groups[i] for i in order), float(max(min(p_family, 1.0), min(1.0, least))))
+
+
+def _of_family(least: float, scores: Floats, sizes: Sequence[int]) -> float:
+    """How often the smallest p-value of all groups is as small as `least`, by draws of their scores (s, q).
+
+    Beyond the draws scaled so that the family behaves as they do.
+    """
+    parts = np.split(scores**2, np.cumsum(sizes)[:-1], axis=1)
+    smallest = np.min([chi2_sf(s.sum(axis=1), s.shape[1]) for s in parts], axis=0)
+    p = (1 + np.count_nonzero(smallest <= least)) / (1 + smallest.size)
+    if p < 20 / smallest.size:
+        at = float(np.quantile(smallest, 0.05))
+        p = min(p, max(0.05 / max(at, 1e-300), float(len(sizes))) * least)
+    return float(p)
 
 
 def _jump(time: Coordinate, fit: Fit, residual: Floats, data: Data, weights: Weights, basis: Floats) -> Judged:

@@ -176,7 +176,7 @@ def screen(
         return Screening(found, z, plain, 1.0, float("inf"))
     null = surrogate_scores(found.columns, quiet(fit.residual, found.columns), rng)
     null = np.where(sided, np.maximum(null, 0.0), np.abs(null)).max(axis=1)
-    normal = _normal_scores(found.columns, rng)
+    normal = normal_scores(found.columns, rng)
     normal = np.where(sided, np.maximum(normal, 0.0), np.abs(normal)).max(axis=1)
     threshold = float(max(np.quantile(null, 1 - alarm), np.quantile(normal, 1 - alarm)))
     return Screening(found, z, plain, _p_value(float(z.max()), null, normal), threshold)
@@ -222,7 +222,7 @@ def surrogate_scores(columns: Floats, residual: Floats, rng: np.random.Generator
     return out
 
 
-def _normal_scores(columns: Floats, rng: np.random.Generator) -> Floats:
+def normal_scores(columns: Floats, rng: np.random.Generator) -> Floats:
     """(4 SURROGATES, q) scores of white normal residuals."""
     gram = columns.T @ columns
     values, vectors = np.linalg.eigh(gram)
