@@ -72,7 +72,7 @@ def size(expression: str, scale: Scale) -> float:
 def rows_of(term: Term) -> list[list[str]]:
     """Lines of the parameter table that speak of this form."""
     lines = [cells(line) for line in sections(term.id)["Formula"].splitlines() if line.startswith("|")]
-    return [row for row in lines[2:] if row[0] in ("both", "all", term.form)]
+    return [row for row in lines[2:] if {"both", "all", term.form} & set(row[0].split(", "))]
 
 
 def test_bounds_are_read() -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.leading import delay_of, rate_lead, thrust_lead
+from identification.mismatch.leading import delay_of, passed_on, rate_lead, thrust_lead
 from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict, ticked
 from identification.physics.filters import delayed, reconstructed
 from identification.physics.term import Parameter, Term
@@ -96,13 +96,14 @@ def raw(
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
         lead = thrust_lead(model, theta, history, data.scale.driver, late)
-        ahead = np.broadcast_to(theta.C * (2 * np.abs(x) * lead + history.excess), F.shape)
+        share = passed_on(model, theta, history)
+        ahead = np.broadcast_to(theta.C * share * (2 * np.abs(x) * lead + history.excess), F.shape)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
         thrust.append((reconstructed(F, history.middle, history.sampled) + ahead)[rows] + theta.tares[i])
         if with_rate:
             assert history.rate_sampled is not None
-            lead = np.broadcast_to(rate_lead(model, theta, history, data.scale.driver), x.shape)
+            lead = np.broadcast_to(share * rate_lead(model, theta, history, data.scale.driver), x.shape)
             if theta.rate_shift:
                 x = delayed(x, history.edges, theta.rate_shift)
             turning = reconstructed(x, history.middle, history.rate_sampled) + lead

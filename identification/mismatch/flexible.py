@@ -197,7 +197,8 @@ def _added(state: State, part: Data, candidate: Candidate) -> tuple[State, Flexi
     again = best_of([candidate.term], replace(first, fit=less), part)
     if again is None or again.term == candidate.term:
         return first, candidate.term
-    return _joined(replace(first, fit=less), part, again), again.term
+    second = _joined(replace(first, fit=less), part, again)
+    return (second, again.term) if second.bic < first.bic else (first, candidate.term)
 
 
 def _joined(state: State, part: Data, candidate: Candidate) -> State:

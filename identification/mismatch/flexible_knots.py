@@ -51,12 +51,15 @@ def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
     every = np.concatenate(axis)
     if float(np.ptp(every)) <= 1e-9 * max(float(np.max(np.abs(every))), 1e-12):
         return None
-    nodes = nodes_of(every, _must(shape, every, state, data))
+    jumps = _jumps(shape, every, state, data)
+    through = (0.0,) if every.min() < 0 < every.max() and shape.quantity != "time_since_step" else ()
+    nodes = nodes_of(every, (*through, *(t for pair in jumps for t in pair)))
     if nodes.size < 2:
         return None
     moments = _moments(shape, nodes, axis, columns, state, data)
     zero = _zero_nodes(shape, nodes, data)
-    found = choose(moments, zero)
+    beside = [tuple(int(np.argmin(np.abs(nodes - t))) for t in pair) for pair in jumps]
+    found = choose(moments, zero, begin=beside)
     if found is None:
         return None
     at = nodes[list(found.knots)]
@@ -68,13 +71,15 @@ def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
     return Candidate(term, tuple(map(float, start)), found.gain)
 
 
-def _must(shape: Flexible, over: Floats, state: State, data: Data) -> tuple[float, ...]:
-    """Places between which a knot may be needed: zero, and the instants beside which the reading may have jumped."""
-    if shape.quantity == "time" and "force" in shape.times:
-        basis = orthogonal_basis(state.fit.jacobian[: data.size])
-        jumps = likeliest_jumps(state.fit, data, state.weights, basis, JUMPS)
-        return tuple(float(t) for at in jumps for t in (np.max(over[over < at], initial=over.min()), at))
-    return (0.0,) if over.min() < 0 < over.max() and shape.quantity != "time_since_step" else ()
+def _jumps(shape: Flexible, over: Floats, state: State, data: Data) -> list[tuple[float, float]]:
+    """Instants before and after which the reading may have jumped: no even knots follow that."""
+    if shape.quantity != "time" or "force" not in shape.times:
+        return []
+    basis = orthogonal_basis(state.fit.jacobian[: data.size])
+    found = likeliest_jumps(state.fit, data, state.weights, basis, JUMPS)
+    rows = np.sort(over)
+    after = np.clip(np.searchsorted(rows, found), 1, rows.size - 1)
+    return [(float(rows[i - 1]), float(rows[i])) for i in after]
 
 
 def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], list[Floats]]:

@@ -95,9 +95,17 @@ def _shares(values: Floats, many: int) -> Floats:
     return np.concatenate([shares, np.linspace(values.min(), values.max(), many - half)])
 
 
-def choose(moments: Moments, must: tuple[int, ...] = (), degrees: Sequence[Degree] = (3, 1)) -> Chosen | None:
-    """The spline of the largest gain. `must`: nodes that are knots always; both ends are anyway."""
-    found = [c for degree in degrees if (c := _of_degree(moments, must, degree)) is not None]
+def choose(
+    moments: Moments,
+    must: tuple[int, ...] = (),
+    degrees: Sequence[Degree] = (3, 1),
+    begin: Sequence[tuple[int, ...]] = (),
+) -> Chosen | None:
+    """The spline of the largest gain. `must`: nodes that are knots always; both ends are anyway.
+
+    `begin`: knots to begin with, beside even ones.
+    """
+    found = [c for degree in degrees if (c := _of_degree(moments, must, degree, begin)) is not None]
     return max(found, key=lambda each: each.gain + (SMOOTH if each.degree == 3 else 0.0), default=None)
 
 
@@ -184,17 +192,17 @@ def _twice_summed(second: Floats, z: Floats) -> Floats:
     return out
 
 
-def _of_degree(moments: Moments, must: tuple[int, ...], degree: Degree) -> Chosen | None:
+def _of_degree(
+    moments: Moments, must: tuple[int, ...], degree: Degree, begin: Sequence[tuple[int, ...]]
+) -> Chosen | None:
     """Even knots first, then one at a time in, moved, and out."""
     columns = _columns(moments, degree)
     if not columns.line:
         return None
     many = moments.nodes.size
     always = [j for j in must if columns.knots[j]]
-    starts = []
-    for k in (k for k in EVEN if k <= many):
-        even = {int(j) for j in np.linspace(0, many - 1, k).round() if columns.knots[int(j)]}
-        starts.append(sorted(even | set(always)))
+    evenly = (np.linspace(0, many - 1, k).round().astype(int).tolist() for k in EVEN if k <= many)
+    starts = [sorted({j for j in (*each, *always) if columns.knots[j]}) for each in (*evenly, *begin)]
     chosen = max(starts, key=lambda each: columns.gain(each, 0))
     chosen, looked = _in(columns, chosen, always)
     chosen = _out(columns, chosen, always, looked)

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 
 from identification.mismatch.model import Model, Theta, remember
+from identification.physics.command_saturation import CommandSaturation, passed
 from identification.physics.filters import reconstructed, within_intervals
 from identification.physics.history import LARGEST_LEAD, History, Samples
 from identification.physics.motor_lag import MotorLag, torques
@@ -44,6 +45,14 @@ def sample_lead(model: Model, theta: Theta, history: History, largest: float) ->
         return history.sample_lead
     line = within_intervals(_means(history, passed), history.edges, history.sample_time)
     return _small(_at(history, passed, history.thrust_samples) - line, history)
+
+
+def passed_on(model: Model, theta: Theta, history: History) -> Floats | float:
+    """(M,) or 1: the share of what the command does within an interval that the drive gives the rotor."""
+    for term, values in zip(model.terms, theta.terms, strict=True):
+        if isinstance(term, CommandSaturation):
+            return passed(history, values[0])
+    return 1.0
 
 
 def _is_late(late: float, history: History) -> bool:

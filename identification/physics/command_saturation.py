@@ -7,8 +7,31 @@ from typing import ClassVar
 
 import numpy as np
 
+from identification.physics.history import History
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+
+LEAST_MOVE = 1e-6
+"""Of the largest command: what moves less within an interval stands still."""
+
+
+def passed(history: History, limit: float) -> Floats:
+    """(M,) share of each interval in which the command is below the limit, and its ticks reach the rotor."""
+    out: Floats = np.clip((limit - np.abs(history.driver)) / _moved(history) + 0.5, 0.0, 1.0)
+    return out
+
+
+def _moved(history: History) -> Floats:
+    """(M,) how far the command moves within each interval, by its variance there."""
+    out: Floats = np.maximum(LEAST_MOVE * history.size, np.sqrt(12 * np.abs(history.excess)))
+    return out
+
+
+def _integral(value: Floats, limit: float) -> Floats:
+    """Of the clipped voltage from 0 to `value` (M,)."""
+    size = np.abs(value)
+    out: Floats = 0.5 * np.minimum(size, limit) ** 2 + limit * np.maximum(size - limit, 0.0)
+    return out
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +55,11 @@ class CommandSaturation:
         return ()
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        out: Floats = np.clip(value, -theta[0], theta[0])
+        if theta[0] >= np.max(np.abs(value)):
+            return value
+        # a command that moves within an interval passes the limit in a part of it
+        half = 0.5 * _moved(now.history)
+        out: Floats = (_integral(value + half, theta[0]) - _integral(value - half, theta[0])) / (2 * half)
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

@@ -196,7 +196,7 @@ class History:
 
     @cached_property
     def direction_of_change(self) -> Floats:
-        """(M,) 1 where the driver last went up, -1 where it went down, 0 before its first change; also while it moves."""
+        """(M,) 1 where the driver last went up, -1 where it went down, 0 before its first change; moving or held."""
         out = np.zeros(self.driver.size)
         way, furthest, play = 0.0, float(self.driver[0]), BACK * self.size
         for i, value in enumerate(self.driver.tolist()):

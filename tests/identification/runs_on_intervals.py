@@ -26,6 +26,7 @@ def history(n=400, volts=1.0, newtons=1.0, seed=1, flow=1.0):
         "rotation_rate": rate * (1 + 0.1 * np.sin(edges[1:])),
         "bus_voltage": volts * (30.0 - 0.02 * np.abs(levels_squared(driver / volts))),
         "flow_speed": flow * np.where(np.sin(0.3 * edges[1:]) > 0, 0.7, -0.2),
+        "motor_temperature": 20.0 + 15.0 * (1 - np.exp(-edges[1:] / 60.0)),
         "neighbour_thrust": newtons * 40.0 * (np.sin(0.5 * edges[1:]) > 0),
     }
     return History(

@@ -130,6 +130,7 @@ def test_what_a_spline_multiplies(multiplier):
         "step": F - C * h.previous * np.abs(h.previous),
         "rate": np.abs(h.driver) / 8.0,
         "drive": np.ones_like(F),
+        "reversed": np.where(h.driver * h.previous < 0, F, 0.0),
         "late": lagging(F, 0.5, 2.0) - F,
     }[multiplier]
     term = Flexible("time", "s", (0.0, 5.0, 10.0), (0,), (multiplier,), degree=1, memory=2.0)
@@ -313,3 +314,32 @@ def test_products_of_the_grammar():
     found = monomials_of(["a", "b", "c"])
     assert len(found) == 9 + 9
     assert all(sum(p for _, p in powers) <= 3 for powers in found)
+
+
+def test_nodes_reach_beyond_common_levels_and_crowd_at_the_ends():
+    """Times since a step are common up to the shortest hold only; a limit shows within the last of a sine."""
+    since = np.concatenate([np.tile(np.arange(0.01, 0.31, 0.02), 40), np.linspace(0.3, 12.0, 200)])
+    assert nodes_of(since)[-1] == pytest.approx(12.0)
+    sine = np.sin(np.linspace(0, 60, 20000))
+    assert np.count_nonzero(nodes_of(sine) > 0.99) >= 3
+
+
+def test_a_jump_of_the_reading_gets_knots_beside_it():
+    found = diagnosed(run(lambda t, _V, F: F + np.where(t > 88.3, 1.2, 0.0)), without=("zero_offset", "zero_drift"))
+    left = found.unexplained
+    assert left.where.quantity == "time"
+    (shape,) = left.flexible
+    assert np.any(np.diff(shape.knots) < 1.0)
+    assert any(abs(k - 88.3) < 0.5 for k in shape.knots)
+
+
+def test_what_only_reversals_lose_is_seen_after_steps():
+    def lossy(t, V, F):
+        changed = np.concatenate([[0], np.flatnonzero(np.diff(V)) + 1])
+        which = np.searchsorted(changed, np.arange(t.size), side="right") - 1
+        before = np.concatenate([[0.0], V[changed[1:] - 1]])[which]
+        return F * (1 - 0.1 * (before * V < 0) * np.exp(-(t - t[changed[which]]) / 0.8))
+
+    left = diagnosed(run(lossy), without=("reversal_loss",)).unexplained
+    assert left.where.quantity == "time_since_step"
+    assert left.flexible[0].splines[0].times == "reversed"

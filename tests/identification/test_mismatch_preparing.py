@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identification.mismatch.preparing import Refusal, history_of
+from identification.physics.history import History
 from identification.recording import Channel, Recording
 
 UNITS = {
@@ -16,6 +17,7 @@ UNITS = {
     "bus_voltage": "V",
     "flow_speed": "m/s",
     "motor_temperature": "degC",
+    "water_temperature": "degC",
     "current": "A",
 }
 
@@ -300,6 +302,25 @@ def test_a_noisy_slow_channel_is_calmed_but_its_jumps_stay():
     far = np.abs(h.middle - 20.25) > 0.5
     assert seen[far] == pytest.approx(np.where(h.middle < 20.25, 0.0, 0.8)[far], abs=0.03)
     assert np.std(seen[h.middle < 17]) < 0.006
+
+
+def test_a_slow_wave_of_a_quiet_channel_is_not_flattened():
+    t = np.arange(0, 40, 1.0)
+    wave = 15 + 4 * np.sin(t / 9)
+    h = history_of(with_others(channel("water_temperature", t, wave)))
+    inside = (h.middle > 2) & (h.middle < 36)
+    assert h.others["water_temperature"][inside] == pytest.approx(15 + 4 * np.sin(h.middle[inside] / 9), abs=0.03)
+
+
+def test_the_direction_of_change_is_known_on_a_slow_sine_and_on_levels():
+    volts = 12 * np.sin(np.arange(0, 200) / 20)
+    none = np.zeros(200)
+    h = History("sine", "command_voltage", 0.1 * np.arange(201.0), volts, volts, np.ones(200, int), none, none)
+    rising = np.cos(np.arange(0, 200) / 20)
+    clear = np.abs(rising) > 0.2
+    assert (h.direction_of_change == np.sign(rising))[clear].mean() > 0.99
+    held = replace(h, driver=np.repeat([0.0, 4.0, 8.0, 2.0], 50))
+    assert held.direction_of_change[[10, 60, 110, 160]].tolist() == [0.0, 1.0, 1.0, -1.0]
 
 
 def test_thrust_between_two_samples_of_a_jumping_flow_is_not_judged():

@@ -349,7 +349,7 @@ def test_static_forms_of_the_propeller():
     assert term("cavitation", "square").apply(T, m, (0.1, 7.0)) == pytest.approx([-54.0, -18.0, 18.0, 54.0])
     assert term("cavitation", "linear").apply(T, m, (0.6, 7.0))[0] == 0.0, "thrust never changes sign"
     assert term("torque_crosstalk").apply(T, m, (0.01,)) == pytest.approx([-70.56, -17.64, 18.36, 73.44])
-    assert term("command_saturation").apply(x, m, (8.0,)).tolist() == [-8, -6, 6, 8]
+    assert term("command_saturation").apply(x, m, (8.0,)).tolist() == pytest.approx([-8, -6, 6, 8])
     assert term("load_cell_nonlinearity", "quadratic").apply(T, m, (1e-3,))[[0, 3]] == pytest.approx([-77.184, 77.184])
     assert term("load_cell_nonlinearity", "cubic").apply(T, m, (1e-5,))[[0, 3]] == pytest.approx([-75.73248, 75.73248])
 
@@ -399,6 +399,12 @@ def test_memories_end_where_the_formula_says():
     twice = term("heating", "magnet").apply(T, m, (0.3, 40.0, 40.0))
     s = h.middle / 40
     assert twice == pytest.approx(72 * (1 - 0.3 * (1 - (1 + s) * np.exp(-s))), abs=0.01)
+    warm = replace(h, others={**h.others, "motor_temperature": np.where(h.middle < 20.0, 15.0, 35.0)})
+    by_reading = term("heating", "measured_winding").apply(T, moment(warm, S), (0.01,))
+    assert by_reading[[0, -1]] == pytest.approx([72.0, 72 * 0.8])
+    later = term("heating", "measured_magnet").apply(T, moment(warm, S), (0.01, 40.0))
+    since = h.middle - 20.0
+    assert later[since > 0] == pytest.approx(72 * (1 - 0.2 * (1 - np.exp(-since[since > 0] / 40))), abs=0.02)
     rate = term("recirculation", "rate").apply(T, m, (0.05, 20.0))
     assert rate == pytest.approx(72 - 0.05 * 144 * (1 - np.exp(-h.middle / 20)), abs=1e-3)
     assert term("recirculation", "thrust").apply(T, m, (0.05, 20.0)) == pytest.approx(rate)
