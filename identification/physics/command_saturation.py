@@ -12,18 +12,18 @@ from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
 LEAST_MOVE = 1e-6
-"""Of the largest command: what moves less within an interval stands still."""
+"""Of the limit: what moves less within an interval stands still."""
 
 
 def passed(history: History, limit: float) -> Floats:
     """(M,) share of each interval in which the command is below the limit, and its ticks reach the rotor."""
-    out: Floats = np.clip((limit - np.abs(history.driver)) / _moved(history) + 0.5, 0.0, 1.0)
+    out: Floats = np.clip((limit - np.abs(history.driver)) / _moved(history, limit) + 0.5, 0.0, 1.0)
     return out
 
 
-def _moved(history: History) -> Floats:
+def _moved(history: History, limit: float) -> Floats:
     """(M,) how far the command moves within each interval, by its variance there."""
-    out: Floats = np.maximum(LEAST_MOVE * history.size, np.sqrt(12 * np.abs(history.excess)))
+    out: Floats = np.maximum(LEAST_MOVE * limit, np.sqrt(12 * np.abs(history.excess)))
     return out
 
 
@@ -58,7 +58,7 @@ class CommandSaturation:
         if theta[0] >= np.max(np.abs(value)):
             return value
         # a command that moves within an interval passes the limit in a part of it
-        half = 0.5 * _moved(now.history)
+        half = 0.5 * _moved(now.history, theta[0])
         out: Floats = (_integral(value + half, theta[0]) - _integral(value - half, theta[0])) / (2 * half)
         return out
 

@@ -108,6 +108,8 @@ def _cavitation(values: Values, form: str, k: float, _driver: float) -> Table:
 
 
 def _heating(values: Values, form: str, k: float, driver: float) -> Table:
+    if form.startswith("measured_"):
+        raise WorldError("the twin's heating follows a recorded motor temperature, which the bench cannot foresee")
     current = _PLAIN.drag * (k * driver) ** 2 / _PLAIN.torque_acceleration
     table: Table = {"loss_per_kelvin": values["loss"] / (_PLAIN.heating * current**2), "form": form}
     return table if form == "winding" else {**table, "time_constant": values["magnet_time_constant"]}
