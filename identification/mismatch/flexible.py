@@ -34,6 +34,8 @@ LOCATED = 0.8
 """Share of the best coordinate's gain at which the located one is kept."""
 FOLLOW_LOAD = ("bus_voltage", "current", "load_history")
 """Quantities that a thruster's own load moves."""
+AS_GOOD = 1.02
+"""Held-out RMSE over that of terms without an earned name at which a shape that claims nothing takes their place."""
 FIT_STEPS = 10
 WORTH = 6.0
 """By which chi-square must fall on what was not fitted, beside 2 for each parameter."""
@@ -74,7 +76,7 @@ def extend(
     first = judge(begin.fit)
     for smaller in _bases(begin, part, [n.term for n in doubted]):
         state, terms, held = _grown(smaller, part, located, judge, rng)
-        if terms and better(held, first, 0):
+        if terms and (better(held, first, 0) or (smaller is not begin and held.rmse < AS_GOOD * first.rmse)):
             break
     else:
         return None

@@ -51,7 +51,7 @@ def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
     every = np.concatenate(axis)
     if float(np.ptp(every)) <= 1e-9 * max(float(np.max(np.abs(every))), 1e-12):
         return None
-    jumps = _jumps(shape, every, state, data)
+    jumps = _jumps(shape, every, columns, state, data)
     through = (0.0,) if every.min() < 0 < every.max() and shape.quantity != "time_since_step" else ()
     nodes = nodes_of(every, (*through, *(t for pair in jumps for t in pair)))
     if nodes.size < 2:
@@ -71,14 +71,17 @@ def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
     return Candidate(term, tuple(map(float, start)), found.gain)
 
 
-def _jumps(shape: Flexible, over: Floats, state: State, data: Data) -> list[tuple[float, float]]:
-    """Instants before and after which the reading may have jumped: no even knots follow that."""
-    if shape.quantity != "time" or "force" not in shape.times:
+def _jumps(
+    shape: Flexible, over: Floats, columns: Sequence[Floats], state: State, data: Data
+) -> list[tuple[float, float]]:
+    """Instants before and after which what a term over time multiplies may have jumped: even knots cannot follow."""
+    if shape.quantity != "time":
         return []
     basis = orthogonal_basis(state.fit.jacobian[: data.size])
-    found = likeliest_jumps(state.fit, data, state.weights, basis, JUMPS)
+    each = ([c[:, k] for c in columns] for k in range(len(shape.times)))
+    found = [at for of in each for at in likeliest_jumps(state.fit, data, state.weights, basis, JUMPS, of)]
     rows = np.sort(over)
-    after = np.clip(np.searchsorted(rows, found), 1, rows.size - 1)
+    after = np.unique(np.clip(np.searchsorted(rows, found), 1, rows.size - 1))
     return [(float(rows[i - 1]), float(rows[i])) for i in after]
 
 

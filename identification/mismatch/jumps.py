@@ -1,4 +1,4 @@
-"""When the zero may have jumped: every instant is looked at, as no grid of trials can.
+"""When zero or gain may have jumped: every instant is looked at, as no grid of trials can.
 
 Under slow noise a step is seen by what changes within seconds of it: a trial half a minute off sees nothing.
 """
@@ -21,12 +21,14 @@ APART = 0.02
 """Share of the longest run between two that are told."""
 
 
-def likeliest_jumps(fitted: Fit, data: Data, weights: Weights, basis: Floats, most: int) -> tuple[float, ...]:
+def likeliest_jumps(
+    fitted: Fit, data: Data, weights: Weights, basis: Floats, most: int, of: Sequence[Floats] | None = None
+) -> tuple[float, ...]:
     """Up to `most` times in s at which a step of the reading explains most of the residual, the best first.
 
-    `basis` (n, p): orthonormal, what the present model can follow.
+    `basis` (n, p): orthonormal, what the present model can follow. `of`: per run (n,), what jumps; None: the zero.
     """
-    when, _ = jumps(fitted.residual, data, weights, basis)
+    when, _ = jumps(fitted.residual, data, weights, basis, of)
     found: list[float] = []
     for at in when:
         if all(abs(at - other) > APART * data.scale.duration for other in found):
@@ -36,36 +38,39 @@ def likeliest_jumps(fitted: Fit, data: Data, weights: Weights, basis: Floats, mo
     return tuple(found)
 
 
-def jumps(residual: Floats, data: Data, weights: Weights, basis: Floats) -> tuple[Floats, Floats]:
+def jumps(
+    residual: Floats, data: Data, weights: Weights, basis: Floats, of: Sequence[Floats] | None = None
+) -> tuple[Floats, Floats]:
     """(k,) s and sigmas of steps of the reading, the largest first; `residual` and `basis` whitened."""
     runs = [h.sampled[r] for h, r in zip(data.histories, data.rows, strict=True)]
+    of = [np.ones(at.size) for at in runs] if of is None else of
     when = np.unique(np.quantile(np.concatenate(runs), np.linspace(0.01, 0.99, TRIED)))
     thrust = Weights(weights.thrust)
     some = np.unique(np.linspace(0, when.size - 1, SIZED).astype(int))
-    size = np.interp(np.arange(when.size), some, np.sqrt(np.maximum(_sizes(runs, when[some], thrust, basis), 0.0)))
-    rough = np.abs(_products(runs, when, thrust, residual)) / np.where(size > 0, size, np.inf)
+    size = np.interp(np.arange(when.size), some, np.sqrt(np.maximum(_sizes(runs, of, when[some], thrust, basis), 0.0)))
+    rough = np.abs(_products(runs, of, when, thrust, residual)) / np.where(size > 0, size, np.inf)
     likely = np.sort(np.argsort(-_peaks(rough))[:SIZED])
-    exact = np.sqrt(np.maximum(_sizes(runs, when[likely], thrust, basis), 0.0))
+    exact = np.sqrt(np.maximum(_sizes(runs, of, when[likely], thrust, basis), 0.0))
     score = rough[likely] * size[likely] / np.where(exact > 0, exact, np.inf)
     order = np.argsort(-score)
     return when[likely[order]], score[order]
 
 
-def _products(runs: Sequence[Floats], when: Floats, thrust: Weights, residual: Floats) -> Floats:
+def _products(runs: Sequence[Floats], of: Sequence[Floats], when: Floats, thrust: Weights, residual: Floats) -> Floats:
     """Of the whitened residual with the whitened step at each instant, whose columns are never made."""
     total = np.zeros(when.size)
     begin = 0
-    for at, whitener in zip(runs, thrust.thrust, strict=True):
-        weighed = whitener.weighed(residual[begin : begin + at.size])
+    for at, size, whitener in zip(runs, of, thrust.thrust, strict=True):
+        weighed = size * whitener.weighed(residual[begin : begin + at.size])
         after = np.concatenate([np.cumsum(weighed[::-1])[::-1], [0.0]])
         total += after[np.searchsorted(at, when, side="left")]
         begin += at.size
     return total
 
 
-def _sizes(runs: Sequence[Floats], when: Floats, thrust: Weights, basis: Floats) -> Floats:
+def _sizes(runs: Sequence[Floats], of: Sequence[Floats], when: Floats, thrust: Weights, basis: Floats) -> Floats:
     """Squared length of the whitened step at each instant beside what the model can follow."""
-    columns = thrust.whiten([(at[:, None] >= when).astype(np.float64) for at in runs], [])
+    columns = thrust.whiten([size[:, None] * (at[:, None] >= when) for at, size in zip(runs, of, strict=True)], [])
     columns -= basis[: columns.shape[0]] @ (basis[: columns.shape[0]].T @ columns)
     out: Floats = np.einsum("ij,ij->j", columns, columns)
     return out
