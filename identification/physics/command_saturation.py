@@ -27,13 +27,6 @@ def _moved(history: History, limit: float) -> Floats:
     return out
 
 
-def _integral(value: Floats, limit: float) -> Floats:
-    """Of the clipped voltage from 0 to `value` (M,)."""
-    size = np.abs(value)
-    out: Floats = 0.5 * np.minimum(size, limit) ** 2 + limit * np.maximum(size - limit, 0.0)
-    return out
-
-
 @dataclass(frozen=True, slots=True)
 class CommandSaturation:
     """The drive clips: V_eff = clip(V, -limit, limit)."""
@@ -59,7 +52,10 @@ class CommandSaturation:
             return value
         # a command that moves within an interval passes the limit in a part of it
         half = 0.5 * _moved(now.history, theta[0])
-        out: Floats = (_integral(value + half, theta[0]) - _integral(value - half, theta[0])) / (2 * half)
+        size = np.abs(value)
+        beyond = np.clip(size + half - theta[0], 0.0, 2 * half)
+        mean = np.where(size - half >= theta[0], theta[0], size - beyond**2 / (4 * half))
+        out: Floats = np.copysign(mean, value)
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
