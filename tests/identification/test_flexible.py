@@ -178,7 +178,7 @@ def test_the_fit_improves_on_what_was_not_fitted(wave):
     left = found.unexplained
     assert found.verdict == "unexplained"
     assert found.model_terms == ("flexible:time",)
-    assert found.heldout.after < min(1.1 * found.heldout.noise, 0.8 * left.heldout_without)
+    assert found.heldout.after < min(1.15 * found.heldout.noise, 0.9 * left.heldout_without)
     (shape,) = left.flexible
     assert shape.covariate == "time"
     (curve,) = shape.splines
