@@ -92,22 +92,24 @@ def raw(
     would hide the slope.
     """
     thrust, rate = [], []
-    late = delay_of(model, near or theta)
+    there = near or theta
+    late = delay_of(model, there) + there.shift
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
-        lead = thrust_lead(model, theta, history, data.scale.driver, late)
+        lead, curved = thrust_lead(model, theta, history, data.scale.driver, late)
         share = passed_on(model, theta, history)
-        ahead = np.broadcast_to(theta.C * share * (2 * np.abs(x) * lead + history.excess), F.shape)
+        ahead = np.broadcast_to(theta.C * share * (2 * np.abs(x) * lead + curved), F.shape)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
         thrust.append((reconstructed(F, history.middle, history.sampled) + ahead)[rows] + theta.tares[i])
         if with_rate:
             assert history.rate_sampled is not None
-            lead = np.broadcast_to(share * rate_lead(model, theta, history, data.scale.driver), x.shape)
+            turning = rate_lead(model, theta, history, data.scale.driver, there.rate_shift)
+            lead = np.broadcast_to(share * turning, x.shape)
             if theta.rate_shift:
                 x = delayed(x, history.edges, theta.rate_shift)
-            turning = reconstructed(x, history.middle, history.rate_sampled) + lead
-            rate.append(theta.k * turning[history.rate_rows])
+            seen = reconstructed(x, history.middle, history.rate_sampled) + lead
+            rate.append(theta.k * seen[history.rate_rows])
     return thrust, rate
 
 

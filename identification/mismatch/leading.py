@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from typing import Literal
 
-import numpy as np
-
 from identification.mismatch.model import Model, Theta, remember
 from identification.physics.command_saturation import CommandSaturation, passed
-from identification.physics.filters import reconstructed, within_intervals
-from identification.physics.history import LARGEST_LEAD, History, Samples
+from identification.physics.history import History
 from identification.physics.motor_lag import MotorLag, torques
+from identification.physics.tick_leads import at_samples, each_lead, leads
 from identification.physics.ticks_passed import Passed
 from identification.recording import Floats
 
@@ -25,26 +23,33 @@ def delay_of(model: Model, theta: Theta) -> float:
     return sum(v[0] for t, v in zip(model.terms, theta.terms, strict=True) if t.id == "time_skew")
 
 
-def thrust_lead(model: Model, theta: Theta, history: History, largest: float, late: float) -> Floats:
-    """(M,) or (1,) driver, at the thrust samples less the line through means: of a force that comes `late` s after."""
+def thrust_lead(model: Model, theta: Theta, history: History, largest: float, late: float) -> tuple[Floats, Floats]:
+    """(M,) or (1,) each, of a force that comes `late` s after: driver at the thrust samples less the line through
+    means, and driver |driver| there less what line and lead make of it."""
     passed = Passed(_rotor(model, theta, largest), _ring(model, theta), late if _is_late(late, history) else 0.0)
-    return _remembered(history, "thrust", passed) if _changes(passed, history) else history.lead
+    if not _changes(passed, history):
+        return history.lead, history.curved
+    lead, curved = _remembered(history, "thrust", passed)
+    return lead, curved
 
 
-def rate_lead(model: Model, theta: Theta, history: History, largest: float) -> Floats:
-    """(M,) or (1,) driver, at the samples of the rate less the line through means: the rotor alone passes ticks on."""
-    passed = Passed(_rotor(model, theta, largest))
-    return _remembered(history, "rate", passed) if _changes(passed, history) else history.rate_lead
+def rate_lead(model: Model, theta: Theta, history: History, largest: float, late: float) -> Floats:
+    """(M,) or (1,) driver, at the samples of a rate `late` s behind less the line through means: the rotor alone passes
+    ticks on."""
+    passed = Passed(_rotor(model, theta, largest), delay=late if _is_late(late, history) else 0.0)
+    if not _changes(passed, history):
+        return history.rate_lead
+    lead: Floats = _remembered(history, "rate", passed)[0]
+    return lead
 
 
 def sample_lead(model: Model, theta: Theta, history: History, largest: float) -> Floats:
-    """(N,) or (1,): as `thrust_lead`, at each sample."""
-    late = delay_of(model, theta)
-    passed = Passed(_rotor(model, theta, largest), _ring(model, theta), late)
+    """(N,) or (1,): the lead of `thrust_lead`, at each sample."""
+    passed = Passed(_rotor(model, theta, largest), _ring(model, theta), delay_of(model, theta) + theta.shift)
     if not _changes(passed, history):
         return history.sample_lead
-    line = within_intervals(_means(history, passed), history.edges, history.sample_time)
-    return _small(_at(history, passed, history.thrust_samples) - line, history)
+    samples = history.thrust_samples
+    return each_lead(history, at_samples(history, passed, samples), _means(history, passed), samples)
 
 
 def passed_on(model: Model, theta: Theta, history: History) -> Floats | float:
@@ -65,18 +70,14 @@ def _changes(passed: Passed, history: History) -> bool:
 
 
 def _remembered(history: History, channel: Literal["thrust", "rate"], passed: Passed) -> Floats:
+    """(2, M) `leads` of a channel."""
     key = (channel, passed)
     known = history.memo.get(key)
     if known is None:
-        known = _lead(history, passed, history.thrust_samples if channel == "thrust" else history.rate_samples)
+        samples = history.thrust_samples if channel == "thrust" else history.rate_samples
+        known = leads(history, at_samples(history, passed, samples), _means(history, passed), samples)
         remember(history, key, known)
     return known
-
-
-def _lead(history: History, passed: Passed, samples: Samples) -> Floats:
-    mean = samples.means(_at(history, passed, samples))
-    line = reconstructed(_means(history, passed), history.middle, samples.middle)
-    return _small(np.where(samples.count > 0, mean - line, 0.0), history)
 
 
 def _means(history: History, passed: Passed) -> Floats:
@@ -85,17 +86,6 @@ def _means(history: History, passed: Passed) -> Floats:
         known = passed.means(history)
         remember(history, passed, known)
     return known
-
-
-def _at(history: History, passed: Passed, samples: Samples) -> Floats:
-    assert history.ticks is not None
-    when, value = history.ticks
-    return passed.at(*samples.after(when, passed.delay), when, value)
-
-
-def _small(lead: Floats, history: History) -> Floats:
-    out: Floats = np.where(np.abs(lead) < LARGEST_LEAD * history.size, lead, 0.0)
-    return out
 
 
 def _rotor(model: Model, theta: Theta, largest: float) -> tuple[float, float] | None:

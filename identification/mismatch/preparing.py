@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from identification.mismatch.channels import followed, jumps, neighbour_at, supply
 from identification.mismatch.grid import STEP, Held, distinct, edges_of
-from identification.physics.filters import reconstructed, within_intervals
-from identification.physics.history import CHANGED, LARGEST_LEAD, History
+from identification.physics.history import CHANGED, History
+from identification.physics.tick_leads import with_leads
 from identification.recording import Channel, Floats, Recording
 
 DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
@@ -179,7 +179,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         turning_time = turning.time[good]
         rate, rate_count, rate_sampled = _binned(turning.time[good], turning.value[good], edges)
         per_driver = _rate_per_driver(driven, others["rotation_rate"], edges)
-    return History(
+    history = History(
         recording_id=recording.recording_id,
         driver_quantity=held.quantity,
         edges=edges,
@@ -189,11 +189,8 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         count=count,
         sampled=sampled,
         within=within,
-        sample_lead=_sample_lead(held, time[inside], edges, driven),
         tick=max(float(np.median(np.diff(held.time))), 1e-6) if held.time.size > 1 else 1.0,
-        lead=_lead(held, time, edges, driven, count),
         ticks=(held.time, held.value) if held.stepwise else None,
-        rate_lead=np.zeros(1) if rate_count is None else _lead(held, turning_time, edges, driven, rate_count),
         sample_time=time[inside],
         sample_thrust=force[inside],
         rate_time=turning_time,
@@ -207,6 +204,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
         static=_is_table(held, time.size),
     )
+    return with_leads(history)
 
 
 def _rate_per_driver(driven: Floats, rate: Floats, edges: Floats) -> float:
@@ -249,27 +247,6 @@ def _explaining(recording: Recording, driver: Channel, held: Held, edges: Floats
     neighbour = neighbour_at(recording, middle)
     if neighbour is not None:
         out["neighbour_thrust"] = neighbour
-    return out
-
-
-def _lead(held: Held, time: Floats, edges: Floats, driven: Floats, count: NDArray[np.int64]) -> Floats:
-    """Command at the samples less the line through means, where it ticks; 0 at steps and for measured drivers."""
-    if not held.stepwise:
-        return np.zeros(1)
-    now = held.value[np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)]
-    mean, _, sampled = _binned(time, now, edges)
-    lead = np.where(count > 0, mean - reconstructed(driven, 0.5 * (edges[1:] + edges[:-1]), sampled), 0.0)
-    out: Floats = np.where(np.abs(lead) < LARGEST_LEAD * float(np.max(np.abs(driven))), lead, 0.0)
-    return out
-
-
-def _sample_lead(held: Held, time: Floats, edges: Floats, driven: Floats) -> Floats:
-    """As _lead, sample by sample."""
-    if not held.stepwise:
-        return np.zeros(1)
-    now = held.value[np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)]
-    lead = now - within_intervals(driven, edges, time)
-    out: Floats = np.where(np.abs(lead) < LARGEST_LEAD * float(np.max(np.abs(driven))), lead, 0.0)
     return out
 
 

@@ -24,8 +24,8 @@ CHANGED = 0.01
 """Share of the largest driver: a smaller difference between neighbouring intervals is no step."""
 BACK = 0.005
 """Share of the largest driver by which it must come back to have turned round."""
-LARGEST_LEAD = 0.02
-"""Of the largest driver: what changes by more is a step, and no tick."""
+LARGEST_LEAD = 0.08
+"""Of the largest driver: what changes by more is a step even in a fast ramp, and no tick."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,6 +109,8 @@ class History:
     """(M,) or (1,): mean of driver |driver| over the interval less that of the mean driver."""
     lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     """(M,) or (1,): driver at the samples less its mean over the interval: ticks may keep step with samples."""
+    curved: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
+    """(M,) or (1,): driver |driver| at the samples less what the line through its means and the lead make of it."""
     tick: float = 1.0
     """s between changes of the command where it ticks on."""
     rate_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
