@@ -150,7 +150,8 @@ def _answer(
     earned = refitted_names(earned, after)
     known = intervals(after.fit, data, after.weights, [n.term for n in earned])
     every = [np.ones(r.size, dtype=bool) for r in data.rows]
-    held = by_runs(before, after, data, others) if others else by_blocks(before, after, data, measured)
+    quiet = found.after.noise
+    held = by_runs(before, after, data, others, quiet) if others else by_blocks(before, after, data, measured, quiet)
     n, p = after.fit.residual.size, int(after.fit.free.sum())
     answer = Diagnosis(
         recordings=tuple(r.recording_id for r in recordings),

@@ -80,22 +80,23 @@ def refitted(state: State, data: Data, keep: Sequence[NDArray[np.bool_]]) -> Fit
     return fit(state.fit.model, state.fit.theta, part, w)
 
 
-def by_blocks(before: State, after: State, data: Data, measured: Data) -> HeldOut:
+def by_blocks(before: State, after: State, data: Data, measured: Data, quiet: Noise) -> HeldOut:
     """Parameters of both models without every fourth block, judged on those blocks.
 
-    `measured`: the same runs with the periodic disturbances still in them, for the model before.
+    `measured`: the same runs with the periodic disturbances still in them, for the model before. `quiet`: noise of
+    another model of these runs; the lower of the two is told, for what a model leaves out makes its noise seem louder.
     """
     keep = [blocks(h) for h in data.histories]
     back = [~k for k in keep]
     old, new = refitted(before, measured, keep), refitted(after, data, keep)
-    noise = noise_rms(after.noise, new.model, new.theta, data, back)
+    noise = min(noise_rms(each, new.model, new.theta, data, back) for each in (after.noise, quiet))
     held = "levels" if data.histories[0].static else "blocks of time"
     what = f"every fourth of the {held}, {sum(int(b.sum()) for b in back)} rows; terms were chosen on all of them"
     return HeldOut(rmse(old.model, old.theta, measured, back), rmse(new.model, new.theta, data, back), noise, what)
 
 
-def by_runs(before: State, after: State, data: Data, others: Sequence[History]) -> HeldOut:
-    """Both models on whole runs that were not fitted; of these only the tare is."""
+def by_runs(before: State, after: State, data: Data, others: Sequence[History], quiet: Noise) -> HeldOut:
+    """Both models on whole runs that were not fitted; of these only the tare is. `quiet` as in `by_blocks`."""
     unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
     errors, last = [], None
@@ -104,7 +105,7 @@ def by_runs(before: State, after: State, data: Data, others: Sequence[History]) 
         errors.append(rmse(state.fit.model, theta, unseen, every))
         last = theta
     assert last is not None
-    noise = noise_rms(after.noise, after.fit.model, last, unseen, every)
+    noise = min(noise_rms(each, after.fit.model, last, unseen, every) for each in (after.noise, quiet))
     names = ", ".join(h.recording_id for h in others)
     return HeldOut(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
 

@@ -153,6 +153,7 @@ def test_a_parameter_that_differs_from_run_to_run_earns_no_name():
     assert found.verdict == "unexplained"
     assert "dead_band" not in effects(found)
     assert found.heldout.after > 5 * NOISE  # a flexible term may fit a part of it, a name does not
+    assert found.heldout.after > 1.3 * found.heldout.noise
 
 
 def test_held_out_runs_judge_both_models():

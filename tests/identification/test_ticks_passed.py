@@ -109,3 +109,26 @@ def test_samples_in_step_with_the_ticks_of_a_ramp_are_foretold():
 
     assert missed(TAU) < 0.002
     assert missed(TAU) < 0.2 * min(missed(0.8 * TAU), missed(1.25 * TAU))
+
+
+def test_ticks_of_a_fast_ramp_are_no_steps():
+    """Ramps of 4 % of full scale a tick: rates read once a tick, and thrust, are foretold wherever they were read."""
+    at = 0.02 * np.arange(3000.0)
+    volts = 25.0 * np.clip(2.5 * np.sin(2 * np.pi * at / 7), -1, 1)
+    assert 0.03 < np.max(np.abs(np.diff(volts))) / 25 < 0.06
+
+    def held(t):
+        return volts[np.searchsorted(at, t, side="right") - 1]
+
+    t, turning = np.arange(0.003, 60.0, 0.0119), at + 0.016
+    x = held(t)
+    channels = (
+        Channel("command_voltage", "command", "command_voltage", "V", at, volts),
+        Channel("thrust", "cell", "thrust", "N", t, 0.5 * x * np.abs(x)),
+        Channel("rotation_rate", "esc", "rotation_rate", "rev/s", turning, 0.8 * held(turning)),
+    )
+    data, theta = start([history_of(Recording("ramps", "T1", channels, source="ramps.h5"))])
+    (thrust,), (rate,) = raw(Model(), replace(theta, C=0.5, tares=(0.0,), k=0.8), data, with_rate=True)
+    (history,) = data.histories
+    assert rate == pytest.approx(history.rates, abs=1e-9)
+    assert thrust == pytest.approx(data.thrust[0], abs=1e-9)
