@@ -63,9 +63,9 @@ def _interval(fitted: Fit, data: Data, weights: Weights, j: int, known: Paramete
     value = float(fitted.theta.vector[j])
     wanted = JUMPS if known.jumps else QUANTILE
     first = max(wanted * float(np.nan_to_num(fitted.std[j])), LEAST_STEP * float(step[j]))
-    blur = QUANTILE * known.blur / sqrt(12.0)
     ends = (_end(Profile(fitted, data, weights, j), wanted, value, bound, first) for bound in (known.low, known.high))
-    far = [float(np.hypot(end - value, blur)) for end in ends]
+    # a level so near counts as half beyond a spread threshold, wholly beyond a sharp one
+    far = [abs(end - value) + 0.5 * known.blur for end in ends]
     return Interval(max(value - far[0], known.low), min(value + far[1], known.high))
 
 

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 
 from identification.recording import Floats
 
+MOST_GROWTH = 60.0
+"""Exponent of what lies farther apart than any correlation reaches."""
 MOST_REMEMBERED = 8
 """Sets of scales and bands whose matrices are kept with the rows."""
 
@@ -98,44 +100,56 @@ class Noise:
         return known
 
     def _shape(self, rows: Rows) -> Shape:
-        unit = replace(self, slow=(1.0,) * len(self.scales), band=(1.0,) * len(self.bands))
-        ac, bc, cc, dc = unit._oscillators()
-        ar, cr = np.array(unit.slow), 1 / np.array(self.scales) if self.scales else np.empty(0)
-        n, J = rows.time.size, ar.size + 2 * ac.size
-        _, U, V = driver.get_celerite_matrices(
-            ar, ac, bc, dc, rows.time, np.zeros(n), np.empty(n), np.empty((n, J)), np.empty((n, J))
-        )
-        gain = self.gains(rows)
-        wide = np.repeat(gain, [1] * ar.size + [2] * ac.size, axis=1)
-        c = np.concatenate([cr, np.repeat(cc, 2)])
-        return Shape(c, gain**2, np.ascontiguousarray(U * wide), np.ascontiguousarray(V * wide))
+        """Exact for samples that lie evenly within each row.
 
-    def gains(self, rows: Rows) -> Floats:
-        """(n, components): what the mean of a row's samples leaves of each, as a factor of its standard deviation."""
-        spacing = rows.width / rows.count
-        rates = [-1 / T + 0j for T in self.scales]
-        rates += [complex(-np.pi * f / Q, 2 * np.pi * f) for f, Q in self.bands]
-        return (
-            np.column_stack([_mean_gain(np.exp(r * spacing), rows.count) for r in rates])
-            if rates
-            else np.empty((rows.time.size, 0))
-        )
+        Where single samples have the covariance Re(A e^(p |dt|)), the mean of a row and that of a later one have
+        Re(A f e^(p dt) f'), f the mean of e^(p t) about the row's own middle.
+        """
+        n, spacing = rows.time.size, rows.width / rows.count
+        none = np.empty((n, 0))
+        c: list[float] = []
+        gain2, U, V = [none], [none], [none]
+        for T in self.scales:
+            relaxed = _mean_wave(-spacing / T + 0j, rows.count).real[:, None]
+            c.append(1 / T)
+            gain2.append(_mean_variance(np.exp(-spacing / T + 0j), rows.count, 1.0))
+            U.append(relaxed)
+            V.append(relaxed)
+        for A, p in self._waves():
+            f = _mean_wave(p * spacing, rows.count)
+            later, earlier = A * f * np.exp(1j * p.imag * rows.time), f * np.exp(-1j * p.imag * rows.time)
+            c += [-p.real, -p.real]
+            gain2.append(_mean_variance(np.exp(p * spacing), rows.count, A))
+            U.append(np.column_stack([later.real, later.imag]))
+            V.append(np.column_stack([earlier.real, -earlier.imag]))
+        left, right = np.column_stack(U), np.column_stack(V)
+        return Shape(np.array(c), np.column_stack(gain2), np.ascontiguousarray(left), np.ascontiguousarray(right))
 
-    def _oscillators(self) -> tuple[Floats, Floats, Floats, Floats]:
-        """Underdamped harmonic oscillators with unit-height kernels times their variance."""
-        f = np.array([b[0] for b in self.bands])
-        Q = np.array([b[1] for b in self.bands])
-        a = np.array(self.band)
-        w = 2 * np.pi * f
-        root = np.sqrt(np.maximum(4 * Q**2 - 1, 1e-9))
-        return a, a / root, 0.5 * w / Q if Q.size else Q, 0.5 * w * root / Q if Q.size else Q
+    def _waves(self) -> list[tuple[complex, complex]]:
+        """A and p of each band: a damped oscillator whose kernel Re(A e^(p |dt|)) is 1 at 0."""
+        out = []
+        for f, Q in self.bands:
+            root = float(np.sqrt(max(4 * Q**2 - 1, 1e-9)))
+            out.append((1 - 1j / root, np.pi * f / Q * complex(-1, root)))
+        return out
 
 
-def _mean_gain(rho: NDArray[np.complex128], m: Floats) -> Floats:
-    """Standard deviation of the mean of m even samples whose correlation over k samples is Re rho^k."""
+def _mean_wave(turn: NDArray[np.complexfloating], m: Floats) -> NDArray[np.complex128]:
+    """(n,) mean of e^(turn k) over m values of k, one apart and even about 0; smaller than that where it overflows."""
+    much = 0.5 * np.where(turn.real < 0, -turn, turn)
+    growth = (m - 1) * much
+    growth = np.minimum(growth.real, MOST_GROWTH) + 1j * growth.imag
+    mean = np.exp(growth) * np.expm1(-2 * m * much) / (m * np.expm1(-2 * much))
+    out: NDArray[np.complex128] = np.where(m > 1.5, mean, 1.0)
+    return out
+
+
+def _mean_variance(rho: NDArray[np.complex128], m: Floats, height: complex) -> Floats:
+    """(n,) variance of the mean of m even samples whose correlation over k samples is Re height rho^k, 1 at 0."""
     far = 1 - rho
-    variance = np.real((1 + rho) / far - 2 * rho * (1 - rho**m) / (m * far**2)) / m
-    out: Floats = np.sqrt(np.clip(np.where(m > 1.5, variance, 1.0), 1e-6, 1.0))
+    total = 2 * height * rho / far * (m - (1 - rho**m) / far)
+    variance = (m + np.real(total)) / m**2
+    out: Floats = np.clip(np.where(m > 1.5, variance, 1.0), 1e-12, 1.0)
     return out
 
 

@@ -38,15 +38,15 @@ def kernel(noise, lag):
 
 
 def dense(noise, r, size):
-    """Covariance of the rows, element by element: the mean of a row has its own variance, and all rows as seen from
-    elsewhere are shrunk by the same factor."""
-    parts = kernel(noise, r.time[:, None] - r.time[None, :]) if noise.scales or noise.bands else np.zeros((0, 1, 1))
-    variances = [*noise.slow, *noise.band]
-    out = np.diag((noise.white + noise.proportional * size**2) * r.extra / r.count)
-    gain = noise.gains(r)
-    for j, v in enumerate(variances):
-        out = out + v * parts[j] * np.outer(gain[:, j], gain[:, j])
-    return out
+    """Covariance of the rows' means, sample by sample; samples lie evenly within each row."""
+    variances = np.array([*noise.slow, *noise.band])
+    index = np.repeat(np.arange(r.time.size), r.count.astype(int))
+    within = np.concatenate([np.arange(m) - 0.5 * (m - 1) for m in r.count])
+    at = r.time[index] + within * (r.width / r.count)[index]
+    each = np.tensordot(variances, kernel(noise, at[:, None] - at[None, :]), 1) if variances.size else 0.0
+    mean = (index[None, :] == np.arange(r.time.size)[:, None]) / r.count[:, None]
+    out: np.ndarray = mean @ np.broadcast_to(each, (at.size, at.size)) @ mean.T
+    return out + np.diag((noise.white + noise.proportional * size**2) * r.extra / r.count)
 
 
 def sizes(n, seed=2):
@@ -67,16 +67,16 @@ def test_whitening_is_the_inverse_of_the_dense_cholesky_factor(noise):
     assert columns.T @ fast.weighed(white) == pytest.approx(fast.whiten(columns).T @ white, abs=1e-9)
 
 
-@pytest.mark.parametrize("m", [1, 2, 7, 40])
-def test_the_mean_of_correlated_samples_has_the_variance_of_the_double_sum(m):
-    r = Rows(np.array([1.0]), np.array([float(m)]), np.ones(1), np.array([0.01 * m]))
-    lag = 0.01 * np.subtract.outer(np.arange(m), np.arange(m))
-    slow = kernel(SLOW, lag).mean(axis=(1, 2))
-    assert SLOW.gains(r)[0] ** 2 == pytest.approx(slow, rel=1e-9)
-    # bands: the cosine of the oscillator, without its small sine
-    for (f, Q), gain in zip(BAND.bands, BAND.gains(r)[0], strict=True):
-        cosine = np.exp(-np.pi * f / Q * np.abs(lag)) * np.cos(2 * np.pi * f * lag)
-        assert gain**2 == pytest.approx(cosine.mean(), rel=1e-9)
+def test_rows_far_longer_than_a_correlation_keep_their_variance():
+    """A second of samples a row beside a correlation of 2 ms, whose exponential no float holds: sum of a geometric
+    series."""
+    count = np.full(50, 20_000.0)
+    r = Rows(40.0 * np.arange(50.0), count, np.ones(50), 40.0 + 0 * count)
+    noise = Noise(1e-6, 0.0, (0.002,), (1.0,))
+    rho = np.exp(-1.0)
+    z = Whitener(noise, r, np.zeros(50)).whiten(np.eye(50))
+    assert np.diag(z) ** -2 == pytest.approx((1e-6 + (1 + rho) / (1 - rho)) / 20_000, rel=1e-3)
+    assert z - np.diag(np.diag(z)) == pytest.approx(0.0, abs=1e-2)
 
 
 def test_white_noise_of_a_mean_falls_with_its_samples():
@@ -105,10 +105,9 @@ def test_means_of_simulated_samples_are_white_when_whitened():
     time = 0.01 * 0.5 * (edges[1:] + edges[:-1] - 1)
     z = Whitener(noise, Rows(time, count.astype(float), np.ones(count.size), 0.01 * count), np.zeros(count.size))
     white = z.whiten(mean)
-    # rows as wide as a quarter of the time constant: the covariance is a little off, and to the safe side
-    assert 0.85 < np.std(white) < 1.0 + 3 / np.sqrt(2 * count.size)
+    assert np.std(white) == pytest.approx(1.0, abs=3 / np.sqrt(2 * count.size))
     for lag in (1, 2, 5, 20):
-        assert abs(np.mean(white[lag:] * white[:-lag])) < 0.12
+        assert abs(np.mean(white[lag:] * white[:-lag])) < 4 / np.sqrt(count.size)
     narrow = np.std(white[count <= 3])
     assert narrow == pytest.approx(1.0, abs=0.06)
 
