@@ -57,7 +57,7 @@ def look(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned | Non
     series = series_of(fitted, data)
     if all(s.time.size < FEW_SAMPLES for s in series):
         return None
-    has_rate = all("rotation_rate" in h.others for h in data.histories)
+    has_rate = all("rotation_rate" in (h.driver_quantity, *h.others) for h in data.histories)
     unit: Literal["rev", "V s"] = "rev" if has_rate else "V s"
     lines = find_lines(series, turns_unit=unit)
     still = []

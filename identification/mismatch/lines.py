@@ -67,7 +67,7 @@ class Line:
     """Hz; of a rotor-locked line at the mean speed of the turning rotor."""
     frequency_std: float
     ratio: float | None
-    """Periods per turn (per V s where `turns` are), of a rotor-locked line."""
+    """Periods per `unit`, of a rotor-locked line."""
     ratio_std: float | None
     amplitude: float
     """N."""
@@ -83,6 +83,8 @@ class Line:
     rival: Literal["", "fixed", "rotation"] = ""
     """The other kind, where it explains the line about as well."""
     parts: tuple[Part, ...] = ()
+    unit: Literal["rev", "V s"] = "rev"
+    """Of the turns: V s where no rate was recorded."""
 
     def at(self, time: Floats, turns: Floats | None = None, run: int = 0) -> Floats:
         """(n,) N, the line at these times (and turns) of that run."""
@@ -124,7 +126,7 @@ def find_lines(
     return tuple(found)
 
 
-def _best(runs: Sequence[Series], alarm: float, lowest: float, unit: str) -> Line | None:
+def _best(runs: Sequence[Series], alarm: float, lowest: float, unit: Literal["rev", "V s"]) -> Line | None:
     long = [(i, r) for i, r in enumerate(runs) if r.time.size >= LEAST_SAMPLES]
     if not long:
         return None
@@ -239,7 +241,7 @@ def _fixed_says(f: float, amplitude: float, spacing: float) -> str:
     return says + "."
 
 
-def _locked(found: Locked, unit: str) -> Line:
+def _locked(found: Locked, unit: Literal["rev", "V s"]) -> Line:
     per = "turn" if unit == "rev" else "V s of the driver"
     near = round(found.ratio)
     blades = unit == "rev" and near >= 1 and abs(found.ratio - near) < max(0.02, 4 * found.ratio_std)
@@ -262,4 +264,5 @@ def _locked(found: Locked, unit: str) -> Line:
         found.gain,
         says,
         parts=parts,
+        unit=unit,
     )

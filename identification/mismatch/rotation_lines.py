@@ -26,7 +26,7 @@ from identification.mismatch.spectrum import (
     transform,
 )
 from identification.recording import Floats
-from identification.tails import gamma_median, gamma_sf
+from identification.tails import chi2_sf, gamma_median, gamma_sf
 
 HIGHEST = 400.0
 """Hz at the highest speed: blade pass of the fastest thrusters, with their harmonics."""
@@ -54,8 +54,8 @@ ORDERS = 12
 """Whole ratios that are looked at."""
 BESIDE = (-7, -6, -5, -4, 4, 5, 6, 7)
 """Independent ratios beside a line at which the noise is taken."""
-COHERENT = 0.6
-"""Share of the power that one phase must keep."""
+COHERENT = 0.01
+"""Probability below which what one phase loses of the power is no noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,10 +229,13 @@ def _fitted(parts: Sequence[_Stretch], ratio: float, reach: float, p_value: floa
     centre = np.array([p.turns.mean() for p in parts])
     spread = float(np.sqrt(np.sum(n * [np.var(p.turns) for p in parts]) / n.sum()))
     together, power = _together(parts, best, reach, centre, n)
-    coherent = power > COHERENT * max(powers)
+    noise = _noise(parts, best)
+    # an angle that slips across steps takes amplitude from a wave of one phase
+    lost = max(max(powers) - power, 0.0) * 2 / noise
+    coherent = chi2_sf(lost, 2 * len(parts) - 2) > COHERENT
     z = together if coherent else best
     sums = _sums(parts, z)
-    noise = _noise(parts, z)
+    size_std = std = float(np.sqrt(2 * noise / n.sum()))
     if coherent:
         whole = 2 * sums.sum() / n.sum()
         each = np.full(len(parts), whole)
@@ -240,8 +243,9 @@ def _fitted(parts: Sequence[_Stretch], ratio: float, reach: float, p_value: floa
         spread = float(np.sqrt(spread**2 + np.cov(centre, aweights=n, ddof=0)))
     else:
         each = 2 * sums / n
-        amplitude = float(np.sqrt(max(np.sum(n * np.abs(each) ** 2) / n.sum() - 4 * noise * len(parts) / n.sum(), 0.0)))
-    std = float(np.sqrt(2 * noise / n.sum()))
+        bias = 2 * std**2 * len(parts)
+        amplitude = float(np.sqrt(max(np.sum(n * np.abs(each) ** 2) / n.sum() - bias, 0.0)))
+        size_std = float(np.sqrt(std**2 + 0.5 * std**2 * bias / max(amplitude, std) ** 2))
     size = max(amplitude, std)
     ratio_std = std / (2 * np.pi * size * spread)
     phase_std = float(np.hypot(std / size, 2 * np.pi * ratio_std * float(np.average(centre, weights=n))))
@@ -249,7 +253,7 @@ def _fitted(parts: Sequence[_Stretch], ratio: float, reach: float, p_value: floa
         ratio=z,
         ratio_std=ratio_std,
         amplitude=amplitude,
-        amplitude_std=std,
+        amplitude_std=size_std,
         phase=float(np.angle(each[0] * 1j)) if coherent else None,
         phase_std=phase_std if coherent else None,
         p_value=p_value,

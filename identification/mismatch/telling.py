@@ -43,7 +43,8 @@ def line_finding(line: Line) -> Finding:
         "frequency": Value(line.frequency, line.frequency_std, "Hz"),
     }
     if line.ratio is not None and line.ratio_std is not None:
-        values["periods_per_turn"] = Value(line.ratio, line.ratio_std, "1")
+        name, unit = ("periods_per_turn", "1") if line.unit == "rev" else ("periods_per_volt_second", "1/(V s)")
+        values[name] = Value(line.ratio, line.ratio_std, unit)
     if line.phase is not None and line.phase_std is not None:
         values["phase"] = Value(line.phase, line.phase_std, "rad")
     p = max(line.p_value, LEAST_P)

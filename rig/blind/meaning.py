@@ -62,9 +62,11 @@ def _drift(p: Table, form: str, _k: float, _truth: Table) -> Table:
     return {n: p[n] for n in ("amplitude", "time_constant")} if form == "exponential" and "amplitude" in p else {}
 
 
-def _line(p: Table, _form: str, _k: float, _truth: Table) -> Table:
+def _line(p: Table, _form: str, k: float, _truth: Table) -> Table:
     known = {"amplitude": p["amplitude"]}
-    return known | ({"frequency": p["frequency"]} if p.get("frequency") else {"periods_per_turn": p["blades"]})
+    if p.get("frequency"):
+        return known | {"frequency": p["frequency"]}
+    return known | {"periods_per_turn": p["blades"], "periods_per_volt_second": p["blades"] * k}
 
 
 def _heating(p: Table, form: str, _k: float, truth: Table) -> Table:

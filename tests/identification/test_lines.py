@@ -83,6 +83,23 @@ def test_line_locked_to_the_rotor_beyond_half_the_sampling_rate() -> None:
     assert np.std(left[speed > 0]) < 0.15
 
 
+def test_a_line_whose_angle_slips_at_every_step_keeps_its_amplitude_and_is_found_once() -> None:
+    """The turns are summed from a rate with errors: a fifth of a period more or less at each new level."""
+    z = []
+    for seed in range(4):
+        series, speed = run(seed)
+        assert series.turns is not None
+        rng = np.random.default_rng(seed)
+        level = np.cumsum(np.diff(speed, prepend=speed[0]) != 0)
+        slip = np.cumsum(rng.normal(0.0, 0.4, level[-1] + 1))[level]
+        wave = np.where(speed > 0, 0.4 * np.sin(2 * np.pi * 3 * series.turns + slip), 0.0)
+        line = only(find_lines([Series(series.time, series.residual + wave, series.turns)]))
+        assert line.kind == "rotation"
+        assert line.phase is None
+        z.append((line.amplitude - 0.4) / line.amplitude_std)
+    assert np.max(np.abs(z)) < 3
+
+
 def test_a_whole_number_of_periods_per_turn_is_found_fainter_than_any_other() -> None:
     found = {}
     for ratio in (4.0, 4.37):

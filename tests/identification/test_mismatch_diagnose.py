@@ -366,18 +366,24 @@ def test_a_channel_that_lies_is_the_finding_and_its_repair_is_told(lie):
     assert any("put right" in note for note in found.notes)
 
 
-@pytest.mark.parametrize("form", ["frequency", "blades"])
-def test_a_periodic_disturbance_is_a_finding_with_its_frequency(form):
+@pytest.mark.parametrize(
+    ("form", "channels"), [("frequency", ["rotation_rate"]), ("blades", ["rotation_rate"]), ("blades", [])]
+)
+def test_a_periodic_disturbance_is_a_finding_with_its_frequency(form, channels):
     rng = np.random.default_rng(3)
-    how = {"forms": [form], "channels": ["rotation_rate"], "noise": "white", "plan": "interleaved"}
+    how = {"forms": [form], "channels": channels, "noise": "white", "plan": "interleaved"}
     case = concealed.case(rng, ["periodic_disturbance"], 60.0, sampling=60.0, duration=120.0, **how)
     found = diagnosed(*recordings(case))
     assert effects(found) == {"periodic_disturbance"}
     assert "periodic_disturbance" in found.model_terms
     line, true = found.findings[0].parameters, case.effects[0].parameters
     assert line["amplitude"].value == pytest.approx(true["amplitude"], rel=0.2)
-    if form == "blades":
+    if form == "blades" and channels:
         assert line["periods_per_turn"].value == pytest.approx(true["blades"], rel=1e-3)
+    elif form == "blades":
+        turns = true["blades"] * case.scale.rate / case.scale.voltage
+        assert line["periods_per_volt_second"].value == pytest.approx(turns, rel=1e-3)
+        assert line["periods_per_volt_second"].unit == "1/(V s)"
     else:
         assert line["frequency"].value == pytest.approx(true["frequency"], rel=1e-4)
 

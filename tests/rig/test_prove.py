@@ -179,6 +179,8 @@ def test_parameters_that_mean_the_same_are_known_for_effects_of_the_world():
     assert known == set(PLACES)
     told = truth("cavitation", form="linear", slope=0.1, onset=12.0)
     assert true_values("cavitation", "linear", told) == {"slope": 0.2, "onset": 6.0}
+    line = true_values("periodic_disturbance", "rotation", truth("periodic_disturbance", amplitude=0.3, blades=4))
+    assert line == {"amplitude": 0.3, "periods_per_turn": 4.0, "periods_per_volt_second": 8.0}
 
 
 def test_rates_have_wilson_s_interval_and_goals_three_states():
