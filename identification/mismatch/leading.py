@@ -7,6 +7,7 @@ from typing import Literal
 from identification.mismatch.model import Model, Theta, remember
 from identification.physics.command_saturation import CommandSaturation, passed
 from identification.physics.history import History
+from identification.physics.load_cell_saturation import LoadCellSaturation, below, half_moved
 from identification.physics.motor_lag import MotorLag, torques
 from identification.physics.tick_leads import at_samples, each_lead, leads
 from identification.physics.ticks_passed import Passed
@@ -57,6 +58,14 @@ def passed_on(model: Model, theta: Theta, history: History) -> Floats | float:
     for term, values in zip(model.terms, theta.terms, strict=True):
         if isinstance(term, CommandSaturation):
             return passed(history, values[0])
+    return 1.0
+
+
+def shown(model: Model, theta: Theta, history: History, F: Floats, x: Floats, tare: float) -> Floats | float:
+    """(M,) or 1: the share of what the force F (without tare) does within an interval that the cell shows."""
+    for term, values in zip(model.terms, theta.terms, strict=True):
+        if isinstance(term, LoadCellSaturation):
+            return below(F + tare, values[0], half_moved(history, theta.C, x))
     return 1.0
 
 

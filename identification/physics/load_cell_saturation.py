@@ -8,13 +8,47 @@ from typing import ClassVar
 import numpy as np
 from scipy.special import ndtr
 
+from identification.physics.history import History
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
+FAR = 8.0
+"""Standard deviations of the noise: what is farther from the limit clips always, or never."""
+LEAST_MOVE = 1e-6
+"""Of the limit: what moves less within an interval stands still."""
+LEAST_BLUR = 0.01
+"""The same, of the noise."""
 
-def _excess(z: Floats) -> Floats:
-    """Mean of max(z + e, 0) for a normal deviate e."""
-    out: Floats = z * ndtr(z) + np.exp(-0.5 * z**2) / np.sqrt(2 * np.pi)
+
+def half_moved(history: History, C: float, x: Floats) -> Floats:
+    """(M,) N: half of how far the force moves within each interval, by the variance of the driver there."""
+    out: Floats = C * np.abs(x) * np.sqrt(12 * np.abs(history.excess))
+    return out
+
+
+def below(reading: Floats, limit: float, half: Floats) -> Floats:
+    """(M,) share of each interval below the limit, from its clipped mean: limit - half share^2 of an even motion."""
+    short = np.maximum(limit - np.abs(reading), 0.0)
+    out: Floats = np.sqrt(np.minimum(short / np.maximum(half, LEAST_MOVE * limit), 1.0))
+    return out
+
+
+def _beyond(z: Floats, half: Floats, noise: float) -> Floats:
+    """Mean of max(z + u + e, 0): u even within +-half, e normal of standard deviation `noise`."""
+    out = np.where(z > 0, z, 0.0)
+    near = np.abs(z) < half + FAR * noise
+    u, h = z[near], half[near]
+    out[near] = (_integral(u + h, noise) - _integral(u - h, noise)) / (2 * h)
+    return out
+
+
+def _integral(z: Floats, noise: float) -> Floats:
+    """Mean of max(z + e, 0)^2 / 2."""
+    if noise <= 0:
+        hard: Floats = 0.5 * np.maximum(z, 0.0) ** 2
+        return hard
+    s = z / noise
+    out: Floats = 0.5 * noise**2 * ((1 + s**2) * ndtr(s) + s * np.exp(-0.5 * s**2) / np.sqrt(2 * np.pi))
     return out
 
 
@@ -39,14 +73,10 @@ class LoadCellSaturation:
         return ()
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        reading = value + now.tare
-        if now.scale.noise <= 0:
-            clipped: Floats = np.clip(reading, -theta[0], theta[0]) - now.tare
-            return clipped
-        # the mean of noisy samples that clip one by one
-        over = (reading - theta[0]) / now.scale.noise
-        under = (-theta[0] - reading) / now.scale.noise
-        out: Floats = value - now.scale.noise * (_excess(over) - _excess(under))
+        # the mean of noisy samples that clip one by one while the force moves within the interval
+        reading, noise = value + now.tare, now.scale.noise
+        half = np.maximum(half_moved(now.history, now.C, now.x), max(LEAST_MOVE * theta[0], LEAST_BLUR * noise))
+        out: Floats = value - (_beyond(reading - theta[0], half, noise) - _beyond(-theta[0] - reading, half, noise))
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

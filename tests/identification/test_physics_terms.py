@@ -14,6 +14,7 @@ from scipy.signal import lfilter
 from identification.mismatch.model import Model, Theta, predict
 from identification.physics import filters
 from identification.physics.catalogue import CATALOGUE
+from identification.physics.load_cell_saturation import below, half_moved
 from identification.physics.term import STAGES
 
 H = history()
@@ -465,13 +466,31 @@ def test_a_clipping_cell_shows_the_mean_of_samples_that_clip_one_by_one():
     """Monte Carlo of noisy samples round the limit, tare and all."""
     value = np.linspace(-110.0, 110.0, 41)
     s = replace(S, noise=4.0)
-    got = term("load_cell_saturation").apply(value, moment(H, s, tare=7.0), (90.0,))
+    still = np.zeros(41)
+    got = term("load_cell_saturation").apply(value, moment(H, s, tare=7.0, x=still), (90.0,))
     noise = 4.0 * np.random.default_rng(9).standard_normal((41, 40_000))
     expected = np.clip(value[:, None] + 7.0 + noise, -90.0, 90.0).mean(axis=1) - 7.0
     assert got == pytest.approx(expected, abs=5 * 4.0 / 200)
     assert not np.allclose(got, np.clip(value + 7.0, -90.0, 90.0) - 7.0, atol=0.5), "the bend at the limit is rounded"
-    hard = term("load_cell_saturation").apply(value, moment(H, replace(S, noise=0.0), tare=7.0), (90.0,))
+    hard = term("load_cell_saturation").apply(value, moment(H, replace(S, noise=0.0), tare=7.0, x=still), (90.0,))
     assert hard == pytest.approx(np.clip(value + 7.0, -90.0, 90.0) - 7.0)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_a_ramp_through_the_limit_of_the_cell_clips_in_a_part_of_each_interval(noise):
+    ends = np.linspace(-14.0, 14.0, 31)
+    fine = np.linspace(ends[:-1], ends[1:], 4001).T
+    mean = fine.mean(axis=1)
+    ramp = replace(H, edges=np.arange(31.0), driver=mean, excess=np.mean(fine**2, axis=1) - mean**2)
+    e = noise * np.random.default_rng(2).standard_normal(fine.shape)
+    force = 0.5 * fine * np.abs(fine)
+    expected = np.clip(force + e, -60.0, 60.0).mean(axis=1)
+    at = moment(ramp, replace(S, noise=noise), x=mean)
+    got = term("load_cell_saturation").apply(force.mean(axis=1), at, (60.0,))
+    assert got == pytest.approx(expected, abs=0.06 + 5 * noise / 60)
+    assert np.max(np.abs(np.clip(force.mean(axis=1), -60.0, 60.0) - expected)) > 0.3, "not the clipped mean"
+    share = below(got, 60.0, half_moved(ramp, 0.5, mean))
+    assert share == pytest.approx((np.abs(force) < 60.0).mean(axis=1), abs=0.03 + 0.3 * noise)
 
 
 # ---------------------------------------------------------------- the chain of stages
