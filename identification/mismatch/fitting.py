@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.leading import delay_of, passed_on, rate_lead, shown, thrust_lead
+from identification.mismatch.leading import delay_of, force_lead, passed_on, rate_lead, shown
 from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict, ticked
 from identification.physics.filters import delayed, reconstructed
 from identification.physics.term import Parameter, Term
@@ -96,10 +96,9 @@ def raw(
     late = delay_of(model, there) + there.shift
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
-        lead, curved = thrust_lead(model, theta, history, data.scale.driver, late)
         share = passed_on(model, theta, history)
         seen = share * shown(model, theta, history, F, x, theta.tares[i])
-        ahead = np.broadcast_to(theta.C * seen * (2 * np.abs(x) * lead + curved), F.shape)
+        ahead = theta.C * seen * force_lead(model, theta, history, x, data.scale.driver, late)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
         thrust.append((reconstructed(F, history.middle, history.sampled) + ahead)[rows] + theta.tares[i])

@@ -44,8 +44,8 @@ def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
         if fitted.theta.shift:
             F = delayed(F, h.edges, fitted.theta.shift)
         at = within_intervals(F, h.edges, h.sample_time)
-        rate = np.abs(within_intervals(x, h.edges, h.sample_time))
-        at += 2 * fitted.theta.C * rate * sample_lead(fitted.model, fitted.theta, h, data.scale.driver)
+        rate = within_intervals(x, h.edges, h.sample_time)
+        at += fitted.theta.C * sample_lead(fitted.model, fitted.theta, h, rate, data.scale.driver)
         residual = h.sample_thrust - at - fitted.theta.tares[i]
         speed = h.others.get("rotation_rate", x)
         out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time)))

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from typing import Literal
 
+import numpy as np
+
 from identification.mismatch.model import Model, Theta, remember
 from identification.physics.command_saturation import CommandSaturation, passed
-from identification.physics.history import History
+from identification.physics.history import History, Samples
 from identification.physics.load_cell_saturation import LoadCellSaturation, below, half_moved
 from identification.physics.motor_lag import MotorLag, torques
-from identification.physics.tick_leads import at_samples, each_lead, leads
+from identification.physics.tick_leads import at_samples, curvature, each_lead, lead
 from identification.physics.ticks_passed import Passed
 from identification.recording import Floats
 
@@ -24,14 +26,15 @@ def delay_of(model: Model, theta: Theta) -> float:
     return sum(v[0] for t, v in zip(model.terms, theta.terms, strict=True) if t.id == "time_skew")
 
 
-def thrust_lead(model: Model, theta: Theta, history: History, largest: float, late: float) -> tuple[Floats, Floats]:
-    """(M,) or (1,) each, of a force that comes `late` s after: driver at the thrust samples less the line through
-    means, and driver |driver| there less what line and lead make of it."""
+def force_lead(model: Model, theta: Theta, history: History, x: Floats, largest: float, late: float) -> Floats:
+    """(M,) driver |driver|, at the thrust samples less the line through means: of a force at the rates x (M,) that a
+    stand may pass on, and that comes `late` s after."""
     passed = Passed(_rotor(model, theta, largest), _ring(model, theta), late if _is_late(late, history) else 0.0)
     if not _changes(passed, history):
-        return history.lead, history.curved
-    lead, curved = _remembered(history, "thrust", passed)
-    return lead, curved
+        return 2 * np.abs(x) * history.lead + history.curved
+    beside, curved = _remembered(history, "thrust", passed)
+    force: Floats = beside if passed.ring is not None else 2 * np.abs(x) * beside + curved
+    return force
 
 
 def rate_lead(model: Model, theta: Theta, history: History, largest: float, late: float) -> Floats:
@@ -40,17 +43,19 @@ def rate_lead(model: Model, theta: Theta, history: History, largest: float, late
     passed = Passed(_rotor(model, theta, largest), delay=late if _is_late(late, history) else 0.0)
     if not _changes(passed, history):
         return history.rate_lead
-    lead: Floats = _remembered(history, "rate", passed)[0]
-    return lead
+    beside: Floats = _remembered(history, "rate", passed)[0]
+    return beside
 
 
-def sample_lead(model: Model, theta: Theta, history: History, largest: float) -> Floats:
-    """(N,) or (1,): the lead of `thrust_lead`, at each sample."""
+def sample_lead(model: Model, theta: Theta, history: History, rate: Floats, largest: float) -> Floats:
+    """(N,) driver |driver|: as `force_lead`, at each sample, where the rates are `rate` (N,)."""
     passed = Passed(_rotor(model, theta, largest), _ring(model, theta), delay_of(model, theta) + theta.shift)
     if not _changes(passed, history):
-        return history.sample_lead
+        return 2 * np.abs(rate) * history.sample_lead
     samples = history.thrust_samples
-    return each_lead(history, at_samples(history, passed, samples), _means(history, passed), samples)
+    value = at_samples(history, passed, samples)
+    beside = each_lead(history, passed, value, _means(history, passed), samples)
+    return beside if passed.ring is not None else 2 * np.abs(rate) * beside
 
 
 def passed_on(model: Model, theta: Theta, history: History) -> Floats | float:
@@ -79,20 +84,26 @@ def _changes(passed: Passed, history: History) -> bool:
 
 
 def _remembered(history: History, channel: Literal["thrust", "rate"], passed: Passed) -> Floats:
-    """(2, M) `leads` of a channel."""
+    """(2, M) `lead` of a channel, and of a rate its `curvature`."""
     key = (channel, passed)
     known = history.memo.get(key)
     if known is None:
-        samples = history.thrust_samples if channel == "thrust" else history.rate_samples
-        known = leads(history, at_samples(history, passed, samples), _means(history, passed), samples)
+        known = _lead(history, passed, history.thrust_samples if channel == "thrust" else history.rate_samples)
         remember(history, key, known)
     return known
+
+
+def _lead(history: History, passed: Passed, samples: Samples) -> Floats:
+    value, means = at_samples(history, passed, samples), _means(history, passed)
+    beside = lead(history, passed, value, means, samples)
+    rings = passed.ring is not None
+    return np.array([beside, 0 * beside if rings else curvature(history, value, means, beside, samples)])
 
 
 def _means(history: History, passed: Passed) -> Floats:
     known = history.memo.get(passed)
     if known is None:
-        known = passed.means(history)
+        known = passed.means(history) if passed.ring is None else passed.rung_means(history)
         remember(history, passed, known)
     return known
 

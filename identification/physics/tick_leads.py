@@ -13,39 +13,52 @@ from identification.recording import Floats
 
 
 def at_samples(history: History, passed: Passed, samples: Samples) -> Floats:
-    """(N,) driver at each sample, as dynamics pass it on."""
+    """(N,) rate at each sample, as dynamics pass it on; rate |rate| as a stand that rings shows it."""
     assert history.ticks is not None
     when, value = history.ticks
-    return passed.at(*samples.after(when, passed.delay), when, value)
+    answer = passed.at if passed.ring is None else passed.rung_at
+    return answer(*samples.after(when, passed.delay), when, value)
 
 
-def leads(history: History, value: Floats, means: Floats, samples: Samples) -> Floats:
-    """(2, M): the driver `value` (N,) at samples less the line through its `means` (M,), and driver |driver| there less
-    what line and lead make of it; both means over each interval."""
-    lead = samples.means(value) - reconstructed(means, history.middle, samples.middle)
+def lead(history: History, passed: Passed, value: Floats, means: Floats, samples: Samples) -> Floats:
+    """(M,) what `value` (N,) of `at_samples` has, mean over an interval, beside the line through `means` (M,)."""
+    beside = samples.means(value) - reconstructed(means, history.middle, samples.middle)
+    return _ticks(np.where(samples.count > 0, beside, 0.0), history, passed)
+
+
+def curvature(history: History, value: Floats, means: Floats, beside: Floats, samples: Samples) -> Floats:
+    """(M,) rate |rate| at the samples less what the line through means of the rate and its lead `beside` make of it."""
     line = reconstructed(means * np.abs(means), history.middle, samples.middle)
-    curved = samples.means(value * np.abs(value)) - line - 2 * np.abs(means) * lead
-    tick = (samples.count > 0) & (np.abs(lead) < LARGEST_LEAD * history.size)
-    return np.where(tick, [lead, curved], 0.0)
+    out: Floats = samples.means(value * np.abs(value)) - line - 2 * np.abs(means) * beside
+    return np.where(beside != 0, out, 0.0)
 
 
-def each_lead(history: History, value: Floats, means: Floats, samples: Samples) -> Floats:
-    """(N,) the first of `leads`, sample by sample."""
-    lead = value - within_intervals(means, history.edges, samples.time)
-    out: Floats = np.where(np.abs(lead) < LARGEST_LEAD * history.size, lead, 0.0)
-    return out
+def each_lead(history: History, passed: Passed, value: Floats, means: Floats, samples: Samples) -> Floats:
+    """(N,) as `lead`, sample by sample."""
+    return _ticks(value - within_intervals(means, history.edges, samples.time), history, passed)
 
 
 def with_leads(history: History) -> History:
     """With what its command itself does at the samples; a measured driver has no ticks, but curves all the same."""
     if history.ticks is None:
         return replace(history, curved=history.excess)
-    still, thrust = Passed(), history.thrust_samples
+    still, thrust, driver = Passed(), history.thrust_samples, history.driver
     value = at_samples(history, still, thrust)
-    lead, curved = leads(history, value, history.driver, thrust)
-    own = each_lead(history, value, history.driver, thrust)
-    out = replace(history, lead=lead, curved=curved, sample_lead=own)
+    beside = lead(history, still, value, driver, thrust)
+    out = replace(
+        history,
+        lead=beside,
+        curved=curvature(history, value, driver, beside, thrust),
+        sample_lead=each_lead(history, still, value, driver, thrust),
+    )
     if history.rate is None:
         return out
     turning = history.rate_samples
-    return replace(out, rate_lead=leads(history, at_samples(history, still, turning), history.driver, turning)[0])
+    return replace(out, rate_lead=lead(history, still, at_samples(history, still, turning), driver, turning))
+
+
+def _ticks(value: Floats, history: History, passed: Passed) -> Floats:
+    """Without what is too much for a tick: of the driver, or what so much of it changes of driver |driver|."""
+    size = history.size if passed.ring is None else 2 * history.size**2
+    out: Floats = np.where(np.abs(value) < LARGEST_LEAD * size, value, 0.0)
+    return out

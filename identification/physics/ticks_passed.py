@@ -1,7 +1,8 @@
 """What ticks of a command do at the samples beside the line through means, as a lag, ringing and a delay pass them on.
 
 Between two ticks the driver stands still: the rotor follows it by its own equation, and ringing is a decaying
-exponential that each tick adds to. So the response is known at any time, not only at the ends of intervals.
+exponential that each tick adds to. So the response is known at any time, not only at the ends of intervals. The force
+rings, not the driver: a tick that rings on adds to it by what the force changed then, however slow the rotor is now.
 """
 
 from __future__ import annotations
@@ -33,19 +34,22 @@ class Passed:
     """s."""
 
     def means(self, history: History) -> Floats:
-        """(M,) means over intervals, of a driver that stands still in each."""
-        out = history.driver
-        if self.rotor is not None:
-            out = history.followed(out, self.rotor)
-        if self.ring is not None:
-            moved = out - history.driver[0]
-            out = out + self.ring[0] * (resonant(moved, history.dt, *self.ring[1:]) - moved)
+        """(M,) of the rotor's rate, means over intervals, of a driver that stands still in each."""
+        out = history.driver if self.rotor is None else history.followed(history.driver, self.rotor)
+        return delayed(out, history.edges, self.delay) if self.delay else out
+
+    def rung_means(self, history: History) -> Floats:
+        """(M,) of rate |rate| as the stand shows it, means over intervals, of a driver that stands still in each."""
+        assert self.ring is not None
+        x = history.driver if self.rotor is None else history.followed(history.driver, self.rotor)
+        force = x * np.abs(x)
+        moved = force - history.driver[0] * np.abs(history.driver[0])
+        out = force + self.ring[0] * (resonant(moved, history.dt, *self.ring[1:]) - moved)
         return delayed(out, history.edges, self.delay) if self.delay else out
 
     def at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
-        """(N,) `since` s + delay after the tick `last`, of a driver that takes `value` (T,) at the ticks `when` (T,) s.
-
-        It was settled before the first.
+        """(N,) the rate `since` s + delay after the tick `last`, of a driver that takes `value` (T,) at the ticks
+        `when` (T,) s. It was settled before the first.
         """
         out: Floats = value[last]
         if self.rotor is not None:
@@ -54,19 +58,20 @@ class Passed:
             end, _ = lag(value[:-1], np.diff(when), quadratic, linear, float(value[0]))
             begun = np.concatenate([value[:1], end])[last[follows]]
             out[follows] = lagged(out[follows], begun, since[follows], quadratic, linear)
-        if self.ring is not None:
-            out = out + self._ringing(when, value, last, since)
         return out
 
-    def _ringing(self, when: Floats, value: Floats, last: NDArray[np.intp], since: Floats) -> Floats:
-        """What the stand adds, (N,): modes of the linear response, the rotor taken as linear about each tick."""
+    def rung_at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
+        """(N,) rate |rate| as the stand shows it then: modes of the linear response, the rotor taken as linear about
+        each tick."""
         assert self.ring is not None
         c, f, z = self.ring
         w = 2 * np.pi * f
         pole = complex(-z * w, w * np.sqrt(max(1 - z**2, 1e-9)))
-        change, gap = np.diff(value, prepend=value[0]), np.diff(when, prepend=when[0])
+        force = value * np.abs(value)
+        change, gap = np.diff(force, prepend=force[0]), np.diff(when, prepend=when[0])
         share: NDArray[np.complex128] = np.full(value.size, c * w**2 / (2j * pole.imag * pole))
-        out = np.zeros(since.size)
+        rate = self.at(last, since, when, value)
+        out = rate * np.abs(rate)
         if self.rotor is not None:
             quadratic, linear = self.rotor
             follow = 2 * quadratic * np.abs(value) + linear

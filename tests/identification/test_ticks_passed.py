@@ -13,6 +13,7 @@ from identification.mismatch.preparing import history_of
 from identification.physics.filters import lag
 from identification.physics.history import ticks_before
 from identification.physics.motor_lag import MotorLag
+from identification.physics.stand_resonance import StandResonance
 from identification.physics.ticks_passed import Passed
 from identification.recording import Channel, Recording
 
@@ -42,9 +43,9 @@ def both(t):
     return np.interp(t, fine, late)
 
 
-def answered(t, response, delay=0.0):
-    out = np.full(t.size, VOLTS[0])
-    for at, change in zip(AT[1:], np.diff(VOLTS), strict=True):
+def answered(t, response, delay=0.0, value=VOLTS):
+    out = np.full(t.size, value[0])
+    for at, change in zip(AT[1:], np.diff(value), strict=True):
         since = t - at - delay
         out += change * np.where(since >= 0, response(np.maximum(since, 0.0)), 0.0)
     return out
@@ -61,8 +62,12 @@ def answered(t, response, delay=0.0):
 )
 def test_each_tick_is_answered_as_the_dynamics_do(response, passed, delay):
     t = np.arange(0.0, 12.0, 0.01)
-    found = passed.at(*ticks_before(t - delay, AT), AT, VOLTS)
-    assert found == pytest.approx(answered(t, response, delay), abs=2e-4 if response is both else 1e-9)
+    before = ticks_before(t - delay, AT)
+    if response is lagging:
+        assert passed.at(*before, AT, VOLTS) == pytest.approx(answered(t, response), abs=1e-9)
+        return
+    found = passed.rung_at(*before, AT, VOLTS)
+    assert found == pytest.approx(answered(t, response, delay, VOLTS**2), abs=0.01 if response is both else 1e-9)
 
 
 def test_a_rotor_that_turns_round_follows_the_torque_balance():
@@ -132,3 +137,32 @@ def test_ticks_of_a_fast_ramp_are_no_steps():
     (history,) = data.histories
     assert rate == pytest.approx(history.rates, abs=1e-9)
     assert thrust == pytest.approx(data.thrust[0], abs=1e-9)
+
+
+def test_ringing_that_outlasts_a_ramp_is_as_loud_as_the_force_that_began_it():
+    """Two samples of 39 Hz to an interval; 7 Hz rings on from full speed through zero. A wrong damping is far off."""
+    f, z, tick, C = 7.26, 0.0238, 0.011, 0.017
+    pole = 2 * np.pi * f * complex(-z, np.sqrt(1 - z**2))
+    at = np.arange(0.0, 560.0, tick) + 0.0031
+    volts = 34 * (np.abs(((np.maximum(at - 1, 0) / 5 + 1) % 4) - 2) - 1)
+    t = np.arange(0.01, 559.0, 0.025747)
+    force = C * volts * np.abs(volts)
+    left = np.diff(force, prepend=0.0) * (2 * np.pi * f) ** 2 / (2j * pole.imag * pole)
+    left = lfilter([1], [1, -np.exp(pole * tick)], left)
+    last = np.searchsorted(at, t, side="right") - 1
+    reading = force[last] + 2 * np.real(left[last] * np.exp(pole * (t - at[last])))
+    channels = (
+        Channel("command_voltage", "command", "command_voltage", "V", at, volts),
+        Channel("thrust", "cell", "thrust", "N", t, reading),
+    )
+    history = history_of(Recording("ramps", "T1", channels, source="ramps.h5"))
+    data, theta = start([history])
+    assert np.median(history.count[history.rows]) == 2
+
+    def missed(damping):
+        at = replace(theta, C=C, tares=(0.0,), terms=((1.0, f, damping),))
+        (told,), _ = raw(Model((StandResonance(),)), at, data, with_rate=False)
+        return float(np.sqrt(np.mean((told - data.thrust[0])[50:] ** 2)))
+
+    assert missed(z) < 1e-9
+    assert min(missed(0.95 * z), missed(1.05 * z)) > 1e-3
