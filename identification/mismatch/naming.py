@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -31,6 +32,10 @@ OWN_COORDINATE = 1e-4
 CANCELLED = 0.15
 """Of what each of two terms does alone: less together, and neither is seen."""
 MANY_SHAPES = 3
+REPAIR = 0.1
+"""Of what two shapes on one static curve explain together: what adds less than this to the other repairs it."""
+ALIKE = 0.7
+"""Of the same: where each explains more than this alone, either could be the one that is repaired."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,6 +126,33 @@ def _raw_effect(now: Fit, terms: tuple[Term, ...], data: Data) -> list[Floats]:
     return out
 
 
+def _standing(state: State, term: Term, data: Data, terms: Sequence[Term]) -> Standing:
+    less = without(state, term, data)
+    return less, swaps(state, term, less, data, terms)
+
+
+def _repaired(state: State, data: Data, less: Mapping[Term, Fit]) -> dict[Term, tuple[str, ...]]:
+    """Two shapes on one static curve that explain nearly the same, but for a little that one repairs of the other: the
+    curve has neither shape, and one that is not in the catalogue would do as well.
+
+    `less`: the fit without each term.
+    """
+    out: dict[Term, tuple[str, ...]] = {}
+    for one, other in combinations(state.fit.model.terms, 2):
+        curve = static_curve(one, measured=data.with_rate)
+        if not curve or curve != static_curve(other, measured=data.with_rate):
+            continue
+        neither = without(replace(state, fit=less[one]), other, data).chi2
+        together = neither - state.fit.chi2
+        adds = [less[term].chi2 - state.fit.chi2 for term in (one, other)]
+        if min(adds) < REPAIR * together and max(adds) < (1 - ALIKE) * together:
+            share = 100 * (1 - max(adds) / together)
+            for term, beside in ((one, other), (other, one)):
+                told = f"{beside.id} alone explains nearly the same ({share:.0f} % of what both do), and neither all"
+                out[term] = (*out.get(term, ()), told)
+    return out
+
+
 def name(
     state: State, data: Data, terms: Sequence[Term], standing: dict[Term, Standing] | None = None
 ) -> tuple[Named, ...]:
@@ -130,12 +162,10 @@ def name(
     at = 1
     std = state.fit.std
     many = max(len(state.fit.model.terms), 1)
+    stands = {term: (standing or {}).get(term) or _standing(state, term, data, terms) for term in state.fit.model.terms}
+    repaired = _repaired(state, data, {term: less for term, (less, _) in stands.items()})
     for term, values in zip(state.fit.model.terms, state.fit.theta.terms, strict=True):
-        if standing is not None and term in standing:
-            less, others = standing[term]
-        else:
-            less = without(state, term, data)
-            others = swaps(state, term, less, data, terms)
+        less, others = stands[term]
         gain = less.chi2 - state.fit.chi2
         close = [r for r in others if min(r.bic_loss, r.aic_loss) < NEAR and r.term.id != term.id]
         unique: dict[str, Rival] = {}
@@ -152,7 +182,7 @@ def name(
                 max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
                 float(probability),
                 tuple(unique.values()),
-                doubts(state, term, data, many),
+                (*doubts(state, term, data, many), *repaired.get(term, ())),
             )
         )
         at += len(values)

@@ -239,6 +239,29 @@ def test_doubts_say_why_a_name_is_not_earned():
     assert found.heldout.after < 0.5 * found.heldout.before, "the fit is better all the same"
 
 
+def test_two_shapes_that_repair_each_other_are_no_names():
+    """An exponent that is in no catalogue: either of two other shapes explains most, both together all of it."""
+    bent = table(lambda v: 0.6 * np.sign(v) * np.abs(v) ** 1.9, number=161, noise=0.1)
+    found = diagnosed(bent, without=("exponent",))
+    assert (found.verdict, effects(found)) == ("unexplained", set())
+    assert found.unexplained.where.quantity == "command_voltage"
+    assert len(found.unexplained.resembles) == 2
+    assert all("alone explains nearly the same" in text for text in found.unexplained.resembles)
+
+
+def test_two_shapes_that_each_explain_a_part_are_named():
+    def both(v):
+        V = np.clip(dead_band(1.5)(v), -10.0, 10.0)
+        return C * V * np.abs(V)
+
+    found = diagnosed(table(both, number=161))
+    assert found.unexplained is None
+    assert {frozenset({f.effect, *(r.effect for r in f.rivals)}) for f in found.findings} == {
+        frozenset({"dead_band"}),
+        frozenset({"command_saturation", "load_cell_saturation"}),
+    }
+
+
 def test_a_lag_and_a_lead_that_undo_each_other_are_doubted():
     from identification.mismatch.baseline import baseline, start
     from identification.mismatch.fitting import fit
