@@ -28,7 +28,7 @@ from identification.mismatch.omnibus import ALARM, Omnibus, judge_left
 from identification.mismatch.predicting import less, predicting
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.rivals import EQUAL, Standing, settle_forms
-from identification.mismatch.search import Found, prune, search
+from identification.mismatch.search import STATIC, Found, prune, search
 from identification.mismatch.shape_error import SHAPE_ERROR, corrections
 from identification.mismatch.state import State
 from identification.mismatch.sweeps import Limits
@@ -142,7 +142,7 @@ def _answer(
     doubted = [n for n in named if n.doubts]
     open_ended = (structure or bool(doubted)) and bool(left.groups)
     bare, place = _located(after, data, left, doubted, rng) if open_ended else (after, left)
-    free = extend(after, data, _foremost(place, doubted), doubted, others, rng) if open_ended else None
+    free = extend(after, data, _foremost(place, doubted, data), doubted, others, rng) if open_ended else None
     unexplained = _unexplained(place, bare, data, doubted, free, others) if open_ended else None
     verdict = _verdict(earned, unexplained)
     unnamed = [n.term for n in doubted]
@@ -240,10 +240,11 @@ def _located(
     return (bare, seen) if seen.p_value < ALARM else (after, left)
 
 
-def _foremost(left: Omnibus, doubted: Sequence[Named]) -> str:
-    """The coordinate over which it is left most clearly."""
+def _foremost(left: Omnibus, doubted: Sequence[Named], data: Data) -> str:
+    """The coordinate over which it is left most clearly; a static curve is one over what drives."""
     if left.p_value >= ALARM:  # nothing beyond noise is left: the doubt itself is the place
-        own = {c for n in doubted for c in n.term.coordinates}
+        driver = data.histories[0].driver_quantity
+        own = {driver if c in STATIC else c for n in doubted for c in n.term.coordinates}
         return next((g for g in left.groups if g.coordinate.quantity in own), left.groups[0]).coordinate.quantity
     return left.groups[0].coordinate.quantity
 
@@ -256,7 +257,7 @@ def _unexplained(
     free: Extended | None,
     others: Sequence[History],
 ) -> Unexplained:
-    quantity = free.terms[0].quantity if free is not None else _foremost(left, doubted)
+    quantity = free.terms[0].quantity if free is not None else _foremost(left, doubted, data)
     if free is None and left.p_value < ALARM:
         clear = [g.coordinate.quantity for g in left.groups if g.p_value < ALARM]
         quantity = foremost(after, data, clear or [quantity])

@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from identification.mismatch.fitting import Fit, at_bound
+from identification.mismatch.flatness import noise_goes_on
 from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.omnibus import Omnibus
 from identification.mismatch.preparing import DRIVERS
@@ -62,6 +63,8 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
         out.append("its parameters end at what is physically possible")
     if _unseen(state.fit, term, data):
         out.append("it is faster than the samples can show")
+    if noise_goes_on(state.fit, term, state.noise, data):
+        out.append("the noise goes on where the readings should be flat")
     change = _raw_effect(state.fit, (term,), data)
     out += [f"it and {other.id} nearly cancel" for other in _cancelled(state.fit, term, change, data)]
     n = data.size

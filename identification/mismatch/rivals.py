@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from identification.mismatch.fitting import Fit, at_bound, change_of, extended, fit
+from identification.mismatch.flatness import noise_goes_on
 from identification.mismatch.model import Data, price
 from identification.mismatch.screening import directions, orthogonal_basis, refined
 from identification.mismatch.state import State, refresh
@@ -66,7 +67,7 @@ def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> tuple[State
             standing[term] = (less, swaps(state, term, less, data, terms))
             # a value that is not possible explains nothing: whatever does nearly as well goes before it
             price = 0.0
-            if at_bound(term, state.fit, data, state.weights):
+            if at_bound(term, state.fit, data, state.weights) or noise_goes_on(state.fit, term, state.noise, data):
                 price = PRESSED_SHARE * (less.chi2 - state.fit.chi2)
             for rival in standing[term][1]:
                 loss = rival.bic_loss - price
@@ -145,7 +146,7 @@ def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]
         extra = more * logn
         begun = extended(less.theta, less.model, other, begin, bigger)
         new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - min(extra, 2.0 * more))
-        if at_bound(other, new, data, state.weights):
+        if at_bound(other, new, data, state.weights) or noise_goes_on(new, other, state.noise, data):
             continue
         loss = new.chi2 - now.chi2 + extra
         out.append(Rival(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))

@@ -7,13 +7,21 @@ import numpy as np
 import pytest
 from diagnosed_runs import NOISE, TOP, C, dead_band, levels, run, table
 
+from identification.mismatch.baseline import baseline, start
 from identification.mismatch.diagnose import diagnose
 from identification.mismatch.diagnosis import Diagnosis, Where, diagnosis_json
 from identification.mismatch.fitting import extended, fit
+from identification.mismatch.flatness import noise_goes_on
+from identification.mismatch.model import Model
+from identification.mismatch.naming import doubts
+from identification.mismatch.noise import Noise
 from identification.mismatch.predicting import predicting
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.search import search
 from identification.physics.dead_band import DeadBand
+from identification.physics.load_cell_saturation import LoadCellSaturation
+from identification.physics.motor_lag import MotorLag
+from identification.physics.time_skew import TimeSkew
 from identification.physics.zero_offset import ZeroOffset
 from identification.recording import Channel, Recording
 from sim_devices import concealed
@@ -262,15 +270,35 @@ def test_two_shapes_that_each_explain_a_part_are_named():
     }
 
 
-def test_a_lag_and_a_lead_that_undo_each_other_are_doubted():
-    from identification.mismatch.baseline import baseline, start
-    from identification.mismatch.fitting import fit
-    from identification.mismatch.model import Model
-    from identification.mismatch.naming import doubts
-    from identification.mismatch.preparing import history_of
-    from identification.physics.motor_lag import MotorLag
-    from identification.physics.time_skew import TimeSkew
+def clipping(limit, *, cell):
+    """Levels of which the highest meet a limit, N: of the cell, which clips noise and all, or of the drive."""
+    runs = run(None if cell else lambda _t, _V, F: np.clip(F, -limit, limit), seconds=120.0, rate=20.0)
+    command, thrust = runs.channels
+    clipped = replace(thrust, value=np.clip(thrust.value, -limit, limit))
+    return replace(runs, channels=(command, clipped)) if cell else runs
 
+
+def test_readings_are_flat_where_a_cell_clips():
+    (cell,) = diagnosed(clipping(66.0, cell=True)).findings
+    assert (cell.effect, cell.rivals) == ("load_cell_saturation", ())
+    (drive,) = diagnosed(clipping(66.0, cell=False)).findings
+    assert drive.effect == "command_saturation"
+    assert "load_cell_saturation" not in {r.effect for r in drive.rivals}
+
+
+@pytest.mark.parametrize("cell", [True, False])
+def test_a_cell_that_is_said_to_clip_is_doubted_where_the_noise_goes_on(cell):
+    data, theta = start([history_of(clipping(66.0, cell=cell))])
+    state = baseline(data, theta, (), Model())
+    clips = LoadCellSaturation()
+    model = Model((clips,))
+    found = replace(state, fit=fit(model, replace(state.fit.theta, terms=((66.0,),)), data, state.weights))
+    white = replace(found, noise=Noise(NOISE**2, 0.0))
+    assert noise_goes_on(white.fit, clips, white.noise, data) != cell
+    assert ("the noise goes on" in " ".join(doubts(white, clips, data, 1))) != cell
+
+
+def test_a_lag_and_a_lead_that_undo_each_other_are_doubted():
     t = np.arange(0.0, 120.0, 0.05)
     volts = 10.0 * np.sin(2 * np.pi * t / 20)
     force = C * volts * np.abs(volts) + 0.3 * np.random.default_rng(6).standard_normal(t.size)
