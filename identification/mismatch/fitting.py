@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.leading import delay_of, force_lead, passed_on, rate_lead, shown
+from identification.mismatch.leading import ahead, delay_of, shown, turning
 from identification.mismatch.model import Data, Model, Theta, Weights, parameters, predict, ticked
 from identification.physics.filters import delayed, reconstructed
 from identification.physics.term import Parameter, Term
@@ -96,19 +96,13 @@ def raw(
     late = delay_of(model, there) + there.shift
     for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(model, theta, history, data.scale, i)
-        share = passed_on(model, theta, history)
-        seen = share * shown(model, theta, history, F, x, theta.tares[i])
-        ahead = theta.C * seen * force_lead(model, theta, history, x, data.scale.driver, late)
+        more = theta.C * shown(model, theta, history, F, x, theta.tares[i])
+        more = more * ahead(model, theta, history, x, data.scale.driver, late)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
-        thrust.append((reconstructed(F, history.middle, history.sampled) + ahead)[rows] + theta.tares[i])
+        thrust.append((reconstructed(F, history.middle, history.sampled) + more)[rows] + theta.tares[i])
         if with_rate:
-            assert history.rate_sampled is not None
-            turning = rate_lead(model, theta, history, data.scale.driver, there.rate_shift)
-            lead = np.broadcast_to(share * turning, x.shape)
-            if theta.rate_shift:
-                x = delayed(x, history.edges, theta.rate_shift)
-            seen = reconstructed(x, history.middle, history.rate_sampled) + lead
+            seen = turning(model, theta, history, x, data.scale.driver, there.rate_shift)
             rate.append(theta.k * seen[history.rate_rows])
     return thrust, rate
 

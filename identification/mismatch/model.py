@@ -126,6 +126,7 @@ def predict(model: Model, theta: Theta, history: History, scale: Scale, run: int
             value = term.apply(value, moment, values)
             remember(history, key, value)
         else:
+            history.memo.move_to_end(key)
             value = known
     if stage < HYDRO:
         x = value

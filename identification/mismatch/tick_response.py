@@ -12,14 +12,14 @@ from identification.recording import Floats
 
 DYNAMIC = ("motor_lag", "stand_resonance", "time_skew")
 """What shows within a few ticks."""
-MOST_REMEMBERED = 200
 Acting = tuple[Term, tuple[float, ...], Scale]
 
 
 def told(rows: TickRows, acting: list[Acting], C: float, shift: float) -> Floats:
     """The rows as a model foretells them."""
-    late = shift + sum(values[0] for term, values, _ in acting if term.id == "time_skew")
-    return rows.predicted(C, held_back(rows, acting, shift), late)
+    terms = _dynamic(acting)
+    late = shift + sum(values[0] for term, values, _ in terms if term.id == "time_skew")
+    return rows.kept((C, *_key(terms, shift)), lambda: rows.predicted(C, held_back(rows, terms, shift), late))
 
 
 def held_back(rows: TickRows, acting: list[Acting], shift: float) -> Floats:
@@ -27,15 +27,18 @@ def held_back(rows: TickRows, acting: list[Acting], shift: float) -> Floats:
 
     Less what the means over intervals have of it: a smooth rise to the last value.
     """
-    terms = [each for each in acting if each[0].id in DYNAMIC]
+    terms = _dynamic(acting)
     if not terms and shift == 0:
         return np.zeros(rows.nodes.size - 1)
-    key = (tuple((term, values, sizes.driver) for term, values, sizes in terms), shift)
-    if key not in rows.memo:
-        if len(rows.memo) >= MOST_REMEMBERED:
-            rows.memo.clear()
-        rows.memo[key] = _held_back(rows, terms, shift)
-    return rows.memo[key]
+    return rows.kept(_key(terms, shift), lambda: _held_back(rows, terms, shift))
+
+
+def _dynamic(acting: list[Acting]) -> list[Acting]:
+    return [each for each in acting if each[0].id in DYNAMIC]
+
+
+def _key(terms: list[Acting], shift: float) -> tuple[object, ...]:
+    return (tuple((term, values, sizes.driver) for term, values, sizes in terms), shift)
 
 
 def _held_back(rows: TickRows, terms: list[Acting], shift: float) -> Floats:

@@ -50,11 +50,30 @@ def lag(
 ) -> tuple[Floats, Floats]:
     """Rate of n' = quadratic (w|w| - n|n|) + linear (w - n) at the ends of intervals, and its means (rotor equation).
 
-    The right side is lambda(n) (w - n) with lambda > 0, which each interval has at the middle of its two ends. All
-    ends at once by Newton's method: each step is one linear recursion. `near`: ends of a lag that is not far off.
+    `near`: ends of a lag that is not far off.
     """
     if quadratic == 0:
         return lowpass(w, dt, 1 / linear, start)
+    end = lag_ends(w, dt, quadratic, linear, start, near)
+    before = np.concatenate([[start], end[:-1]])
+    decay = quadratic * _secant(w, np.abs(w), 0.5 * (before + end)) + linear
+    decay *= dt
+    np.maximum(decay, 1e-12, out=decay)
+    mean: Floats = w - (before - w) * (np.expm1(-decay) / decay)
+    return end, mean
+
+
+def lag_ends(
+    w: Floats, dt: Floats, quadratic: float, linear: float, start: float = 0.0, near: Floats | None = None
+) -> Floats:
+    """The same rate at the ends of intervals alone.
+
+    The right side is lambda(n) (w - n) with lambda > 0, which each interval has at the middle of its two ends. All
+    ends at once by Newton's method: each step is one linear recursion.
+    """
+    if quadratic == 0:
+        keep = np.exp(-linear * dt)
+        return recursion(keep, (1 - keep) * w, start)
     much = np.abs(w)
     size = float(np.max(much, initial=0.0)) or 1.0
     end = w if near is None else near
@@ -62,46 +81,59 @@ def lag(
     before[0] = start
     for _ in range(LAG_STEPS):
         before[1:] = end[:-1]
-        gap = before - w
-        slope, bend = _secant(w, much, 0.5 * (before + end))
-        keep = np.exp(-(quadratic * slope + linear) * dt)
-        left = gap * keep
-        own = 0.5 * quadratic * dt * bend * left  # d left / d end, less its sign
+        middle = before + end
+        middle *= 0.5
+        keep = quadratic * _secant(w, much, middle) + linear
+        keep *= -dt
+        np.exp(keep, out=keep)
+        left = (before - w) * keep
+        own = (0.5 * quadratic) * dt * _secant_slope(w, much, middle)  # d left / d end, less its sign
+        own *= left
         steady = np.maximum(1 + own, LEAST_STEADY)
-        move = recursion(np.clip((keep - own) / steady, 0.0, 1.0), (w + left - end) / steady, 0.0)
+        left += w
+        left -= end
+        left /= steady
+        keep -= own
+        keep /= steady
+        move = recursion(np.clip(keep, 0.0, 1.0, out=keep), left, 0.0)
         end = end + move
-        if float(np.max(np.abs(move))) < LAG_CLOSE * size:
+        if float(np.max(np.abs(move, out=move))) < LAG_CLOSE * size:
             break
-    before[1:] = end[:-1]
-    slope, _ = _secant(w, much, 0.5 * (before + end))
-    decay = np.maximum((quadratic * slope + linear) * dt, 1e-12)
-    mean: Floats = w + (before - w) * -np.expm1(-decay) / decay
-    return end, mean
+    return end
 
 
 def lagged(w: Floats, before: Floats, since: Floats, quadratic: float, linear: float) -> Floats:
     """Rate of the same equation `since` s after it was `before`, w constant since then; any one shape."""
     much = np.abs(w)
+    gap = before - w
     end = before
     for _ in range(2):
-        slope, _ = _secant(w, much, 0.5 * (before + end))
-        end = w + (before - w) * np.exp(-(quadratic * slope + linear) * since)
+        rate = quadratic * _secant(w, much, 0.5 * (before + end)) + linear
+        rate *= -since
+        end = w + gap * np.exp(rate, out=rate)
     return end
 
 
-def _secant(w: Floats, much: Floats, n: Floats) -> tuple[Floats, Floats]:
-    """(w|w| - n|n|)/(w - n) without a difference of likes, and its slope over n; `much` is |w|.
+def _secant(w: Floats, much: Floats, n: Floats) -> Floats:
+    """(w|w| - n|n|)/(w - n) without a difference of likes; `much` is |w|.
 
     |w| + |n| where both turn one way, (w^2 + n^2)/(|w| + |n|) where they do not.
     """
-    size = np.abs(n)
-    both = np.maximum(much + size, 1e-300)
-    share = np.minimum(w * n, 0.0) / both
-    slope: Floats = both + 2 * share
-    # against each other d/d|n| (both - 2 much size / both)
-    against = 1 - 2 * (much / both) ** 2
-    bend: Floats = np.copysign(1.0, n) * np.where(share < 0, against, 1.0)
-    return slope, bend
+    both = np.abs(n)
+    both += much
+    product = w * n
+    if float(np.min(product, initial=0.0)) < 0:
+        both += 2 * np.minimum(product, 0.0) / np.maximum(both, 1e-300)
+    return both
+
+
+def _secant_slope(w: Floats, much: Floats, n: Floats) -> Floats:
+    """Of `_secant` over n: 1 - 2 w^2/(|w| + |n|)^2 where both turn against each other, else 1, with the sign of n."""
+    bend = np.copysign(1.0, n)
+    against = np.flatnonzero(w * n < 0)
+    if against.size:
+        bend[against] *= 1 - 2 * (much[against] / (much[against] + np.abs(n[against]))) ** 2
+    return bend
 
 
 def integral(value: Floats, edges: Floats, at: Floats) -> Floats:
@@ -118,11 +150,15 @@ def delayed(value: Floats, edges: Floats, delay: float) -> Floats:
     """Means over each interval of value(t - delay)."""
     dt = edges[1:] - edges[:-1]
     if abs(delay) > float(dt.min()):
-        out: Floats = np.diff(integral(value, edges, edges - delay)) / dt
-        return out
+        return np.asarray(np.diff(integral(value, edges, edges - delay)) / dt, dtype=np.float64)
     # of each interval only a part beside its edge is the neighbour's
-    beside = np.concatenate([value[:1], value[:-1]]) if delay > 0 else np.concatenate([value[1:], value[-1:]])
-    return value + (beside - value) * (abs(delay) / dt)
+    out = value.copy()
+    rise = value[1:] - value[:-1]
+    if delay > 0:
+        out[1:] -= rise * (delay / dt[1:])
+    else:
+        out[:-1] -= rise * (delay / dt[:-1])
+    return out
 
 
 def reconstructed(mean: Floats, middle: Floats, at: Floats) -> Floats:
@@ -132,9 +168,11 @@ def reconstructed(mean: Floats, middle: Floats, at: Floats) -> Floats:
     """
     slope = (mean[1:] - mean[:-1]) / (middle[1:] - middle[:-1])
     left, right = slope[:-1], slope[1:]
-    least = np.copysign(np.minimum(np.abs(left), np.abs(right)), left)
+    least = np.maximum(np.minimum(left, right), 0.0)
+    least += np.minimum(np.maximum(left, right), 0.0)
+    least *= (at - middle)[1:-1]
     out: Floats = mean.copy()
-    out[1:-1] += np.where(left * right > 0, least, 0.0) * (at - middle)[1:-1]
+    out[1:-1] += least
     return out
 
 

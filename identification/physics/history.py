@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.physics.filters import lag
+from identification.physics.kept import Kept
 from identification.physics.tick_rows import TickRows, tick_rows
 from identification.recording import Floats
 
@@ -24,6 +25,9 @@ CHANGED = 0.01
 """Share of the largest driver: a smaller difference between neighbouring intervals is no step."""
 BACK = 0.005
 """Share of the largest driver by which it must come back to have turned round."""
+MOST_LEADS = 160
+"""Remembered: those of all trials of a screening, twice."""
+MOST_LATELY = 12
 LARGEST_LEAD = 0.08
 """Of the largest driver: what changes by more is a step even in a fast ramp, and no tick."""
 
@@ -125,6 +129,10 @@ class History:
     """(n,) s, every sample of the rotation rate."""
     memo: OrderedDict[object, Floats] = field(default_factory=OrderedDict, repr=False)
     """Values behind the first terms of models predicted lately: a fit moves one parameter at a time."""
+    leads: Kept = field(default_factory=lambda: Kept(MOST_LEADS), repr=False)
+    """What dynamics make of the ticks: each screening tries the same ones."""
+    lately: Kept = field(default_factory=lambda: Kept(MOST_LATELY), repr=False)
+    """What the rates of the last few models make at the samples: most terms change none."""
     static: bool = False
     """Levels without a course of time: nothing that moves can be seen."""
 

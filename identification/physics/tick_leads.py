@@ -8,57 +8,53 @@ import numpy as np
 
 from identification.physics.filters import reconstructed, within_intervals
 from identification.physics.history import LARGEST_LEAD, History, Samples
-from identification.physics.ticks_passed import Passed
 from identification.recording import Floats
 
 
-def at_samples(history: History, passed: Passed, samples: Samples) -> Floats:
-    """(N,) rate at each sample, as dynamics pass it on; rate |rate| as a stand that rings shows it."""
-    assert history.ticks is not None
-    when, value = history.ticks
-    answer = passed.at if passed.ring is None else passed.rung_at
-    return answer(*samples.after(when, passed.delay), when, value)
+def lead(history: History, seen: Floats, means: Floats, samples: Samples, size: float) -> Floats:
+    """(M,) what is `seen` at the samples, mean over an interval, beside the line through `means` (M,).
+
+    Nothing where that is too much for a tick, `size` what the largest driver makes of it.
+    """
+    beside = seen - reconstructed(means, history.middle, samples.middle)
+    return _ticks(np.where(samples.count > 0, beside, 0.0), size)
 
 
-def lead(history: History, passed: Passed, value: Floats, means: Floats, samples: Samples) -> Floats:
-    """(M,) what `value` (N,) of `at_samples` has, mean over an interval, beside the line through `means` (M,)."""
-    beside = samples.means(value) - reconstructed(means, history.middle, samples.middle)
-    return _ticks(np.where(samples.count > 0, beside, 0.0), history, passed)
-
-
-def curvature(history: History, value: Floats, means: Floats, beside: Floats, samples: Samples) -> Floats:
-    """(M,) rate |rate| at the samples less what the line through means of the rate and its lead `beside` make of it."""
+def curvature(history: History, seen: Floats, means: Floats, beside: Floats, samples: Samples) -> Floats:
+    """(M,) rate |rate| `seen` at the samples less what the line through means of the rate and its lead make of it."""
     line = reconstructed(means * np.abs(means), history.middle, samples.middle)
-    out: Floats = samples.means(value * np.abs(value)) - line - 2 * np.abs(means) * beside
-    return np.where(beside != 0, out, 0.0)
+    return np.where(beside != 0, seen - line - 2 * np.abs(means) * beside, 0.0)
 
 
-def each_lead(history: History, passed: Passed, value: Floats, means: Floats, samples: Samples) -> Floats:
-    """(N,) as `lead`, sample by sample."""
-    return _ticks(value - within_intervals(means, history.edges, samples.time), history, passed)
+def each_lead(history: History, value: Floats, means: Floats, size: float) -> Floats:
+    """(N,) as `lead`, of each thrust sample."""
+    return _ticks(value - within_intervals(means, history.edges, history.sample_time), size)
 
 
 def with_leads(history: History) -> History:
     """With what its command itself does at the samples; a measured driver has no ticks, but curves all the same."""
     if history.ticks is None:
         return replace(history, curved=history.excess)
-    still, thrust, driver = Passed(), history.thrust_samples, history.driver
-    value = at_samples(history, still, thrust)
-    beside = lead(history, still, value, driver, thrust)
-    out = replace(
-        history,
-        lead=beside,
-        curved=curvature(history, value, driver, beside, thrust),
-        sample_lead=each_lead(history, still, value, driver, thrust),
-    )
+    driver, size, samples = history.driver, history.size, history.thrust_samples
+    value = _held(history, samples)
+    beside = lead(history, samples.means(value), driver, samples, size)
+    curved = curvature(history, samples.means(value * np.abs(value)), driver, beside, samples)
+    out = replace(history, lead=beside, curved=curved, sample_lead=each_lead(history, value, driver, size))
     if history.rate is None:
         return out
     turning = history.rate_samples
-    return replace(out, rate_lead=lead(history, still, at_samples(history, still, turning), driver, turning))
+    return replace(out, rate_lead=lead(history, turning.means(_held(history, turning)), driver, turning, size))
 
 
-def _ticks(value: Floats, history: History, passed: Passed) -> Floats:
-    """Without what is too much for a tick: of the driver, or what so much of it changes of driver |driver|."""
-    size = history.size if passed.ring is None else 2 * history.size**2
+def _held(history: History, samples: Samples) -> Floats:
+    """(N,) the command at each sample."""
+    assert history.ticks is not None
+    when, value = history.ticks
+    last, _ = samples.after(when, 0.0)
+    out: Floats = value[last]
+    return out
+
+
+def _ticks(value: Floats, size: float) -> Floats:
     out: Floats = np.where(np.abs(value) < LARGEST_LEAD * size, value, 0.0)
     return out

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.physics.kept import Kept
 from identification.recording import Floats
 
 if TYPE_CHECKING:
@@ -54,6 +55,7 @@ SHAPE = 0.01
 """Of a step: how far a response is known between nodes, and a static curve from level to level."""
 GAIN_STD = 0.1
 """Relative: how far the slope of the static curve may be off C V|V| where the command ticks."""
+MOST_KEPT = 1000
 JUMP_STD = 0.3
 """Of a step: how far the line between two nodes may be off a jump between them."""
 LEVELS = (0.1, 0.3, 0.5, 0.7, 0.9)
@@ -72,8 +74,8 @@ class TickRows:
     """(B + 1,) s after a tick; at the last nothing is held back."""
     levels: Floats
     """(5,) |V| of the ticks."""
-    memo: dict[object, Floats] = field(default_factory=dict, repr=False)
-    """Responses worked out lately: most parameters of a model move none."""
+    kept: Kept = field(default_factory=lambda: Kept(MOST_KEPT), repr=False)
+    """Responses and rows worked out lately: most parameters of a model move none."""
 
     def predicted(self, C: float, held_back: Floats, jump: float = 0.0) -> Floats:
         """(r + 3,) rows for 1 - s = held_back (B,) at the nodes, and what was loose, in its own sigmas.

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.physics.filters import complex_recursion, delayed, lag, lagged, recursion, resonant
+from identification.physics.filters import complex_recursion, delayed, lag_ends, lagged, recursion, resonant
 from identification.physics.history import History
 from identification.recording import Floats
 
@@ -51,18 +51,33 @@ class Passed:
         """(N,) the rate `since` s + delay after the tick `last`, of a driver that takes `value` (T,) at the ticks
         `when` (T,) s. It was settled before the first.
         """
+        return self.followed(last, since, value, self.rates(when, value))
+
+    def rung_at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
+        """(N,) rate |rate| as the stand shows it then."""
+        rate = self.at(last, since, when, value)
+        return rate * np.abs(rate) + self.ringing(last, since, when, value)
+
+    def rates(self, when: Floats, value: Floats, near: Floats | None = None) -> Floats:
+        """(T,) of the rotor at each tick. `near`: those of a rotor that is not far off."""
+        if self.rotor is None:
+            return value
+        begin = float(value[0])
+        end = lag_ends(value[:-1], np.diff(when), *self.rotor, begin, None if near is None else near[1:])
+        return np.concatenate([value[:1], end])
+
+    def followed(self, last: NDArray[np.intp], since: Floats, value: Floats, rates: Floats) -> Floats:
+        """(N,) as `at`; `rates` (T,) at the ticks."""
         out: Floats = value[last]
         if self.rotor is not None:
             quadratic, linear = self.rotor
             follows = np.flatnonzero(since * (quadratic * np.abs(value) + linear)[last] < SETTLED)
-            end, _ = lag(value[:-1], np.diff(when), quadratic, linear, float(value[0]))
-            begun = np.concatenate([value[:1], end])[last[follows]]
-            out[follows] = lagged(out[follows], begun, since[follows], quadratic, linear)
+            out[follows] = lagged(out[follows], rates[last[follows]], since[follows], quadratic, linear)
         return out
 
-    def rung_at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
-        """(N,) rate |rate| as the stand shows it then: modes of the linear response, the rotor taken as linear about
-        each tick."""
+    def ringing(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
+        """What the stand adds to rate |rate|, (N,): modes of the linear response, the rotor taken as linear about each
+        tick."""
         assert self.ring is not None
         c, f, z = self.ring
         w = 2 * np.pi * f
@@ -70,8 +85,7 @@ class Passed:
         force = value * np.abs(value)
         change, gap = np.diff(force, prepend=force[0]), np.diff(when, prepend=when[0])
         share: NDArray[np.complex128] = np.full(value.size, c * w**2 / (2j * pole.imag * pole))
-        rate = self.at(last, since, when, value)
-        out = rate * np.abs(rate)
+        out = np.zeros(since.size)
         if self.rotor is not None:
             quadratic, linear = self.rotor
             follow = 2 * quadratic * np.abs(value) + linear
