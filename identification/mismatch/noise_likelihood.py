@@ -25,6 +25,8 @@ MOST_STEPS = 30
 MOST_TRIES = 6
 ENDED = 1e-3
 """Fall of half the restricted deviance at which the search for variances ends."""
+NEARLY = 1e-2
+"""Fall that is foretold so well that it is not looked at: the next would be ten times smaller, or a hundred."""
 
 
 def longest_scale(runs: Sequence[Rows]) -> float:
@@ -99,7 +101,8 @@ def fit_noise(
     if start is None or start.bands != bands:
         scales = time_scales(runs) if in_time else ()
         quick = _differences(runs, residuals)
-        slow = tuple([0.05 * variance / max(len(scales), 1)] * len(scales))
+        slower = max(_beside(total, np.concatenate(columns)) - quick * float(np.mean(1 / weight)), 0.05 * variance)
+        slow = tuple([slower / max(len(scales), 1)] * len(scales))
         start = Noise(quick, 0.02 * quick / F2, scales, slow, bands, tuple([0.05 * variance] * len(bands)))
         first = likeliest(start)
         scales = refined_scales(first, runs)
@@ -119,8 +122,9 @@ def _likeliest(start: Noise, responses: Sequence[Response], floor: Floats) -> No
     damping = 1e-3
     for _ in range(MOST_STEPS):
         step = _step(values, here, floor, damping)
-        if -float(here.slope @ step) < ENDED:
-            break
+        foretold = -float(here.slope @ step)
+        if foretold < NEARLY:
+            return start.with_variances(values + step if foretold > 0 else values)
         for _ in range(MOST_TRIES):
             try:
                 moved, there = _levelled(start, values + step, responses, floor)
@@ -167,6 +171,12 @@ def _step(values: Floats, here: Likelihood, floor: Floats, damping: float) -> Fl
         step[low] = floor[low] - values[low]
         free &= ~low
     return step
+
+
+def _beside(residual: Floats, columns: Floats) -> float:
+    """Variance of a residual (n,) beside columns (n, p) that were fitted to it."""
+    left = residual - columns @ np.linalg.lstsq(columns, residual, rcond=None)[0] if columns.shape[1] else residual
+    return float(np.mean(left**2))
 
 
 def _differences(runs: Sequence[Rows], residuals: Sequence[Floats]) -> float:

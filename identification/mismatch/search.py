@@ -177,7 +177,7 @@ def _hidden(state: State, judged: Screening, data: Data) -> State | None:
         begin = refined(state.fit, data, state.weights, term, values)
         theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
         first = fit(bigger, theta, data, state.weights)
-        new = refresh(bigger, first.theta, data, None, None, now.noise)
+        new = refresh(bigger, first.theta, data, None, now, now.noise)
         gain = now.fit.deviance - new.fit.deviance
         if gain > judged.threshold**2 + price(term, data) * np.log(data.size):
             found.append((gain, new))
