@@ -93,9 +93,10 @@ def diagnose(
         found = search(seen.histories, rng, given=given, bands=seen.bands, without=without)
     after, standing = found.after, None
     if after.fit.model.terms:
-        settled, standing = settle_forms(after, found.data, found.terms)
-        after = prune(settled, found.data)
-        standing = standing if after is settled else None
+        after, standing = settle_forms(found.after, found.data, found.terms)
+        if after is not found.after:  # the search ends with what it pruned
+            pruned = prune(after, found.data)
+            after, standing = pruned, standing if pruned is after else None
     left = _with_colour(judge_left(after.fit, found.data, after.weights, rng), after, found.data)
     measured = replace(found.data, histories=histories)
     answer, after = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)

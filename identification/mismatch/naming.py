@@ -14,10 +14,10 @@ from identification.mismatch.flatness import noise_goes_on
 from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.omnibus import Omnibus
 from identification.mismatch.preparing import DRIVERS
-from identification.mismatch.rivals import NEAR, Rival, Standing, swaps, without
+from identification.mismatch.rivals import NEAR, Rival, Standing, swaps
 from identification.mismatch.screening import orthogonal_basis
 from identification.mismatch.search import STATIC, static_curve
-from identification.mismatch.state import State
+from identification.mismatch.state import State, fit_without
 from identification.physics.term import Term
 from identification.recording import Floats
 from identification.tails import chi2_sf, noncentral_chi2_sf
@@ -130,7 +130,7 @@ def _raw_effect(now: Fit, terms: tuple[Term, ...], data: Data) -> list[Floats]:
 
 
 def _standing(state: State, term: Term, data: Data, terms: Sequence[Term]) -> Standing:
-    less = without(state, term, data)
+    less = fit_without(state, term, data)
     return less, swaps(state, term, less, data, terms)
 
 

@@ -12,7 +12,7 @@ from identification.mismatch.fitting import Fit, at_bound, change_of, extended, 
 from identification.mismatch.flatness import noise_goes_on
 from identification.mismatch.model import Data, price
 from identification.mismatch.screening import directions, orthogonal_basis, refined
-from identification.mismatch.state import State, refresh
+from identification.mismatch.state import State, fit_without, refresh
 from identification.physics.term import Term
 from identification.recording import Floats
 
@@ -49,21 +49,13 @@ Standing = tuple[Fit, list[Rival]]
 """The fit without a term, and the rivals in its place."""
 
 
-def without(state: State, term: Term, data: Data) -> Fit:
-    """The model without one term, refitted with the same noise."""
-    smaller = state.fit.model.without(term)
-    known = dict(zip(state.fit.model.terms, state.fit.theta.terms, strict=True))
-    theta = replace(state.fit.theta, terms=tuple(known[t] for t in smaller.terms))
-    return fit(smaller, theta, data, state.weights)
-
-
 def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> tuple[State, dict[Term, Standing] | None]:
     """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end."""
     for _ in range(ROUNDS):
         best: tuple[float, Fit] | None = None
         standing: dict[Term, Standing] = {}
         for term in state.fit.model.terms:
-            less = without(state, term, data)
+            less = fit_without(state, term, data)
             standing[term] = (less, swaps(state, term, less, data, terms))
             # a value that is not possible explains nothing: whatever does nearly as well goes before it
             price = 0.0
@@ -89,7 +81,7 @@ def _one_for_two(
     for pair in combinations(now.model.terms, 2):
         less = now
         for term in pair:
-            less = without(replace(state, fit=less), term, data)
+            less = fit_without(replace(state, fit=less), term, data)
         others = [t for t in terms if t.id not in {u.id for u in less.model.terms} and t not in pair]
         found = directions(less, data, state.weights, others)
         score = found.columns.T @ less.residual

@@ -76,6 +76,12 @@ class Screening:
         return out
 
 
+def lengths(columns: Floats) -> Floats:
+    """(q,) Euclidean norms of columns (n, q), without a copy of them."""
+    out: Floats = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    return out
+
+
 def orthogonal_basis(columns: Floats) -> Floats:
     """(n, r) orthonormal basis of what columns span."""
     if columns.shape[1] == 0:
@@ -137,16 +143,19 @@ def directions(
         [np.column_stack(c) for c in rate if c],
         [np.column_stack(c) for c in ticks],
     )
-    before = np.linalg.norm(columns, axis=0)
-    columns = columns - basis @ (basis.T @ columns)
-    size = np.linalg.norm(columns, axis=0)
+    before = lengths(columns)
+    columns -= basis @ (basis.T @ columns)
+    size = lengths(columns)
     good = (size > LEAST_DIRECTION * before) & (size > 0) & np.isfinite(size)
     keep = np.flatnonzero(good)
+    if keep.size < good.size:
+        columns = columns[:, keep]
+    columns /= size[keep]
     return Directions(
         tuple(used[j] for j in keep),
         tuple(values[j] for j in keep),
         tuple(sided[j] for j in keep),
-        columns[:, keep] / size[keep],
+        columns,
         size[keep],
     )
 

@@ -18,7 +18,7 @@ from identification.mismatch.screening import (
     screen,
 )
 from identification.mismatch.shape_error import allowed, corrections
-from identification.mismatch.state import State, refresh
+from identification.mismatch.state import State, fit_without, refresh
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.history import History
 from identification.physics.term import Term
@@ -210,13 +210,9 @@ def prune(state: State, data: Data) -> State:
     """Drop terms that no longer earn their place."""
     while state.fit.model.terms:
         costs = []
-        for term in state.fit.model.terms:
-            smaller = state.fit.model.without(term)
-            kept = dict(zip(state.fit.model.terms, state.fit.theta.terms, strict=True))
-            theta = replace(state.fit.theta, terms=tuple(kept[t] for t in smaller.terms))
-            less = fit(smaller, theta, data, state.weights)
-            extra = len(kept[term])
-            costs.append((less.chi2 - state.fit.chi2 - accept_threshold(extra), less))
+        for term, values in zip(state.fit.model.terms, state.fit.theta.terms, strict=True):
+            less = fit_without(state, term, data)
+            costs.append((less.chi2 - state.fit.chi2 - accept_threshold(len(values)), less))
         worst, less = min(costs, key=lambda pair: pair[0])
         if worst > 0:
             break

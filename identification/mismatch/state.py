@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from identification.mismatch.model import Data, Model, Theta, Weights, weights
 from identification.mismatch.noise import Noise, Rows
 from identification.mismatch.noise_likelihood import fit_noise
 from identification.physics.free_form import spline
+from identification.physics.term import Term
 from identification.recording import Floats
 
 MOST_NODES = 17
@@ -26,10 +27,22 @@ class State:
     rate_noise: Noise | None
     weights: Weights
     rows: tuple[Rows, ...]
+    lesser: dict[Term, Fit] = field(default_factory=dict, init=False, repr=False)
+    """By `fit_without`."""
 
     @property
     def bic(self) -> float:
         return self.fit.deviance + int(self.fit.free.sum()) * float(np.log(max(self.fit.residual.size, 2)))
+
+
+def fit_without(state: State, term: Term, data: Data) -> Fit:
+    """The model without one of its terms, refitted with the same noise; once for all who ask."""
+    if term not in state.lesser:
+        smaller = state.fit.model.without(term)
+        kept = dict(zip(state.fit.model.terms, state.fit.theta.terms, strict=True))
+        theta = replace(state.fit.theta, terms=tuple(kept[t] for t in smaller.terms))
+        state.lesser[term] = fit(smaller, theta, data, state.weights)
+    return state.lesser[term]
 
 
 def forces(fit_model: Model, theta: Theta, data: Data) -> list[Floats]:
