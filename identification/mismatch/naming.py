@@ -145,7 +145,7 @@ def _repaired(state: State, data: Data, less: Mapping[Term, Fit]) -> dict[Term, 
         curve = static_curve(one, measured=data.with_rate)
         if not curve or curve != static_curve(other, measured=data.with_rate):
             continue
-        neither = without(replace(state, fit=less[one]), other, data).chi2
+        neither = fit_without(replace(state, fit=less[one]), other, data).chi2
         together = neither - state.fit.chi2
         adds = [less[term].chi2 - state.fit.chi2 for term in (one, other)]
         if min(adds) < REPAIR * together and max(adds) < (1 - ALIKE) * together:
