@@ -63,7 +63,8 @@ def _interval(fitted: Fit, data: Data, weights: Weights, j: int, known: Paramete
     value = float(fitted.theta.vector[j])
     wanted = JUMPS if known.jumps else QUANTILE
     first = max(wanted * float(np.nan_to_num(fitted.std[j])), LEAST_STEP * float(step[j]))
-    ends = (_end(Profile(fitted, data, weights, j), wanted, value, bound, first) for bound in (known.low, known.high))
+    profiles = [Profile(fitted, data, weights, j, jumps=known.jumps) for _ in range(2)]
+    ends = (_end(p, wanted, value, bound, first) for p, bound in zip(profiles, (known.low, known.high), strict=True))
     # a level so near counts as half beyond a spread threshold, wholly beyond a sharp one
     far = [abs(end - value) + 0.5 * known.blur for end in ends]
     return Interval(max(value - far[0], known.low), min(value + far[1], known.high))
@@ -72,11 +73,11 @@ def _interval(fitted: Fit, data: Data, weights: Weights, j: int, known: Paramete
 class Profile:
     """The rise of chi-square where parameter `j` of theta's vector is held elsewhere and the other free ones follow.
 
-    They follow by Gauss-Newton, each time from where they were last.
+    They follow by Gauss-Newton, each time from where they were last; from the fit where the prediction jumps at `j`.
     """
 
-    def __init__(self, fitted: Fit, data: Data, weights: Weights, j: int) -> None:
-        self.fitted, self.data, self.weights, self.j = fitted, data, weights, j
+    def __init__(self, fitted: Fit, data: Data, weights: Weights, j: int, *, jumps: bool = False) -> None:
+        self.fitted, self.data, self.weights, self.j, self.jumps = fitted, data, weights, j, jumps
         self.low, self.high, _ = bounds_of(fitted.model, data, fitted.theta)
         moves = np.linalg.norm(fitted.jacobian, axis=0) * (self.high - self.low)[fitted.free] > LEAST_REACH
         mine = np.flatnonzero(fitted.free) == j
@@ -110,7 +111,8 @@ class Profile:
                 theta = self.fitted.theta.with_vector(vector)
                 columns = columns_of(self.fitted.model, theta, self.data, self.weights, others)
                 self.slopes, fresh = _Slopes.of(columns), True
-        self.drawn = (vector[others] - best[others]) / away
+        if not self.jumps:
+            self.drawn = (vector[others] - best[others]) / away
         return float(residual @ residual) - self.fitted.chi2
 
     def _moved(self, vector: Floats, step: Floats) -> Floats:
