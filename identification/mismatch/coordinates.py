@@ -14,6 +14,7 @@ import numpy as np
 from identification.mismatch.fitting import Fit, raw
 from identification.mismatch.model import Data, predict
 from identification.physics.filters import delayed, lowpass
+from identification.physics.free_form import turned
 from identification.physics.rotation_coupling import slip
 from identification.recording import Floats
 
@@ -129,6 +130,8 @@ def _splines(
     return Coordinate(quantity, tuple(over), unit, tuple(columns), what)
 
 
+WAKE = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+"""s since it turned the other way."""
 LATE = (1.0, 10.0, 100.0)
 """Intervals of the finest kind."""
 
@@ -157,9 +160,17 @@ def _times(view: _View) -> Iterator[Coordinate]:
     for i, (s, f, before) in enumerate(zip(since, view.force, view.previous, strict=True)):
         basis = hats(np.log(np.maximum(s, knots[0])), np.log(knots))
         jump = f - before * np.abs(before) / data.scale.driver**2
-        kinds = (jump, f, np.where(view.rate[i] * before < 0, f, 0.0))
-        columns.append(np.column_stack([*(basis * kind[:, None] for kind in kinds), *_late(view, i)]))
+        steps = (basis * kind[:, None] for kind in (jump, f))
+        columns.append(np.column_stack([*steps, _turned(view, i), *_late(view, i)]))
     yield Coordinate("time_since_step", since, "s", tuple(columns), "it follows a step late, or overshoots")
+
+
+def _turned(view: _View, run: int) -> Floats:
+    """(n, p) hats over the time since it turned the other way, times the force: a sine turns without a step."""
+    history, rows = view.data.histories[run], view.data.rows[run]
+    age, known = turned(history, view.whole[run][1], view.data.scale)
+    basis = hats(np.log(np.maximum(age[rows], WAKE[0])), np.log(np.array(WAKE)))
+    return basis * np.where(known[rows], view.force[run], 0.0)[:, None]
 
 
 def _late(view: _View, run: int) -> Iterator[Floats]:

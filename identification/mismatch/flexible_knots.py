@@ -14,7 +14,7 @@ from identification.mismatch.knots import Moments, choose, heights, nodes_of
 from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.screening import orthogonal_basis
 from identification.mismatch.state import State
-from identification.physics.free_form import Flexible, Multiplier, lately, spline
+from identification.physics.free_form import Flexible, Multiplier, lately, spline, turned
 from identification.recording import Floats
 
 JUMPS = 3
@@ -96,7 +96,7 @@ def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], lis
             "gain": F,
             "even": np.abs(F),
             "step": F - fitted.theta.C * before * np.abs(before),
-            "reversed": np.where(x * before < 0, F, 0.0),
+            "reversed": np.where(turned(h, x, data.scale)[1], F, 0.0),
             "rate": np.abs(x) / data.scale.driver,
             "drive": 2 * fitted.theta.C * np.abs(x),
         }

@@ -10,23 +10,24 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
-from identification.physics.filters import lowpass
+from identification.physics.filters import lowpass, since_opposite
 from identification.physics.history import TURNING, History
 from identification.physics.rotation_coupling import slip
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
 Multiplier = Literal["force", "gain", "even", "step", "reversed", "rate", "drive", "late"]
-"""What the spline multiplies: 1, the thrust T, |T|, the change of T since the level before, T where the level before
-had the other sign, |x|, what T was lately less what it is; or it adds to x."""
+"""What the spline multiplies: 1, the thrust T, |T|, the change of T since the level before, T once it has turned the
+other way, |x|, what T was lately less what it is; or it adds to x."""
 MULTIPLIERS: tuple[Multiplier, ...] = ("force", "gain", "even", "step", "reversed", "rate", "drive", "late")
 WORDS: dict[Multiplier, str] = {
     "force": "adds a force",
     "gain": "multiplies the thrust",
     "even": "adds a force in proportion to the size of the thrust",
     "step": "acts on the change of thrust since the level before",
-    "reversed": "multiplies the thrust where the level before had the other sign",
+    "reversed": "multiplies the thrust, by the time since it turned the other way",
     "rate": "adds a force in proportion to the size of the drive",
     "drive": "adds to the drive",
     "late": "lets a share of the thrust come late",
@@ -125,6 +126,8 @@ class Flexible:
         match self.quantity:
             case "time":
                 return history.middle
+            case "time_since_step" if "reversed" in self.times:
+                return turned(history, x, scale)[0]
             case "time_since_step":
                 return history.since_step
             case "previous_voltage":
@@ -170,11 +173,17 @@ def multiplied(multiplier: Multiplier, value: Floats, now: Moment, memory: float
             out: Floats = value - now.C * before * np.abs(before)
             return out
         case "reversed":
-            return np.where(now.x * now.history.previous < 0, value, 0.0)
+            return np.where(turned(now.history, now.x, now.scale)[1], value, 0.0)
         case "rate":
             return np.abs(now.x) / now.scale.driver
         case "late":
             return lately(value, now.history.dt, memory)
+
+
+def turned(history: History, x: Floats, scale: Scale) -> tuple[Floats, NDArray[np.bool_]]:
+    """S since it last turned the other way, and whether it ever did; (M,). A sine turns without a step."""
+    age, _, known = since_opposite(x, history.dt, TURNING * scale.driver)
+    return np.where(known, age, 0.0), known
 
 
 def lately(force: Floats, dt: Floats, memory: float) -> Floats:

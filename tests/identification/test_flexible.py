@@ -17,7 +17,7 @@ from identification.mismatch.preparing import history_of
 from identification.mismatch.simulating import Drive, Prediction, others_of, simulate
 from identification.mismatch.sizes import scale_of
 from identification.physics.formula_form import Monomial
-from identification.physics.free_form import MULTIPLIERS, Flexible, spline
+from identification.physics.free_form import MULTIPLIERS, Flexible, spline, turned
 from identification.physics.history import History
 from identification.physics.term import Moment, Scale
 from identification.recording import Channel
@@ -131,7 +131,9 @@ def test_what_a_spline_multiplies(multiplier):
         "step": F - C * h.previous * np.abs(h.previous),
         "rate": np.abs(h.driver) / 8.0,
         "drive": np.ones_like(F),
-        "reversed": np.where(h.driver * h.previous < 0, F, 0.0),
+        "reversed": np.where(
+            np.where(F > 0, np.minimum.accumulate(h.driver) < 0, np.maximum.accumulate(h.driver) > 0), F, 0.0
+        ),
         "late": lagging(F, 0.5, 2.0) - F,
     }[multiplier]
     term = Flexible("time", "s", (0.0, 5.0, 10.0), (0,), (multiplier,), degree=1, memory=2.0)
@@ -152,6 +154,21 @@ def test_coordinates_that_every_run_has(quantity):
     assert term.covariate(h, h.driver, SCALE).shape == h.driver.shape
     assert term.needs == ()
     assert term.trials(SCALE) == term.finer((0.0,), SCALE) == ()
+
+
+def test_time_since_it_turned_the_other_way_is_seen_on_a_sine():
+    """No step, and rests between: what was lost last is counted from the last interval of the other direction."""
+    t = np.arange(0.0, 40.0, 0.5)
+    V = 8.0 * np.sin(2 * np.pi * t / 20)
+    h = history()
+    h = replace(h, edges=np.append(t, 40.0), driver=V, thrust=V, count=np.ones(t.size, int), sampled=t, within=0.0 * t)
+    since, known = turned(h, V, SCALE)
+    assert not known[t < 10.0].any()
+    assert known[t > 10.5].all()
+    away = known & (np.abs(V) > 0.5)
+    assert since[away] == pytest.approx((t[away] + 0.25) % 10.0, abs=0.76)
+    term = Flexible("time_since_step", "s", (0.5, 10.0), (1,), ("reversed",))
+    assert term.covariate(h, V, SCALE) == pytest.approx(since)
 
 
 def test_a_recorded_quantity_is_needed():
