@@ -30,6 +30,16 @@ MOST_LEADS = 160
 MOST_LATELY = 12
 LARGEST_LEAD = 0.08
 """Of the largest driver: what changes by more is a step even in a fast ramp, and no tick."""
+LOUD_READINGS = 0.4, 0.9
+"""Of the largest reading: above, the cell may clip; below, noise that is proportional is too small."""
+LEAST_IN_ROW, LEAST_SCATTER = 5, 200
+"""Samples of an interval, and of a run, that tell how samples scatter."""
+STILL = 1e-3
+"""Share of the largest driver by which it may move within an interval that tells so."""
+TAIL = 3.0
+"""Times the standard deviation of the others: that of the samples in the tails."""
+GLITCH = 30.0
+"""Times the median: what is off by more is no noise."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,6 +180,32 @@ class History:
     def rate_samples(self) -> Samples:
         """Every sample of the rotation rate that is in an interval."""
         return samples_in(self.rate_time, self.edges)
+
+    @cached_property
+    def scatter(self) -> tuple[float, float] | None:
+        """N and 1: standard deviation of a sample about the mean where readings are large, and the share of samples
+        that scatter TAIL times as much; None where too few samples tell. By the mean |e| and the mean e^2."""
+        samples = self.thrust_samples
+        if self.sample_thrust.size < LEAST_SCATTER or self.sample_thrust.size != samples.time.size:
+            return None
+        low, high = (share * float(np.nanmax(np.abs(self.thrust))) for share in LOUD_READINGS)
+        size = np.abs(self.thrust)
+        moved = np.broadcast_to(np.abs(self.excess), size.shape)
+        usual = (size > low) & (size < high) & (samples.count >= LEAST_IN_ROW) & (moved < (STILL * self.size) ** 2)
+        which = usual[samples.interval]
+        if np.count_nonzero(which) < LEAST_SCATTER:
+            return None
+        at, n = samples.interval[which], samples.count[samples.interval[which]]
+        e = np.abs(self.sample_thrust[which] - self.thrust[at]) * np.sqrt(n / (n - 1))
+        e = np.minimum(e, GLITCH * float(np.median(e)))
+        first, second = float(np.mean(e)) * np.sqrt(np.pi / 2), float(np.mean(e**2))
+        if first <= 0:
+            return None
+        # second = s^2 (1 + (TAIL^2 - 1) w), first = s (1 + (TAIL - 1) w)
+        q, a, b = second / first**2, TAIL - 1, TAIL**2 - 1
+        root = (b - 2 * a * q) ** 2 - 4 * a**2 * q * (q - 1)
+        w = max((b - 2 * a * q - float(np.sqrt(max(root, 0.0)))) / (2 * a**2 * q), 0.0)
+        return first / (1 + a * w), w
 
     @cached_property
     def rows(self) -> NDArray[np.intp]:

@@ -8,7 +8,7 @@ from typing import ClassVar
 import numpy as np
 from scipy.special import ndtr
 
-from identification.physics.history import History
+from identification.physics.history import TAIL, History
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
@@ -74,9 +74,14 @@ class LoadCellSaturation:
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         # the mean of noisy samples that clip one by one while the force moves within the interval
-        reading, noise = value + now.tare, now.scale.noise
+        noise, tails = now.history.scatter or (now.scale.noise, 0.0)
         half = np.maximum(half_moved(now.history, now.C, now.x), max(LEAST_MOVE * theta[0], LEAST_BLUR * noise))
-        out: Floats = value - (_beyond(reading - theta[0], half, noise) - _beyond(-theta[0] - reading, half, noise))
+        out = value.copy()
+        for share, std in ((1 - tails, noise), (tails, TAIL * noise)):
+            if share > 0:
+                over = value + now.tare - theta[0]
+                under = -theta[0] - value - now.tare
+                out -= share * (_beyond(over, half, std) - _beyond(under, half, std))
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

@@ -476,6 +476,32 @@ def test_a_clipping_cell_shows_the_mean_of_samples_that_clip_one_by_one():
     assert hard == pytest.approx(np.clip(value + 7.0, -90.0, 90.0) - 7.0)
 
 
+@pytest.mark.parametrize("dof", [4, np.inf])
+def test_a_clipping_cell_knows_how_its_samples_scatter_in_the_tails(dof):
+    """Levels of 100 samples each; Student's noise of four degrees of freedom, or normal."""
+    rng = np.random.default_rng(3)
+    level = np.concatenate([rng.uniform(40.0, 80.0, 90), np.linspace(94.0, 106.0, 40)])
+    e = rng.standard_normal((level.size, 100)) if np.isinf(dof) else rng.standard_t(dof, (level.size, 100))
+    thrust = np.clip(level[:, None] + e, -100.0, 100.0)
+    n = level.size
+    run = replace(
+        H,
+        edges=np.arange(n + 1.0),
+        driver=np.sqrt(level),
+        thrust=thrust.mean(axis=1),
+        excess=np.zeros(1),
+        sample_time=np.repeat(np.arange(n), 100) + np.tile((np.arange(100) + 0.5) / 100, n),
+        sample_thrust=thrust.ravel(),
+    )
+    std, tails = run.scatter
+    assert std == pytest.approx(1.0, rel=0.1)
+    assert tails == pytest.approx(0.0 if np.isinf(dof) else 0.12, abs=0.04)
+    got = term("load_cell_saturation").apply(level, moment(run, replace(S, noise=1.0), x=np.zeros(n)), (100.0,))
+    many = rng.standard_normal(40_000) if np.isinf(dof) else rng.standard_t(dof, 40_000)
+    expected = np.minimum(level[:, None] + many, 100.0).mean(axis=1)
+    assert got == pytest.approx(expected, abs=0.03)
+
+
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_a_ramp_through_the_limit_of_the_cell_clips_in_a_part_of_each_interval(noise):
     ends = np.linspace(-14.0, 14.0, 31)
