@@ -13,6 +13,7 @@ from identification.mismatch.model import Data, Model, Theta, Weights
 from identification.mismatch.screening import (
     MOST_PLAIN,
     PLAIN,
+    lengths,
     matching_pursuit,
     orthogonal_basis,
 )
@@ -57,8 +58,8 @@ def every_shape(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
     """(n, k) raw columns: all trials of the catalogue's terms, and any shape over each coordinate."""
     shapes = [np.concatenate(c.columns) for c in coordinates(fit_now, data)]
     columns = np.column_stack([raw_directions(fit_now, data, terms), *shapes])
-    out: Floats = columns[:, np.linalg.norm(columns, axis=0) > 0]
-    return out
+    some = lengths(columns) > 0
+    return columns if some.all() else columns[:, some]
 
 
 def pursue(fit_now: Fit, data: Data, judged: Weights, raw_columns: Floats) -> Floats:
@@ -70,9 +71,9 @@ def pursue(fit_now: Fit, data: Data, judged: Weights, raw_columns: Floats) -> Fl
     n = data.size
     columns = thrust_only.whiten(by_run(raw_columns, data), [])
     basis = orthogonal_basis(fit_now.jacobian[:n])
-    columns = columns - basis @ (basis.T @ columns)
-    first = np.linalg.norm(columns, axis=0)
-    columns = np.where(first > 1e-6 * np.median(first), columns / np.maximum(first, 1e-300), 0.0)
+    columns -= basis @ (basis.T @ columns)
+    first = lengths(columns)
+    columns *= np.where(first > 1e-6 * np.median(first), 1 / np.maximum(first, 1e-300), 0.0)
     chosen, _ = matching_pursuit(columns, fit_now.residual[:n], PLAIN, MOST_PLAIN)
     out: Floats = raw_columns[:, chosen]
     return out
