@@ -247,6 +247,7 @@ def _flexible(table: Table) -> Flexible:
         tuple(times),
         1 if table.whole("degree") == 1 else 3,
         table.number("memory", 0.0),
+        table.number("period", 0.0),
     )
 
 

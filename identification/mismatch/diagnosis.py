@@ -94,6 +94,8 @@ class Unexplained:
     """Effects that fit but whose name was not earned, each with the reason."""
     flexible: tuple[FlexibleShape, ...] = ()
     """Of the final model, the clearest first; empty where none predicts better what was not fitted."""
+    equals: tuple[str, ...] = ()
+    """Coordinates over which the first flexible term would have done about as well."""
     replaces: tuple[str, ...] = ()
     """Effects whose name was not earned and whose place the flexible terms take."""
     heldout_without: float | None = None
@@ -288,6 +290,7 @@ def _unexplained(u: Unexplained) -> dict[str, object]:
         "shape": [{"at": _number(a), "residual": _number(b), "std": _number(c)} for a, b, c in u.shape],
         "statement": u.statement,
         "resembles": list(u.resembles),
+        "equals": list(u.equals),
         "flexible": flexible_json(u.flexible, u.replaces, u.heldout_without),
         "formula": None if u.formula is None else formula_json(u.formula),
     }

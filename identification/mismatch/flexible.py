@@ -20,6 +20,7 @@ from identification.mismatch.judging import Score, blocks, judge_blocks, judge_r
 from identification.mismatch.model import Data, weights
 from identification.mismatch.naming import Named
 from identification.mismatch.omnibus import ALARM, judge_left
+from identification.mismatch.pulses import Pulses
 from identification.mismatch.state import State, forces, refresh
 from identification.physics.free_form import Flexible
 from identification.physics.history import History
@@ -30,6 +31,8 @@ MOST_COORDINATES = 3
 """Coordinates tried for each term, the clearest first."""
 EQUAL = 10.0
 """BIC within which two coordinates do equally well."""
+MONOTONE = 0.9
+"""Rank correlation with time above which a recorded quantity goes one way only."""
 LOCATED = 0.8
 """Share of the best coordinate's gain at which the located one is kept."""
 FOLLOW_LOAD = ("bus_voltage", "current", "load_history")
@@ -57,6 +60,8 @@ class Extended:
     """Held-out RMSE of the model before, N."""
     held: float
     """Held-out RMSE with them, N."""
+    equals: tuple[str, ...]
+    """Coordinates over which the first of them would have done about as well."""
 
 
 def extend(
@@ -75,7 +80,7 @@ def extend(
     part, judge, begin = split(after, data, others)
     first = judge(begin.fit)
     for smaller in _bases(begin, part, [n.term for n in doubted]):
-        state, terms, held = _grown(smaller, part, located, judge, rng)
+        state, terms, held, equals = _grown(smaller, part, located, judge, rng)
         if terms and (better(held, first, 0) or (smaller is not begin and held.rmse < AS_GOOD * first.rmse)):
             break
     else:
@@ -83,7 +88,7 @@ def extend(
     whole = refresh(state.fit.model, replace(state.fit.theta, tares=after.fit.theta.tares), data, None, None)
     whole, final = _anew(whole, terms, data)
     dropped = tuple(t for t in after.fit.model.terms if t not in state.fit.model.terms)
-    return Extended(whole, tuple(final), dropped, first.rmse, held.rmse)
+    return Extended(whole, tuple(final), dropped, first.rmse, held.rmse, equals)
 
 
 def foremost(state: State, data: Data, order: Sequence[str]) -> str:
@@ -140,55 +145,77 @@ def _bases(begin: State, part: Data, doubted: Sequence[Term]) -> list[State]:
 
 def _grown(
     state: State, part: Data, located: str, judge: Judge, rng: np.random.Generator
-) -> tuple[State, list[Flexible], Score]:
-    """Terms one after another while each predicts better what was not fitted."""
+) -> tuple[State, list[Flexible], Score, tuple[str, ...]]:
+    """Terms one after another while each predicts better what was not fitted; and the first one's equals."""
     terms: list[Flexible] = []
+    equals: tuple[str, ...] = ()
     held = judge(state.fit)
-    order = list(dict.fromkeys((located, *_left(state, part, rng))))
+    left, pulses = _left(state, part, rng)
+    order = list(dict.fromkeys((located, *left)))
     while True:
         taken = {t.quantity for t in terms}
         new = None
-        for candidate in _candidates(state, part, [q for q in order if q not in taken]):
+        candidates = _candidates(state, part, [q for q in order if q not in taken], pulses)
+        for candidate in candidates:
             tried, term = _added(state, part, candidate)
             score = judge(tried.fit)
             if better(score, held, len(term.parameters(part.scale))):
                 new, held = tried, score
+                equals = equals if terms else _equals(candidate, candidates)
                 terms.append(term)
                 break
         if new is None:
-            return state, terms, held
+            return state, terms, held, equals
         state = new
         if len(terms) == MOST_TERMS:
-            return state, terms, held
-        order = _left(state, part, rng)
+            return state, terms, held, equals
+        order, pulses = _left(state, part, rng)
 
 
-def _left(state: State, part: Data, rng: np.random.Generator) -> list[str]:
-    """Coordinates over which something is left, the clearest first."""
+def _left(state: State, part: Data, rng: np.random.Generator) -> tuple[list[str], Pulses | None]:
+    """Coordinates over which something is left, the clearest first, and pulses that come back."""
     left = judge_left(state.fit, part, state.weights, rng)
-    return [g.coordinate.quantity for g in left.groups if g.p_value < ALARM] if left.p_value < ALARM else []
+    clear = [g.coordinate.quantity for g in left.groups if g.p_value < ALARM]
+    return (clear, left.pulses) if left.p_value < ALARM else ([], None)
 
 
-def _candidates(state: State, part: Data, order: Sequence[str]) -> list[Candidate]:
+def _candidates(state: State, part: Data, order: Sequence[str], pulses: Pulses | None) -> list[Candidate]:
     """The best over each of the first coordinates; the located one first unless others gain more, or a recorded
-    quantity gains as much: what a channel does, time can do too. Where a quantity that follows the load is best, the
-    static curve itself goes before it when it gains nearly as much."""
-    found = [best_over(quantity, state, part) for quantity in order[:MOST_COORDINATES]]
+    quantity gains as much: what a channel does, time can do too. A quantity that never turns back is time by another
+    name, and time claims less. Where a quantity that follows the load is best, the static curve itself goes before it
+    when it gains nearly as much."""
+    found = [best_over(quantity, state, part, pulses) for quantity in order[:MOST_COORDINATES]]
     gaining = [c for c in found if c is not None and c.gain > 0]
     if not gaining:
         return []
     most = max(c.gain for c in gaining)
-
+    equal = {c.term.quantity for c in gaining if c.gain > most - EQUAL}
+    rising = {q for q in equal if q in UNITS and _with_time(q, part)}
+    first = "time" if "time" in equal and order[0] in rising else order[0]
     follows = max(gaining, key=lambda c: c.gain).term.quantity in FOLLOW_LOAD
     static = (part.histories[0].driver_quantity, "direction")
 
     def rank(c: Candidate) -> tuple[bool, bool, bool, float]:
         near = c.gain > LOCATED * most
         itself = follows and near and c.term.quantity in static
-        recorded = c.term.quantity in UNITS and c.gain > most - EQUAL
-        return not itself, not recorded, c.term.quantity != order[0] or not near, -c.gain
+        recorded = c.term.quantity in equal - rising and c.term.quantity in UNITS
+        return not itself, not recorded, c.term.quantity != first or not near, -c.gain
 
     return sorted(gaining, key=rank)
+
+
+def _with_time(quantity: str, data: Data) -> bool:
+    """Whether a recorded quantity rises or falls all through each run, but for its noise: Spearman's correlation."""
+    order = [
+        np.corrcoef(np.argsort(np.argsort(h.others[quantity][r])), np.arange(r.size))[0, 1]
+        for h, r in zip(data.histories, data.rows, strict=True)
+    ]
+    return bool(np.min(np.abs(order)) > MONOTONE)
+
+
+def _equals(chosen: Candidate, candidates: Sequence[Candidate]) -> tuple[str, ...]:
+    """Coordinates of the others that gain about as much."""
+    return tuple(c.term.quantity for c in candidates if c is not chosen and c.gain > chosen.gain - EQUAL)
 
 
 def _added(state: State, part: Data, candidate: Candidate) -> tuple[State, Flexible]:

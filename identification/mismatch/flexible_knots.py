@@ -12,6 +12,7 @@ from identification.mismatch.flexible_kinds import shapes_over
 from identification.mismatch.jumps import likeliest_jumps
 from identification.mismatch.knots import Moments, choose, heights, nodes_of
 from identification.mismatch.model import Data, Weights, predict
+from identification.mismatch.pulses import Pulses
 from identification.mismatch.screening import orthogonal_basis
 from identification.mismatch.state import State
 from identification.physics.free_form import Flexible, Multiplier, lately, spline, turned
@@ -31,9 +32,16 @@ class Candidate:
     """Of BIC."""
 
 
-def best_over(quantity: str, state: State, data: Data) -> Candidate | None:
-    """The best flexible term over a coordinate by BIC; None where there is none that could be."""
-    return best_of(shapes_over(quantity, data), state, data)
+def best_over(quantity: str, state: State, data: Data, pulses: Pulses | None = None) -> Candidate | None:
+    """The best flexible term over a coordinate by BIC; None where there is none that could be.
+
+    `pulses` of one run: a spline over time may begin anew with each.
+    """
+    shapes = shapes_over(quantity, data)
+    if quantity == "time" and pulses is not None and len(data.histories) == 1:
+        edges = sorted({pulses.begin % pulses.period, (pulses.begin + pulses.length) % pulses.period})
+        shapes.append(Flexible("time", "s", tuple(edges), (), ("gain",), period=pulses.period))
+    return best_of(shapes, state, data)
 
 
 def best_of(shapes: Sequence[Flexible], state: State, data: Data) -> Candidate | None:
@@ -59,7 +67,7 @@ def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
     moments = _moments(shape, nodes, axis, columns, state, data)
     zero = _zero_nodes(shape, nodes, data)
     beside = [tuple(int(np.argmin(np.abs(nodes - t))) for t in pair) for pair in jumps]
-    found = choose(moments, zero, begin=beside)
+    found = choose(moments, zero, begin=[tuple(j for pair in beside for j in pair)] if shape.period else beside)
     if found is None:
         return None
     at = nodes[list(found.knots)]
@@ -77,11 +85,18 @@ def _jumps(
     """Instants before and after which what a term over time multiplies may have jumped: even knots cannot follow."""
     if shape.quantity != "time":
         return []
+    if shape.period:
+        return _beside(shape.knots, over)
     basis = orthogonal_basis(state.fit.jacobian[: data.size])
     each = ([c[:, k] for c in columns] for k in range(len(shape.times)))
     found = [at for of in each for at in likeliest_jumps(state.fit, data, state.weights, basis, JUMPS, of)]
+    return _beside(found, over)
+
+
+def _beside(instants: Sequence[float], over: Floats) -> list[tuple[float, float]]:
+    """The last row before each instant and the first after it."""
     rows = np.sort(over)
-    after = np.unique(np.clip(np.searchsorted(rows, found), 1, rows.size - 1))
+    after = np.unique(np.clip(np.searchsorted(rows, instants), 1, rows.size - 1))
     return [(float(rows[i - 1]), float(rows[i])) for i in after]
 
 

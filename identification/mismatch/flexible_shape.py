@@ -50,6 +50,7 @@ def shape_of(term: Flexible, fitted: Fit, data: Data, weights: Weights) -> Flexi
         term.knots,
         term.degree,
         term.memory,
+        term.period,
         {p.name: Value(v, float(s), p.unit) for p, v, s in zip(known, theta, std, strict=True)},
         tuple(_splines(term, theta, covariance, fitted, data, weights)),
         term.statement(theta, data.scale),
@@ -145,10 +146,13 @@ def with_flexible(found: Unexplained, extended: Extended | None, data: Data, oth
         f"A flexible term over {over} takes the error on data that were not fitted from {extended.without:.4g} to "
         f"{extended.held:.4g} N."
     )
+    if extended.equals:
+        says += f" Over {' or '.join(extended.equals)} it does about as well: this plan cannot tell them apart."
     return replace(
         found,
         statement=f"{found.statement} {says}",
         flexible=shapes,
+        equals=extended.equals,
         replaces=tuple(t.id for t in extended.dropped),
         heldout_without=extended.without,
         formula=find_formula(extended, data, others),

@@ -16,6 +16,7 @@ from identification.mismatch.coordinates import Coordinate, coordinates
 from identification.mismatch.fitting import Fit
 from identification.mismatch.jumps import APART, TRIED, jumps
 from identification.mismatch.model import Data, Weights, predict
+from identification.mismatch.pulses import Pulses, likeliest_pulses
 from identification.mismatch.screening import normal_scores, orthogonal_basis, quiet, surrogate_scores
 from identification.mismatch.shape_error import allowed_in, corrections
 from identification.recording import Floats
@@ -48,6 +49,8 @@ class Omnibus:
     """Smallest p-value first."""
     p_value: float
     """Family-wise, of the smallest."""
+    pulses: Pulses | None = None
+    """Of the gain, that come back: a part of what is left over time."""
 
 
 def judge_left(
@@ -77,6 +80,13 @@ def judge_left(
         spans.append(Q)
         if c.quantity == "time":
             groups[-1] = min(groups[-1], _jump(c, fit, residual, data, weights, basis), key=lambda g: g.p_value)
+    pulses = None
+    at = next((i for i, g in enumerate(groups) if g.coordinate.quantity == "time"), None)
+    if at is not None:
+        others = [(Q, g) for Q, g in zip(spans, groups, strict=True) if g is not groups[at] and g.p_value < PLAIN_P]
+        pulses = _pulses(fit, residual, data, weights, others)
+        if pulses is not None:
+            groups[at] = min(groups[at], _of_pulses(groups[at].coordinate, pulses, residual), key=lambda g: g.p_value)
     order = sorted(range(len(groups)), key=lambda i: (groups[i].p_value, groups[i].dof - groups[i].statistic))
     if not groups:
         return Omnibus((), 1.0)
@@ -90,7 +100,7 @@ def judge_left(
     # of blocks' signs: heavy tails and colour within a block are in them; of white normal noise: few blocks are not
     draws = (surrogate_scores(every, clean, rng), normal_scores(every, rng))
     p_family = max(_of_family(least, scores, [Q.shape[1] for Q in spans]) for scores in draws)
-    return Omnibus(tuple(groups[i] for i in order), float(max(min(p_family, 1.0), min(1.0, least))))
+    return Omnibus(tuple(groups[i] for i in order), float(max(min(p_family, 1.0), min(1.0, least))), pulses)
 
 
 def _of_family(least: float, scores: Floats, sizes: Sequence[int]) -> float:
@@ -123,6 +133,34 @@ def _jump(time: Coordinate, fit: Fit, residual: Floats, data: Data, weights: Wei
     told = replace(time, what=f"{time.what}; the reading jumps at {when[0]:.4g} s")
     share = max(stat - 1, 0.0) / max(float(residual @ residual), 1e-300)
     return Judged(told, stat, 1, p if p < PLAIN_P else 1.0, share)
+
+
+def _pulses(
+    fit: Fit, residual: Floats, data: Data, weights: Weights, others: Sequence[tuple[Floats, Judged]]
+) -> Pulses | None:
+    """The likeliest pulses of the gain that come back: slow noise takes them up, and no smooth shape follows them.
+
+    Taken for such only where they are plainly no noise, and account for what is plainly left over `others` (spans), but
+    not these for them: a plan that repeats itself makes pulses of anything.
+    """
+    found = likeliest_pulses(fit, data, weights, residual)
+    if found is None or found.p_value > PLAIN_P:
+        return None
+    rest = residual - found.column * (found.column @ residual)
+    if any(_tail(float(np.sum((Q.T @ rest) ** 2)), g.dof, 0.0) < PLAIN_P for Q, g in others):
+        return None
+    if others:
+        known = orthogonal_basis(np.column_stack([Q for Q, _ in others]))
+        beyond = likeliest_pulses(fit, data, weights, residual - known @ (known.T @ residual))
+        if beyond is None or beyond.p_value > PLAIN_P:
+            return None
+    return found
+
+
+def _of_pulses(time: Coordinate, found: Pulses, residual: Floats) -> Judged:
+    stat = found.sigmas**2
+    share = max(stat - 1, 0.0) / max(float(residual @ residual), 1e-300)
+    return Judged(replace(time, what=f"{time.what}; {found.statement}"), stat, 1, found.p_value, share)
 
 
 def _tail(stat: float, dof: int, extra: float) -> float:

@@ -40,6 +40,8 @@ class FlexibleShape:
     degree: int
     memory: float
     """s, of load_history; otherwise 0."""
+    period: float
+    """s after which a spline over time begins anew; 0: never."""
     coefficients: Mapping[str, Value]
     splines: tuple[Spline, ...]
     statement: str
@@ -86,6 +88,7 @@ def _flexible_shape(f: FlexibleShape) -> dict[str, object]:
         "knots": list(f.knots),
         "degree": f.degree,
         "memory": f.memory,
+        "period": f.period,
         "coefficients": _values(f.coefficients),
         "table": [
             {

@@ -55,6 +55,8 @@ class Flexible:
     degree: Literal[1, 3] = 3
     memory: float = 0.0
     """s, of load_history."""
+    period: float = 0.0
+    """s after which a spline over time begins anew; 0: never."""
 
     @property
     def id(self) -> str:
@@ -125,7 +127,7 @@ class Flexible:
         """(M,) in `unit`."""
         match self.quantity:
             case "time":
-                return history.middle
+                return history.middle % self.period if self.period else history.middle
             case "time_since_step" if "reversed" in self.times:
                 return turned(history, x, scale)[0]
             case "time_since_step":
@@ -155,8 +157,9 @@ class Flexible:
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         what = " and ".join(WORDS[m] for m in self.times)
         of_run = " It is of this run's own clock: another run need not repeat it." if self.quantity == "time" else ""
-        says = f"A flexible term over {self.quantity} ({len(self.knots)} knots) {what}; no physics is claimed for it."
-        return says + of_run
+        anew = f" and begins anew every {self.period:.4g} s" if self.period else ""
+        over = f"A flexible term over {self.quantity} ({len(self.knots)} knots)"
+        return f"{over} {what}{anew}; no physics is claimed for it.{of_run}"
 
 
 def multiplied(multiplier: Multiplier, value: Floats, now: Moment, memory: float) -> Floats:

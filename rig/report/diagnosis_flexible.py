@@ -66,6 +66,7 @@ def _picture(f: FlexibleShape, s: Spline, driver: str) -> Picture:
     curve = Curve("flexible term", s.at, factor * s.value, factor * (s.value - half), factor * (s.value + half))
     x = axis(f.covariate, driver)
     x = f"{x} (low-pass of {f.memory:g} s)" if f.memory else x
+    x = f"{x} (within each {f.period:.4g} s)" if f.period else x
     plot = spline_over(points, curve, x, y, spread_out=f.covariate == "time_since_step")
     name = x.split(" / ")[0]
     kind = "cubic spline" if f.degree == 3 else "broken line"
