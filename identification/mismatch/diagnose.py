@@ -261,7 +261,7 @@ def _unexplained(
     quantity = free.terms[0].quantity if free is not None else _foremost(left, doubted, data)
     if free is None and left.p_value < ALARM:
         clear = [g.coordinate.quantity for g in left.groups if g.p_value < ALARM]
-        quantity = foremost(after, data, clear or [quantity])
+        quantity = foremost(after, data, clear or [quantity], left.pulses)
     judged = next((g for g in left.groups if g.coordinate.quantity == quantity), left.groups[0])
     where, share, table = where_of(judged, after.fit, data)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in doubted)

@@ -91,9 +91,10 @@ def extend(
     return Extended(whole, tuple(final), dropped, first.rmse, held.rmse, equals)
 
 
-def foremost(state: State, data: Data, order: Sequence[str]) -> str:
+def foremost(state: State, data: Data, order: Sequence[str], pulses: Pulses | None) -> str:
     """The coordinate, of those in `order`, over which a flexible term gains most; the first when none gains."""
-    found = [c for quantity in order[:MOST_COORDINATES] if (c := best_over(quantity, state, data)) is not None]
+    tried = [best_over(quantity, state, data, pulses) for quantity in order[:MOST_COORDINATES]]
+    found = [c for c in tried if c is not None]
     best = max(found, key=lambda c: c.gain, default=None)
     return order[0] if best is None or best.gain <= 0 else best.term.quantity
 
