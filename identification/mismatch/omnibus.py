@@ -54,9 +54,15 @@ class Omnibus:
 
 
 def judge_left(
-    fit: Fit, data: Data, weights: Weights, rng: np.random.Generator, looked_at: Sequence[Coordinate] | None = None
+    fit: Fit,
+    data: Data,
+    weights: Weights,
+    rng: np.random.Generator,
+    looked_at: Sequence[Coordinate] | None = None,
+    *,
+    pulsing: bool = True,
 ) -> Omnibus:
-    """Judge the residual of the thrust over every coordinate."""
+    """Judge the residual of the thrust over every coordinate. `pulsing`: pulses that come back are looked for too."""
     found = tuple(looked_at) if looked_at is not None else coordinates(fit, data)
     n = data.size
     basis = orthogonal_basis(fit.jacobian[:n])
@@ -82,7 +88,7 @@ def judge_left(
             groups[-1] = min(groups[-1], _jump(c, fit, residual, data, weights, basis), key=lambda g: g.p_value)
     pulses = None
     at = next((i for i, g in enumerate(groups) if g.coordinate.quantity == "time"), None)
-    if at is not None:
+    if at is not None and pulsing:
         others = [(Q, g) for Q, g in zip(spans, groups, strict=True) if g is not groups[at] and g.p_value < PLAIN_P]
         pulses = _pulses(fit, residual, data, weights, others)
         if pulses is not None:

@@ -63,7 +63,8 @@ def round_level(volts: float, largest: float) -> float:
     wanted = largest / QUANTUM
     ten = 10.0 ** np.floor(np.log10(wanted))
     step = ten * max(m for m in (1.0, 2.0, 5.0) if m * ten <= wanted * (1 + 1e-9))
-    return float(round(round(volts / step) * step, 6))
+    most = np.floor(largest / step * (1 + 1e-9))  # to round up would go beyond the largest
+    return float(round(float(np.clip(round(volts / step), -most, most)) * step, 6))
 
 
 def blocks(largest: float, flows: Sequence[float] = ()) -> tuple[Block, ...]:

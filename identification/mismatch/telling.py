@@ -126,7 +126,7 @@ def says(where: Where, share: float, what: str) -> str:
 
 def places_of(found: Found, rng: np.random.Generator) -> tuple[Mismatch, ...]:
     """Where the baseline fails, the clearest coordinates first."""
-    seen = judge_left(found.before.fit, found.data, found.before.weights, rng)
+    seen = judge_left(found.before.fit, found.data, found.before.weights, rng, pulsing=False)
     if seen.p_value >= ALARM and not found.after.fit.model.terms:
         return ()
     out: list[Mismatch] = []

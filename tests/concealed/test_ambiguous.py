@@ -10,9 +10,9 @@ from tests.concealed.ambiguous import OPENING, Bench, drawn
 
 def test_the_bench_goes_on_where_it_was_and_the_loop_counts_its_time():
     """On a staircase that only goes up, a clipped command and a clipped cell are one: the flat top is the same."""
-    ambiguous = drawn(9, "staircase", "command_saturation")
+    ambiguous = drawn(10, "staircase", "command_saturation")
     assert "load_cell_saturation" in ambiguous.twins
-    bench = Bench(ambiguous, budget=120.0)
+    bench = Bench(ambiguous, budget=200.0)
     course, end = bench.settle()
     assert course.first.verdict == "ambiguous"
     assert any({"command_saturation", "load_cell_saturation"} <= alike for alike in course.first.doubt)

@@ -125,7 +125,9 @@ def test_other_channels_are_foreseen():
 def test_levels_are_round():
     assert round_level(13.37, 20.0) == 13.4
     assert round_level(-3.333, 48.0) == -3.4
-    assert round_level(1.234, 1.0) == pytest.approx(1.235, abs=0.005)
+    assert round_level(0.234, 1.0) == pytest.approx(0.235, abs=0.005)
+    assert round_level(19.43, 19.43) == 19.4
+    assert round_level(-19.43, 19.43) == -19.4, "never beyond what was recorded"
 
 
 def test_blocks_hold_no_more_than_the_largest():
