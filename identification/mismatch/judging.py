@@ -61,6 +61,17 @@ def rmse(model: Model, theta: Theta, data: Data, which: Sequence[NDArray[np.bool
     return float(np.sqrt(total / samples)) if samples else float("nan")
 
 
+def least_noise(fitted: Fit, noises: Sequence[Noise], data: Data, which: Sequence[NDArray[np.bool_]]) -> float:
+    """N per sample, rms: the lowest of these noises, and no louder than what the model leaves where it was fitted.
+
+    What a model leaves out makes its noise seem louder, and slow noise is uncertain by more than its size.
+    """
+    n, p = fitted.residual.size, int(fitted.free.sum())
+    left = rmse(fitted.model, fitted.theta, data, which) * np.sqrt(n / max(n - p, 1))
+    every = [np.ones(r.size, dtype=bool) for r in data.rows]
+    return min(float(left), *(noise_rms(each, fitted.model, fitted.theta, data, every) for each in noises))
+
+
 def noise_rms(noise: Noise, model: Model, theta: Theta, data: Data, which: Sequence[NDArray[np.bool_]]) -> float:
     """What the estimated noise alone gives per sample, N."""
     size = forces(model, theta, data)
@@ -84,12 +95,12 @@ def by_blocks(before: State, after: State, data: Data, measured: Data, quiet: No
     """Parameters of both models without every fourth block, judged on those blocks.
 
     `measured`: the same runs with the periodic disturbances still in them, for the model before. `quiet`: noise of
-    another model of these runs; the lower of the two is told, for what a model leaves out makes its noise seem louder.
+    another model of these runs.
     """
     keep = [blocks(h) for h in data.histories]
     back = [~k for k in keep]
     old, new = refitted(before, measured, keep), refitted(after, data, keep)
-    noise = min(noise_rms(each, new.model, new.theta, data, back) for each in (after.noise, quiet))
+    noise = least_noise(new, (after.noise, quiet), data, keep)
     held = "levels" if data.histories[0].static else "blocks of time"
     what = f"every fourth of the {held}, {sum(int(b.sum()) for b in back)} rows; terms were chosen on all of them"
     return HeldOut(rmse(old.model, old.theta, measured, back), rmse(new.model, new.theta, data, back), noise, what)
@@ -99,13 +110,11 @@ def by_runs(before: State, after: State, data: Data, others: Sequence[History], 
     """Both models on whole runs that were not fitted; of these only the tare is. `quiet` as in `by_blocks`."""
     unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
-    errors, last = [], None
+    errors = []
     for state in (before, after):
         theta = _with_tares(state.fit.model, state.fit.theta, unseen)
         errors.append(rmse(state.fit.model, theta, unseen, every))
-        last = theta
-    assert last is not None
-    noise = min(noise_rms(each, after.fit.model, last, unseen, every) for each in (after.noise, quiet))
+    noise = least_noise(after.fit, (after.noise, quiet), data, [np.ones(r.size, dtype=bool) for r in data.rows])
     names = ", ".join(h.recording_id for h in others)
     return HeldOut(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
 
