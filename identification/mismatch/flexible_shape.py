@@ -145,8 +145,8 @@ def with_flexible(found: Unexplained, extended: Extended | None, data: Data, oth
     if extended.held < extended.without:
         how = f"takes the error on data that were not fitted from {extended.without:.4g} to {extended.held:.4g} N"
     else:
-        names, both = " and ".join(t.id for t in extended.dropped), f"{extended.held:.4g} against {extended.without:.4g} N"
-        how = f"predicts data that were not fitted about as well as {names}, {both}"
+        names = " and ".join(t.id for t in extended.dropped)
+        how = f"predicts data that were not fitted about as well as {names} ({extended.held:.4g} N)"
     says = f"A flexible term over {over} {how}."
     if extended.equals:
         says += f" Over {' or '.join(extended.equals)} it does about as well: this plan cannot tell them apart."
