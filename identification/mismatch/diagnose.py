@@ -160,7 +160,7 @@ def _answer(
         verdict=verdict,
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
-        mismatch=places_of(found, rng),
+        mismatch=places_of(found, rng, pulsing=left.pulses is not None),
         findings=tuple(finding_of(n, data, known) for n in earned),
         unexplained=unexplained,
         model_terms=tuple(t.id for t in after.fit.model.terms),

@@ -124,9 +124,9 @@ def says(where: Where, share: float, what: str) -> str:
     return f"{100 * share:.0f} % of the residual lies at {place}: {what}."
 
 
-def places_of(found: Found, rng: np.random.Generator) -> tuple[Mismatch, ...]:
-    """Where the baseline fails, the clearest coordinates first."""
-    seen = judge_left(found.before.fit, found.data, found.before.weights, rng, pulsing=False)
+def places_of(found: Found, rng: np.random.Generator, *, pulsing: bool) -> tuple[Mismatch, ...]:
+    """Where the baseline fails, the clearest coordinates first. `pulsing`: pulses that come back were found."""
+    seen = judge_left(found.before.fit, found.data, found.before.weights, rng, pulsing=pulsing)
     if seen.p_value >= ALARM and not found.after.fit.model.terms:
         return ()
     out: list[Mismatch] = []

@@ -65,6 +65,7 @@ def test_they_are_located_in_time_and_followed_by_a_spline_that_begins_anew(loss
     assert isinstance(found, Diagnosis)
     assert (found.verdict, found.unexplained.where.quantity) == ("unexplained", "time")
     assert "less of the thrust for" in found.unexplained.statement
+    assert found.mismatch[0].where.quantity == "time"
     (shape,) = found.unexplained.flexible
     assert shape.period == pytest.approx(PERIOD, abs=0.2)
     assert diagnosis_json(found)["unexplained"]["flexible"]["period"] == shape.period
