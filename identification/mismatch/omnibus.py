@@ -96,17 +96,23 @@ def judge_left(
     order = sorted(range(len(groups)), key=lambda i: (groups[i].p_value, groups[i].dof - groups[i].statistic))
     if not groups:
         return Omnibus((), 1.0)
-    clean = quiet(residual, np.column_stack(spans))
+    p_family = _family(groups, spans, residual, rng)
+    return Omnibus(tuple(groups[i] for i in order), p_family, pulses)
+
+
+def _family(groups: Sequence[Judged], spans: Sequence[Floats], residual: Floats, rng: np.random.Generator) -> float:
+    """P-value of the smallest p-value of all groups, by draws of the residual over their spans (n, q)."""
+    every = np.column_stack(spans)
+    clean = quiet(residual, every)
     plain = [Q for Q, g in zip(spans, groups, strict=True) if g.p_value < PLAIN_P]
     if plain:  # a structure of many small parts would be in the draws, and hide itself
         known = orthogonal_basis(np.column_stack(plain))
         clean = clean - known @ (known.T @ clean)
-    every = np.column_stack(spans)
-    least = groups[order[0]].p_value
+    least = min(g.p_value for g in groups)
     # of blocks' signs: heavy tails and colour within a block are in them; of white normal noise: few blocks are not
     draws = (surrogate_scores(every, clean, rng), normal_scores(every, rng))
-    p_family = max(_of_family(least, scores, [Q.shape[1] for Q in spans]) for scores in draws)
-    return Omnibus(tuple(groups[i] for i in order), float(max(min(p_family, 1.0), min(1.0, least))), pulses)
+    p = max(_of_family(least, scores, [Q.shape[1] for Q in spans]) for scores in draws)
+    return float(max(min(p, 1.0), min(1.0, least)))
 
 
 def _of_family(least: float, scores: Floats, sizes: Sequence[int]) -> float:

@@ -143,6 +143,12 @@ def directions(
         [np.column_stack(c) for c in rate if c],
         [np.column_stack(c) for c in ticks],
     )
+    return _beside(basis, Directions(tuple(used), tuple(values), tuple(sided), columns, np.empty(0)))
+
+
+def _beside(basis: Floats, found: Directions) -> Directions:
+    """What is left of the columns beside `basis` (n, p), made unit; without those of which nothing is. In place."""
+    columns = found.columns
     before = lengths(columns)
     columns -= basis @ (basis.T @ columns)
     size = lengths(columns)
@@ -152,9 +158,9 @@ def directions(
         columns = columns[:, keep]
     columns /= size[keep]
     return Directions(
-        tuple(used[j] for j in keep),
-        tuple(values[j] for j in keep),
-        tuple(sided[j] for j in keep),
+        tuple(found.terms[j] for j in keep),
+        tuple(found.values[j] for j in keep),
+        tuple(found.one_sided[j] for j in keep),
         columns,
         size[keep],
     )
