@@ -9,6 +9,9 @@ from identification.physics.filters import delayed
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
+FINER = (0.45, 0.55, 0.67, 0.82, 1.0, 1.22, 1.5, 1.83, 2.2)
+"""Of a trial delay: from one trial halfway to the next."""
+
 
 @dataclass(frozen=True, slots=True)
 class TimeSkew:
@@ -28,7 +31,8 @@ class TimeSkew:
         return tuple((d,) for d in (0.004, 0.02, 0.1, 0.4))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return ()
+        """Steps of the command between two samples make a staircase of the delay: a slope finds no way along it."""
+        return tuple((sign * values[0] * factor,) for sign in (1.0, -1.0) for factor in FINER)
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         return delayed(value, now.history.edges, theta[0])
