@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from identification.physics.filters import delayed
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
-FINER = (0.45, 0.55, 0.67, 0.82, 1.0, 1.22, 1.5, 1.83, 2.2)
-"""Of a trial delay: from one trial halfway to the next."""
+FINER = tuple(np.geomspace(0.2, 5.0, 17).tolist())
+"""Of a trial delay: from one trial to the next."""
 
 
 @dataclass(frozen=True, slots=True)
