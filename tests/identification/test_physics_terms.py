@@ -155,8 +155,8 @@ def test_finer_trials_reach_to_the_neighbours(term):
             at = places.index(trial[where])
             assert tried.min() <= 0.05 * places[at] + 0.95 * places[max(at - 1, 0)]
             assert tried.max() >= 0.05 * places[at] + 0.95 * places[min(at + 1, len(places) - 1)]
-            close = 0.2 * np.maximum(max(np.diff(places).min(), trial[where]), np.abs(tried[1:]))
-            assert np.all(np.diff(tried) < close)
+            itself = np.maximum(np.abs(tried[1:]), np.abs(tried[:-1]))
+            assert np.all(np.diff(tried) < 0.2 * np.maximum(max(np.diff(places).min(), trial[where]), itself))
 
 
 def test_only_jumps_delays_and_ringing_have_finer_trials():
