@@ -9,14 +9,14 @@ from sim_devices.world.effects.blade import Asymmetry, Cavitation, Exponent, Hea
 from sim_devices.world.effects.cell import (
     LoadCellCreep,
     LoadCellNonlinearity,
-    LoadCellSaturation,
     PeriodicDisturbance,
     ZeroDrift,
     ZeroOffset,
 )
 from sim_devices.world.effects.channel import ChannelFault
-from sim_devices.world.effects.electrical import CommandSaturation, DeadBand, SupplySag, WindingResistance
+from sim_devices.world.effects.electrical import DeadBand, SupplySag, WindingResistance
 from sim_devices.world.effects.flow import InflowDynamics, Recirculation, SpeedOfAdvance, ThrusterInteraction
+from sim_devices.world.effects.limit import CommandSaturation, LoadCellSaturation
 from sim_devices.world.effects.rotor import MotorLag, RotationCoupling
 from sim_devices.world.effects.stage import Effect
 from sim_devices.world.effects.stand import Hysteresis, StandResonance, StrutDrag, TimeSkew, TorqueCrosstalk

@@ -8,13 +8,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
+from sim_devices.world.effects.stage import Floats, Stage, require_positive
 from sim_devices.world.filters import low_pass
 from sim_devices.world.history import History
 from sim_devices.world.state import State
-
-KNEE = 8.0
-"""Of a limit that sets in softly: the larger, the sharper its bend."""
 
 
 @dataclass(slots=True)
@@ -150,30 +147,3 @@ class ZeroOffset:
 
     def over(self, value: Floats, h: History) -> Floats:
         return np.where(h.t >= self.start, value + self.offset, value)
-
-
-@dataclass(slots=True)
-class LoadCellSaturation:
-    """Cell or amplifier clips, noise and all: clip(reading, -limit, limit).
-
-    form "soft": reading / (1 + |reading/limit|^KNEE)^(1/KNEE), which bends before it is flat.
-    """
-
-    stage: ClassVar[Stage] = "output"
-    limit: float
-    """N."""
-    form: str = "hard"
-
-    def __post_init__(self) -> None:
-        require_positive(limit=self.limit)
-        require_choice("form", self.form, ("hard", "soft"))
-
-    def apply(self, value: float, _s: State, _dt: float) -> float:
-        if self.form == "soft":
-            return float(value / (1.0 + abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
-        return min(max(value, -self.limit), self.limit)
-
-    def over(self, value: Floats, _h: History) -> Floats:
-        if self.form == "soft":
-            return np.asarray(value / (1.0 + np.abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
-        return np.clip(value, -self.limit, self.limit)

@@ -15,35 +15,6 @@ from sim_devices.world.state import State
 
 OUTPUT_CAPACITOR = 0.02
 """s: the supply's output capacitor, so that current and voltage do not chase each other step by step."""
-KNEE = 8.0
-"""Of a limit that sets in softly: the larger, the sharper its bend."""
-
-
-@dataclass(slots=True)
-class CommandSaturation:
-    """The drive clips: V_eff = clip(V, -limit, limit).
-
-    form "soft": V / (1 + |V/limit|^KNEE)^(1/KNEE), which bends before it is flat.
-    """
-
-    stage: ClassVar[Stage] = "command"
-    limit: float
-    """V."""
-    form: str = "hard"
-
-    def __post_init__(self) -> None:
-        require_positive(limit=self.limit)
-        require_choice("form", self.form, ("hard", "soft"))
-
-    def apply(self, value: float, _s: State, _dt: float) -> float:
-        if self.form == "soft":
-            return float(value / (1.0 + abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
-        return min(max(value, -self.limit), self.limit)
-
-    def over(self, value: Floats, _h: History) -> Floats:
-        if self.form == "soft":
-            return np.asarray(value / (1.0 + np.abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
-        return np.clip(value, -self.limit, self.limit)
 
 
 @dataclass(slots=True)
