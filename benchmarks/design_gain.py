@@ -19,8 +19,9 @@ from identification.run_order import Course, Slow
 from identification.thrust import ThrustFit, fit_thrust
 from identification.thrust_design import Noise, Terms
 from rig.design import plan_of
+from rig.design_levels import Ask
 from rig.design_plain import LEVELS, filling, judge
-from rig.design_plan import Ask, choose
+from rig.design_plan import choose
 from rig.plan import Plan, TareConfig
 from rig.plan_file import Template
 from rig.shapes import Interleaved, Staircase

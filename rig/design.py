@@ -12,8 +12,9 @@ import click
 
 from rig.design_ask import Options, prepare
 from rig.design_inertia import InertiaOptions, design_inertia, inertia_json, inertia_text, write_inertia
+from rig.design_levels import Ask
 from rig.design_plain import judge, plain_plans
-from rig.design_plan import Ask, Chosen, choose, without_checks
+from rig.design_plan import Chosen, choose, without_checks
 from rig.design_text import Designed, design_json, design_text
 from rig.errors import ConfigError, PlanError
 from rig.loading import load_campaign

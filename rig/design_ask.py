@@ -16,8 +16,8 @@ from identification.run_order import THERMAL_TIME, Course, Slow
 from identification.thrust_design import Noise, Terms
 from rig.bench import build
 from rig.config import BenchConfig
+from rig.design_levels import DRIFT, Ask
 from rig.design_noise import Known, read_noise
-from rig.design_plan import DRIFT, Ask
 from rig.errors import ConfigError, PlanError
 from rig.loading import load_bench, load_campaign
 from rig.plan import TareConfig

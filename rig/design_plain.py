@@ -9,7 +9,8 @@ import numpy as np
 
 from identification.run_order import Exposure, exposure
 from identification.thrust_design import Means, Promise, promise
-from rig.design_plan import Ask, mean_heat, worth
+from rig.design_levels import Ask, mean_heat
+from rig.design_plan import worth
 from rig.plan import FixedDwell, Plan, Step, TareConfig
 from rig.shapes import Interleaved, Shape, Staircase
 

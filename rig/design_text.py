@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from identification.thrust_design import LEVEL, POWER, noticed
+from rig.design_levels import Ask
 from rig.design_plain import Judged, means_of
-from rig.design_plan import Ask, Chosen
+from rig.design_plan import Chosen
 from rig.plan import Plan, Step
 
 

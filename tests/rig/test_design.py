@@ -13,9 +13,10 @@ from rig.check import check_campaign
 from rig.cli import main
 from rig.design import design, plan_of
 from rig.design_ask import Options, prepare
+from rig.design_levels import THOROUGH, Ask, mean_heat
 from rig.design_noise import read_noise
 from rig.design_plain import judge, means_of, plain_plans
-from rig.design_plan import THOROUGH, Ask, choose, mean_heat, without_checks
+from rig.design_plan import choose, without_checks
 from rig.design_text import budget, design_json, design_text, lack_of_fit_dof, table
 from rig.errors import PlanError, RecordingError
 from rig.loading import load_campaign
