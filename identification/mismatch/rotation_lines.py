@@ -100,6 +100,8 @@ class _Colour:
         self._rate = 1.0 / spacing
         self._f, density = averaged(grid, self._rate, segment)
         density[0] = density[min(1, density.size - 1)]
+        if segment % 2 == 0:
+            density[-1] *= 2.0  # one-sided density counts the highest frequency once, a turning phase sees it whole
         self._density = np.maximum(density, 1e-9 * float(density.max()) + 1e-300)
 
     def out_of(self, power: Floats, z: Floats, speeds: Floats) -> Floats:

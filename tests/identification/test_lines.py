@@ -44,6 +44,16 @@ def test_noise_is_no_line(kind: str) -> None:
         assert find_lines([run(seed, kind)[0]]) == ()
 
 
+def test_noise_at_half_the_sampling_rate_is_no_line() -> None:
+    """Few levels, each held often: some ratio of the rotor shows one of them just there."""
+    rng = np.random.default_rng(0)
+    levels = np.array([11.2, 14.6, 33.8, 41.6])
+    speed = np.concatenate([rng.permutation(np.concatenate([levels, levels])) for _ in range(25)])
+    t = np.arange(12000) / 20.0
+    series = Series(t, rng.standard_normal(t.size), turned(3.0 * np.arange(speed.size + 1), speed, t))
+    assert find_lines([series]) == ()
+
+
 def test_fixed_line_and_its_standard_errors() -> None:
     z = []
     for seed in range(6):
