@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.fitting import Fit
+from identification.mismatch.fitting import Fit, raw
 from identification.mismatch.leading import sample_lead
 from identification.mismatch.lines import Line, find_lines
 from identification.mismatch.model import Data, predict
@@ -24,6 +24,11 @@ UNSETTLED = 0.4
 """s after a step in which a residual is no noise."""
 MOST_BANDS = 1
 FEW_SAMPLES = 400
+STEADY = 10.0
+"""s of the blocks over which a measured rate is compared with the model's."""
+FEW_BLOCKS = 10
+MUCH = 4.0
+"""Standard deviations."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,6 +44,7 @@ class Cleaned:
 def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
     """Measured minus predicted at every sample that the intervals hold; turns from the rate, or from the model."""
     out = []
+    follows = _rate_follows(fitted, data)
     for i, h in enumerate(data.histories):
         F, x = predict(fitted.model, fitted.theta, h, data.scale, i)
         if fitted.theta.shift:
@@ -47,9 +53,27 @@ def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
         rate = within_intervals(x, h.edges, h.sample_time)
         at += fitted.theta.C * sample_lead(fitted.model, fitted.theta, h, rate, data.scale.driver)
         residual = h.sample_thrust - at - fitted.theta.tares[i]
-        speed = h.others.get("rotation_rate", x)
+        speed = fitted.theta.k * x if follows else h.others.get("rotation_rate", x)
         out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time)))
     return tuple(out)
+
+
+def _rate_follows(fitted: Fit, data: Data) -> bool:
+    """Whether the measured rate is the model's but for white noise: summed up, that would only blur the angle.
+
+    What is left is summed over blocks; the squares of its parts say how large that is when they are independent.
+    """
+    if not data.with_rate:
+        return False
+    _, modelled = raw(fitted.model, fitted.theta, data, with_rate=True)
+    blocks = []
+    for h, model in zip(data.histories, modelled, strict=True):
+        turned_more = (h.rates - model) * np.sign(model) * h.dt[h.rate_rows]
+        block = (h.middle[h.rate_rows] / STEADY).astype(np.intp)
+        size = np.bincount(block, turned_more**2)
+        blocks.append(np.bincount(block, turned_more)[size > 0] ** 2 / size[size > 0])
+    found = np.concatenate(blocks)
+    return bool(found.size >= FEW_BLOCKS and found.mean() < 1.0 + MUCH * np.sqrt(2.0 / found.size))
 
 
 def look(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned | None:

@@ -164,7 +164,7 @@ def _fixed(runs: Sequence[tuple[int, Series]], alarm: float, lowest: float) -> L
 
 
 def _p_value(mean_ratio: float, runs: int, trials: float) -> float:
-    return family_wise(tail(mean_ratio, runs, FAR / 2), runs * mean_ratio, trials)
+    return family_wise(tail(mean_ratio, runs, FAR), runs * mean_ratio, trials)
 
 
 def _fitted(
