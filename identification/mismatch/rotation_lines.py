@@ -22,6 +22,8 @@ LEAST_GAIN = 25.0
 """In chi-square."""
 TRIED = np.linspace(-1.0, 1.0, 41)
 """Ratios near a candidate, in its reach."""
+BESIDE = (-7, -6, -5, -4, 4, 5, 6, 7)
+"""Independent ratios of a stretch beside a line."""
 COHERENT = 0.01
 """Probability below which what fewer phases lose of the power is no noise."""
 
@@ -40,6 +42,16 @@ class Locked:
     """Mean speed of the turning rotor, turns per s."""
     parts: tuple[tuple[int, float, float, float, float], ...]
     """(run, start, end, a, b) of each stretch."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Noise:
+    """Of the stretches, at one ratio."""
+
+    own: Floats
+    """(k,) variance of white noise as loud as that of the run at the line: what the waves were whitened with."""
+    beside: float
+    """How much louder it is beside the line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +94,7 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float) -> Locked | No
 
 def _fitted(parts: Sequence[Stretch], candidate: Candidate) -> Locked:
     """With the fewest phases that keep the power."""
-    noise = np.array([p.colour.variance(candidate.ratio, p.speeds) for p in parts])
+    noise = _noise_at(parts, candidate.ratio)
     finest = waves = _apart(parts, noise, candidate)
     for seconds in LASTING:
         fewer = _joined(parts, noise, finest.ratio, candidate.reach, _pieces_of(parts, seconds))
@@ -94,6 +106,20 @@ def _fitted(parts: Sequence[Stretch], candidate: Candidate) -> Locked:
     return _told(parts, waves, candidate.p_value)
 
 
+def _noise_at(parts: Sequence[Stretch], ratio: float) -> _Noise:
+    return _Noise(np.array([p.colour.variance(ratio, p.speeds) for p in parts]), _beside(parts, ratio))
+
+
+def _beside(parts: Sequence[Stretch], ratio: float) -> float:
+    """How much louder than its noise the residual is on either side of a line: of repeated shapes there are many."""
+    powers, n = 0.0, 0
+    for p in parts:
+        own = float(np.ptp(p.turns))
+        powers += float(np.mean([abs(p.wave(ratio + j / own)) ** 2 for j in BESIDE]))
+        n += p.time.size
+    return max(powers / n, 1.0)
+
+
 def _pieces_of(parts: Sequence[Stretch], seconds: float) -> NDArray[np.intp]:
     """(k,) piece of so many seconds in which each stretch lies."""
     keys = [(p.run, int(p.time[0] // seconds)) for p in parts]
@@ -101,13 +127,15 @@ def _pieces_of(parts: Sequence[Stretch], seconds: float) -> NDArray[np.intp]:
     return np.array([known[key] for key in keys], dtype=np.intp)
 
 
-def _sums(parts: Sequence[Stretch], noise: Floats, ratio: float) -> NDArray[np.complex128]:
-    """(k,) of value exp(-2 pi i ratio turns) over the variance of the noise; the waves are over its root already."""
-    return np.array([p.wave(ratio) for p in parts], dtype=np.complex128) / np.sqrt(noise).astype(np.complex128)
+def _sums(parts: Sequence[Stretch], noise: _Noise, ratio: float) -> NDArray[np.complex128]:
+    """(k,) of value exp(-2 pi i ratio turns) over the variance of the noise."""
+    waves = np.array([p.wave(ratio) for p in parts], dtype=np.complex128)
+    out: NDArray[np.complex128] = waves / (np.sqrt(noise.own) * noise.beside)
+    return out
 
 
-def _weights(parts: Sequence[Stretch], noise: Floats, piece: NDArray[np.intp]) -> Floats:
-    n = np.array([p.time.size for p in parts]) / noise
+def _weights(parts: Sequence[Stretch], noise: _Noise, piece: NDArray[np.intp]) -> Floats:
+    n = np.array([p.time.size for p in parts]) / (noise.own * noise.beside)
     return np.asarray(np.bincount(piece, n), dtype=np.float64)
 
 
@@ -118,7 +146,7 @@ def _added(sums: NDArray[np.complex128], piece: NDArray[np.intp]) -> NDArray[np.
     return out
 
 
-def _apart(parts: Sequence[Stretch], noise: Floats, candidate: Candidate) -> _Waves:
+def _apart(parts: Sequence[Stretch], noise: _Noise, candidate: Candidate) -> _Waves:
     """A phase for each stretch; the ratio of most power near the candidate's."""
     piece = np.arange(len(parts))
     weights = _weights(parts, noise, piece)
@@ -128,7 +156,7 @@ def _apart(parts: Sequence[Stretch], noise: Floats, candidate: Candidate) -> _Wa
     return max(tried, key=lambda waves: waves.gain)
 
 
-def _joined(parts: Sequence[Stretch], noise: Floats, ratio: float, reach: float, piece: NDArray[np.intp]) -> _Waves:
+def _joined(parts: Sequence[Stretch], noise: _Noise, ratio: float, reach: float, piece: NDArray[np.intp]) -> _Waves:
     """A phase for each piece; the ratio within `reach` of the one given at which that has most power."""
     weights = _weights(parts, noise, piece)
     centre = np.array([p.turns.mean() for p in parts])

@@ -17,7 +17,7 @@ from scipy.fft import next_fast_len
 from identification.mismatch.rotor_stretches import Stretch
 from identification.mismatch.spectrum import CELLS, OVERSAMPLING, family_wise, transform
 from identification.recording import Floats
-from identification.tails import gamma_median, gamma_sf
+from identification.tails import chi2_sf, gamma_median, gamma_sf
 
 HIGHEST = 400.0
 """Hz at the highest speed: blade pass of the fastest thrusters, with their harmonics."""
@@ -29,6 +29,10 @@ SPEEDS = 12
 """Groups of speed: no single one of them may carry a line that is locked to the rotor."""
 ORDERS = 12
 """Whole ratios that are looked at."""
+STEADY = 0.05
+"""Share of its speed by which a stretch may become faster or slower and is neither."""
+UNEVEN = 1e-3
+"""Probability below which a wave is not the same at all speeds: what a plan repeats is no wave, nor a model's error."""
 AROUND = 5
 """Ratios round the best one over which it may have its best without one group of speed."""
 
@@ -114,23 +118,34 @@ def _of_waves(parts: Sequence[Stretch], top: float, seconds: float) -> Candidate
     strong, shape = _standing(total)
     at, p_value = _highest(strong, shape, grid, 1.0 / grid.longest)
     ratio = float(grid.ratios[at])
-    return Candidate(ratio, 1.0 / grid.longest, max(p_value, _without_loudest(list(pieces.values()), ratio)))
+    return Candidate(ratio, 1.0 / grid.longest, max(p_value, _even(list(pieces.values()), ratio)))
 
 
-def _without_loudest(pieces: Sequence[Sequence[tuple[Stretch, int]]], ratio: float) -> float:
-    """p-value of the waves without the group of speed that gives most of them; 1 when there is only one."""
-    sums = np.zeros((len(pieces), SPEEDS + 1), dtype=np.complex128)
-    n = np.zeros((len(pieces), SPEEDS + 1))
+def _even(pieces: Sequence[Sequence[tuple[Stretch, int]]], ratio: float) -> float:
+    """p-value of the waves without the group of speed that gives most of them; 1 when they differ between groups.
+
+    A plan that comes again turns the rotor as often, and what the model lacks comes again with it: but not as one wave,
+    of one size and phase at every speed, going up and going down.
+    """
+    sums = np.zeros((len(pieces), 3 * (SPEEDS + 1)), dtype=np.complex128)
+    n = np.zeros(sums.shape)
     for i, piece in enumerate(pieces):
         for p, g in piece:
-            sums[i, g] += p.wave(ratio)
-            n[i, g] += p.time.size
-    if np.count_nonzero(n.any(axis=0)) < 2:
+            sums[i, 3 * g + p.trend(STEADY)] += p.wave(ratio)
+            n[i, 3 * g + p.trend(STEADY)] += p.time.size
+    used = n > 0
+    each = float(np.sum(np.abs(sums[used]) ** 2 / n[used]))
+    lost = each - float(np.sum(np.abs(sums.sum(axis=1)) ** 2 / n.sum(axis=1)))
+    if chi2_sf(2 * lost, 2.0 * (np.count_nonzero(used) - len(pieces))) < UNEVEN:
         return 1.0
-    left, size = sums.sum(axis=1)[:, None] - sums, n.sum(axis=1)[:, None] - n
-    powers = np.where(size > 0, np.abs(left) ** 2 / np.maximum(size, 1.0), 0.0).sum(axis=0)
-    loudest = int(np.argmin(np.where(n.any(axis=0), powers, np.inf)))
-    return AROUND * float(gamma_sf(powers[loudest], float(np.count_nonzero(size[:, loudest]))))
+    by_speed, size = (x.reshape(len(pieces), -1, 3).sum(axis=2) for x in (sums, n))
+    there = size.any(axis=0)
+    if np.count_nonzero(there) < 2:
+        return 1.0
+    rest, left = by_speed.sum(axis=1)[:, None] - by_speed, size.sum(axis=1)[:, None] - size
+    powers = np.where(left > 0, np.abs(rest) ** 2 / np.maximum(left, 1.0), 0.0).sum(axis=0)
+    loudest = int(np.argmin(np.where(there, powers, np.inf)))
+    return AROUND * float(gamma_sf(powers[loudest], float(np.count_nonzero(left[:, loudest]))))
 
 
 def _highest(strong: Floats, shape: float, grid: _Grid, near: float) -> tuple[int, float]:

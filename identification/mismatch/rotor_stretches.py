@@ -92,6 +92,16 @@ class Stretch:
     def speed(self) -> float:
         return float(self.speeds.mean())
 
+    def trend(self, least: float) -> int:
+        """0 while the rotor keeps its speed to a share of `least`, 1 while it becomes faster, 2 slower."""
+        middle = self.time.size // 2
+        first, last = (
+            float(np.ptp(self.turns[s]) / max(np.ptp(self.time[s]), 1e-300))
+            for s in (slice(None, middle), slice(middle, None))
+        )
+        change = (last - first) / max(first, last, 1e-300)
+        return 0 if abs(change) < least else 1 if change > 0 else 2
+
     def wave(self, z: float) -> complex:
         """Sum of white exp(-2 pi i z turns): whitened, for a loud resonance leaks into all frequencies of a stretch."""
         return complex(self.white @ np.exp(-2j * np.pi * z * self.turns))

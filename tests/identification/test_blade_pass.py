@@ -13,7 +13,7 @@ from identification.recording import Recording
 from sim_devices import concealed
 from tests.concealed.recordings import recording
 
-STRENGTH = 9.0
+STRENGTH = 12.0
 """Sigma at which an oracle sees it."""
 
 
