@@ -29,10 +29,13 @@ def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
     theta = replace(fitted.theta, terms=tuple(values[t] for t in bare.terms))
     left = scatter = samples = 0.0
     for i, (h, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
-        force = predict(bare, theta, h, data.scale, i)[0][rows]
+        whole = predict(bare, theta, h, data.scale, i)[0]
+        edges = np.concatenate([whole[:1], 0.5 * (whole[1:] + whole[:-1]), whole[-1:]])
+        force, first, last = whole[rows], edges[:-1][rows], edges[1:][rows]
         variance = noise.white + noise.proportional * force**2 + sum(noise.slow) + sum(noise.band)
         for side in (1.0, -1.0):
-            deep = side * (force + theta.tares[i]) > limit + DEEP * np.sqrt(variance)
+            reached = np.minimum(side * first, side * last) + side * theta.tares[i]  # not on the way there and back
+            deep = reached > limit + DEEP * np.sqrt(variance)
             count, read = h.count[rows][deep].astype(np.float64), h.thrust[rows][deep]
             if count.sum() > 1:
                 left += float(count @ (read - np.average(read, weights=count)) ** 2 + h.within[rows][deep].sum())

@@ -43,6 +43,15 @@ class Locked:
     parts: tuple[tuple[int, float, float, float, float], ...]
     """(run, start, end, a, b) of each stretch."""
 
+    def at(self, run: int, series: Series) -> Floats:
+        """(n,) N, at the samples of that run."""
+        assert series.turns is not None
+        out, angle = np.zeros(series.time.size), 2 * np.pi * self.ratio * series.turns
+        for _, start, end, a, b in (part for part in self.parts if part[0] == run):
+            inside = slice(*np.searchsorted(series.time, (start, end)))
+            out[inside] = a * np.cos(angle[inside]) + b * np.sin(angle[inside])
+        return out
+
 
 @dataclass(frozen=True, eq=False)
 class _Noise:
@@ -89,7 +98,10 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float) -> Locked | No
     if not candidate.p_value < alarm:
         return None
     found = _fitted(parts, candidate)
-    return found if found.gain > LEAST_GAIN else None
+    if not found.gain > LEAST_GAIN:
+        return None
+    loud = [found.at(i, r) for i, r in runs]  # a loud line was part of its own noise
+    return _fitted(list(stretches(runs, top, loud)), candidate)
 
 
 def _fitted(parts: Sequence[Stretch], candidate: Candidate) -> Locked:

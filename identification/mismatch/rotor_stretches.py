@@ -30,16 +30,20 @@ QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 
 
 class Colour:
-    """The noise of one run over frequency, at the resolution of a stretch (Welch, IEEE Trans. AU-15, 70, 1967)."""
+    """The noise of one run over frequency, at the resolution of a stretch (Welch, IEEE Trans. AU-15, 70, 1967).
 
-    def __init__(self, series: Series) -> None:
+    `line` (n,): what is known of the residual to be none.
+    """
+
+    def __init__(self, series: Series, line: Floats) -> None:
         spacing, _ = spacing_of(series.time)
         self._index = np.round((series.time - series.time[0]) / spacing).astype(np.intp)
-        self._grid = np.zeros(int(self._index[-1]) + 1)
-        self._grid[self._index] = quick(series)
-        segment = min(max(int(LONGEST / spacing), LEAST), self._grid.size)
+        self._grid, noise = np.zeros((2, int(self._index[-1]) + 1))
+        self._grid[self._index] = quick(series, series.residual)
+        noise[self._index] = quick(series, series.residual - line)
+        segment = min(max(int(LONGEST / spacing), LEAST), noise.size)
         self._rate = 1.0 / spacing
-        self._f, density = averaged(self._grid, self._rate, segment)
+        self._f, density = averaged(noise, self._rate, segment)
         density[0] = density[min(1, density.size - 1)]
         if segment % 2 == 0:
             density[-1] *= 2.0  # one-sided density counts the highest frequency once, a turning phase sees it whole
@@ -107,9 +111,9 @@ class Stretch:
         return complex(self.white @ np.exp(-2j * np.pi * z * self.turns))
 
 
-def quick(series: Series) -> Floats:
-    """The residual without what is slower than about 1/(4 SMOOTH)."""
-    value = clipped(series.residual)
+def quick(series: Series, residual: Floats) -> Floats:
+    """A residual of this run without what is slower than about 1/(4 SMOOTH)."""
+    value = clipped(residual)
     spacing, _ = spacing_of(series.time)
     out: Floats = value - smoothed(value, SMOOTH / spacing)
     return out
@@ -122,12 +126,15 @@ def speed_of(series: Series) -> Floats:
     return out
 
 
-def stretches(runs: Sequence[tuple[int, Series]], top: float) -> Iterator[Stretch]:
-    """Of all runs, in which the rotor turns without a step of its speed; `top`: highest speed, turns per s."""
-    for i, r in runs:
+def stretches(runs: Sequence[tuple[int, Series]], top: float, lines: Sequence[Floats] = ()) -> Iterator[Stretch]:
+    """Of all runs, in which the rotor turns without a step of its speed; `top`: highest speed, turns per s.
+
+    `lines`: what is known to be no noise, run for run.
+    """
+    for (i, r), line in zip(runs, lines or [np.zeros(r.time.size) for _, r in runs], strict=True):
         assert r.turns is not None
-        speed, colour = speed_of(r), Colour(r)
-        value, white = quick(r), colour.whitened()
+        speed, colour = speed_of(r), Colour(r, line)
+        value, white = quick(r, r.residual), colour.whitened()
         for low, high in pairwise(_edges(r.time, speed, top)):
             s = slice(low, high)
             if high - low >= LEAST and speed[s].mean() > TURNING * top and np.any(value[s]):

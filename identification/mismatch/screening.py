@@ -29,6 +29,10 @@ PLAIN = 4.0
 MOST_PLAIN = 10
 MOST_JUMPS = 4
 MOST_RINGS = 4
+TICKS = (-1, 1, 2, 3)
+"""Delays that are tried."""
+SLOW_TICK = 0.5
+"""s: a command that changes no faster does not tick on."""
 LEAST_DIRECTION = 1e-6
 """Share of a direction that must remain when the present model is projected out."""
 
@@ -167,8 +171,10 @@ def _beside(basis: Floats, found: Directions) -> Directions:
 
 
 def _trials(term: Term, fit: Fit, data: Data, weights: Weights, basis: Floats) -> list[tuple[float, ...]]:
-    """The term's own; for a jump of the zero and for ringing also those that the data point to."""
+    """The term's own; for a jump of the zero, for a delay and for ringing also those that the data point to."""
     found = list(term.trials(data.scale))
+    if term.id == "time_skew":  # ticks of a ramp meet the samples as before only when whole ones have passed
+        found += [(k * tick,) for tick in {h.tick for h in data.histories if h.tick < SLOW_TICK} for k in TICKS]
     if term.id == "zero_offset":
         found += [(found[0][0], at) for at in likeliest_jumps(fit, data, weights, basis, MOST_JUMPS)]
     if term.id == "stand_resonance" and weights.ticks:
