@@ -136,7 +136,10 @@ def optimal_levels(
     target = np.diag(1 / scale**2) if criterion == "A" else None
     information = np.einsum("vi,ij,ik->vjk", corners, rows, rows) + given
     weights = _exchange(information, target, gap) @ corners
-    kept: Floats = _pruned(weights, rows, information, target, given, max(2 * gap, GAP_AFTER))
+    kept = _pruned(weights, heat, max_mean_heat)
+    M = rows.T @ (kept[:, None] * rows) + given
+    if np.linalg.cond(M) >= 1e15 or _excess(information, M, target) > max(2 * gap, GAP_AFTER):
+        kept = weights
     M = rows.T @ (kept[:, None] * rows) + given
     on = np.flatnonzero(kept)
     cov: Floats = np.asarray(np.linalg.inv(M) / total_time, dtype=np.float64)
@@ -264,11 +267,12 @@ def _line_search(M: Floats, change: Floats, target: Floats | None, most: float) 
     return float(brentq(slope, 0.0, most, rtol=1e-12)) if slope(0.0) > 0 > slope(most) else 0.0
 
 
-def _pruned(
-    weights: Floats, rows: Floats, information: Floats, target: Floats | None, given: Floats, gap: float
-) -> Floats:
-    """Without the traces that the exchange leaves behind, unless they matter."""
+def _pruned(weights: Floats, heat: Floats | None, limit: float) -> Floats:
+    """Without the traces that the exchange leaves behind; what they had goes to all, or to what heats least."""
     kept = np.where(weights >= LEAST_WEIGHT, weights, 0.0)
-    kept /= kept.sum()
-    M = rows.T @ (kept[:, None] * rows) + given
-    return kept if np.linalg.cond(M) < 1e15 and _excess(information, M, target) <= gap else weights
+    out: Floats = kept / kept.sum()
+    if heat is None or out @ heat <= limit:
+        return out
+    used = np.flatnonzero(kept)
+    kept[used[np.argmin(heat[used])]] += 1.0 - kept.sum()
+    return kept if kept @ heat <= limit else weights
