@@ -27,8 +27,9 @@ FEW_SAMPLES = 400
 STEADY = 10.0
 """s of the blocks over which a measured rate is compared with the model's."""
 FEW_BLOCKS = 10
+"""Fewer tell nothing of a rate."""
 MUCH = 4.0
-"""Standard deviations."""
+"""Standard deviations of a mean over the blocks beyond which a rate wanders."""
 
 
 @dataclass(frozen=True, eq=False)

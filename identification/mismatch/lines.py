@@ -16,7 +16,7 @@ from typing import Literal
 import numpy as np
 
 from identification.mismatch.line_width import peak_p_value
-from identification.mismatch.rotation_lines import Locked, find_locked
+from identification.mismatch.rotation_lines import Locked, Part, find_locked, wave_of
 from identification.mismatch.spectrum import (
     FAR,
     Series,
@@ -45,17 +45,6 @@ MAINS = (50.0, 60.0)
 HARMONICS = (1, 2, 3, 4, 5)
 EQUAL = 10.0
 """Gain in chi-square by which fixed and rotor-locked lines are told apart."""
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """a cos(phi) + b sin(phi) from `start` to `end` (s) of one run."""
-
-    run: int
-    start: float
-    end: float
-    a: float
-    b: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,12 +80,7 @@ class Line:
         if self.kind == "rotation" and turns is None:
             raise ValueError("a line locked to the rotor needs the turns at these times")
         angle = 2 * np.pi * (self.frequency * time if self.ratio is None or turns is None else self.ratio * turns)
-        out = np.zeros_like(time)
-        for part in self.parts:
-            if part.run == run:
-                inside = (time >= part.start) & (time < part.end)
-                out[inside] += part.a * np.cos(angle[inside]) + part.b * np.sin(angle[inside])
-        return out
+        return wave_of(self.parts, run, time, angle)
 
 
 def find_lines(
@@ -248,7 +232,6 @@ def _locked(found: Locked, unit: Literal["rev", "V s"]) -> Line:
     says = f"Periodic disturbance of {found.amplitude:.3g} N locked to the rotor, {found.ratio:.4g} periods per {per}"
     says += f" (blade pass of {near} blades, or the {near}. order of the shaft)" if blades and near > 1 else ""
     says += ": silent at rest."
-    parts = tuple(Part(*p) for p in found.parts)
     speed = found.speed
     return Line(
         "rotation",
@@ -263,6 +246,6 @@ def _locked(found: Locked, unit: Literal["rev", "V s"]) -> Line:
         found.p_value,
         found.gain,
         says,
-        parts=parts,
+        parts=found.parts,
         unit=unit,
     )

@@ -28,6 +28,27 @@ COHERENT = 0.01
 """Probability below which what fewer phases lose of the power is no noise."""
 
 
+@dataclass(frozen=True, slots=True)
+class Part:
+    """a cos(phi) + b sin(phi) from `start` to `end` (s) of one run."""
+
+    run: int
+    start: float
+    end: float
+    a: float
+    b: float
+
+
+def wave_of(parts: Sequence[Part], run: int, time: Floats, angle: Floats) -> Floats:
+    """(n,) N at these times of a run, from phi = angle (n,) rad; 0 where no part is."""
+    out = np.zeros_like(time)
+    for part in parts:
+        if part.run == run:
+            inside = (time >= part.start) & (time < part.end)
+            out[inside] += part.a * np.cos(angle[inside]) + part.b * np.sin(angle[inside])
+    return out
+
+
 @dataclass(frozen=True, eq=False)
 class Locked:
     ratio: float
@@ -40,17 +61,8 @@ class Locked:
     gain: float
     speed: float
     """Mean speed of the turning rotor, turns per s."""
-    parts: tuple[tuple[int, float, float, float, float], ...]
-    """(run, start, end, a, b) of each stretch."""
-
-    def at(self, run: int, series: Series) -> Floats:
-        """(n,) N, at the samples of that run."""
-        assert series.turns is not None
-        out, angle = np.zeros(series.time.size), 2 * np.pi * self.ratio * series.turns
-        for _, start, end, a, b in (part for part in self.parts if part[0] == run):
-            inside = slice(*np.searchsorted(series.time, (start, end)))
-            out[inside] = a * np.cos(angle[inside]) + b * np.sin(angle[inside])
-        return out
+    parts: tuple[Part, ...]
+    """One for each stretch."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,7 +112,8 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float) -> Locked | No
     found = _fitted(parts, candidate)
     if not found.gain > LEAST_GAIN:
         return None
-    loud = [found.at(i, r) for i, r in runs]  # a loud line was part of its own noise
+    # a loud line was part of its own noise
+    loud = [wave_of(found.parts, i, r.time, 2 * np.pi * found.ratio * r.turns) for i, r in runs if r.turns is not None]
     return _fitted(list(stretches(runs, top, loud)), candidate)
 
 
@@ -210,7 +223,7 @@ def _told(parts: Sequence[Stretch], waves: _Waves, p_value: float) -> Locked:
         gain=waves.gain if coherent else waves.gain - 2.0 * each.size,
         speed=float(np.average([p.speed for p in parts], weights=n)),
         parts=tuple(
-            (p.run, float(p.time[0]), float(np.nextafter(p.time[-1], np.inf)), float(c.real), float(-c.imag))
+            Part(p.run, float(p.time[0]), float(np.nextafter(p.time[-1], np.inf)), float(c.real), float(-c.imag))
             for p, c in zip(parts, each[waves.piece], strict=True)
         ),
     )

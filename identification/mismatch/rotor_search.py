@@ -136,7 +136,8 @@ def _even(pieces: Sequence[Sequence[tuple[Stretch, int]]], ratio: float) -> floa
     used = n > 0
     each = float(np.sum(np.abs(sums[used]) ** 2 / n[used]))
     lost = each - float(np.sum(np.abs(sums.sum(axis=1)) ** 2 / n.sum(axis=1)))
-    if chi2_sf(2 * lost, 2.0 * (np.count_nonzero(used) - len(pieces))) < UNEVEN:
+    freedom = np.count_nonzero(used) - len(pieces)  # none: one speed in each piece, and nothing to compare
+    if freedom and chi2_sf(2 * lost, 2.0 * freedom) < UNEVEN:
         return 1.0
     by_speed, size = (x.reshape(len(pieces), -1, 3).sum(axis=2) for x in (sums, n))
     there = size.any(axis=0)
