@@ -19,6 +19,7 @@ from identification.information import Excitation, Information, excitation, line
 from identification.noise import MIN_SAMPLES, NoiseModel, leverage
 from identification.recording import Floats
 from identification.regression import RANK_TOLERANCE, LinearFit, block_noise, correlated_std, least_squares
+from identification.singular_values import thin_svd
 from identification.verdicts import ALPHA, Significance, Underfit, Whiteness, significance, underfit, whiteness
 
 T = TypeVar("T")
@@ -146,7 +147,7 @@ class _Spectra:
 
 def _spectra(H: Floats, noise: NoiseModel, dof: int) -> _Spectra:
     n, scale, grid = noise.n, np.linalg.norm(H, axis=0), noise.grid
-    U, s, _ = np.linalg.svd(H / np.where(scale > 0, scale, 1.0), full_matrices=False)
+    U, s, _ = thin_svd(H / np.where(scale > 0, scale, 1.0))
     left = np.clip(1 - leverage(U[:, s > RANK_TOLERANCE * s[0]]), 0.0, 1.0)
     keep = noise.weight > LIKELY
     first = left[0] * n * grid.mean_variance[keep]

@@ -10,6 +10,7 @@ from scipy.linalg import cholesky, solve_triangular
 
 from identification.noise import NoiseModel, fit_noise, leverage
 from identification.recording import Floats
+from identification.singular_values import thin_svd
 
 RANK_TOLERANCE = 1e-10
 """Smallest over largest singular value of the column-scaled regressor below which a combination counts as unseen."""
@@ -161,6 +162,6 @@ def block_noise(H: Floats, residual: Floats, blocks: Sequence[slice]) -> tuple[N
     What the fit took out of the residual at each frequency is allowed for.
     """
     scale = np.linalg.norm(H, axis=0)
-    U, s, _ = np.linalg.svd(H / np.where(scale > 0, scale, 1.0), full_matrices=False)
+    U, s, _ = thin_svd(H / np.where(scale > 0, scale, 1.0))
     basis = U[:, s > RANK_TOLERANCE * s[0]]
     return tuple(fit_noise(residual[rows], leverage(basis[rows])) for rows in blocks)

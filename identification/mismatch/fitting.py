@@ -12,6 +12,7 @@ from identification.mismatch.model import Data, Model, Theta, Weights, parameter
 from identification.physics.filters import delayed, reconstructed
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
+from identification.singular_values import thin_svd
 
 MOST_STEPS = 25
 MOST_TRIES = 8
@@ -264,7 +265,7 @@ def _push(j: int, fitted: Fit, data: Data, weights: Weights) -> float:
     which = np.zeros(fitted.free.size, dtype=bool)
     which[j] = True
     column = columns_of(fitted.model, fitted.theta, data, weights, which)[:, 0]
-    u, s, _ = np.linalg.svd(fitted.jacobian, full_matrices=False)
+    u, s, _ = thin_svd(fitted.jacobian)
     u = u[:, s > 1e-9 * s[0]] if s.size else u
     rest = column - u @ (u.T @ column)
     size = float(np.linalg.norm(rest))

@@ -16,6 +16,7 @@ from identification.physics.history import History
 from identification.physics.term import STAGES, Moment, Parameter, Scale, Term
 from identification.physics.tick_rows import TickRows
 from identification.recording import Floats
+from identification.singular_values import thin_svd
 
 ORDER = {term: i for i, term in enumerate(sorted(CATALOGUE, key=lambda t: STAGES.index(t.stage)))}
 """Stage by stage, and in the order of the catalogue within one."""
@@ -273,7 +274,7 @@ def ticked(model: Model, theta: Theta, data: Data) -> list[Floats]:
 def _spread(known: Weights, data: Data, spread: Spread) -> Floats | None:
     """Whitened, and turned into orthogonal columns."""
     thrust = spread.thrust if data.keep is None else [c[k] for c, k in zip(spread.thrust, data.keep, strict=True)]
-    u, s, _ = np.linalg.svd(known.whiten(thrust, spread.rate if known.rate else ()), full_matrices=False)
+    u, s, _ = thin_svd(known.whiten(thrust, spread.rate if known.rate else ()))
     kept = s > 1e-6
     return u[:, kept] * s[kept] if kept.any() else None
 

@@ -19,6 +19,7 @@ from identification.mismatch.model import Data, Weights
 from identification.mismatch.rings import likeliest_rings
 from identification.physics.term import Term
 from identification.recording import Floats
+from identification.singular_values import thin_svd
 from identification.tails import normal_sf
 
 SURROGATES = 1000
@@ -92,7 +93,7 @@ def orthogonal_basis(columns: Floats) -> Floats:
         return columns
     size = np.linalg.norm(columns, axis=0)
     scaled = columns[:, size > 0] / size[size > 0]
-    u, s, _ = np.linalg.svd(scaled, full_matrices=False)
+    u, s, _ = thin_svd(scaled)
     out: Floats = u[:, s > 1e-9 * s[0]] if s.size else scaled
     return out
 

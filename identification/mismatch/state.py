@@ -14,6 +14,7 @@ from identification.mismatch.noise_likelihood import fit_noise
 from identification.physics.free_form import spline
 from identification.physics.term import Term
 from identification.recording import Floats
+from identification.singular_values import thin_svd
 
 MOST_NODES = 17
 
@@ -132,7 +133,7 @@ def _independent(parts: Sequence[Floats]) -> list[Floats]:
     stacked = np.concatenate(parts)
     size = np.linalg.norm(stacked, axis=0)
     stacked = stacked[:, size > 0] / size[size > 0]
-    u, s, _ = np.linalg.svd(stacked, full_matrices=False)
+    u, s, _ = thin_svd(stacked)
     u = u[:, s > 1e-7 * s[0]] * np.sqrt(stacked.shape[0])
     ends = np.cumsum([p.shape[0] for p in parts])
     return list(np.split(u, ends[:-1]))

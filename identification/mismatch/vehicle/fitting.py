@@ -14,6 +14,7 @@ from identification.mismatch.vehicle.model import Known, Layout, known, predict
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared
 from identification.recording import Floats
+from identification.singular_values import thin_svd
 
 STEPS = 30
 ENOUGH = 1e-3
@@ -165,7 +166,7 @@ def _cov(H: Floats, free: Mask) -> Floats:
     at = np.flatnonzero(free)
     size = np.sqrt(np.sum(H[:, at] ** 2, axis=0))
     size[size == 0] = 1.0
-    _, s, Vt = np.linalg.svd(H[:, at] / size, full_matrices=False)
+    _, s, Vt = thin_svd(H[:, at] / size)
     kept = s > 1e-9 * s.max() if s.size else s > 0
     inside = (Vt[kept].T / s[kept] ** 2) @ Vt[kept]
     out[np.ix_(at, at)] = inside / np.outer(size, size)
@@ -191,7 +192,7 @@ def _independent(columns: Sequence[Floats]) -> list[Floats]:
     whole = np.vstack(columns)
     size = np.sqrt(np.sum(whole**2, axis=0))
     whole = whole[:, size > 0] / size[size > 0]
-    U, s, _ = np.linalg.svd(whole, full_matrices=False)
+    U, s, _ = thin_svd(whole)
     basis = U[:, s > 1e-7 * s.max()] if s.size else U
     ends = np.cumsum([c.shape[0] for c in columns])[:-1]
     return [np.ascontiguousarray(part) for part in np.split(basis, ends)]

@@ -14,6 +14,7 @@ from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared, Run
 from identification.mismatch.vehicle.screening import beyond, surrogates
 from identification.recording import Floats
+from identification.singular_values import thin_svd
 
 BUMPS = 6
 ALARM = 0.01
@@ -168,7 +169,7 @@ def _stacked(white: Weights, columns: Sequence[Floats], rows: int) -> Floats:
 def _solved(columns: Floats, base: Floats, residual: Floats) -> tuple[Floats, Floats]:
     """Forces at the knots and their standard errors; of what the model's parameters could hold too, the least."""
     left = columns - base @ (base.T @ columns)
-    U, s, Vt = np.linalg.svd(left, full_matrices=False)
+    U, s, Vt = thin_svd(left)
     kept = s > 1e-5 * s[0]
     inverse = Vt[kept].T / s[kept]
     return inverse @ (U[:, kept].T @ residual), np.sqrt(np.sum(inverse**2, axis=1))

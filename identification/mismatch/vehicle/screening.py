@@ -15,6 +15,7 @@ from identification.physics.vehicle.catalogue import CATALOGUE
 from identification.physics.vehicle.installation_efficiency import InstallationEfficiency
 from identification.physics.vehicle.term import VehicleTerm
 from identification.recording import Floats
+from identification.singular_values import thin_svd
 
 ALARM = 0.01
 """Family-wise false-alarm rate."""
@@ -105,7 +106,7 @@ def screen(
     residual = fitted.residual
     bases = [_own(white, trial, base, residual.size) for trial in found]
     every = np.hstack([base, *bases])
-    U, s, _ = np.linalg.svd(every, full_matrices=False)
+    U, s, _ = thin_svd(every)
     span = U[:, s > np.sqrt(SEEN) * s[0]]
     quiet = residual - span @ (span.T @ residual)
     flipped = surrogates(_of_unit_size(quiet), [w.rows.time.size for w in white], rng)
@@ -153,7 +154,7 @@ def beyond(base: Floats, columns: Floats) -> Floats:
     left = np.asarray(left - base @ (base.T @ left))
     if not left.shape[1]:
         return left
-    U, s, _ = np.linalg.svd(left, full_matrices=False)
+    U, s, _ = thin_svd(left)
     return np.asarray(U[:, s > np.sqrt(SEEN)])
 
 
