@@ -11,10 +11,10 @@ from typing import Literal
 import numpy as np
 
 from identification.mismatch.model import Model, Theta
-from identification.physics.command_saturation import CommandSaturation, passed
+from identification.physics.command_saturation import CommandSaturation
 from identification.physics.filters import delayed, reconstructed
 from identification.physics.history import History, Samples
-from identification.physics.load_cell_saturation import LoadCellSaturation, below, half_moved
+from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.motor_lag import MotorLag, torques
 from identification.physics.tick_leads import curvature, each_lead, lead
 from identification.physics.ticks_passed import Passed
@@ -78,7 +78,7 @@ def passed_on(model: Model, theta: Theta, history: History) -> Floats | float:
     """(M,) or 1: the share of what the command does within an interval that the drive gives the rotor."""
     for term, values in zip(model.terms, theta.terms, strict=True):
         if isinstance(term, CommandSaturation):
-            return passed(history, values[0])
+            return term.passed(history, values)
     return 1.0
 
 
@@ -86,7 +86,7 @@ def shown(model: Model, theta: Theta, history: History, F: Floats, x: Floats, ta
     """(M,) or 1: the share of what the force F (without tare) does within an interval that the cell shows."""
     for term, values in zip(model.terms, theta.terms, strict=True):
         if isinstance(term, LoadCellSaturation):
-            return below(F + tare, values[0], half_moved(history, theta.C, x))
+            return term.shown(history, theta.C, x, F + tare, values)
     return 1.0
 
 

@@ -1,14 +1,15 @@
-"""Cell or amplifier clips: clip(F, -limit, limit)."""
+"""Cell or amplifier clips: clip(F, -limit, limit); or shows less and less from an onset on, until a knee is passed."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Literal
 
 import numpy as np
 from scipy.special import ndtr
 
 from identification.physics.history import TAIL, History
+from identification.physics.soft_limit import limited, slope_at
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
 
@@ -18,19 +19,6 @@ LEAST_MOVE = 1e-6
 """Of the limit: what moves less within an interval stands still."""
 LEAST_BLUR = 0.01
 """The same, of the noise."""
-
-
-def half_moved(history: History, C: float, x: Floats) -> Floats:
-    """(M,) N: half of how far the force moves within each interval, by the variance of the driver there."""
-    out: Floats = C * np.abs(x) * np.sqrt(12 * np.abs(history.excess))
-    return out
-
-
-def below(reading: Floats, limit: float, half: Floats) -> Floats:
-    """(M,) share of each interval below the limit, from its clipped mean: limit - half share^2 of an even motion."""
-    short = np.maximum(limit - np.abs(reading), 0.0)
-    out: Floats = np.sqrt(np.minimum(short / np.maximum(half, LEAST_MOVE * limit), 1.0))
-    return out
 
 
 def _beyond(z: Floats, half: Floats, noise: float) -> Floats:
@@ -54,20 +42,26 @@ def _integral(z: Floats, noise: float) -> Floats:
 
 @dataclass(frozen=True, slots=True)
 class LoadCellSaturation:
-    """Cell or amplifier clips: clip(F, -limit, limit)."""
+    """Cell or amplifier clips: clip(F, -limit, limit); or shows less and less from an onset on, over a knee."""
 
     id: ClassVar[str] = "load_cell_saturation"
     stage: ClassVar[Stage] = "cell"
     physics: ClassVar[str] = "the load cell or its amplifier clips"
     needs: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[str, ...]] = ("thrust",)
-    form: ClassVar[str] = ""
+    form: Literal["hard", "knee"] = "hard"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("limit", "N", 0.1 * scale.reading, 1.3 * scale.reading, 1.3 * scale.reading),)
+        most = 1.3 * scale.reading
+        if self.form == "hard":
+            return (Parameter("limit", "N", 0.1 * scale.reading, most, most),)
+        bend = Parameter("bend", "1/N", 0.0, 50.0 / scale.reading, 0.0)
+        return bend, Parameter("onset", "N", 0.1 * scale.reading, 0.98 * scale.reading)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return tuple((share * scale.reading,) for share in (0.99, 0.95, 0.88, 0.75, 0.6))
+        if self.form == "hard":
+            return tuple((share * scale.reading,) for share in (0.99, 0.95, 0.88, 0.75, 0.6))
+        return tuple((0.5 / scale.reading, share * scale.reading) for share in (0.3, 0.5, 0.7, 0.88))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
@@ -75,7 +69,14 @@ class LoadCellSaturation:
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
         # the mean of noisy samples that clip one by one while the force moves within the interval
         noise, tails = now.history.scatter or (now.scale.noise, 0.0)
-        half = np.maximum(half_moved(now.history, now.C, now.x), max(LEAST_MOVE * theta[0], LEAST_BLUR * noise))
+        half = np.maximum(
+            _half_moved(now.history, now.C, now.x), max(LEAST_MOVE * now.scale.reading, LEAST_BLUR * noise)
+        )
+        if self.form == "knee":  # within a knee the mean shows the variance of what moves, not its distribution
+            spread = np.sqrt(half**2 + 3 * noise**2 * (1 + tails * (TAIL**2 - 1)))
+            reading = value + now.tare
+            bent: Floats = np.copysign(limited(np.abs(reading), spread, *theta), reading) - now.tare
+            return bent
         out = value.copy()
         for share, std in ((1 - tails, noise), (tails, TAIL * noise)):
             if share > 0:
@@ -84,10 +85,39 @@ class LoadCellSaturation:
                 out -= share * (_beyond(over, half, std) - _beyond(under, half, std))
         return out
 
+    def shown(self, history: History, C: float, x: Floats, reading: Floats, theta: tuple[float, ...]) -> Floats:
+        """(M,) share of what the force does within each interval that the cell shows, from the mean reading there."""
+        if self.form == "knee":
+            return slope_at(np.abs(reading), *theta)
+        half = _half_moved(history, C, x)
+        # limit - half share^2 is the clipped mean of an even motion
+        short = np.maximum(theta[0] - np.abs(reading), 0.0)
+        out: Floats = np.sqrt(np.minimum(short / np.maximum(half, LEAST_MOVE * theta[0]), 1.0))
+        return out
+
+    def slope(self, reading: Floats, theta: tuple[float, ...]) -> Floats:
+        """What the cell would show of a small change where it reads `reading` N if it were endless."""
+        beyond = np.abs(reading) - self.start(theta)
+        if self.form == "hard":
+            return np.where(beyond > 0, 0.0, 1.0)
+        out: Floats = np.clip(1 - theta[0] * np.maximum(beyond, 0.0), 0.0, 1.0)
+        return out
+
+    def start(self, theta: tuple[float, ...]) -> float:
+        """N: where the cell begins to show less."""
+        return theta[0] if self.form == "hard" else theta[1]
+
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return (
-            f"Load-cell saturation: readings end at +-{theta[0]:.4g} N; change the range of the amplifier or the cell."
-        )
+        advice = "change the range of the amplifier or the cell"
+        if self.form == "hard":
+            return f"Load-cell saturation: readings end at +-{theta[0]:.4g} N; {advice}."
+        return f"Load-cell saturation: from {theta[1]:.4g} N on readings show less and less of the force; {advice}."
 
 
-FORMS = (LoadCellSaturation(),)
+def _half_moved(history: History, C: float, x: Floats) -> Floats:
+    """(M,) N: half of how far the force moves within each interval, by the variance of the driver there."""
+    out: Floats = C * np.abs(x) * np.sqrt(12 * np.abs(history.excess))
+    return out
+
+
+FORMS = (LoadCellSaturation("hard"), LoadCellSaturation("knee"))

@@ -270,29 +270,49 @@ def test_two_shapes_that_each_explain_a_part_are_named():
     }
 
 
-def clipping(limit, *, cell):
+LIMIT = 66.0
+"""N"""
+KNEE = (0.03, 30.0)
+"""1/N, N: bend and onset."""
+
+
+def clipping(*, cell):
     """Levels of which the highest meet a limit, N: of the cell, which clips noise and all, or of the drive."""
-    runs = run(None if cell else lambda _t, _V, F: np.clip(F, -limit, limit), seconds=120.0, rate=20.0)
+    runs = run(None if cell else lambda _t, _V, F: np.clip(F, -LIMIT, LIMIT), seconds=120.0, rate=20.0)
     command, thrust = runs.channels
-    clipped = replace(thrust, value=np.clip(thrust.value, -limit, limit))
+    clipped = replace(thrust, value=np.clip(thrust.value, -LIMIT, LIMIT))
     return replace(runs, channels=(command, clipped)) if cell else runs
 
 
 def test_readings_are_flat_where_a_cell_clips():
-    (cell,) = diagnosed(clipping(66.0, cell=True)).findings
+    (cell,) = diagnosed(clipping(cell=True)).findings
     assert (cell.effect, cell.rivals) == ("load_cell_saturation", ())
-    (drive,) = diagnosed(clipping(66.0, cell=False)).findings
+    (drive,) = diagnosed(clipping(cell=False)).findings
     assert drive.effect == "command_saturation"
     assert "load_cell_saturation" not in {r.effect for r in drive.rivals}
 
 
+def bent(*, cell):
+    """Levels that a knee compresses by up to a third: of the cell, noise and all, or of what drives the rotor."""
+
+    def compressed(value):
+        bend, onset = KNEE
+        e = np.clip(np.abs(value) - onset, 0.0, 1 / bend)
+        return np.sign(value) * (np.minimum(np.abs(value), onset) + e - 0.5 * bend * e**2)
+
+    runs = run(None if cell else lambda _t, _V, F: compressed(F), seconds=120.0, rate=20.0)
+    command, thrust = runs.channels
+    return replace(runs, channels=(command, replace(thrust, value=compressed(thrust.value)))) if cell else runs
+
+
 @pytest.mark.parametrize("cell", [True, False])
-def test_a_cell_that_is_said_to_clip_is_doubted_where_the_noise_goes_on(cell):
-    data, theta = start([history_of(clipping(66.0, cell=cell))])
+@pytest.mark.parametrize(("made", "form", "values"), [(clipping, "hard", (LIMIT,)), (bent, "knee", KNEE)])
+def test_a_cell_that_is_said_to_clip_is_doubted_where_the_noise_goes_on(made, form, values, cell):
+    data, theta = start([history_of(made(cell=cell))])
     state = baseline(data, theta, (), Model())
-    clips = LoadCellSaturation()
+    clips = LoadCellSaturation(form)
     model = Model((clips,))
-    found = replace(state, fit=fit(model, replace(state.fit.theta, terms=((66.0,),)), data, state.weights))
+    found = replace(state, fit=fit(model, replace(state.fit.theta, terms=(values,)), data, state.weights))
     white = replace(found, noise=Noise(NOISE**2, 0.0))
     assert noise_goes_on(white.fit, clips, white.noise, data) != cell
     assert ("the noise goes on" in " ".join(doubts(white, clips, data, 1))) != cell
