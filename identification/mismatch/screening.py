@@ -34,6 +34,8 @@ TICKS = (-1, 1, 2, 3)
 """Delays that are tried."""
 SLOW_TICK = 0.5
 """s: a command that changes no faster does not tick on."""
+SHIFT = -3
+"""Where the nuisance shift stands in Theta.vector."""
 LEAST_DIRECTION = 1e-6
 """Share of a direction that must remain when the present model is projected out."""
 
@@ -115,7 +117,11 @@ def directions(
     terms: Sequence[Term],
     trials: tuple[tuple[float, ...], ...] | None = None,
 ) -> Directions:
-    """Of all trials (their own, or those given) of all terms whose channels were recorded."""
+    """Of all trials (their own, or those given) of all terms whose channels were recorded, beside what is fitted.
+
+    A delay takes the place of the small one that the clocks are allowed: ramps in ticks make stairs of it, and the
+    slope of one that the small one ends on would hide all others.
+    """
     with_rate = bool(weights.rate)
     base_thrust, base_rate = raw(fit.model, fit.theta, data, with_rate=with_rate)
     base_ticks = ticks_told(fit.model, fit.theta, data, weights)
@@ -148,14 +154,18 @@ def directions(
         [np.column_stack(c) for c in rate if c],
         [np.column_stack(c) for c in ticks],
     )
-    return _beside(basis, Directions(tuple(used), tuple(values), tuple(sided), columns, np.empty(0)))
-
-
-def _beside(basis: Floats, found: Directions) -> Directions:
-    """What is left of the columns beside `basis` (n, p), made unit; without those of which nothing is. In place."""
-    columns = found.columns
+    late = np.array([term.id == "time_skew" for term in used])
     before = lengths(columns)
-    columns -= basis @ (basis.T @ columns)
+    columns -= basis @ ((basis.T @ columns) * ~late)
+    if late.any():
+        own = orthogonal_basis(fit.jacobian[:, np.flatnonzero(fit.free) != fit.free.size + SHIFT])
+        columns[:, late] -= own @ (own.T @ columns[:, late])
+    return _unit(Directions(tuple(used), tuple(values), tuple(sided), columns, np.empty(0)), before)
+
+
+def _unit(found: Directions, before: Floats) -> Directions:
+    """The columns made unit; without those of which, of lengths `before` (q,), nothing is left. In place."""
+    columns = found.columns
     size = lengths(columns)
     good = (size > LEAST_DIRECTION * before) & (size > 0) & np.isfinite(size)
     keep = np.flatnonzero(good)
