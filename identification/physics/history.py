@@ -31,7 +31,7 @@ MOST_LATELY = 12
 LARGEST_LEAD = 0.08
 """Of the largest driver: what changes by more is a step even in a fast ramp, and no tick."""
 LOUD_READINGS = 0.4, 0.9
-"""Of the largest reading: above, the cell may clip; below, noise that is proportional is too small."""
+"""Of the largest reading: above, the cell may clip; below, noise that is proportional is small."""
 LEAST_IN_ROW, LEAST_SCATTER = 5, 200
 """Samples of an interval, and of a run, that tell how samples scatter."""
 STILL = 1e-3
@@ -183,29 +183,42 @@ class History:
 
     @cached_property
     def scatter(self) -> tuple[float, float] | None:
-        """N and 1: standard deviation of a sample about the mean where readings are large, and the share of samples
+        """N and 1: standard deviation of a sample about the mean at the largest readings, and the share of samples
         that scatter TAIL times as much; None where too few samples tell. By the mean |e| and the mean e^2."""
         samples = self.thrust_samples
         if self.sample_thrust.size < LEAST_SCATTER or self.sample_thrust.size != samples.time.size:
             return None
-        low, high = (share * float(np.nanmax(np.abs(self.thrust))) for share in LOUD_READINGS)
-        size = np.abs(self.thrust)
+        size, largest = np.abs(self.thrust), float(np.nanmax(np.abs(self.thrust)))
+        low, high = (share * largest for share in LOUD_READINGS)
         moved = np.broadcast_to(np.abs(self.excess), size.shape)
-        usual = (size > low) & (size < high) & (samples.count >= LEAST_IN_ROW) & (moved < (STILL * self.size) ** 2)
+        usual = (size < high) & (samples.count >= LEAST_IN_ROW) & (moved < (STILL * self.size) ** 2)
+        loud, quiet = (self._beside_means(usual & which) for which in (size > low, size <= low))
+        if loud is None:
+            return None
+        force, e = loud
+        # second = s^2 (1 + (TAIL^2 - 1) w), first = s (1 + (TAIL - 1) w)
+        first, second = float(np.mean(e)) * np.sqrt(np.pi / 2), float(np.mean(e**2))
+        if first <= 0:
+            return None
+        q, a, b = second / first**2, TAIL - 1, TAIL**2 - 1
+        root = (b - 2 * a * q) ** 2 - 4 * a**2 * q * (q - 1)
+        w = max((b - 2 * a * q - float(np.sqrt(max(root, 0.0)))) / (2 * a**2 * q), 0.0)
+        std = first / (1 + a * w)
+        if quiet is not None:  # noise that is proportional is larger still at the largest readings
+            there, here = float(np.mean(quiet[0] ** 2)), float(np.mean(force**2))
+            share = max(1 - float(np.mean(quiet[1]) / np.mean(e)) ** 2, 0.0)
+            std *= float(np.sqrt(1 + share * (largest**2 - here) / (here - there)))
+        return std, w
+
+    def _beside_means(self, usual: NDArray[np.bool_]) -> tuple[Floats, Floats] | None:
+        """N: mean of its interval and |distance from it| of each sample in intervals `usual` (M,); None of too few."""
+        samples = self.thrust_samples
         which = usual[samples.interval]
         if np.count_nonzero(which) < LEAST_SCATTER:
             return None
         at, n = samples.interval[which], samples.count[samples.interval[which]]
         e = np.abs(self.sample_thrust[which] - self.thrust[at]) * np.sqrt(n / (n - 1))
-        e = np.minimum(e, GLITCH * float(np.median(e)))
-        first, second = float(np.mean(e)) * np.sqrt(np.pi / 2), float(np.mean(e**2))
-        if first <= 0:
-            return None
-        # second = s^2 (1 + (TAIL^2 - 1) w), first = s (1 + (TAIL - 1) w)
-        q, a, b = second / first**2, TAIL - 1, TAIL**2 - 1
-        root = (b - 2 * a * q) ** 2 - 4 * a**2 * q * (q - 1)
-        w = max((b - 2 * a * q - float(np.sqrt(max(root, 0.0)))) / (2 * a**2 * q), 0.0)
-        return first / (1 + a * w), w
+        return self.thrust[at], np.minimum(e, GLITCH * float(np.median(e)))
 
     @cached_property
     def rows(self) -> NDArray[np.intp]:
