@@ -34,6 +34,8 @@ TICKING = 5
 """More steps than this part of the intervals are the ticks of ramps, unless they are..."""
 LARGEST_TICK = 0.08
 """...larger than this share of the largest driver."""
+REST = 3.0
+"""Spacings of the samples: a command that stood for longer was held."""
 STEP = 0.02
 """Share of the largest driver: a change of a command that is a step."""
 
@@ -107,6 +109,12 @@ class Held:
         out: Floats = total / np.diff(edges) - mean * np.abs(mean)
         return out
 
+    def starts(self, rest: float) -> Floats:
+        """Times at which it moves after it stood for more than `rest` s."""
+        moves = self.time[1:][np.diff(self.value) != 0]
+        out: Floats = moves[np.diff(moves, prepend=-np.inf) > rest]
+        return out
+
     def changes(self) -> Floats:
         """Times at which it has moved by MOVES of its size since the last such time."""
         step = MOVES * float(np.max(np.abs(self.value)))
@@ -138,7 +146,17 @@ def edges_of(time: Floats, held: Held, most: int) -> Floats:
     gap = np.flatnonzero(np.diff(time) > GAP * spacing)
     if 0 < gap.size < most // 4:  # samples at the end of a long interval would stand for its middle
         edges = np.union1d(edges, np.concatenate([time[gap] + 0.5 * spacing, time[gap + 1] - 0.5 * spacing]))
+    edges = _with_starts(edges, candidates, held, spacing, most)
     return _with_windows(_with_steps(edges, held, spacing, most), time, held, spacing, most)
+
+
+def _with_starts(edges: Floats, candidates: Floats, held: Held, spacing: float, most: int) -> Floats:
+    """What is held and what moves after it share no interval: an edge before the first sample on the way."""
+    starts = held.starts(REST * spacing) if held.stepwise else np.empty(0)
+    if not 0 < starts.size < most // 4:
+        return edges
+    before = np.searchsorted(candidates, starts, side="right") - 1
+    return np.union1d(edges, candidates[np.clip(before, 0, candidates.size - 1)])
 
 
 def _with_steps(edges: Floats, held: Held, spacing: float, most: int) -> Floats:

@@ -1,4 +1,7 @@
-"""The jet comes round the tunnel: T - k |x| u, u' = (j - u)/tau, j = x or as momentum theory has it sqrt(T/C)."""
+"""The jet comes round the tunnel: T - k |x| u, u' = (j - u)/tau, j = x or as momentum theory has it sqrt(T/C).
+
+Or late, on a circuit through two volumes of water: u' = (w - u)/tau, w' = (x - w)/tau.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,7 @@ class Recirculation:
     physics: ClassVar[str] = "the jet of the thruster comes round the tunnel"
     needs: ClassVar[tuple[str, ...]] = ()
     coordinates: ClassVar[tuple[str, ...]] = ("time_since_step", "time")
-    form: Literal["rate", "thrust"] = "rate"
+    form: Literal["rate", "thrust", "circuit"] = "rate"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (
@@ -38,16 +41,18 @@ class Recirculation:
         return ()
 
     def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        jet = now.x if self.form == "rate" else np.sign(value) * np.sqrt(np.abs(value / now.C))
+        jet = np.sign(value) * np.sqrt(np.abs(value / now.C)) if self.form == "thrust" else now.x
         u = lowpass(jet, now.history.dt, theta[1])[1]
+        if self.form == "circuit":
+            u = lowpass(u, now.history.dt, theta[1])[1]
         out: Floats = value - theta[0] * np.abs(now.x) * u
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
             f"Recirculation: the jet comes round and takes up to {100 * theta[0] * scale.driver**2 / scale.thrust:.0f} "
-            f"% of the thrust within {theta[1]:.3g} s of one direction."
+            f"% of the thrust within {theta[1] * (2 if self.form == 'circuit' else 1):.3g} s of one direction."
         )
 
 
-FORMS = (Recirculation("rate"), Recirculation("thrust"))
+FORMS = (Recirculation("rate"), Recirculation("thrust"), Recirculation("circuit"))
