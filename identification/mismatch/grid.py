@@ -110,9 +110,11 @@ class Held:
         return out
 
     def starts(self, rest: float) -> Floats:
-        """Times at which it moves after it stood for more than `rest` s."""
-        moves = self.time[1:][np.diff(self.value) != 0]
-        out: Floats = moves[np.diff(moves, prepend=-np.inf) > rest]
+        """Times at which it begins to move, and not by a step, after it stood for more than `rest` s."""
+        change = np.diff(self.value)
+        moves, far = self.time[1:][change != 0], np.abs(change[change != 0])
+        begins = (np.diff(moves, prepend=-np.inf) > rest) & (far <= STEP * float(np.max(np.abs(self.value))))
+        out: Floats = moves[begins]
         return out
 
     def changes(self) -> Floats:

@@ -151,9 +151,12 @@ def search(
         )
         if larger is None:
             break
-        state = prune(larger, data)
-        if frozenset(state.fit.model.terms) in seen:  # what was added was dropped again
+        pruned = prune(larger, data)
+        if (
+            frozenset(pruned.fit.model.terms) in seen
+        ):  # added, and dropped again: slow noise would take its place
             break
+        state = pruned
         seen.add(frozenset(state.fit.model.terms))
     return Found(data, terms, before, state, tuple(screenings), judged)
 
