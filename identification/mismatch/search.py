@@ -152,9 +152,7 @@ def search(
         if larger is None:
             break
         pruned = prune(larger, data)
-        if (
-            frozenset(pruned.fit.model.terms) in seen
-        ):  # added, and dropped again: slow noise would take its place
+        if frozenset(pruned.fit.model.terms) in seen:  # added, and dropped again: slow noise would take its place
             break
         state = pruned
         seen.add(frozenset(state.fit.model.terms))
