@@ -172,6 +172,12 @@ def _told(store: Store, job: Job, *, verbose: bool) -> str:
 )
 @click.option("--renew", is_flag=True, help="Answer again what another version of the diagnosis answered.")
 @click.option("--failures", is_flag=True, help="Only what came out wrong by another version of the diagnosis: again.")
+@click.option(
+    "--scores",
+    "scores_path",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="File of scores: what it holds by this version of the diagnosis is not asked again; all are written to it.",
+)
 @click.option("--keep", is_flag=True, help="Keep the recordings (some 5 MB each).")
 @click.option("--no-run", is_flag=True, help="Only tell what is in the store.")
 @click.option("--case", metavar="CELL/EFFECT/NUMBER", help="Make and answer this one case, print truth and answer.")
@@ -188,6 +194,7 @@ def prove_command(
     limit: float,
     renew: bool,
     failures: bool,
+    scores_path: Path | None,
     keep: bool,
     no_run: bool,
     case: str | None,
@@ -199,19 +206,25 @@ def prove_command(
 
     Exit status 0 whatever the figures are, 2 when the proof cannot be run.
     """
+    from rig.blind import elsewhere
     from rig.blind.collecting import collected, not_good
-    from rig.blind.store import Store
+    from rig.blind.store import Store, version_of_diagnosis
 
     try:
         if case is not None:
             click.echo(one_case(case, limit, verbose=verbose))
             return
         kept, jobs = Store(store), designed(seeds, only)
+        told = elsewhere.read(scores_path) if scores_path is not None else {}
+        known = elsewhere.usable(told, jobs, "" if no_run else version_of_diagnosis())
         if failures:
             jobs, renew = not_good(collected(kept, jobs), jobs), True
         if not no_run:
-            run(kept, jobs, lanes or os.cpu_count() or 1, limit, renew=renew, keep=keep)
-        found = collected(kept, jobs)
+            pending = elsewhere.unanswered(jobs, known)
+            run(kept, pending, lanes or os.cpu_count() or 1, limit, renew=renew, keep=keep)
+        found = collected(kept, jobs, known)
+        if scores_path is not None:
+            elsewhere.write(scores_path, {**told, **{each.score.order.id: each for each in found.known}}.values())
         click.echo(still_wrong(found) if failures else summary(found))
         leave(found, seeds, json_path, report)
     except (RigError, OSError) as error:

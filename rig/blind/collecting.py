@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rig.blind.design import LADDER, Job
@@ -11,14 +12,32 @@ from rig.blind.store import Store
 
 
 @dataclass(frozen=True, slots=True)
+class Known:
+    """A score with what it is a score of."""
+
+    score: Score
+    version: str
+    """Of the diagnosis that answered."""
+    asked: str
+    """Job.digest: what the world was asked for."""
+
+
+@dataclass(frozen=True, slots=True)
 class Collected:
     """`missing`: orders not answered yet; `undrawn`: cases that the world could not make."""
 
-    scores: tuple[Score, ...]
+    known: tuple[Known, ...]
     missing: int
     undrawn: tuple[str, ...]
-    versions: tuple[str, ...]
-    """Of the diagnosis, the most frequent first."""
+
+    @property
+    def scores(self) -> tuple[Score, ...]:
+        return tuple(each.score for each in self.known)
+
+    @property
+    def versions(self) -> tuple[str, ...]:
+        """Of the diagnosis, the most frequent first."""
+        return tuple(version for version, _ in Counter(each.version for each in self.known).most_common())
 
 
 def not_good(found: Collected, jobs: Sequence[Job]) -> list[Job]:
@@ -28,9 +47,9 @@ def not_good(found: Collected, jobs: Sequence[Job]) -> list[Job]:
     return [job for job in kept if job.orders]
 
 
-def collected(store: Store, jobs: Sequence[Job]) -> Collected:
-    """All that is answered."""
-    found, missing, undrawn, versions = [], 0, [], []
+def collected(store: Store, jobs: Sequence[Job], elsewhere: Mapping[str, Known] | None = None) -> Collected:
+    """All that is answered: in the store, or else among the scores from `elsewhere`, by the ids of their orders."""
+    found, missing, undrawn = [], 0, []
     for job in jobs:
         truth = store.truth(job)
         if truth is not None and truth["error"]:
@@ -38,10 +57,11 @@ def collected(store: Store, jobs: Sequence[Job]) -> Collected:
             continue
         for order in job.orders:
             answer = store.answer(job, order)
-            if truth is None or answer is None:
+            if truth is not None and answer is not None:
+                score = scored(order, truth, answer, store.thrust(job), store.predictions(job, order))
+                found.append(Known(score, str(answer["code"]), job.digest))
+            elif elsewhere is not None and order.id in elsewhere:
+                found.append(elsewhere[order.id])
+            else:
                 missing += 1
-                continue
-            found.append(scored(order, truth, answer, store.thrust(job), store.predictions(job, order)))
-            versions.append(str(answer["code"]))
-    ranked = sorted(set(versions), key=lambda v: -versions.count(v))
-    return Collected(tuple(found), missing, tuple(undrawn), tuple(ranked))
+    return Collected(tuple(found), missing, tuple(undrawn))

@@ -7,6 +7,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -89,6 +90,11 @@ class Job:
     def asked(self) -> dict[str, Any]:
         """The line that the world reads."""
         return {"token": self.token, "seed": self.seed, **self.spec}
+
+    @property
+    def digest(self) -> str:
+        """Hash of `asked`."""
+        return sha256(json.dumps(self.asked(), sort_keys=True).encode()).hexdigest()[:12]
 
 
 def design(world: Kinds, catalogue: Collection[str], seeds: int, only: Sequence[str] = ()) -> list[Job]:

@@ -10,16 +10,17 @@ from blind_scores import CATALOGUE, WORLD, answer, finding, order, truth, whole_
 from click.testing import CliRunner
 from report_reading import open_fonts
 
+from rig.blind import elsewhere
 from rig.blind.answering import answered
-from rig.blind.collecting import collected, not_good
-from rig.blind.design import Job, design, matches
+from rig.blind.collecting import Collected, Known, collected, not_good
+from rig.blind.design import Job, Order, design, matches
 from rig.blind.figures import confusion, goals, half, half_named, tables, twins, worst
 from rig.blind.lanes import Child, Ended, Lane, Overdue, carry_out, concealable
 from rig.blind.meaning import SAME, true_values
 from rig.blind.places import PLACES
 from rig.blind.rates import Goal, Rate, of_rate
 from rig.blind.scoring import Score, scored
-from rig.blind.store import ProofError, Store
+from rig.blind.store import ProofError, Store, version_of_diagnosis
 from rig.prove import designed, prove_command
 from rig.report.page import html
 from rig.report.proof import proof_page
@@ -209,14 +210,17 @@ def test_figures_of_a_whole_proof_are_json_and_a_page():
     assert figures["goals"][0]["n"] == 20
     assert {row["cell"] for row in figures["open_world"]} == {"outside", "removed"}
     assert worst(scores)[0]["failures"] >= worst(scores)[-1]["failures"]
-    page = html(proof_page(store_less(scores), figures))
+    told = store_less(scores)
+    assert told.versions == ("abc", "def")
+    page = html(proof_page(told, figures))
     for text in ("Open world", "False alarms by kind of noise", "Twins", "Detection power", "✗ missed", "--renew"):
         assert text in page
 
 
 def store_less(scores):
-    found = collected(Store(None), [])
-    return replace(found, scores=tuple(scores), versions=("abc", "def"), undrawn=("faint/x/0: no",))
+    versions = ["abc" if i % 3 else "def" for i in range(len(scores))]
+    known = tuple(Known(s, v, "") for s, v in zip(scores, versions, strict=True))
+    return Collected(known, 0, ("faint/x/0: no",))
 
 
 def test_a_page_of_nothing_is_still_a_page():
@@ -308,3 +312,52 @@ def test_the_command_tells_an_empty_store(tmp_path):
     assert done.exit_code == 0, done.output
     assert "0 answers" in done.output
     assert json.loads(out.read_text(encoding="utf-8"))["format"] == "thruster-rig-proof"
+
+
+def test_scores_of_another_machine_come_back_as_they_were(tmp_path):
+    jobs = {order.id: job for job in design(WORLD, CATALOGUE, 2) for order in job.orders}
+    known = {s.order.id: Known(s, "abc", jobs[s.order.id].digest) for s in whole_proof(2)}
+    for name in ("scores.jsonl", "scores.jsonl.gz"):
+        elsewhere.write(tmp_path / name, known.values())
+        assert elsewhere.read(tmp_path / name) == known
+    assert elsewhere.read(tmp_path / "none.jsonl") == {}
+
+
+def test_scores_of_another_version_or_design_are_asked_again():
+    one, other = jobs = design(WORLD, CATALOGUE, 1, ["plain/asymmetry/0", "plain/heating/0"])
+    asked = one.orders[0]
+    known = {asked.id: Known(Score(asked, ("asymmetry",), "explained"), "abc", one.digest)}
+    assert elsewhere.usable(known, jobs, "abc") == elsewhere.usable(known, jobs) == known
+    assert elsewhere.usable(known, jobs, "abd") == {}
+    assert elsewhere.usable(known, [replace(one, spec={}), other], "abc") == {}
+    assert {o.id for job in elsewhere.unanswered(jobs, known) for o in job.orders} == {
+        o.id for job in jobs for o in job.orders
+    } - {asked.id}
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [("a.jsonl", b'{"version": "abc"}\n'), ("a.jsonl", b"scores\n"), ("a.jsonl.gz", b"{}"), ("a.jsonl", b"\xff\xfe")],
+)
+def test_a_file_that_holds_no_scores_is_refused(tmp_path, name, content):
+    (tmp_path / name).write_bytes(content)
+    words = ["--no-run", "--only", "plain/heating/0", "--store", str(tmp_path / "s"), "--scores", str(tmp_path / name)]
+    done = CliRunner().invoke(prove_command, words)
+    assert done.exit_code == 2
+    assert f"{name}" in done.output
+    assert "rig prove --scores" in done.output
+    assert (tmp_path / name).read_bytes() == content
+
+
+def test_what_a_file_of_scores_holds_is_counted_and_not_asked(tmp_path):
+    (job,) = designed(1, ["plain/heating/0"])
+    score = Score(job.orders[0], ("heating",), "explained", named=("heating",))
+    older = Score(Order("plain/dead_band/0"), ("dead_band",), "adequate")
+    file = tmp_path / "scores.jsonl.gz"
+    elsewhere.write(file, [Known(score, version_of_diagnosis(), job.digest), Known(older, "old", "0")])
+    words = ["--only", "plain/heating/0", "--seeds", "1", "--store", str(tmp_path / "s"), "--scores", str(file)]
+    done = CliRunner().invoke(prove_command, words)
+    assert done.exit_code == 0, done.output
+    assert "1 answers, 0 of them crashed, refused or overdue; 0 still to come" in done.output
+    assert not (tmp_path / "s").exists(), "nothing was asked"
+    assert {k.score.order.id for k in elsewhere.read(file).values()} == {"plain/heating/0", "plain/dead_band/0"}
