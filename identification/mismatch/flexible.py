@@ -66,6 +66,7 @@ class Extended:
 
 def extend(
     after: State,
+    before: State,
     data: Data,
     located: str,
     doubted: Sequence[Named],
@@ -74,14 +75,18 @@ def extend(
 ) -> Extended | None:
     """The model with up to MOST_TERMS flexible terms; None where none improves what was not fitted.
 
+    None also where they predict it worse than the baseline, `before`.
+
     `located`: the coordinate over which it is left; `doubted`: terms whose name was not earned;
     `others`: whole runs to judge on, blocks of time when empty.
     """
     part, judge, begin = split(after, data, others)
     first = judge(begin.fit)
+    plain = judge(fit(before.fit.model, before.fit.theta, part, begin.weights))
     for smaller in _bases(begin, part, [n.term for n in doubted]):
         state, terms, held, equals = _grown(smaller, part, located, judge, rng)
-        if terms and (better(held, first, 0) or (smaller is not begin and held.rmse < AS_GOOD * first.rmse)):
+        improves = better(held, first, 0) or (smaller is not begin and held.rmse < AS_GOOD * first.rmse)
+        if terms and improves and held.rmse < plain.rmse:
             break
     else:
         return None

@@ -91,6 +91,12 @@ def _with_form(values: Values, form: str, _k: float, _driver: float) -> Table:
     return {**values, "form": form}
 
 
+def _limit(values: Values, form: str, _k: float, _driver: float) -> Table:
+    if form == "knee":
+        return {"form": form, "bend": values["bend"], "limit": values["onset"] + 0.5 / values["bend"]}
+    return dict(values)
+
+
 def _winding(values: Values, _form: str, k: float, _driver: float) -> Table:
     return {"resistance": values["loss"] * _PLAIN.torque_acceleration / (_PLAIN.drag * k**2)}
 
@@ -162,7 +168,7 @@ def _offset(values: Values, _form: str, _k: float, _driver: float) -> Table:
 
 
 TERMS: Mapping[str, Callable[[Values, str, float, float], Table]] = {
-    "command_saturation": _same,
+    "command_saturation": _limit,
     "dead_band": _with_form,
     "winding_resistance": _winding,
     "motor_lag": _lag,
@@ -184,7 +190,7 @@ TERMS: Mapping[str, Callable[[Values, str, float, float], Table]] = {
     "load_cell_nonlinearity": _cell,
     "zero_drift": _same,
     "zero_offset": _offset,
-    "load_cell_saturation": _same,
+    "load_cell_saturation": _limit,
 }
 """Effect id -> (values, form, k, the driver that the form refers to) -> `[effects.<id>]`. The rest (supply_sag,
 rotation_coupling, thruster_interaction) follow a channel that the world makes itself."""

@@ -9,6 +9,7 @@ import pytest
 from sim_devices.tables import WorldError
 from sim_devices.world import World, read_world
 from sim_devices.world.effects import EFFECTS
+from sim_devices.world.effects.limit import CommandSaturation
 from sim_devices.world.headless import run
 
 C = 0.4
@@ -155,6 +156,14 @@ def test_supply_sag_moves_the_bus_voltage_that_is_measured():
     s = world.state
     assert world.sample("bus_voltage") == pytest.approx(48.0 - 0.5 * s.input_current, rel=1e-3)
     assert s.thrust == pytest.approx(C * (20.0 * s.bus_voltage / 48.0) ** 2, rel=1e-3)
+
+
+def test_a_limit_with_a_knee_bends_from_its_onset():
+    """Onset 10, slope 1 - 0.25 e beyond it: 0 at 14, where 12 is reached."""
+    world = World(read_world(PLAIN), np.random.default_rng(1))
+    limit = CommandSaturation(limit=12.0, form="knee", bend=0.25)
+    seen = [limit.apply(v, world.state, 0.01) for v in (8.0, 10.0, 12.0, 14.0, 20.0, -12.0)]
+    assert seen == pytest.approx([8.0, 10.0, 11.5, 12.0, 12.0, -11.5])
 
 
 def test_a_clipping_cell_clips_its_noise_too():

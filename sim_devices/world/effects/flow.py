@@ -61,7 +61,8 @@ class Recirculation:
     """The jet comes round the tunnel: T - coefficient |n| u, u' = (j - u)/time_constant.
 
     form "rate": the jet j is n. form "thrust": j = sgn(T) sqrt(|T| / C_t), momentum theory's jet of the thrust itself.
-    form "late": j is n of `delay` ago, the time that the water takes round the tunnel.
+    form "late": j is n of `delay` ago, the time that the water takes round the tunnel. form "circuit": j follows n with
+    the same time constant first, in a volume of water of its own.
     """
 
     stage: ClassVar[Stage] = "hydro"
@@ -76,15 +77,20 @@ class Recirculation:
     """rev/s, what is under way."""
     jet: float = field(init=False, default=0.0)
     """rev/s: u."""
+    first: float = field(init=False, default=0.0)
+    """rev/s: j of "circuit"."""
 
     def __post_init__(self) -> None:
         require_positive(time_constant=self.time_constant)
-        require_choice("form", self.form, ("rate", "thrust", "late"))
+        require_choice("form", self.form, ("rate", "thrust", "late", "circuit"))
 
     def apply(self, value: float, s: State, dt: float) -> float:
         if self.form == "late":
             self.way.append(s.n)
             made = self.way.popleft() if len(self.way) > round(self.delay / dt) else self.way[0]
+        elif self.form == "circuit":
+            self.first += (s.n - self.first) * min(dt / self.time_constant, 1.0)
+            made = self.first
         else:
             made = s.n if self.form == "rate" else copysign(sqrt(abs(value) / s.thrust_constant), value)
         self.jet += (made - self.jet) * min(dt / self.time_constant, 1.0)
@@ -93,6 +99,8 @@ class Recirculation:
     def over(self, value: Floats, h: History) -> Floats:
         if self.form == "thrust":
             made = np.sign(value) * np.sqrt(np.abs(value) / h.thrust_constant)
+        elif self.form == "circuit":
+            made = low_pass(h.n, self.time_constant, h.dt)
         else:
             made = h.n if self.form == "rate" else delayed(h.n, self.delay, h.dt)
         return np.asarray(value - self.coefficient * np.abs(h.n) * low_pass(made, self.time_constant, h.dt))

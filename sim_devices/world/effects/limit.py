@@ -17,26 +17,38 @@ KNEE = 8.0
 
 @dataclass(slots=True)
 class Limit:
-    """clip(x, -limit, limit); form "soft": x / (1 + |x/limit|^KNEE)^(1/KNEE), which bends before it is flat."""
+    """clip(x, -limit, limit); form "soft": x / (1 + |x/limit|^KNEE)^(1/KNEE), which bends before it is flat.
+
+    form "knee": the slope falls evenly from 1, `bend` per unit of x, and is 0 where the limit is reached.
+    """
 
     stage: ClassVar[Stage]
     limit: float
     """In the unit of the stage."""
     form: str = "hard"
+    bend: float = 0.0
+    """One over the unit of the stage; only for "knee"."""
 
     def __post_init__(self) -> None:
         require_positive(limit=self.limit)
-        require_choice("form", self.form, ("hard", "soft"))
+        require_choice("form", self.form, ("hard", "soft", "knee"))
+        if self.form == "knee":
+            require_positive(bend=self.bend)
 
     def apply(self, value: float, _s: State, _dt: float) -> float:
-        if self.form == "soft":
-            return float(value / (1.0 + abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
-        return min(max(value, -self.limit), self.limit)
+        if self.form == "hard":
+            return min(max(value, -self.limit), self.limit)
+        return float(self._bent(np.asarray(value)))
 
     def over(self, value: Floats, _h: History) -> Floats:
+        return np.clip(value, -self.limit, self.limit) if self.form == "hard" else self._bent(value)
+
+    def _bent(self, value: Floats) -> Floats:
         if self.form == "soft":
             return np.asarray(value / (1.0 + np.abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
-        return np.clip(value, -self.limit, self.limit)
+        short = np.maximum(self.limit + 0.5 / self.bend - np.abs(value), 0.0)  # of where the slope is 0
+        size = np.where(short < 1.0 / self.bend, self.limit - 0.5 * self.bend * short**2, np.abs(value))
+        return np.asarray(np.copysign(size, value))
 
 
 @dataclass(slots=True)
