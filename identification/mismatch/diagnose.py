@@ -93,15 +93,24 @@ def diagnose(
         found = search(seen.histories, rng, given=given, bands=seen.bands, without=without)
     after, standing = found.after, None
     if after.fit.model.terms:
-        after, standing = settle_forms(found.after, found.data, found.terms)
-        if after is not found.after:  # the search ends with what it pruned
-            pruned = prune(after, found.data)
-            after, standing = pruned, standing if pruned is after else None
+        after, standing = _settled(found)
     left = _with_colour(judge_left(after.fit, found.data, after.weights, rng), after, found.data)
     measured = replace(found.data, histories=histories)
     answer, after = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
     answer = _with_channels(answer, lines, faults)
     return with_twin(answer, after, found.data, recordings, baseline)
+
+
+def _settled(found: Found) -> tuple[State, dict[Term, Standing] | None]:
+    """With rivals exchanged, pruned as a search ends; as found where what was exchanged for a term is dropped again."""
+    after, standing = settle_forms(found.after, found.data, found.terms)
+    if after is found.after:
+        return after, standing
+    pruned = prune(after, found.data)
+    if pruned is after:
+        return after, standing
+    exchanged = set(after.fit.model.terms) - set(found.after.fit.model.terms)
+    return (pruned if exchanged <= set(pruned.fit.model.terms) else found.after), None
 
 
 def _histories(recordings: Sequence[Recording]) -> tuple[History, ...] | Refusal:

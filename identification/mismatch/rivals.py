@@ -12,6 +12,7 @@ from identification.mismatch.fitting import Fit, at_bound, change_of, extended, 
 from identification.mismatch.flatness import noise_goes_on
 from identification.mismatch.model import Data, price
 from identification.mismatch.screening import directions, orthogonal_basis, refined
+from identification.mismatch.search import accept_threshold
 from identification.mismatch.state import State, fit_without, refresh
 from identification.physics.term import Term
 from identification.recording import Floats
@@ -63,7 +64,8 @@ def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> tuple[State
                 price = PRESSED_SHARE * (less.chi2 - state.fit.chi2)
             for rival in standing[term][1]:
                 loss = rival.bic_loss - price
-                if loss < -BETTER and (best is None or loss < best[0]):
+                lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.term.parameters(data.scale)))
+                if lasts and loss < -BETTER and (best is None or loss < best[0]):
                     best = (loss, rival.fit)
         best = _one_for_two(state, data, terms, best)
         if best is None:

@@ -146,22 +146,37 @@ def search(
             )
         if len(ids) >= MOST_TERMS:
             break
-        larger = (
-            _larger(state, judged, data, terms) if judged.largest > judged.threshold else _hidden(state, judged, data)
-        )
+        larger = _lasting(state, judged, data, terms, seen)
         if larger is None:
             break
-        pruned = prune(larger, data)
-        if frozenset(pruned.fit.model.terms) in seen:  # added, and dropped again: slow noise would take its place
-            break
-        state = pruned
+        state = larger
         seen.add(frozenset(state.fit.model.terms))
     return Found(data, terms, before, state, tuple(screenings), judged)
 
 
-def _larger(state: State, judged: Screening, data: Data, terms: Sequence[Term]) -> State | None:
-    """The model with one more term, its noise estimated anew."""
-    best = _best_addition(state, judged, data)
+def _lasting(
+    state: State, judged: Screening, data: Data, terms: Sequence[Term], seen: Collection[frozenset[Term]]
+) -> State | None:
+    """The larger model, pruned; of additions that are dropped again the next best. None where none lasts."""
+    refused: set[Term] = set()
+    found = judged.largest > judged.threshold
+    while True:
+        larger = _larger(state, judged, data, terms, refused) if found else _hidden(state, judged, data)
+        if larger is None:
+            return None
+        pruned = prune(larger, data)
+        if frozenset(pruned.fit.model.terms) not in seen:
+            return pruned
+        if not found:
+            return None
+        refused |= set(larger.fit.model.terms) - set(state.fit.model.terms)
+
+
+def _larger(
+    state: State, judged: Screening, data: Data, terms: Sequence[Term], refused: Collection[Term]
+) -> State | None:
+    """The model with one more term, none of those `refused`, its noise estimated anew."""
+    best = _best_addition(state, judged, data, refused)
     if best is None:
         return None
     remaining = [t for t in terms if t.id not in {u.id for u in best.model.terms}]
@@ -193,9 +208,11 @@ def _hidden(state: State, judged: Screening, data: Data) -> State | None:
     return refresh(best.model, best.theta, data, None, None)
 
 
-def _best_addition(state: State, judged: Screening, data: Data) -> Fit | None:
+def _best_addition(state: State, judged: Screening, data: Data, refused: Collection[Term]) -> Fit | None:
     fits = []
     for term, values, _ in judged.best(CANDIDATES):
+        if term in refused:
+            continue
         bigger = state.fit.model.plus(term)
         begin = refined(state.fit, data, state.weights, term, values)
         theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from sim_devices.concealed.definition import Case, Concealed
 from sim_devices.concealed.draw import NEEDS_DRIFT, NEEDS_FLOW
 from sim_devices.concealed.projection import Screen, signals
-from sim_devices.concealed.shapes import FORMS, Shape, shape
+from sim_devices.concealed.shapes import FORMS, NEIGHBOURS, Shape, shape
 
 Floats = NDArray[np.float64]
 
@@ -52,7 +52,7 @@ def twins(case: Case, effect: str, rivals: Sequence[str], rng: np.random.Generat
             continue
         if rival in NEEDS_DRIFT and not case.temperature_drift:
             continue
-        tried = [_drawn(oracle, rival, form, rng) for form in FORMS.get(rival, ("",))]
+        tried = [_drawn(oracle, rival, form, rng) for form in (*FORMS.get(rival, ("",)), *NEIGHBOURS.get(rival, ()))]
         found.append(min(tried, key=lambda each: each[0].left))
     found.sort(key=lambda each: each[0].left)
     nearest = [_searched(oracle, *each) for each in found[:SEARCHED]]

@@ -77,7 +77,7 @@ def shape(effect: str, scale: Scale, rng: Rng, form: str = "") -> Shape:
     if effect not in SHAPES:
         raise ValueError(f"effect must be one of {', '.join(SHAPES)}, got {effect!r}")
     forms = FORMS.get(effect, ("",))
-    known = (*forms, *VARIANTS.get(effect, ()))
+    known = (*forms, *NEIGHBOURS.get(effect, ()), *VARIANTS.get(effect, ()))
     if form and form not in known:
         raise ValueError(f"form of {effect} must be one of {', '.join(known)}, got {form!r}")
     return SHAPES[effect](scale, rng, form or str(rng.choice(forms)))
@@ -98,6 +98,14 @@ FORMS: dict[str, tuple[str, ...]] = {
     "periodic_disturbance": ("frequency", "blades"),
     "supply_sag": ("resistance", "discharge"),
 }
+
+
+NEIGHBOURS: dict[str, tuple[str, ...]] = {
+    "command_saturation": ("knee",),
+    "load_cell_saturation": ("knee",),
+    "recirculation": ("circuit",),
+}
+"""Forms that are never concealed, but what is concealed may be mistaken for them: tried as rivals beside FORMS."""
 
 
 VARIANTS: dict[str, tuple[str, ...]] = {
@@ -185,8 +193,11 @@ def _winding(s: Scale, _rng: Rng, form: str) -> Shape:
     return Shape("winding_resistance", "resistance", 1.0, s.voltage / s.current)
 
 
-def _clipped(effect: str, highest: float, limit: float, form: str) -> Shape:
+def _clipped(effect: str, highest: float, limit: float, rng: Rng, form: str) -> Shape:
     """A soft limit also bends what lies far below it: it may lie above the largest value."""
+    if form == "knee":
+        fixed = {"onset": limit * _uniform(rng, 0.3, 0.9), "form": form}
+        return Shape(effect, "bend", 2.0, 1.0 / limit, fixed=fixed)
     if form:
         return Shape(effect, "limit", highest + 0.3, -limit, base=1.3 * limit, fixed={"form": form})
     return Shape(effect, "limit", highest, -limit, base=limit)
@@ -206,7 +217,7 @@ def _neighbour(s: Scale, rng: Rng, _form: str) -> Shape:
 
 
 SHAPES: dict[str, Callable[[Scale, Rng, str], Shape]] = {
-    "command_saturation": lambda s, _r, f: _clipped("command_saturation", 0.6, s.voltage, f),
+    "command_saturation": lambda s, r, f: _clipped("command_saturation", 0.6, s.voltage, r, f),
     "supply_sag": _sag,
     "dead_band": lambda s, _r, f: Shape("dead_band", "half_width", 0.4, s.voltage, fixed={"form": f}),
     "winding_resistance": _winding,
@@ -249,7 +260,7 @@ SHAPES: dict[str, Callable[[Scale, Rng, str], Shape]] = {
     "zero_offset": lambda s, r, _f: Shape(
         "zero_offset", "offset", 0.5, _sign(r) * s.thrust, fixed={"start": s.duration * _uniform(r, 0.25, 0.75)}
     ),
-    "load_cell_saturation": lambda s, _r, f: _clipped("load_cell_saturation", 0.7, s.thrust, f),
+    "load_cell_saturation": lambda s, r, f: _clipped("load_cell_saturation", 0.7, s.thrust, r, f),
     "gain_step": lambda s, r, _f: Shape(
         "gain_step", "amount", 0.5, _sign(r), fixed={"start": s.duration * _uniform(r, 0.3, 0.7)}
     ),

@@ -92,9 +92,7 @@ def _with_form(values: Values, form: str, _k: float, _driver: float) -> Table:
 
 
 def _limit(values: Values, form: str, _k: float, _driver: float) -> Table:
-    if form == "knee":
-        return {"form": form, "bend": values["bend"], "limit": values["onset"] + 0.5 / values["bend"]}
-    return dict(values)
+    return {**values, "form": form or "hard"}
 
 
 def _winding(values: Values, _form: str, k: float, _driver: float) -> Table:

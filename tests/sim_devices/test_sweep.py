@@ -44,13 +44,13 @@ OTHER_FORMS = [
     ("zero_drift", {"root": 0.5}),
     ("dead_band", {"half_width": 0.9, "form": "smooth"}),
     ("command_saturation", {"limit": 12.0, "form": "soft"}),
-    ("command_saturation", {"limit": 12.0, "form": "knee", "bend": 0.2}),
+    ("command_saturation", {"onset": 10.0, "form": "knee", "bend": 0.2}),
     ("winding_resistance", {"resistance": 0.1, "form": "linearised"}),
     ("motor_lag", {"time_constant": 0.2, "form": "two_lags"}),
     ("cavitation", {"onset": 15.0, "slope": 0.05, "form": "exponential"}),
     ("recirculation", {"coefficient": 0.02, "time_constant": 5.0, "form": "late", "delay": 1.5}),
     ("load_cell_saturation", {"limit": 100.0, "form": "soft"}),
-    ("load_cell_saturation", {"limit": 100.0, "form": "knee", "bend": 0.02}),
+    ("load_cell_saturation", {"onset": 80.0, "form": "knee", "bend": 0.02}),
     ("recirculation", {"coefficient": 0.02, "time_constant": 5.0, "form": "circuit"}),
 ]
 SLOWER = {

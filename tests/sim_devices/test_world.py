@@ -159,9 +159,9 @@ def test_supply_sag_moves_the_bus_voltage_that_is_measured():
 
 
 def test_a_limit_with_a_knee_bends_from_its_onset():
-    """Onset 10, slope 1 - 0.25 e beyond it: 0 at 14, where 12 is reached."""
+    """Slope 1 - 0.25 e beyond 10: 0 at 14, where 12 is reached."""
     world = World(read_world(PLAIN), np.random.default_rng(1))
-    limit = CommandSaturation(limit=12.0, form="knee", bend=0.25)
+    limit = CommandSaturation(onset=10.0, form="knee", bend=0.25)
     seen = [limit.apply(v, world.state, 0.01) for v in (8.0, 10.0, 12.0, 14.0, 20.0, -12.0)]
     assert seen == pytest.approx([8.0, 10.0, 11.5, 12.0, 12.0, -11.5])
 

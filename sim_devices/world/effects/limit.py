@@ -19,21 +19,24 @@ KNEE = 8.0
 class Limit:
     """clip(x, -limit, limit); form "soft": x / (1 + |x/limit|^KNEE)^(1/KNEE), which bends before it is flat.
 
-    form "knee": the slope falls evenly from 1, `bend` per unit of x, and is 0 where the limit is reached.
+    form "knee": from `onset` on the slope falls evenly, `bend` per unit of x, until nothing more is passed.
     """
 
     stage: ClassVar[Stage]
-    limit: float
-    """In the unit of the stage."""
+    limit: float = 0.0
+    """In the unit of the stage; of "hard" and "soft"."""
     form: str = "hard"
+    onset: float = 0.0
+    """In the unit of the stage; of "knee", as `bend`."""
     bend: float = 0.0
-    """One over the unit of the stage; only for "knee"."""
+    """One over the unit of the stage."""
 
     def __post_init__(self) -> None:
-        require_positive(limit=self.limit)
         require_choice("form", self.form, ("hard", "soft", "knee"))
         if self.form == "knee":
-            require_positive(bend=self.bend)
+            require_positive(onset=self.onset, bend=self.bend)
+        else:
+            require_positive(limit=self.limit)
 
     def apply(self, value: float, _s: State, _dt: float) -> float:
         if self.form == "hard":
@@ -46,8 +49,8 @@ class Limit:
     def _bent(self, value: Floats) -> Floats:
         if self.form == "soft":
             return np.asarray(value / (1.0 + np.abs(value / self.limit) ** KNEE) ** (1.0 / KNEE))
-        short = np.maximum(self.limit + 0.5 / self.bend - np.abs(value), 0.0)  # of where the slope is 0
-        size = np.where(short < 1.0 / self.bend, self.limit - 0.5 * self.bend * short**2, np.abs(value))
+        beyond = np.clip(np.abs(value) - self.onset, 0.0, 1.0 / self.bend)
+        size = np.minimum(np.abs(value), self.onset) + beyond - 0.5 * self.bend * beyond**2
         return np.asarray(np.copysign(size, value))
 
 
