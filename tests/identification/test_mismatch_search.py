@@ -1,0 +1,49 @@
+"""What a search does with additions and exchanges that do not last."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import pytest
+
+from identification.mismatch import diagnose, search
+
+
+def state(*terms):
+    return SimpleNamespace(fit=SimpleNamespace(model=SimpleNamespace(terms=terms)))
+
+
+BASE, LAG, RING = state(), state("lag"), state("ring")
+
+
+def larger(_state, _judged, _data, _terms, refused):
+    return next((s for s in (LAG, RING) if not set(s.fit.model.terms) & set(refused)), None)
+
+
+@pytest.mark.parametrize(("lasting", "found"), [((LAG, RING), LAG), ((RING,), RING), ((), None)])
+def test_what_is_dropped_again_gives_way_to_the_next_best(monkeypatch, lasting, found):
+    monkeypatch.setattr(search, "_larger", larger)
+    monkeypatch.setattr(search, "prune", lambda s, _data: s if s in lasting else BASE)
+    judged = SimpleNamespace(largest=5.0, threshold=4.0)
+    assert search._lasting(BASE, judged, None, (), {frozenset()}) is found
+
+
+def test_what_noise_hides_is_tried_once(monkeypatch):
+    monkeypatch.setattr(search, "_hidden", lambda *_: LAG)
+    monkeypatch.setattr(search, "prune", lambda s, _data: BASE)
+    assert search._lasting(BASE, SimpleNamespace(largest=3.0, threshold=4.0), None, (), {frozenset()}) is None
+
+
+@pytest.mark.parametrize(
+    ("exchanged", "pruned", "kept"),
+    [
+        (state("a", "c"), state("c"), state("c")),  # what was beside it became superfluous
+        (state("a", "c"), state("a"), state("a", "b")),  # what came in the place of b is dropped again
+    ],
+)
+def test_an_exchange_that_is_dropped_again_is_none(monkeypatch, exchanged, pruned, kept):
+    monkeypatch.setattr(diagnose, "settle_forms", lambda *_: (exchanged, {"c": None}))
+    monkeypatch.setattr(diagnose, "prune", lambda *_: pruned)
+    after, standing = diagnose._settled(SimpleNamespace(after=state("a", "b"), data=None, terms=()))
+    assert after.fit.model.terms == kept.fit.model.terms
+    assert standing is None
