@@ -77,6 +77,33 @@ def _rate_follows(fitted: Fit, data: Data) -> bool:
     return bool(found.size >= FEW_BLOCKS and found.mean() < 1.0 + MUCH * np.sqrt(2.0 / found.size))
 
 
+def _scale_std(fitted: Fit, data: Data) -> float:
+    """Relative standard error of the scale of turns: noise of the rate is in the angle, summed or fitted."""
+    _, modelled = raw(fitted.model, fitted.theta, data, with_rate=True)
+    noise = size = 0.0
+    for h, model in zip(data.histories, modelled, strict=True):
+        width = h.dt[h.rate_rows]
+        block = (h.middle[h.rate_rows] / STEADY).astype(np.intp)
+        noise += float(np.sum(np.bincount(block, (h.rates - model) * model * width) ** 2))
+        size += float(np.sum(model**2 * width))
+    return float(np.sqrt(noise)) / size if size > 0 else 0.0
+
+
+def _with_scale(line: Line, scale_std: float, series: Sequence[Series]) -> Line:
+    """A line locked to the rotor, with the error that the scale of its turns adds to periods per turn and phase."""
+    if line.ratio is None or line.ratio_std is None:
+        return line
+    ratio_std = float(np.hypot(line.ratio_std, line.ratio * scale_std))
+    if line.phase_std is None:
+        return replace(line, ratio_std=ratio_std)
+    turns = float(np.mean(np.concatenate([s.turns for s in series])))
+    return replace(
+        line,
+        ratio_std=ratio_std,
+        phase_std=float(np.hypot(line.phase_std, 2 * np.pi * line.ratio * scale_std * turns)),
+    )
+
+
 def look(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned | None:
     """Lines and bands of what this fit leaves; None when there are neither."""
     series = series_of(fitted, data)
@@ -85,6 +112,8 @@ def look(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned | Non
     has_rate = all("rotation_rate" in (h.driver_quantity, *h.others) for h in data.histories)
     unit: Literal["rev", "V s"] = "rev" if has_rate else "V s"
     lines = find_lines(series, turns_unit=unit)
+    if data.with_rate:
+        lines = tuple(_with_scale(line, _scale_std(fitted, data), series) for line in lines)
     still = []
     for i, (s, h) in enumerate(zip(series, data.histories, strict=True)):
         left = s.residual.copy()

@@ -50,7 +50,20 @@ def test_faint_blade_pass_is_named_with_its_amplitude_and_phase(noise: str) -> N
         if name == "phase":
             off = (off + np.pi) % (2 * np.pi) - np.pi
         assert abs(off) < 4 * value.std
-    assert finding.parameters["periods_per_turn"].value == pytest.approx(truth["blades"], abs=1e-3)
+    ratio = finding.parameters["periods_per_turn"]
+    assert abs(ratio.value - truth["blades"]) < min(3 * ratio.std, 1e-3)
+
+
+def test_the_scale_of_turns_has_the_error_of_the_rate() -> None:
+    """Four times as noisy a rate: what periods per turn lose by it."""
+    measured, _ = made(4, "white")
+    rate = next(c for c in measured.channels if c.quantity == "rotation_rate")
+    noise = np.random.default_rng(5).standard_normal(rate.value.size)
+    errors = []
+    for std in (0.1, 0.4):
+        noisy = tuple(replace(c, value=c.value + std * noise) if c is rate else c for c in measured.channels)
+        errors.append(named(diagnose([replace(measured, channels=noisy)])).parameters["periods_per_turn"].std)
+    assert errors[1] == pytest.approx(4 * errors[0], rel=0.2)
 
 
 def test_a_rate_that_wanders_is_believed() -> None:
