@@ -152,8 +152,7 @@ def _answer(
     doubted = [n for n in named if n.doubts]
     open_ended = (structure or bool(doubted)) and bool(left.groups)
     bare, place = _located(after, data, left, doubted, rng) if open_ended else (after, left)
-    at = _foremost(place, doubted, data) if open_ended else ""
-    free = extend(after, before, data, at, doubted, others, rng) if open_ended else None
+    free = extend(after, before, data, _foremost(place, doubted, data), doubted, others, rng) if open_ended else None
     unexplained = _unexplained(place, bare, data, doubted, free, others) if open_ended else None
     verdict = _verdict(earned, unexplained)
     unnamed = [n.term for n in doubted]
