@@ -70,11 +70,16 @@ def _rate_follows(fitted: Fit, data: Data) -> bool:
     blocks = []
     for h, model in zip(data.histories, modelled, strict=True):
         turned_more = (h.rates - model) * np.sign(model) * h.dt[h.rate_rows]
-        block = (h.middle[h.rate_rows] / STEADY).astype(np.intp)
+        block = _blocks(h)
         size = np.bincount(block, turned_more**2)
         blocks.append(np.bincount(block, turned_more)[size > 0] ** 2 / size[size > 0])
     found = np.concatenate(blocks)
     return bool(found.size >= FEW_BLOCKS and found.mean() < 1.0 + MUCH * np.sqrt(2.0 / found.size))
+
+
+def _blocks(history: History) -> NDArray[np.intp]:
+    """(m,) block of STEADY s that each measured rate is in."""
+    return (history.middle[history.rate_rows] / STEADY).astype(np.intp)
 
 
 def _scale_std(fitted: Fit, data: Data) -> float:
@@ -83,8 +88,7 @@ def _scale_std(fitted: Fit, data: Data) -> float:
     noise = size = 0.0
     for h, model in zip(data.histories, modelled, strict=True):
         width = h.dt[h.rate_rows]
-        block = (h.middle[h.rate_rows] / STEADY).astype(np.intp)
-        noise += float(np.sum(np.bincount(block, (h.rates - model) * model * width) ** 2))
+        noise += float(np.sum(np.bincount(_blocks(h), (h.rates - model) * model * width) ** 2))
         size += float(np.sum(model**2 * width))
     return float(np.sqrt(noise)) / size if size > 0 else 0.0
 
@@ -112,8 +116,9 @@ def look(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned | Non
     has_rate = all("rotation_rate" in (h.driver_quantity, *h.others) for h in data.histories)
     unit: Literal["rev", "V s"] = "rev" if has_rate else "V s"
     lines = find_lines(series, turns_unit=unit)
-    if data.with_rate:
-        lines = tuple(_with_scale(line, _scale_std(fitted, data), series) for line in lines)
+    if lines and data.with_rate:
+        scale_std = _scale_std(fitted, data)
+        lines = tuple(_with_scale(line, scale_std, series) for line in lines)
     still = []
     for i, (s, h) in enumerate(zip(series, data.histories, strict=True)):
         left = s.residual.copy()

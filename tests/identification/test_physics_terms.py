@@ -516,12 +516,18 @@ def test_noise_that_is_proportional_scatters_most_where_the_cell_clips():
     assert tails < 0.03
 
 
-@pytest.mark.parametrize("noise", [0.0, 1.0])
-def test_a_ramp_through_the_limit_of_the_cell_clips_in_a_part_of_each_interval(noise):
+def through_zero():
+    """A ramp from -14 V to 14 V, and the command within each interval (30, 4001)."""
     ends = np.linspace(-14.0, 14.0, 31)
     fine = np.linspace(ends[:-1], ends[1:], 4001).T
     mean = fine.mean(axis=1)
-    ramp = replace(H, edges=np.arange(31.0), driver=mean, excess=np.mean(fine**2, axis=1) - mean**2)
+    return replace(H, edges=np.arange(31.0), driver=mean, excess=np.mean(fine**2, axis=1) - mean**2), fine
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_a_ramp_through_the_limit_of_the_cell_clips_in_a_part_of_each_interval(noise):
+    ramp, fine = through_zero()
+    mean = ramp.driver
     e = noise * np.random.default_rng(2).standard_normal(fine.shape)
     force = 0.5 * fine * np.abs(fine)
     expected = np.clip(force + e, -60.0, 60.0).mean(axis=1)
@@ -541,10 +547,8 @@ def compressed(size, bend, onset):
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_a_ramp_through_the_knee_of_the_cell(noise):
-    ends = np.linspace(-14.0, 14.0, 31)
-    fine = np.linspace(ends[:-1], ends[1:], 401).T
-    mean = fine.mean(axis=1)
-    ramp = replace(H, edges=np.arange(31.0), driver=mean, excess=np.mean(fine**2, axis=1) - mean**2)
+    ramp, fine = through_zero()
+    mean = ramp.driver
     force = 0.5 * fine * np.abs(fine) + noise * np.random.default_rng(2).standard_normal(fine.shape)
     bend, onset = 0.02, 40.0
     e = np.clip(np.abs(force) - onset, 0.0, 1 / bend)
