@@ -23,14 +23,14 @@ EVERY = 25
 """Jobs between two lines of a log file."""
 
 
-def designed(seeds: int, only: Sequence[str]) -> list[Job]:
+def designed(seeds: int, only: Sequence[str], draw: str = "") -> list[Job]:
     """The jobs of a proof of everything that the world conceals. Raises ProofError when nothing is asked."""
     from identification.physics.catalogue import CATALOGUE
     from rig.blind.design import NOT_REMOVABLE, design
     from rig.blind.lanes import concealable
     from rig.blind.store import ProofError
 
-    jobs = design(concealable(), {term.id for term in CATALOGUE} | NOT_REMOVABLE, seeds, only)
+    jobs = design(concealable(), {term.id for term in CATALOGUE} | NOT_REMOVABLE, seeds, only, draw)
     if not jobs:
         raise ProofError(
             f"no case is called {', '.join(only)}; expected cell/effect, as plain/heating, clean, removed/*"
@@ -114,14 +114,14 @@ def leave(found: Collected, seeds: int, json_path: Path | None, report: Path | N
         write(proof_page(found, figures), report)
 
 
-def one_case(name: str, limit: float, *, verbose: bool) -> str:
+def one_case(name: str, draw: str, limit: float, *, verbose: bool) -> str:
     """Make and answer one order anew, and tell truth and answer. Raises ProofError."""
     from rig.blind.collecting import collected
     from rig.blind.store import Store
 
     store = Store(STORE.with_name("prove-case"))
     number = name.rsplit("/", 1)[-1]
-    jobs = designed(int(number) + 1 if number.isdigit() else 1, [name])
+    jobs = designed(int(number) + 1 if number.isdigit() else 1, [name], draw)
     for job in jobs:
         for order in job.orders:
             (store.answers / job.token / f"{order.tag}.json").unlink(missing_ok=True)
@@ -153,6 +153,9 @@ def _told(store: Store, job: Job, *, verbose: bool) -> str:
 @click.option("--seeds", type=click.IntRange(min=1), default=20, show_default=True, help="Cases of each cell.")
 @click.option(
     "--only", multiple=True, metavar="CELL/EFFECT", help="Only these cells, as plain/heating, removed, */dead_band."
+)
+@click.option(
+    "--draw", default="", metavar="TEXT", help="Other cases: those of no draw are what the diagnosis was developed on."
 )
 @click.option("--jobs", "lanes", type=click.IntRange(min=1), help="Cases at a time.  [default: one per core]")
 @click.option(
@@ -189,6 +192,7 @@ def _told(store: Store, job: Job, *, verbose: bool) -> str:
 def prove_command(
     seeds: int,
     only: tuple[str, ...],
+    draw: str,
     lanes: int | None,
     store: Path,
     limit: float,
@@ -212,9 +216,9 @@ def prove_command(
 
     try:
         if case is not None:
-            click.echo(one_case(case, limit, verbose=verbose))
+            click.echo(one_case(case, draw, limit, verbose=verbose))
             return
-        kept, jobs = Store(store), designed(seeds, only)
+        kept, jobs = Store(store), designed(seeds, only, draw)
         told = elsewhere.read(scores_path) if scores_path is not None else {}
         known = elsewhere.usable(told, jobs, "" if no_run else version_of_diagnosis())
         if failures:

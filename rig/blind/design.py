@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from hashlib import sha256
 from itertools import chain
@@ -45,6 +45,8 @@ class Kinds:
     """Forms that are there when asked for only: not those of the catalogue."""
     lies: tuple[str, ...]
     noise: tuple[str, ...]
+    version: str = ""
+    """Of the world that conceals."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,25 +73,32 @@ class Order:
 
 @dataclass(frozen=True, slots=True)
 class Job:
-    """One case and what is asked of it. `id` decides the seed, so a case is the same in every proof."""
+    """One case and what is asked of it. `id` and `draw` decide the seed: it is the same in every proof of that draw."""
 
     id: str
     spec: Mapping[str, Any]
     """What is not left to chance, as `sim_devices conceal` reads it."""
     orders: tuple[Order, ...]
+    draw: str = ""
+    world: str = ""
+    """Version of the world that is to make it."""
 
     @property
     def token(self) -> str:
-        return sha256(self.id.encode()).hexdigest()[:16]
+        return sha256(f"{self.id}{self._salt}".encode()).hexdigest()[:16]
 
     @property
     def seed(self) -> list[int]:
-        digest = sha256(f"seed of {self.id}".encode()).digest()
+        digest = sha256(f"seed of {self.id}{self._salt}".encode()).digest()
         return [int.from_bytes(digest[i : i + 4], "big") for i in range(0, 16, 4)]
+
+    @property
+    def _salt(self) -> str:
+        return f" in draw {self.draw}" if self.draw else ""
 
     def asked(self) -> dict[str, Any]:
         """The line that the world reads."""
-        return {"token": self.token, "seed": self.seed, **self.spec}
+        return {"token": self.token, "seed": self.seed, "world": self.world, **self.spec}
 
     @property
     def digest(self) -> str:
@@ -97,18 +106,20 @@ class Job:
         return sha256(json.dumps(self.asked(), sort_keys=True).encode()).hexdigest()[:12]
 
 
-def design(world: Kinds, catalogue: Collection[str], seeds: int, only: Sequence[str] = ()) -> list[Job]:
+def design(world: Kinds, catalogue: Collection[str], seeds: int, only: Sequence[str] = (), draw: str = "") -> list[Job]:
     """All jobs, so ordered that a proof that is broken off has all cells evenly.
 
     `catalogue`: ids that the diagnosis can name; `seeds` per cell; `only`: patterns of cell/label (`plain/*`), some of
-    the orders.
+    the orders; `draw`: any other text draws other cases.
     """
-    rows = chain(_alone(world, catalogue, seeds), _open(world, catalogue, seeds), _others(world, catalogue, seeds))
+    rows = chain(
+        _alone(world, catalogue, seeds), _open(world, catalogue, seeds), _others(world, catalogue, seeds, draw)
+    )
     found = []
     for place, job in rows:
         orders = tuple(order for order in job.orders if matches(order.id, only))
         if orders:
-            found.append((place, job.id, Job(job.id, job.spec, orders)))
+            found.append((place, job.id, Job(job.id, job.spec, orders, draw, world.version)))
     return [job for _, _, job in sorted(found, key=lambda row: row[:2])]
 
 
@@ -155,7 +166,7 @@ def _open(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tupl
             yield from _many("outside", effect, seeds, spec)
 
 
-def _others(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tuple[float, Job]]:
+def _others(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -> Iterator[tuple[float, Job]]:
     """Pairs, textbook forms, clean recordings."""
     known = [effect for effect in world.effects if effect in catalogue]
     for cell, table in (("form", world.forms), ("variant", world.variants)):
@@ -164,7 +175,8 @@ def _others(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tu
                 spec = {"effects": [effect], "strength": STRENGTHS["plain"], "forms": [form]}
                 yield from _many(cell, f"{effect}:{form}", seeds, spec)
     for place, job in _many("pair", "any", PAIRS_PER_SEED * seeds if len(known) > 1 else 0, {}):
-        two = np.random.default_rng(job.seed).choice(known, 2, replace=False).tolist()
+        seed = replace(job, draw=draw).seed
+        two = np.random.default_rng(seed).choice(known, 2, replace=False).tolist()
         yield place, Job(job.id, {"effects": two, "strength": PAIR_STRENGTH}, job.orders)
     for kind in world.noise:
         yield from _many("clean", kind, -(-CLEAN_PER_SEED * seeds // len(world.noise)), {"noise": kind})

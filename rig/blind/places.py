@@ -2,7 +2,7 @@
 
 The physics decides, not the catalogue: a gain that steps is a matter of time; a loss that depends on the temperature of
 water that warms steadily is a matter of that temperature, and of time just as well. Quantities are those of `where` in
-the answer (docs/howto/diagnose.md).
+the answer (docs/howto/diagnosis-json.md).
 """
 
 from __future__ import annotations

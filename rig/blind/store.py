@@ -37,7 +37,9 @@ class Store:
         """What was concealed; None before the world has made the case. Raises ProofError for another design."""
         found = _read(self.root / "sealed" / f"{job.token}.json")
         if found is not None and found["asked"] != job.asked():
-            raise ProofError(f"{self.root} holds {job.id} of another design; give another --store, or remove it")
+            raise ProofError(
+                f"{self.root} holds {job.id} of another design or world; give another --store, or remove it"
+            )
         return found
 
     def thrust(self, job: Job) -> tuple[Floats, Floats] | None:

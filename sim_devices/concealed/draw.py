@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from sim_devices.concealed.bystanders import with_bystanders
 from sim_devices.concealed.definition import Case, Concealed, Run, Sensor
 from sim_devices.concealed.faults import fault
 from sim_devices.concealed.oracle import OutOfReach, levelled, scaled_to
@@ -51,11 +52,14 @@ def case(
 
     What is not given is drawn: `forms` one per effect ("" draws), `plan` of plans.KINDS, `noise` of NOISE_KINDS,
     `voltage` V and `thrust` N at full command, `sampling` 1/s, `duration` s of each of `runs` recordings, `channels`
-    beside command and thrust. `lie`: of faults.KINDS, about a channel, beside the effects; none when not given.
+    beside command and thrust (where drawn, and none lies, with bystanders). `lie`: of faults.KINDS, about a channel,
+    beside the effects; none when not given.
     Raises OutOfReach when no case of TRIES can show the effects so; ValueError for a name that is not known.
     """
     for _ in range(TRIES):
         drawn = _bare(rng, effects, plan, noise, voltage, thrust, sampling, duration, channels, runs, lie)
+        if channels is None and not lie:
+            drawn = with_bystanders(drawn, rng.spawn(1)[0], frozenset(effects))
         wanted = [*forms, *[""] * (len(effects) - len(forms))]
         try:
             for effect, form in zip(effects, wanted, strict=True):

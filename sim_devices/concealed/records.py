@@ -9,7 +9,7 @@ from uuid import UUID
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_devices.concealed.definition import Case, Run, Sensor, history, thrust_of
+from sim_devices.concealed.definition import Case, Run, Sensor, history, settings, thrust_of
 from sim_devices.concealed.faults import Column, lying
 from sim_devices.concealed.oracle import strength
 from sim_devices.concealed.plans import Step
@@ -73,10 +73,9 @@ def _sensed(case: Case, sensor: Sensor, h: History, seconds: Floats, rng: np.ran
 
 def _neighbour(case: Case, run: Run) -> list[Column]:
     """The command of the other thruster, where there is one."""
-    found = [c.parameters for c in case.effects if c.effect == "thruster_interaction"]
-    if not found:
+    p = settings(case).effects.get("thruster_interaction")
+    if p is None:
         return []
-    p = found[0]
     switches = np.arange(0.0, run.start + run.profile.duration, p["period"])
     on, off = switches + p["period"] - p["on_time"], switches
     time = np.concatenate([off, on]) - run.start

@@ -7,7 +7,8 @@
 
 A case is asked for by a table: `token` (its name, which should tell nothing), `seed` (integers), and what is not to be
 left to chance: `effects`, `strength`, `forms`, `noise`, `plan`, `lie`, `runs`, `sampling`, `duration` as of
-`concealed.case`; `rivals`: names whose likeness to the first effect goes into the seal (`concealed.twins`).
+`concealed.case`; `rivals`: names whose likeness to the first effect goes into the seal (`concealed.twins`);
+`world`: the version that is to make it, where that matters.
 """
 
 from __future__ import annotations
@@ -29,6 +30,7 @@ from sim_devices.concealed.oracle import OutOfReach
 from sim_devices.concealed.records import Rows, rows, truth
 from sim_devices.concealed.rivals import twins
 from sim_devices.concealed.shapes import FORMS, SHAPES, VARIANTS
+from sim_devices.concealed.version import version
 from sim_devices.tables import WorldError
 
 Floats = NDArray[np.float64]
@@ -39,10 +41,11 @@ KINDS: Mapping[str, Any] = {
     "variants": {effect: list(forms) for effect, forms in VARIANTS.items()},
     "lies": list(LIES),
     "noise": list(NOISE_KINDS),
+    "version": version(),
 }
-"""What may be asked for."""
+"""What may be asked for, and of what world."""
 CHOSEN = ("effects", "strength", "forms", "noise", "plan", "lie", "runs", "sampling", "duration")
-KNOWN = frozenset({"token", "seed", "rivals", *CHOSEN})
+KNOWN = frozenset({"token", "seed", "world", "rivals", *CHOSEN})
 NEAREST = 5
 """Twins that go into the seal."""
 
@@ -52,6 +55,8 @@ def conceal(asked: Mapping[str, Any], out: Path) -> None:
     unknown = sorted(set(asked) - KNOWN)
     if unknown or not {"token", "seed"} <= set(asked):
         raise WorldError(f"case: expected token, seed and some of {', '.join(sorted(KNOWN))}; got {sorted(asked)}")
+    if asked.get("world") not in (None, "", KINDS["version"]):
+        raise WorldError(f"case: this is world {KINDS['version']}, asked was {asked['world']}")
     token, seed = str(asked["token"]), list(asked["seed"])
     sealed = out / "sealed"
     sealed.mkdir(parents=True, exist_ok=True)

@@ -24,6 +24,8 @@ from rig.blind.store import ProofError, Store, version_of_diagnosis
 from rig.prove import designed, prove_command
 from rig.report.page import html
 from rig.report.proof import proof_page
+from sim_devices.concealed.sealing import conceal
+from sim_devices.tables import WorldError
 
 
 @pytest.fixture(autouse=True, scope="module")
@@ -64,6 +66,24 @@ def test_the_physics_that_is_taken_out_is_asked_of_the_same_recording():
     (only,) = design(WORLD, CATALOGUE, 1, ["removed/heating"])
     assert [o.id for o in only.orders] == ["removed/heating/0"]
     assert (only.token, only.seed) == (job.token, job.seed)
+
+
+def test_another_draw_has_the_same_orders_and_other_cases():
+    first, second = (design(WORLD, CATALOGUE, 2, draw=draw) for draw in ("", "autumn"))
+    assert [job.id for job in first] == [job.id for job in second]
+    assert [o for job in first for o in job.orders] == [o for job in second for o in job.orders]
+    assert not {job.token for job in first} & {job.token for job in second}
+    assert not {tuple(job.seed) for job in first} & {tuple(job.seed) for job in second}
+    pairs = [[job.spec["effects"] for job in jobs if job.id.startswith("pair/")] for jobs in (first, second)]
+    assert pairs[0] != pairs[1]
+
+
+def test_a_case_is_of_one_world(tmp_path):
+    (job,) = design(replace(WORLD, version="abc"), CATALOGUE, 1, ["plain/heating"])
+    assert job.asked()["world"] == "abc"
+    with pytest.raises(WorldError, match="asked was abc"):
+        conceal(job.asked(), tmp_path)
+    assert job.digest != replace(job, world="abd").digest
 
 
 def test_orders_are_asked_for_by_pattern():
