@@ -22,7 +22,7 @@ from tests.reliability.live import LiveBench, live_bench, zero_after
 from tests.reliability.test_console_stop import CTRL_C, F9, RIG, leave, start_from
 
 PROMISE = 0.1
-"""s, p99 of 100 presses (reliability promise 4)."""
+"""s, p99 of 100 presses (docs/reliability.md, promise 4)."""
 BATCH = 10
 
 

@@ -2,7 +2,8 @@
 
     python examples/real_recordings.py [FOLDER]
 
-FOLDER holds the recordings; default: `../shared/recordings` beside the project. They are not part of the project.
+FOLDER holds the recordings, a folder for each table; default: `../shared/recordings` beside the project. They are not
+part of the project: `origin` in `rig/maps/*.toml` says who published them.
 """
 
 from __future__ import annotations

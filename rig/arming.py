@@ -38,7 +38,7 @@ def connect(session: Session) -> None:
 
 
 def _require_same_devices(session: Session) -> None:
-    """A resumed campaign goes on with the devices it began with (reliability.md, promise 23)."""
+    """A resumed campaign goes on with the devices it began with (docs/reliability.md, promise 23)."""
     begun: dict[str, str] = next((fact["identities"] for fact in session.before if fact["fact"] == "start"), {})
     for name, identity in session.bench.identities.items():
         if begun.get(name, identity) != identity:

@@ -43,7 +43,7 @@ def main(campaign_path: str, folder_path: str, *thrusters: str) -> int:
 
 
 def stop_on_signals(session: Session) -> None:
-    """SIGTERM, SIGINT and SIGHUP are stop requests, carried out by the next tick (reliability.md, promise 2)."""
+    """SIGTERM, SIGINT and SIGHUP are stop requests, carried out by the next tick (docs/reliability.md, promise 2)."""
 
     def stop(number: int, _: object) -> None:
         session.loop.signals.append(Request("stop", signal.Signals(number).name))
@@ -53,7 +53,7 @@ def stop_on_signals(session: Session) -> None:
 
 
 def real_time() -> str:
-    """Ask for real-time scheduling of this thread; says what came of it (performance.md, loop lateness)."""
+    """Ask for real-time scheduling of this thread; says what came of it (`benchmarks/loop_lateness.py`)."""
     gc.collect()
     gc.freeze()
     try:

@@ -17,7 +17,7 @@ from rig.config import LimitConfig
 Source = Literal["limit", "nan", "stale", "frozen", "rate", "corrupt", "late", "link", "recorder", "lease"]
 
 MIN_AGE = 0.2
-"""s, shortest default sample age (reliability.md, promise 7: within max(3 sample periods, 0.2 s))."""
+"""s, shortest default sample age (docs/reliability.md, promise 7: within max(3 sample periods, 0.2 s))."""
 MIN_LATENESS = 0.25
 """s, shortest tolerated lateness of a loop tick."""
 LEAST_FROZEN = 2.0
@@ -104,7 +104,7 @@ class Allowances:
     lateness: float = MIN_LATENESS
     grace: float = 2.0
     recorder_age: float = 12.0
-    """A flush may block 10 s on a slow disk (reliability.md, promise 18) while the queue holds the rows."""
+    """A flush may block 10 s on a slow disk (docs/reliability.md, promise 18) while the queue holds the rows."""
     lease_age: float = 2.0
     """Four leases missed at two a second."""
 

@@ -1,8 +1,8 @@
 """The control loop: drain -> guard -> decide -> command -> publish. The only caller of MotorController.command.
 
 Every tick re-sends the present set-point, so the motor's own watchdog is fed by a fresh tick of this loop and by
-nothing else (reliability.md, rule 3). What is to be commanded is decided by whoever runs the tick: idle stages or the
-sequencer.
+nothing else (docs/reliability.md, rule 3). What is to be commanded is decided by whoever runs the tick: idle stages or
+the sequencer.
 """
 
 from __future__ import annotations

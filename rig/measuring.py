@@ -121,7 +121,7 @@ def judged(session: Session, output: Output) -> tuple[Outcome, str]:
 
 
 def missing_steps(plan: Iterable[Step], measured: Set[tuple[int, str]], points: Set[int]) -> list[Step]:
-    """Steps that a run which says it is completed has not measured (reliability.md, promise 27).
+    """Steps that a run which says it is completed has not measured (docs/reliability.md, promise 27).
 
     A hold needs its point; a tare, sine or swept ramp needs to have run to its end.
     """

@@ -1,7 +1,7 @@
 """Does a stream keep its pace, and is what comes readable? Counted over whole windows. Pure: time is given.
 
 A stream that comes at a tenth of its rate is never old, and one with spoilt lines always has a good one that is young:
-both pass every check of a single sample (reliability.md, promise 8).
+both pass every check of a single sample (docs/reliability.md, promise 8).
 """
 
 from __future__ import annotations

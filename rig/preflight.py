@@ -44,7 +44,7 @@ def rate_check(stream: Stream, rate: float | None) -> Check:
 
 
 def watchdog_check(watchdog: Watchdog, limit: float) -> Check:
-    """The motor controller must stop by itself when we fall silent (reliability.md, rule 1 and promise 9)."""
+    """The motor controller must stop by itself when we fall silent (docs/reliability.md, rule 1 and promise 9)."""
     if watchdog.timeout_s is None:
         return Check("watchdog", "failed", "the motor controller's own command timeout is off or unknown: refused")
     text = f"{watchdog.timeout_s:g} s, then {watchdog.action}; fed by {watchdog.fed_by}"

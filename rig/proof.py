@@ -1,4 +1,4 @@
-"""Proof that the motor stops by itself when nobody commands it (reliability.md, rule 2). Pure: time is given.
+"""Proof that the motor stops by itself when nobody commands it (docs/reliability.md, rule 2). Pure: time is given.
 
 At a low voltage the rig falls silent and measures how long the motor's own watchdog takes. The motor is refused when it
 does not slow down, slows down too late, does not come to rest, or moves again afterwards.

@@ -18,11 +18,11 @@ from rig.link import Overrun, Peer, pair
 from rig.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Outcome, Ready, Rows, StepRow
 
 ACK_TIMEOUT = 15.0
-"""s without a flush before the recorder counts as gone: above the 10 s stall that promise 18 tolerates."""
+"""s without a flush before the recorder counts as gone: above the 10 s stall of docs/reliability.md, promise 18."""
 SHUT_DOWN_TIMEOUT = 10.0
 """s for the recorder to close its file after the motor has been stopped."""
 RESERVE_BYTES = 64 * 2**20
-"""Free disk space below which the run ends in order (promise 17)."""
+"""Free disk space below which the run ends in order (docs/reliability.md, promise 17)."""
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""After a stop: "at 0" means measured at rest, not "we sent 0" (reliability.md, rule 5). Pure: time is given."""
+"""After a stop: "at 0" means measured at rest, not "we sent 0" (docs/reliability.md, rule 5). Pure: time is given."""
 
 from __future__ import annotations
 

@@ -98,7 +98,7 @@ async def test_the_handler_sends_without_a_turn_of_the_event_loop():
 
 @pytest.mark.alone
 async def test_latency_under_redraw_is_below_100_ms():
-    """reliability.md, promise 4: key event to request, with a snapshot and both plots due at every press."""
+    """docs/reliability.md, promise 4: key event to request, with a snapshot and both plots due at every press."""
     async with sitting(running(), size=(120, 40)) as desk:
         waits = []
         for i in range(30):

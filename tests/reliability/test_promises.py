@@ -1,4 +1,4 @@
-"""More promises of the rig, each measured on a simulated bench in another process."""
+"""More promises of docs/reliability.md, each measured on a simulated bench in another process."""
 
 from __future__ import annotations
 
