@@ -44,11 +44,11 @@ def run(store: Store, jobs: Sequence[Job], lanes: int, limit: float, *, renew: b
     from rig.blind.store import version_of_diagnosis
 
     code = version_of_diagnosis()
-    pending = [job for job in jobs if store.pending(job, code if renew else "")]
+    pending = [job for job in jobs if store.pending(job, code if renew else "", limit)]
     if not pending:
         return
     working = [Lane(store, str(i), limit, code, keep) for i in range(min(lanes, len(pending)))]
-    with shown(len(pending)) as told:
+    with store.locked(), shown(len(pending)) as told:
         carry_out(pending, working, renew, told)
 
 
@@ -219,16 +219,16 @@ def prove_command(
             click.echo(one_case(case, draw, limit, verbose=verbose))
             return
         kept, jobs = Store(store), designed(seeds, only, draw)
-        told = elsewhere.read(scores_path) if scores_path is not None else {}
-        known = elsewhere.usable(told, jobs, "" if no_run else version_of_diagnosis())
+        told, version = elsewhere.read(scores_path) if scores_path is not None else [], version_of_diagnosis()
+        known = elsewhere.usable(told, jobs, version, others=no_run)
         if failures:
             jobs, renew = not_good(collected(kept, jobs), jobs), True
         if not no_run:
             pending = elsewhere.unanswered(jobs, known)
             run(kept, pending, lanes or os.cpu_count() or 1, limit, renew=renew, keep=keep)
-        found = collected(kept, jobs, known)
+        found = collected(kept, jobs, known, version)
         if scores_path is not None:
-            elsewhere.write(scores_path, {**told, **{each.score.order.id: each for each in found.known}}.values())
+            elsewhere.write(scores_path, [*told, *found.known])
         click.echo(still_wrong(found) if failures else summary(found))
         leave(found, seeds, json_path, report)
     except (RigError, OSError) as error:

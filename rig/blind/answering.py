@@ -2,12 +2,13 @@
 
 One JSON line in, {"token", "tag", "without", "code"}, one line out when the answer is there: ANSWERS/<token>/<tag>.json
 and beside it <tag>.npz, what the model that was found and the baseline predict for the other run. From its start on it
-refuses to open any file of the store that is not a recording or an answer of its own.
+refuses to read any file of the store but recordings.
 """
 
 from __future__ import annotations
 
 import json
+import os
 import sys
 import traceback
 from collections.abc import Mapping, Sequence
@@ -24,19 +25,26 @@ from identification.mismatch.simulating import Drive, Prediction, held, others_o
 from identification.recording import Floats, Recording
 from rig.blind.reading import recording, recordings, times
 
+LOOKS = ("open", "os.listdir", "os.scandir")
+"""Audit events with a path."""
+
 
 class Sealed(PermissionError):
     """A file of the store was to be opened that is not for the eyes of the diagnosis."""
 
 
-def blindfold(store: Path, allowed: Sequence[Path]) -> None:
-    """From now on this process cannot open what lies in `store` outside the `allowed` folders. Cannot be taken off."""
-    inside, open_to = store.resolve(), [path.resolve() for path in allowed]
+def blindfold(store: Path, opened: Path, answers: Path) -> None:
+    """From now on this process reads of what lies in `store` the folder `opened` alone, and writes into `answers`.
+
+    Answers are not read: names of files beside them say what was taken out of the catalogue. Cannot be taken off.
+    """
+    inside, readable, writable = (path.resolve() for path in (store, opened, answers))
 
     def watch(event: str, arguments: tuple[Any, ...]) -> None:
-        if event in ("open", "os.listdir", "os.scandir") and isinstance(arguments[0], str):
-            path = Path(arguments[0]).resolve()
-            if path.is_relative_to(inside) and not any(path.is_relative_to(folder) for folder in open_to):
+        if event in LOOKS and isinstance(arguments[0], str | bytes):
+            path = Path(os.fsdecode(arguments[0])).resolve()
+            allowed = writable if event == "open" and arguments[2] & (os.O_WRONLY | os.O_RDWR) else readable
+            if path.is_relative_to(inside) and not path.is_relative_to(allowed):
                 raise Sealed(f"{path} is sealed: the diagnosis opens recordings only")
 
     sys.addaudithook(watch)
@@ -57,29 +65,38 @@ def answered(folder: Path, without: Sequence[str] = ()) -> tuple[dict[str, Any],
     seconds = perf_counter() - start
     if isinstance(found, Refusal):
         return {"seconds": seconds, "error": f"refused: {found.reason}"}, {}
-    drive = folder / "drive.npz"
-    lacking, predicted = predictions(found, recording(drive), times(drive)) if drive.exists() else (None, {})
+    lacking, predicted = predictions(found, folder / "drive.npz")
     answer = {"seconds": seconds, "error": None, "diagnosis": diagnosis_json(found), "not_predicted": lacking}
     return answer, predicted
 
 
-def predictions(found: Diagnosis, driven: Recording, at: Floats) -> tuple[str | None, dict[str, Floats]]:
-    """Thrust (n,) N of the model found and of its baseline in another run, without a tare; or why there is none."""
+def predictions(found: Diagnosis, file: Path) -> tuple[str | None, dict[str, Floats]]:
+    """Thrust (n,) N of the model found and of its baseline in the run of `file`, without a tare; or why there is none.
+
+    Nothing at all where there is no such run.
+    """
+    if not file.exists():
+        return None, {}
+    try:
+        return None, _predicted(found, recording(file), times(file))
+    except Exception as error:  # noqa: BLE001  # so is one of the twin
+        return f"{type(error).__name__}: {error}", {}
+
+
+def _predicted(found: Diagnosis, driven: Recording, at: Floats) -> dict[str, Floats]:
+    """Raises ValueError for what the twin cannot predict."""
     command = driven.first_of("command_voltage")
     assert command is not None
     assert found.twin is not None
     others = others_of(driven)
     others.setdefault("flow_speed", (np.array([0.0]), np.array([0.0])))
     drive = Drive(command.time, command.value, others=others)
-    try:
-        model = simulate(found.twin, drive, at)
-    except Exception as error:  # noqa: BLE001  # so is one of the twin
-        return f"{type(error).__name__}: {error}", {}
+    model = simulate(found.twin, drive, at)
     if not isinstance(model, Prediction):
-        return model.reason, {}
+        raise ValueError(model.reason)
     volts = held(drive, at)
     baseline: Floats = found.baseline["C"].value * volts * np.abs(volts)
-    return None, {"model": model.thrust, "baseline": baseline}
+    return {"model": model.thrust, "baseline": baseline}
 
 
 def work(opened: Path, answers: Path, line: Mapping[str, Any]) -> None:
@@ -98,7 +115,7 @@ def work(opened: Path, answers: Path, line: Mapping[str, Any]) -> None:
 def main(arguments: Sequence[str]) -> None:
     """Until the input ends."""
     opened, answers = map(Path, arguments)
-    blindfold(opened.parent, (opened, answers))
+    blindfold(opened.parent, opened, answers)
     for text in iter(sys.stdin.readline, ""):
         work(opened, answers, json.loads(text))
         sys.stdout.write("answered\n")

@@ -47,21 +47,28 @@ def not_good(found: Collected, jobs: Sequence[Job]) -> list[Job]:
     return [job for job in kept if job.orders]
 
 
-def collected(store: Store, jobs: Sequence[Job], elsewhere: Mapping[str, Known] | None = None) -> Collected:
-    """All that is answered: in the store, or else among the scores from `elsewhere`, by the ids of their orders."""
+def collected(
+    store: Store, jobs: Sequence[Job], elsewhere: Mapping[str, Known] | None = None, version: str = ""
+) -> Collected:
+    """All that is answered: in the store, or among the scores from `elsewhere`, by the ids of their orders.
+
+    Where both have one, that of the store counts, unless only the other is by `version` of the diagnosis.
+    """
     found, missing, undrawn = [], 0, []
+    elsewhere = elsewhere or {}
     for job in jobs:
         truth = store.truth(job)
         if truth is not None and truth["error"]:
             undrawn.append(f"{job.id}: {truth['error']}")
             continue
         for order in job.orders:
-            answer = store.answer(job, order)
-            if truth is not None and answer is not None:
+            answer, other = store.answer(job, order), elsewhere.get(order.id)
+            newer = other is not None and answer is not None and other.version == version != answer["code"]
+            if truth is not None and answer is not None and not newer:
                 score = scored(order, truth, answer, store.thrust(job), store.predictions(job, order))
                 found.append(Known(score, str(answer["code"]), job.digest))
-            elif elsewhere is not None and order.id in elsewhere:
-                found.append(elsewhere[order.id])
+            elif other is not None:
+                found.append(other)
             else:
                 missing += 1
     return Collected(tuple(found), missing, tuple(undrawn))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -19,25 +20,27 @@ from rig.blind.scoring import HeldOut, Interval, Near, Score
 from rig.blind.store import ProofError
 
 
-def read(path: Path) -> dict[str, Known]:
-    """By the id of the order; empty when there is no such file. Raises ProofError for what is no score, OSError."""
+def read(path: Path) -> list[Known]:
+    """Empty when there is no such file. Raises ProofError for what is no score, OSError."""
     if not path.exists():
-        return {}
-    found = {}
+        return []
+    found = []
     for number, line in enumerate(_text(path).splitlines(), 1):
         try:
-            known = _known(json.loads(line))
-        except (ValueError, TypeError, KeyError) as error:
+            found.append(_known(json.loads(line)))
+        except (ValueError, TypeError, KeyError, AttributeError) as error:
             raise ProofError(
                 f"{path}, line {number}: expected a score as `rig prove --scores` writes it: {error}"
             ) from error
-        found[known.score.order.id] = known
     return found
 
 
 def write(path: Path, known: Iterable[Known]) -> None:
-    """In the order of their ids; a file that is there is replaced when all is written. Raises OSError."""
-    rows = sorted(known, key=lambda each: each.score.order.id)
+    """In the order of their ids, each case and version once: the last. Raises OSError.
+
+    A file that is there is replaced when all is written.
+    """
+    rows = [row for _, row in sorted({_key(each): each for each in known}.items())]
     text = "".join(json.dumps(_row(each), separators=(",", ":")) + "\n" for each in rows).encode()
     path.parent.mkdir(parents=True, exist_ok=True)
     beside = path.with_name(f".{path.name}")
@@ -45,18 +48,24 @@ def write(path: Path, known: Iterable[Known]) -> None:
     beside.replace(path)
 
 
-def usable(known: Mapping[str, Known], jobs: Sequence[Job], version: str = "") -> dict[str, Known]:
-    """Those of the orders of these jobs; with `version` only those by this version of the diagnosis."""
+def usable(known: Iterable[Known], jobs: Sequence[Job], version: str, *, others: bool = False) -> dict[str, Known]:
+    """By the ids of the orders of these jobs, those by this `version` of the diagnosis; or, as asked, by `others`."""
     asked = {order.id: job.digest for job in jobs for order in job.orders}
-    return {
-        name: each for name, each in known.items() if asked.get(name) == each.asked and version in ("", each.version)
-    }
+    mine = [each for each in known if asked.get(each.score.order.id) == each.asked]
+    kept = sorted(
+        (each for each in mine if others or each.version == version), key=lambda each: each.version == version
+    )
+    return {each.score.order.id: each for each in kept}
 
 
 def unanswered(jobs: Sequence[Job], known: Mapping[str, Known]) -> list[Job]:
     """The jobs with their orders that are not among the known ones."""
     kept = (replace(job, orders=tuple(o for o in job.orders if o.id not in known)) for job in jobs)
     return [job for job in kept if job.orders]
+
+
+def _key(known: Known) -> tuple[str, str, str]:
+    return known.score.order.id, known.asked, known.version
 
 
 def _row(known: Known) -> dict[str, Any]:
@@ -78,5 +87,5 @@ def _text(path: Path) -> str:
     said = path.read_bytes()
     try:
         return (gzip.decompress(said) if path.suffix == ".gz" else said).decode()
-    except (gzip.BadGzipFile, EOFError, UnicodeDecodeError) as error:
+    except (gzip.BadGzipFile, zlib.error, EOFError, UnicodeDecodeError) as error:
         raise ProofError(f"{path}: expected scores as `rig prove --scores` writes them: {error}") from error

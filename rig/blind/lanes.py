@@ -1,7 +1,7 @@
 """Jobs carried out: on each lane a process of the world and one of the diagnosis, which share files and nothing else.
 
 A diagnosis that takes longer than its limit is killed and its answer is `timeout`; of one that dies it is `died`. Both
-are failures of the diagnosis. A world that fails ends the proof.
+are failures of the diagnosis. A world that fails ends the proof. What is broken off by us is no answer.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from time import monotonic
 from typing import Any
 
 from rig.blind.design import Job, Kinds, Order
-from rig.blind.store import ProofError, Store
+from rig.blind.store import TIMEOUT, ProofError, Store
 
 WORLD_LIMIT = 900.0
 """s for one case: thirty draws at 500 samples/s."""
@@ -38,6 +38,10 @@ class Ended(Exception):
     """The process ended instead of answering."""
 
 
+class BrokenOff(Exception):
+    """The proof ends: nothing is asked any more, and what was asked has no answer."""
+
+
 @dataclass
 class Child:
     """A process that answers each line with a line. It is started when first asked, and again after it was killed."""
@@ -46,9 +50,24 @@ class Child:
     log: Path
     """Its standard error is added here."""
     process: subprocess.Popen[bytes] | None = None
+    dismissed: bool = False
+    """It is not asked any more."""
 
     def ask(self, line: Mapping[str, Any], limit: float) -> None:
-        """Raises Overdue after `limit` s without an answer, Ended when there will be none."""
+        """Raises Overdue after `limit` s without an answer, Ended when there will be none, BrokenOff when dismissed."""
+        try:
+            self._ask(line, limit)
+        except (Overdue, Ended) as end:
+            if self.dismissed:
+                raise BrokenOff from end
+            raise
+
+    def dismiss(self, patience: float = STOPPING) -> None:
+        """End it for good, from any thread."""
+        self.dismissed = True
+        self.close(patience)
+
+    def _ask(self, line: Mapping[str, Any], limit: float) -> None:
         process = self._running()
         assert process.stdin is not None
         assert process.stdout is not None
@@ -85,6 +104,8 @@ class Child:
             process.stdout.close()
 
     def _running(self) -> subprocess.Popen[bytes]:
+        if self.dismissed:
+            raise BrokenOff
         if self.process is None:
             with self.log.open("ab") as log:
                 self.process = subprocess.Popen(
@@ -140,7 +161,10 @@ class Lane:
         self.diagnosis = Child([*python, "rig.blind.answering", *places], root / f"answering-{self.name}.log")
 
     def carry_out(self, job: Job, renew: bool = False) -> None:
-        """Make the case if need be, answer what is pending. Raises ProofError when the world fails."""
+        """Make the case if need be, answer what is pending.
+
+        Raises ProofError when the world fails, BrokenOff when the lane was closed.
+        """
         if not self.store.has_recordings(job):
             try:
                 self.world.ask(job.asked(), WORLD_LIMIT)
@@ -148,7 +172,8 @@ class Lane:
                 raise ProofError(f"{job.id}: the world took more than {WORLD_LIMIT:g} s") from None
             except Ended as end:
                 raise ProofError(f"{job.id}: the world ended ({end})") from end
-        for order in self.store.pending(job, self.code if renew else ""):
+            self.store.recordings_are_whole(job)
+        for order in self.store.pending(job, self.code if renew else "", self.limit):
             self._answer(job, order)
         if not self.keep:
             self.store.drop_recordings(job)
@@ -158,13 +183,15 @@ class Lane:
         try:
             self.diagnosis.ask(line, self.limit)
         except Overdue:
-            self.store.put(job, order, {"seconds": self.limit, "error": "timeout", "code": self.code})
+            late = {"seconds": self.limit, "error": TIMEOUT, "limit": self.limit, "code": self.code}
+            self.store.put(job, order, late)
         except Ended as end:
             self.store.put(job, order, {"seconds": 0.0, "error": f"died: {end}", "code": self.code})
 
     def close(self, patience: float = STOPPING) -> None:
-        self.world.close(patience)
-        self.diagnosis.close(patience)
+        """For good."""
+        self.world.dismiss(patience)
+        self.diagnosis.dismiss(patience)
 
 
 def carry_out(jobs: Sequence[Job], lanes: Sequence[Lane], renew: bool, told: Callable[[Job], None]) -> None:
@@ -188,6 +215,9 @@ def carry_out(jobs: Sequence[Job], lanes: Sequence[Lane], renew: bool, told: Cal
         finished = waiting.empty()
         for lane in lanes:
             lane.close(STOPPING if finished else 0.0)
+        for thread in threads:
+            if thread.is_alive():
+                thread.join(STOPPING)
 
 
 def _drive(
@@ -205,6 +235,8 @@ def _drive(
         try:
             lane.carry_out(job, renew)
             done.put(job)
+        except BrokenOff:
+            return
         except BaseException as error:  # noqa: BLE001  # raised again where the results are read
             done.put(error)
             return

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from shutil import rmtree
-from typing import Any
+from typing import Any, Final
+from zipfile import BadZipFile
 
 import numpy as np
 
@@ -15,6 +19,11 @@ import identification
 from identification.recording import Floats
 from rig.blind.design import Job, Order
 from rig.errors import RigError
+
+TIMEOUT: Final = "timeout"
+"""The error of an answer that took longer than its `limit`."""
+WHOLE: Final = "whole"
+"""File beside the recordings of a case, when all of them are there."""
 
 
 class ProofError(RigError):
@@ -59,22 +68,46 @@ class Store:
         folder = self.answers / job.token
         folder.mkdir(parents=True, exist_ok=True)
         (folder / f"{order.tag}.npz").unlink(missing_ok=True)
-        (folder / f"{order.tag}.json").write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
+        part = folder / f"{order.tag}.json.part"
+        part.write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
+        part.replace(folder / f"{order.tag}.json")
 
-    def pending(self, job: Job, code: str = "") -> tuple[Order, ...]:
-        """Orders not answered yet; with `code` also those that another version of the diagnosis answered."""
+    def pending(self, job: Job, code: str = "", limit: float = 0.0) -> tuple[Order, ...]:
+        """Orders not answered yet, or given up after less than `limit` s.
+
+        With `code` also those that another version of the diagnosis answered.
+        """
         truth = self.truth(job)
         if truth is not None and truth["error"]:
             return ()
         answers = {order: self.answer(job, order) for order in job.orders}
-        return tuple(o for o, found in answers.items() if found is None or (code and found.get("code") != code))
+        return tuple(o for o, found in answers.items() if found is None or _again(found, code, limit))
+
+    def recordings_are_whole(self, job: Job) -> None:
+        """The world has made all of them; where no such case could be drawn there are none."""
+        folder = self.opened / job.token
+        if folder.is_dir():
+            (folder / WHOLE).touch()
 
     def has_recordings(self, job: Job) -> bool:
-        return self.truth(job) is not None and (self.opened / job.token / "0.npz").exists()
+        return self.truth(job) is not None and (self.opened / job.token / WHOLE).exists()
 
     def drop_recordings(self, job: Job) -> None:
         """They can be made again from their seed; all of them are some 30 GB."""
-        rmtree(self.opened / job.token, ignore_errors=True)
+        folder = self.opened / job.token
+        (folder / WHOLE).unlink(missing_ok=True)
+        rmtree(folder, ignore_errors=True)
+
+    @contextmanager
+    def locked(self) -> Iterator[None]:
+        """While a proof works here. Raises ProofError when another one does."""
+        self.root.mkdir(parents=True, exist_ok=True)
+        with (self.root / "lock").open("ab") as file:
+            try:
+                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            except BlockingIOError:
+                raise ProofError(f"another proof works in {self.root}; wait for it, or give another --store") from None
+            yield
 
 
 def version_of_diagnosis() -> str:
@@ -87,16 +120,28 @@ def version_of_diagnosis() -> str:
     return found.hexdigest()[:12]
 
 
+def _again(answer: dict[str, Any], code: str, limit: float) -> bool:
+    given_up = answer.get("error") == TIMEOUT and float(answer.get("limit", limit)) < limit
+    return given_up or bool(code and answer.get("code") != code)
+
+
 def _read(path: Path) -> dict[str, Any] | None:
+    """None where there is no such file. Raises ProofError for what is no JSON."""
     try:
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
     except FileNotFoundError:
         return None
+    except ValueError as error:
+        raise ProofError(f"{path} is broken ({error}); remove it, and it is made again") from error
     return found
 
 
 def _arrays(path: Path) -> dict[str, Floats] | None:
+    """None where there is no such file. Raises ProofError for what holds no arrays."""
     if not path.exists():
         return None
-    with np.load(path) as found:
-        return {name: found[name].astype(np.float64) for name in found.files}
+    try:
+        with np.load(path) as found:
+            return {name: found[name].astype(np.float64) for name in found.files}
+    except (BadZipFile, EOFError, ValueError) as error:
+        raise ProofError(f"{path} is broken ({error}); remove it and its JSON, and they are made again") from error

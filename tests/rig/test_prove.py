@@ -3,6 +3,9 @@
 import json
 import sys
 from dataclasses import replace
+from gzip import compress
+from threading import Thread
+from time import monotonic, sleep
 
 import numpy as np
 import pytest
@@ -15,7 +18,7 @@ from rig.blind.answering import answered
 from rig.blind.collecting import Collected, Known, collected, not_good
 from rig.blind.design import Job, Order, design, matches
 from rig.blind.figures import confusion, goals, half, half_named, tables, twins, worst
-from rig.blind.lanes import Child, Ended, Lane, Overdue, carry_out, concealable
+from rig.blind.lanes import BrokenOff, Child, Ended, Lane, Overdue, carry_out, concealable
 from rig.blind.meaning import SAME, true_values
 from rig.blind.places import PLACES
 from rig.blind.rates import Goal, Rate, of_rate
@@ -259,6 +262,7 @@ def test_a_tiny_proof_end_to_end(tmp_path):
     lane = Lane(store, "0", 120.0, "code")
     carry_out(jobs[:2], [lane], renew=False, told=lambda _: None)
     assert collected(store, jobs).missing > 0
+    lane = Lane(store, "0", 120.0, "code")
     carry_out([j for j in jobs if store.pending(j)], [lane], renew=False, told=lambda _: None)
     found = collected(store, jobs)
     assert (found.missing, found.undrawn, found.versions) == (0, (), ("code",))
@@ -288,14 +292,17 @@ def test_the_diagnosing_process_cannot_open_a_seal(tmp_path):
         (tmp_path / name / "x.json").write_text("{}", encoding="utf-8")
     code = (
         "import sys; from pathlib import Path; from rig.blind.answering import Sealed, blindfold\n"
-        "root = Path(sys.argv[1]); blindfold(root, (root / 'open', root / 'answers'))\n"
+        "root = Path(sys.argv[1]); blindfold(root, root / 'open', root / 'answers')\n"
         "(root / 'open/x.json').read_text(); (root / 'answers/y.json').write_text('')\n"
+        "list((root / 'open').iterdir())\n"
         "seen = []\n"
         "for act in ((root / 'sealed/x.json').read_text, lambda: list((root / 'sealed').iterdir()),\n"
-        "            (root / 'open/../sealed/x.json').read_text):\n"
+        "            (root / 'open/../sealed/x.json').read_text, lambda: open(bytes(root / 'sealed/x.json')),\n"
+        "            (root / 'answers/x.json').read_text, lambda: list((root / 'answers').iterdir()),\n"
+        "            lambda: (root / 'open/z.json').write_text('')):\n"
         "    try: act()\n"
         "    except Sealed: seen.append(1)\n"
-        "assert len(seen) == 3, seen\n"
+        "assert len(seen) == 7, seen\n"
         "assert not [m for m in sys.modules if m.startswith('sim_devices')]\n"
     )
     child = Child([sys.executable, "-c", code, str(tmp_path)], tmp_path / "log")
@@ -336,20 +343,23 @@ def test_the_command_tells_an_empty_store(tmp_path):
 
 def test_scores_of_another_machine_come_back_as_they_were(tmp_path):
     jobs = {order.id: job for job in design(WORLD, CATALOGUE, 2) for order in job.orders}
-    known = {s.order.id: Known(s, "abc", jobs[s.order.id].digest) for s in whole_proof(2)}
+    known = [Known(s, "abc", jobs[s.order.id].digest) for s in whole_proof(2)]
     for name in ("scores.jsonl", "scores.jsonl.gz"):
-        elsewhere.write(tmp_path / name, known.values())
-        assert elsewhere.read(tmp_path / name) == known
-    assert elsewhere.read(tmp_path / "none.jsonl") == {}
+        elsewhere.write(tmp_path / name, [*known, *known])
+        assert elsewhere.read(tmp_path / name) == sorted(known, key=lambda each: each.score.order.id)
+    assert elsewhere.read(tmp_path / "none.jsonl") == []
 
 
 def test_scores_of_another_version_or_design_are_asked_again():
     one, other = jobs = design(WORLD, CATALOGUE, 1, ["plain/asymmetry/0", "plain/heating/0"])
     asked = one.orders[0]
-    known = {asked.id: Known(Score(asked, ("asymmetry",), "explained"), "abc", one.digest)}
-    assert elsewhere.usable(known, jobs, "abc") == elsewhere.usable(known, jobs) == known
-    assert elsewhere.usable(known, jobs, "abd") == {}
-    assert elsewhere.usable(known, [replace(one, spec={}), other], "abc") == {}
+    score = Score(asked, ("asymmetry",), "explained")
+    told = [Known(score, "abc", one.digest), Known(score, "old", one.digest)]
+    known = {asked.id: told[0]}
+    assert elsewhere.usable(told, jobs, "abc") == elsewhere.usable(told, jobs, "abc", others=True) == known
+    assert elsewhere.usable(told, jobs, "new") == {}
+    assert set(elsewhere.usable(told, jobs, "new", others=True)) == {asked.id}
+    assert elsewhere.usable(told, [replace(one, spec={}), other], "abc") == {}
     assert {o.id for job in elsewhere.unanswered(jobs, known) for o in job.orders} == {
         o.id for job in jobs for o in job.orders
     } - {asked.id}
@@ -357,7 +367,14 @@ def test_scores_of_another_version_or_design_are_asked_again():
 
 @pytest.mark.parametrize(
     ("name", "content"),
-    [("a.jsonl", b'{"version": "abc"}\n'), ("a.jsonl", b"scores\n"), ("a.jsonl.gz", b"{}"), ("a.jsonl", b"\xff\xfe")],
+    [
+        ("a.jsonl", b'{"version": "abc"}\n'),
+        ("a.jsonl", b"scores\n"),
+        ("a.jsonl", b"null\n"),
+        ("a.jsonl.gz", b"{}"),
+        ("a.jsonl.gz", compress(b"{}")[:12] + b"broken broken"),
+        ("a.jsonl", b"\xff\xfe"),
+    ],
 )
 def test_a_file_that_holds_no_scores_is_refused(tmp_path, name, content):
     (tmp_path / name).write_bytes(content)
@@ -380,4 +397,98 @@ def test_what_a_file_of_scores_holds_is_counted_and_not_asked(tmp_path):
     assert done.exit_code == 0, done.output
     assert "1 answers, 0 of them crashed, refused or overdue; 0 still to come" in done.output
     assert not (tmp_path / "s").exists(), "nothing was asked"
-    assert {k.score.order.id for k in elsewhere.read(file).values()} == {"plain/heating/0", "plain/dead_band/0"}
+    assert {k.score.order.id for k in elsewhere.read(file)} == {"plain/heating/0", "plain/dead_band/0"}
+
+
+def test_a_newer_score_from_elsewhere_counts_before_an_older_answer_of_the_store(tmp_path):
+    (job,) = design(WORLD, CATALOGUE, 1, ["plain/heating/0"])
+    order = job.orders[0]
+    store = Store(tmp_path)
+    (tmp_path / "sealed").mkdir()
+    seal = truth("heating") | {"asked": job.asked()}
+    (tmp_path / "sealed" / f"{job.token}.json").write_text(json.dumps(seal), encoding="utf-8")
+    store.put(job, order, answer("adequate") | {"code": "old"})
+    newer = Known(Score(order, ("heating",), "explained", named=("heating",)), "new", job.digest)
+    for version, said in (("new", "explained"), ("old", "adequate"), ("", "adequate")):
+        found = collected(store, [job], {order.id: newer}, version)
+        assert [s.said for s in found.scores] == [said]
+    file = tmp_path / "scores.jsonl"
+    elsewhere.write(file, [newer, *collected(store, [job]).known])
+    assert {k.version for k in elsewhere.read(file)} == {"new", "old"}, "neither is lost"
+
+
+def test_what_is_broken_off_is_no_answer(tmp_path):
+    """Ctrl+C while a diagnosis thinks: no answer, and no process is started for the orders that follow."""
+    jobs = design(WORLD, CATALOGUE, 1, ["plain/heating/0", "removed/heating/0"])
+    store = Store(tmp_path)
+    lane = Lane(store, "0", 60.0, "code")
+    begun = tmp_path / "begun"
+    sleeps = f"import pathlib, time; input(); pathlib.Path({str(begun)!r}).touch(); time.sleep(60)"
+    says = f"import pathlib; input(); pathlib.Path({str(store.opened / jobs[0].token)!r}).mkdir(); print('made')"
+    lane.world = Child([sys.executable, "-c", says], tmp_path / "world.log")
+    lane.diagnosis = Child([sys.executable, "-c", sleeps], tmp_path / "log")
+    seal = truth("heating") | {"asked": jobs[0].asked()}
+    (tmp_path / "sealed").mkdir()
+    (tmp_path / "sealed" / f"{jobs[0].token}.json").write_text(json.dumps(seal), encoding="utf-8")
+    seen = []
+    thread = Thread(target=lambda: seen.append(_raised(lambda: lane.carry_out(jobs[0]))))
+    thread.start()
+    end = monotonic() + 30.0
+    while not begun.exists() and monotonic() < end:
+        sleep(0.01)
+    lane.close(0.0)
+    thread.join(30.0)
+    assert seen == [BrokenOff]
+    assert lane.diagnosis.process is None
+    assert not list(store.answers.rglob("*.json"))
+    assert len(store.pending(jobs[0])) == 2
+
+
+def _raised(act):
+    try:
+        act()
+    except Exception as error:  # noqa: BLE001  # which one is what is asked
+        return type(error)
+    return None
+
+
+def test_a_diagnosis_given_up_early_is_asked_again_with_more_time(tmp_path):
+    (job,) = design(WORLD, CATALOGUE, 1, ["plain/heating/0"])
+    store = Store(tmp_path)
+    store.put(job, job.orders[0], {"seconds": 10.0, "error": "timeout", "limit": 10.0, "code": "abc"})
+    assert store.pending(job, "", 300.0) == job.orders
+    assert store.pending(job, "", 10.0) == store.pending(job) == ()
+
+
+def test_one_proof_at_a_time_works_in_a_store(tmp_path):
+    store = Store(tmp_path / "proof")
+    with store.locked(), pytest.raises(ProofError, match="another proof works"), store.locked():
+        pass
+    with store.locked():
+        pass
+
+
+def test_recordings_half_made_are_made_again(tmp_path):
+    (job,) = design(WORLD, CATALOGUE, 1, ["plain/heating/0"])
+    store = Store(tmp_path)
+    (tmp_path / "sealed").mkdir()
+    seal = truth("heating") | {"asked": job.asked()}
+    (tmp_path / "sealed" / f"{job.token}.json").write_text(json.dumps(seal), encoding="utf-8")
+    (store.opened / job.token).mkdir(parents=True)
+    (store.opened / job.token / "0.npz").write_bytes(b"half of it")
+    assert not store.has_recordings(job)
+    store.recordings_are_whole(job)
+    assert store.has_recordings(job)
+    store.drop_recordings(job)
+    assert not store.has_recordings(job)
+
+
+@pytest.mark.parametrize("part", ["sealed", "answers"])
+def test_a_broken_file_of_the_store_is_named(tmp_path, part):
+    (job,) = designed(1, ["plain/heating/0"])
+    file = tmp_path / (f"sealed/{job.token}.json" if part == "sealed" else f"answers/{job.token}/whole.json")
+    file.parent.mkdir(parents=True)
+    file.write_text('{"asked": ', encoding="utf-8")
+    done = CliRunner().invoke(prove_command, ["--no-run", "--only", "plain/heating/0", "--store", str(tmp_path)])
+    assert done.exit_code == 2
+    assert f"{file} is broken" in done.output
