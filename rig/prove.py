@@ -77,15 +77,18 @@ def shown(count: int) -> Iterator[Callable[[Job], None]]:
 
 def summary(found: Collected) -> str:
     """The goals, as a person reads them in a terminal."""
-    from rig.blind.figures import goals
+    from rig.blind.figures import besides, goals
 
-    sign = {"yes": "ok    ", "no": "MISSED", "open": "open  "}
+    sign = {"yes": "ok    ", "reached": "ok ?  ", "open": "open  ", "no": "MISSED", "": "      "}
     rows = [
         f"{sign[g.met]}  {g.what}: {g.measured}"
         + (f" ({g.interval})" if g.interval else "")
-        + f", n = {g.n}, goal {g.wanted}"
-        for g in goals(found.scores)
+        + f", n = {g.n}"
+        + (f", goal {g.wanted}" if g.wanted else "")
+        for g in (*goals(found.scores), *(g for g in besides(found.scores) if g.n))
     ]
+    if len(found.versions) > 1:
+        rows.append(f"answered by {len(found.versions)} versions of the diagnosis: {', '.join(found.versions)}")
     failed = sum(s.failed for s in found.scores)
     tail = f"{len(found.scores)} answers, {failed} of them crashed, refused or overdue; {found.missing} still to come"
     return "\n".join([*rows, f"{tail}; {len(found.undrawn)} cases could not be drawn"])
@@ -99,11 +102,11 @@ def still_wrong(found: Collected) -> str:
     return "\n".join([*rows, f"{len(found.scores) - len(rows)} of {len(found.scores)} came out right this time"])
 
 
-def leave(found: Collected, seeds: int, json_path: Path | None, report: Path | None) -> None:
+def leave(found: Collected, seeds: int, draw: str, json_path: Path | None, report: Path | None) -> None:
     """Write figures and page where they are wanted. Raises OSError."""
     from rig.blind.figures import tables
 
-    figures = tables(found.scores, seeds, found.versions, found.undrawn)
+    figures = tables(found.scores, seeds, found.versions, found.undrawn, draw)
     if json_path is not None:
         json_path.parent.mkdir(parents=True, exist_ok=True)
         json_path.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n", encoding="utf-8")
@@ -116,7 +119,6 @@ def leave(found: Collected, seeds: int, json_path: Path | None, report: Path | N
 
 def one_case(name: str, draw: str, limit: float, *, verbose: bool) -> str:
     """Make and answer one order anew, and tell truth and answer. Raises ProofError."""
-    from rig.blind.collecting import collected
     from rig.blind.store import Store
 
     store = Store(STORE.with_name("prove-case"))
@@ -126,7 +128,7 @@ def one_case(name: str, draw: str, limit: float, *, verbose: bool) -> str:
         for order in job.orders:
             (store.answers / job.token / f"{order.tag}.json").unlink(missing_ok=True)
     run(store, jobs, 1, limit, renew=True, keep=True)
-    return "\n\n".join(_told(store, job, verbose=verbose) for job in jobs) or str(collected(store, jobs))
+    return "\n\n".join(_told(store, job, verbose=verbose) for job in jobs)
 
 
 def _told(store: Store, job: Job, *, verbose: bool) -> str:
@@ -230,7 +232,7 @@ def prove_command(
         if scores_path is not None:
             elsewhere.write(scores_path, [*told, *found.known])
         click.echo(still_wrong(found) if failures else summary(found))
-        leave(found, seeds, json_path, report)
+        leave(found, seeds, draw, json_path, report)
     except (RigError, OSError) as error:
         click.echo(f"rig prove: {error}", err=True)
         raise SystemExit(2) from error

@@ -9,18 +9,28 @@ from typing import Literal
 
 Z = 1.959964
 """Of a 95 % interval."""
-Met = Literal["yes", "no", "open"]
-"""open: missed, but the interval still holds the goal; or nothing was measured."""
+Met = Literal["yes", "reached", "open", "no", ""]
+"""yes: the whole interval lies within the goal; reached: the figure does; open: the interval still touches it; no: all
+of it lies outside. Empty: a figure without a goal, or nothing was measured."""
+
+
+def wilson(p: float, n: float) -> tuple[float, float]:
+    """95 % interval of a share `p` seen in `n` (Wilson 1927), which holds near 0 and 1 too.
+
+    >>> [round(x, 3) for x in wilson(0.95, 20)]
+    [0.764, 0.991]
+    """
+    if not n:
+        return 0.0, 1.0
+    weight = Z**2 / n
+    middle = (p + weight / 2) / (1 + weight)
+    half = Z / (1 + weight) * sqrt(p * (1 - p) / n + weight / (4 * n))
+    return max(middle - half, 0.0), min(middle + half, 1.0)
 
 
 @dataclass(frozen=True, slots=True)
 class Rate:
-    """`hits` of `n`; interval of Wilson (1927), which holds near 0 and 1 too.
-
-    >>> r = Rate(19, 20)
-    >>> round(r.value, 3), round(r.low, 3), round(r.high, 3)
-    (0.95, 0.764, 0.991)
-    """
+    """`hits` of `n`, with its interval."""
 
     hits: int
     n: int
@@ -31,28 +41,20 @@ class Rate:
 
     @property
     def low(self) -> float:
-        return self._bounds()[0]
+        return wilson(self.value, self.n)[0]
 
     @property
     def high(self) -> float:
-        return self._bounds()[1]
-
-    def _bounds(self) -> tuple[float, float]:
-        if not self.n:
-            return 0.0, 1.0
-        p, weight = self.value, Z**2 / self.n
-        middle = (p + weight / 2) / (1 + weight)
-        half = Z / (1 + weight) * sqrt(p * (1 - p) / self.n + weight / (4 * self.n))
-        return max(middle - half, 0.0), min(middle + half, 1.0)
+        return wilson(self.value, self.n)[1]
 
     @property
     def told(self) -> str:
         """Empty when nothing was counted.
 
         >>> Rate(3, 4).told, Rate(0, 0).told
-        ('75 % of 4', '')
+        ('3 of 4', '')
         """
-        return f"{100 * self.value:.0f} % of {self.n}" if self.n else ""
+        return f"{self.hits} of {self.n}" if self.n else ""
 
     def json(self) -> dict[str, float | int | None]:
         return {
@@ -89,10 +91,10 @@ class Goal:
 
     @property
     def met(self) -> Met:
-        if not self.n:
-            return "open"
+        if not self.n or not self.wanted:
+            return ""
         if self.least <= self.value <= self.most:
-            return "yes"
+            return "yes" if self.least <= self.low and self.high <= self.most else "reached"
         return "open" if self.high >= self.least and self.low <= self.most else "no"
 
     @property
@@ -105,6 +107,8 @@ class Goal:
         unit = " %" if self.percent else ""
         if self.least > 0.0 and self.most < (1.0 if self.percent else float("inf")):
             return f"{low} to {high}{unit}"
+        if self.least <= 0.0 and self.most >= 1.0 and self.percent:
+            return ""
         return f"≥ {low}{unit}" if self.least > 0.0 else f"≤ {high}{unit}"
 
     @property
@@ -118,6 +122,25 @@ class Goal:
         if not self.n or not self.percent:
             return ""
         return f"{100 * self.low:.1f} to {100 * self.high:.1f} %"
+
+
+def of_groups(what: str, groups: Iterable[Iterable[bool]], least: float = 0.0, most: float = 1.0) -> Goal:
+    """A rate of what comes in groups (parameters of one run) that are right or wrong together: a wider interval.
+
+    The interval is Wilson's for as many independent ones as have the variance that the groups show (Rao and Scott
+    1992, A simple method for the analysis of clustered binary data, Biometrics 48).
+
+    >>> one, many = of_groups("", [[True]] * 30 + [[False]] * 10), of_groups("", [[True] * 3] * 30 + [[False] * 3] * 10)
+    >>> many.n, round(many.high - many.low, 2) == round(one.high - one.low, 2)
+    (120, True)
+    """
+    seen = [list(group) for group in groups if group]
+    found = rate(hit for group in seen for hit in group)
+    p, n, m = found.value, found.n, len(seen)
+    alone = p * (1.0 - p) * n
+    together = sum((sum(group) - p * len(group)) ** 2 for group in seen) * m / (m - 1) if m > 1 else alone
+    low, high = wilson(p, n / max(together / alone, 1.0) if alone > 0.0 else n)
+    return Goal(what, least, most, p, low, high, n)
 
 
 def of_rate(what: str, found: Rate, least: float = 0.0, most: float = 1.0) -> Goal:

@@ -3,9 +3,11 @@
     right      each concealed effect is among the findings or their stated rivals; of a clean run: `adequate`
     alone      the findings are exactly what was concealed and the verdict is `explained`
     wrong      something is named, and of what was concealed nothing is among findings and rivals
+    extra      a finding is not what was concealed, whatever stands beside it
 
 Where the physics is outside the catalogue, or was taken out of it, the outcome counts: `located` (unexplained, in the
-right place), `misplaced` (unexplained, elsewhere), `wrong name` (findings without `unexplained`), `missed` (adequate).
+right place), `located, named` (the same, and a name beside it, wrong as every name is there), `misplaced` (unexplained,
+elsewhere), `wrong name` (findings without `unexplained`), `missed` (adequate).
 A diagnosis that crashed, refused or ran out of time has failed: it is never right.
 """
 
@@ -24,9 +26,12 @@ from rig.blind.places import PLACES, UPSTREAM
 
 Table = Mapping[str, Any]
 
+AS_RIVAL: Final = "among rivals"
+"""The answer of a confusion matrix where the truth is a stated rival of what was found."""
 OPEN_CELLS: Final = ("outside", "removed")
+LOCATED: Final = ("located", "located, named")
 TELLABLE: Final = 8.0
-"""sigma that the best neighbour must leave to an oracle; below, nobody can tell it from that recording."""
+"""sigma that the best neighbour must leave to an oracle, as much as a faint effect has."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,9 +103,22 @@ class Score:
         return bool(self.named) and not set(self.truth) & {*self.named, *self.rivals}
 
     @property
+    def extra(self) -> bool:
+        return bool(set(self.named) - set(self.truth))
+
+    @property
+    def rival_only(self) -> bool:
+        """Right, but something that was concealed is among the rivals alone."""
+        return self.right and not set(self.truth) <= set(self.named)
+
+    @property
     def counted(self) -> bool:
-        """In the open world: whether this effect can be told from its nearest neighbour at all."""
-        return self.near is None or self.near.left >= TELLABLE
+        """Whether an oracle tells this effect from its nearest neighbour as clearly as a faint effect from noise."""
+        return self.leaves(TELLABLE)
+
+    def leaves(self, sigma: float) -> bool:
+        """Whether the nearest neighbour leaves that much."""
+        return self.near is None or self.near.left >= sigma
 
     @property
     def outcome(self) -> str:
@@ -108,14 +126,15 @@ class Score:
         if self.failed:
             return "failed"
         if self.said == "unexplained":
-            return "located" if self.place in PLACES[self.truth[0]] else "misplaced"
+            named = LOCATED[bool(self.named)]
+            return named if self.place in PLACES[self.truth[0]] else "misplaced"
         return "wrong name" if self.named else "missed"
 
     @property
     def good(self) -> bool:
         """As it should be, by the measure of its cell."""
         if self.order.cell in OPEN_CELLS:
-            return self.outcome == "located" or not self.counted
+            return self.outcome in LOCATED or not self.counted
         return self.right
 
     @property
@@ -124,8 +143,8 @@ class Score:
         if self.failed:
             return "failed"
         if self.right and self.truth:
-            return self.truth[0]
-        return self.said if self.said == "unexplained" or not self.named else self.named[0]
+            return AS_RIVAL if self.rival_only else self.truth[0]
+        return self.named[0] if self.named else self.said
 
 
 def scored(
@@ -150,7 +169,7 @@ def scored(
         place=unexplained["where"]["quantity"] if unexplained else "",
         resembles=tuple(unexplained["resembles"]) if unexplained else (),
         statement=found["statement"],
-        near=nearest(truth),
+        near=nearest(order, truth),
         held_out=held_out(*thrust, predicted) if thrust and predicted else None,
         intervals=intervals(findings, truth) if len(hidden) == 1 else (),
         seconds=answer["seconds"],
@@ -164,9 +183,13 @@ def concealed(truth: Table) -> tuple[str, ...]:
     return (*(effect["effect"] for effect in truth["effects"]), *lie)
 
 
-def nearest(truth: Table) -> Near | None:
-    """As the world measured it; a measured rate explains what happens before the rotor without knowing what it is."""
-    if truth["effects"] and truth["effects"][0]["effect"] in UPSTREAM and "rotation_rate" in truth["channels"]:
+def nearest(order: Order, truth: Table) -> Near | None:
+    """As the world measured it.
+
+    In the open world a measured rate explains what happens before the rotor without knowing what it is: 0 sigma left.
+    """
+    upstream = bool(truth["effects"]) and truth["effects"][0]["effect"] in UPSTREAM
+    if upstream and order.cell in OPEN_CELLS and "rotation_rate" in truth["channels"]:
         return Near("rotation_coupling", 0.0)
     twins = truth.get("twins")
     return Near(twins[0]["rival"], twins[0]["left"]) if twins else None

@@ -24,8 +24,10 @@ LEAST = 2.6
 DESK = 8.0
 """inches of width from which names fit on both axes of a matrix."""
 LOOKS = ((MUTED, "v"), (OTHER, "s"), (DATA, "o"), (THIRD, "^"))
-OUTCOMES = (DATA, MUTED, MODEL, GRID, INK)
-"""In the order of the outcomes: good, in between, bad, nothing, failed."""
+OUTCOMES = (DATA, THIRD, MUTED, MODEL, GRID, INK)
+"""In the order of the outcomes: good, good but for a name, in between, bad, nothing, failed."""
+OTHERS = (THIRD, MUTED, GRID, INK)
+"""Answers that are no name: among rivals, unexplained, adequate, failed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +88,8 @@ def taken_for(counts: Mapping[str, Mapping[str, int]], others: Sequence[str]) ->
         share = np.array([[counts[t].get(a, 0) / total[t] for a in answers] for t in effects])
         for (i, j), value in np.ndenumerate(share):
             if value > 0:
-                colour = DATA if answers[j] == effects[i] else MODEL
+                good = DATA if answers[j] == effects[i] else MODEL
+                colour = dict(zip(others, OTHERS, strict=True)).get(answers[j], good)
                 axes.plot(j, i, "s", color=colour, markersize=3.0 + 9.0 * float(np.sqrt(value)))
         axes.set_xticks(range(len(answers)), answers, rotation=90)
         axes.set_xlim(-0.7, len(answers) - 0.3)
@@ -94,7 +97,7 @@ def taken_for(counts: Mapping[str, Mapping[str, int]], others: Sequence[str]) ->
         _names(axes, effects)
 
     def short(figure: Figure, axes: Axes) -> None:
-        parts = {"right": DATA, "another name": MODEL, **dict(zip(others, (MUTED, GRID, INK), strict=False))}
+        parts = {"right": DATA, "another name": MODEL, **dict(zip(others, OTHERS, strict=True))}
         left = np.zeros(len(effects))
         for part, colour in parts.items():
             n = np.array([_part(counts[t], t, part, others) / total[t] for t in effects])

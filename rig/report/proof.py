@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
 from rig.blind.collecting import Collected
 from rig.blind.design import STRENGTHS
-from rig.blind.figures import by_label, cell, confusion, goals, instead
+from rig.blind.figures import besides, by_label, cell, confusion, counts, goals, instead
 from rig.blind.rates import Goal, rate
-from rig.blind.scoring import Score
+from rig.blind.scoring import AS_RIVAL, Score
 from rig.report import figures_proof
 from rig.report.figures_proof import Row
 from rig.report.page import Page, Picture, Remark, Section, Sentences, Table
 from rig.report.proof_parts import SIGNS, alarms_section, models_section, open_section, power_section
 
-UNNAMED = ("unexplained", "adequate", "failed")
+UNNAMED = (AS_RIVAL, "unexplained", "adequate", "failed")
 FEW = 8
 """Rows of a table that is shown without being asked for."""
 MOST_SAID = 4
@@ -26,7 +27,7 @@ def proof_page(found: Collected, figures: dict[str, Any]) -> Page:
     """`figures`: of blind.figures.tables."""
     scores, told = found.scores, goals(found.scores)
     parts = [
-        _goals(told),
+        _goals(told, besides(scores)),
         _alone(scores),
         _taken(scores),
         _other_cells(scores),
@@ -43,20 +44,29 @@ def proof_page(found: Collected, figures: dict[str, Any]) -> Page:
 
 
 def _lead(found: Collected, told: Sequence[Goal]) -> str:
-    counts = {sign: sum(g.met == sign for g in told if g.n) for sign in SIGNS}
+    sums = {sign: sum(g.met == sign for g in told) for sign in SIGNS}
     unmeasured = sum(not g.n for g in told)
     more = f", {unmeasured} not measured" if unmeasured else ""
+    mixed = f" By {len(found.versions)} versions of the diagnosis." if len(found.versions) > 1 else ""
     return (
-        f"{len(found.scores)} diagnoses of recordings with concealed physics: {counts['yes']} goals met, "
-        f"{counts['no']} missed, {counts['open']} that so few runs cannot decide{more}."
+        f"{len(found.scores)} diagnoses of recordings with concealed physics: {sums['yes']} goals met, "
+        f"{sums['reached']} reached, {sums['open']} open, {sums['no']} missed{more}.{mixed}"
     )
 
 
-def _goals(told: Sequence[Goal]) -> Section:
+def _goals(told: Sequence[Goal], more: Sequence[Goal]) -> Section:
     head = ("figure", "goal", "measured", "95 % interval", "n", "")
-    rows = tuple((g.what, g.wanted, g.measured, g.interval, str(g.n), SIGNS[g.met] if g.n else "") for g in told)
-    lead = "Missed: the interval does not reach the goal. Open: it does, the rate itself does not; more runs decide."
-    return Section("Goals", (Table("Goals and what was measured", head, rows, frozenset({0, 1, 5})),), lead)
+    rows = tuple((g.what, g.wanted, g.measured, g.interval, str(g.n), SIGNS.get(g.met, "")) for g in told)
+    others = tuple((g.what, g.measured, g.interval, str(g.n)) for g in more)
+    lead = (
+        "Met: the whole interval lies within the goal. Reached: the figure does, its interval does not. Open: the "
+        "interval touches the goal, the figure does not reach it. Missed: all of it lies outside."
+    )
+    tables = (
+        Table("Goals and what was measured", head, rows, frozenset({0, 1, 5})),
+        Table("Beside the goals", ("figure", "measured", "95 % interval", "n"), others, frozenset({0})),
+    )
+    return Section("Goals", tables, lead)
 
 
 def _alone(scores: Sequence[Score]) -> Section | None:
@@ -160,8 +170,8 @@ def _made(found: Collected, figures: dict[str, Any]) -> Section:
     rows: list[str | Remark] = [
         "The world's process wrote recordings and, apart from them, the sealed truth; the diagnosis ran in a process "
         "that cannot open the seals.",
-        f"{found.missing} orders are not answered yet; {len(found.undrawn)} cases could not be drawn: no plan, scale "
-        "and noise of a load cell shows that effect at that strength.",
+        _which(figures["draw"]),
+        f"{found.missing} orders are not answered yet; {_not_drawn(found.undrawn)}",
         f"One diagnosis takes {seconds['0.5']:.1f} s (median), {seconds['0.95']:.1f} s (95 %), "
         f"{seconds['1.0']:.0f} s at most.",
         Remark(
@@ -174,3 +184,19 @@ def _made(found: Collected, figures: dict[str, Any]) -> Section:
     if len(failed) > 20:
         rows.append(Remark(f"and {len(failed) - 20} more that crashed, refused or took too long", "bad"))
     return Section("How it was made", (Sentences(tuple(rows)),))
+
+
+def _which(draw: str) -> str:
+    if draw:
+        return f"The cases are those of draw {draw}."
+    return "The cases are those that the diagnosis was developed on: figures of a draw of its own are the fairer ones."
+
+
+def _not_drawn(undrawn: Sequence[str]) -> str:
+    if not undrawn:
+        return "every case could be drawn."
+    cells = Counter(case.split(":")[0].rsplit("/", 1)[0] for case in undrawn)
+    return (
+        f"{len(undrawn)} cases could not be drawn, for no plan, scale and noise of a load cell shows that effect at "
+        f"that strength: {counts(dict(cells.most_common()))}."
+    )

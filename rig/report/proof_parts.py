@@ -8,13 +8,13 @@ from typing import Any
 from rig.blind.design import LADDER, ORACLE, WITHIN
 from rig.blind.figures import by_label, counts, instead, named_by_strength, ratios
 from rig.blind.rates import Rate, rate
-from rig.blind.scoring import TELLABLE, Score
+from rig.blind.scoring import LOCATED, TELLABLE, Score
 from rig.report import figures_proof
 from rig.report.figures_proof import Row
 from rig.report.page import Picture, Section, Table
 
-SIGNS = {"yes": "✓ met", "no": "✗ missed", "open": "? open"}
-OUTCOMES = ("located", "misplaced", "wrong name", "missed", "failed")
+SIGNS = {"yes": "✓ met", "reached": "✓ reached", "open": "? open", "no": "✗ missed"}
+OUTCOMES = (*LOCATED, "misplaced", "wrong name", "missed", "failed")
 
 
 def open_section(figures: dict[str, Any]) -> Section | None:
@@ -29,23 +29,25 @@ def open_section(figures: dict[str, Any]) -> Section | None:
         bars = [(row["effect"], row["outcomes"]) for row in rows if row["cell"] == name and row["counted"]]
         if bars:
             parts.append(Picture(title, figures_proof.outcomes(bars, OUTCOMES)))
-    head = ("concealed", "can be told", "located", "misplaced", "wrong name", "missed", "names given", "places")
+    head = ("concealed", "can be told", *OUTCOMES, "names given", "places")
     cells = tuple(
         (
             row["effect"] + (", taken out" if row["cell"] == "removed" else ""),
             f"{row['counted']} of {row['runs']}",
-            *(str(row["outcomes"].get(o, 0)) for o in OUTCOMES[:4]),
+            *(str(row["outcomes"].get(o, 0)) for o in OUTCOMES),
             counts(row["names"]),
             counts(row["places"]),
         )
         for row in rows
     )
-    parts.append(Table("What was said of physics that is not known", head, cells, frozenset({0, 6, 7}), folded=True))
+    text = frozenset({0, 8, 9})
+    parts.append(Table("What was said of physics that is not known", head, cells, text, folded=True))
     if figures["twins"]:
         parts.append(_twins(figures["twins"]))
     lead = (
         f"Counted where the best neighbour in the catalogue still leaves at least {TELLABLE:g} sigma to an oracle. "
-        "Located: unexplained, with the right quantity. Wrong name: something is named, nothing said to be unexplained."
+        "Located: unexplained, with the right quantity; located, named: with a name beside it, which is wrong, as every "
+        "name is here. Wrong name: something is named, nothing said to be unexplained."
     )
     return Section("Open world", tuple(parts), lead)
 
@@ -57,13 +59,15 @@ def _twins(rows: Sequence[dict[str, Any]]) -> Table:
             row["effect"],
             row["twin"],
             str(row["runs"]),
-            f"{row['left'][0]:g} to {row['left'][1]:g}",
+            f"{row['left'][0]:g} to {row['left'][1]:g}" if row["left"][1] else "the rate is recorded",
             counts(row["said_instead"]),
             f"{row['rivals_stated']['hits']} of {row['rivals_stated']['n']}" if row["rivals_stated"]["n"] else "",
         )
         for row in rows
     )
-    return Table("Twins: recordings that nobody can tell apart", head, cells, frozenset({0, 1, 4}), folded=True)
+    return Table(
+        f"Twins: neighbours that leave less than {TELLABLE:g} sigma", head, cells, frozenset({0, 1, 4}), folded=True
+    )
 
 
 def alarms_section(scores: Sequence[Score]) -> Section | None:
