@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import json
+import math
 import shlex
 import subprocess
 import sys
@@ -54,28 +55,48 @@ class Settling:
     begun: float = field(default_factory=time.monotonic)
     thinking: float = 0.0
     """s of the longest diagnosis so far."""
+    flow: float = 0.0
+    """m/s, as it was set last; it is still when this begins."""
+    setting: float = 0.0
+    """s that the flow took at most so far."""
 
     def settle(self) -> tuple[Diagnosis, Course, End]:
-        """Until one answer stands. Raises RigError for input that cannot be used; an aborted run is an end."""
-        from identification.mismatch.settle import Course, End, belief, next_step, opening_line, round_line
+        """Until one answer stands, the water still again.
+
+        Raises RigError for input that cannot be used, before anything moves; after that what goes wrong is an end.
+        """
+        from identification.mismatch.settle import Course, End, belief, opening_line
 
         found = self._diagnosed(0.0)
         course = Course(self.budget, belief(found), self._spent())
         self.say(opening_line(course))
-        while True:
-            plans = self._written(found, len(course.rounds) + 1)
-            step = next_step(course, self._needs(plans))
-            if isinstance(step, End):
-                return found, course, step
-            began = time.monotonic()
-            try:
-                self.files += self._run(plans)
-            except RigError as error:
-                return found, course, End("aborted", f"{course.now.says}; the run was aborted: {error}")
-            on_bench = time.monotonic() - began
-            found = self._diagnosed(self._spent())
-            course = course.after(on_bench, self._spent(), found)
-            self.say(round_line(course))
+        try:
+            while True:
+                try:
+                    found, course, end = self._round(found, course)
+                except (RigError, OSError, click.Abort) as error:
+                    why = str(error) or "broken off by the operator"
+                    return found, course, End("aborted", f"{course.now.says}; the run was aborted: {why}")
+                if end is not None:
+                    return found, course, end
+        finally:
+            self._still()
+
+    def _round(self, found: Diagnosis, course: Course) -> tuple[Diagnosis, Course, End | None]:
+        """One experiment and its diagnosis, or why there is none."""
+        from identification.mismatch.settle import End, next_step, round_line
+
+        plans = self._written(found, len(course.rounds) + 1)
+        step = next_step(course, self._needs(plans))
+        if isinstance(step, End):
+            return found, course, step
+        began = time.monotonic()
+        self.files += self._run(plans)
+        on_bench = time.monotonic() - began
+        found = self._diagnosed(self._spent())
+        course = course.after(on_bench, self._spent(), found)
+        self.say(round_line(course))
+        return found, course, None
 
     def _spent(self) -> float:
         return time.monotonic() - self.begun
@@ -98,7 +119,7 @@ class Settling:
 
     def _needs(self, plans: Sequence[Path]) -> float:
         """S until the plans are run and diagnosed."""
-        return sum(_expected(load_campaign(plan)) for plan in plans) + self.thinking
+        return sum(_expected(load_campaign(plan)) + self.setting for plan in plans) + self.thinking
 
     def _run(self, plans: Sequence[Path]) -> list[Path]:
         """The recordings of the plans, each run as `rig run --headless` runs it. Raises RigError when one is aborted.
@@ -108,8 +129,7 @@ class Settling:
         made: list[Path] = []
         for plan in plans:
             config = require_runnable(plan, (), headless=True)
-            if config.flow_speed is not None and self.set_flow is not None:
-                self.set_flow(config.flow_speed)
+            self._flow_at(config.flow_speed or 0.0)
             folder = self.folder / plan.stem
             folder.mkdir()
             with contextlib.redirect_stdout(sys.stderr):
@@ -118,6 +138,23 @@ class Settling:
                 raise RigError(f"{folder} holds what was recorded and why it ended")
             made += sorted(folder.glob("*.h5"))
         return made
+
+    def _flow_at(self, speed: float) -> None:
+        """Raises RigError when the water cannot be brought to `speed` m/s."""
+        if self.set_flow is None or speed == self.flow:
+            return
+        began = time.monotonic()
+        self.flow = math.nan  # until it is known again
+        self.set_flow(speed)
+        self.flow = speed
+        self.setting = max(self.setting, time.monotonic() - began)
+
+    def _still(self) -> None:
+        """Whatever happened; a flow that goes on is said."""
+        try:
+            self._flow_at(0.0)
+        except (RigError, click.Abort) as error:
+            self.say(f"THE WATER MAY STILL FLOW: it could not be brought to rest: {error or 'broken off'}")
 
 
 def _expected(campaign: CampaignConfig) -> float:

@@ -46,8 +46,8 @@ def open_section(figures: dict[str, Any]) -> Section | None:
         parts.append(_twins(figures["twins"]))
     lead = (
         f"Counted where the best neighbour in the catalogue still leaves at least {TELLABLE:g} sigma to an oracle. "
-        "Located: unexplained, with the right quantity; located, named: with a name beside it, which is wrong, as every "
-        "name is here. Wrong name: something is named, nothing said to be unexplained."
+        "Located: unexplained, with the right quantity; located, named: with a name beside it, wrong as every name is "
+        "here. Wrong name: something is named, nothing said to be unexplained."
     )
     return Section("Open world", tuple(parts), lead)
 

@@ -3,6 +3,7 @@
 import sys
 from pathlib import Path
 
+import click
 import numpy as np
 import pytest
 
@@ -76,6 +77,75 @@ def test_an_experiment_that_does_not_fit_leaves_its_plan_and_moves_nothing(recor
     plan = load_campaign(folder / "round-1.toml")
     assert not plan.unattended
     assert plan.bench.path.resolve() == load_campaign(RIGHT).bench.path.resolve()
+
+
+class Rounds:
+    """`Settling` with made-up rounds: what each wants of the flow, and what becomes of it."""
+
+    def __init__(self, settling, *flows, fails=None):
+        self.flows, self.fails, self.ran = list(flows), fails, []
+        settling._run = self.run
+        self.settling = settling
+
+    def run(self, plans):
+        self.settling._flow_at(self.flows[len(self.ran)])
+        self.ran.append(self.settling.flow)
+        if self.fails and len(self.ran) == len(self.flows):
+            raise self.fails
+        return []
+
+
+@pytest.fixture
+def doubtful(recording, tmp_path):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    settling = Settling(load_campaign(RIGHT), folder, [recording()], budget=3600.0)
+    settling.say = lambda text: said.append(text)
+    said, speeds = [], []
+    settling.set_flow = speeds.append
+    return settling, speeds, said
+
+
+def test_the_water_is_still_for_a_sweep_that_says_nothing_of_it_and_at_the_end(doubtful):
+    settling, speeds, _ = doubtful
+    rounds = Rounds(settling, 0.5, 0.0)  # the same doubt after two rounds is an end
+    _, course, end = settling.settle()
+    assert (end.reason, len(course.rounds)) == ("same_doubt", 2)
+    assert rounds.ran == [0.5, 0.0]
+    assert speeds == [0.5, 0.0]
+
+
+@pytest.mark.parametrize(
+    ("trouble", "told"),
+    [
+        (RigError("the guard tripped"), "the guard tripped"),
+        (OSError("no room"), "no room"),
+        (click.Abort(), "broken off by the operator"),
+    ],
+)
+def test_the_water_is_brought_to_rest_whatever_ends_it(doubtful, trouble, told):
+    settling, speeds, _ = doubtful
+    Rounds(settling, 0.8, fails=trouble)
+    found, course, end = settling.settle()
+    assert (end.reason, found.verdict, course.rounds) == ("aborted", "ambiguous", ())
+    assert told in end.says
+    assert speeds == [0.8, 0.0]
+
+
+def test_a_flow_that_does_not_stop_is_said(doubtful):
+    settling, speeds, said = doubtful
+
+    def set_flow(speed):
+        speeds.append(speed)
+        if speed == 0.0:
+            raise RigError("the pump does not answer")
+
+    settling.set_flow = set_flow
+    Rounds(settling, 0.8, fails=RigError("the guard tripped"))
+    assert settling.settle()[2].reason == "aborted"
+    assert speeds == [0.8, 0.0]
+    assert said[-1].startswith("THE WATER MAY STILL FLOW")
+    assert "the pump does not answer" in said[-1]
 
 
 def test_a_bench_alone_is_a_campaign_with_the_defaults(tmp_path):
