@@ -40,6 +40,8 @@ class WatchLink:
     """None: the other end of the link is not a child of ours."""
     failed: str = ""
     """Why the run is not watched; empty while it is."""
+    t0_ns: int | None = None
+    """Of the run that is watched; None between runs."""
     _places: dict[str, int] = field(default_factory=dict)
     """Stream -> its index in the watcher's messages; empty between runs."""
     _waiting: dict[str, list[Sample]] = field(default_factory=dict)
@@ -62,14 +64,16 @@ class WatchLink:
     def begin(self, run: Watched) -> None:
         """A run begins: what was learnt of the one before is forgotten."""
         self.failed = "" if not self.peer.closed else self.failed
+        self.t0_ns = run.t0_ns
         self._places = {stream.name: index for index, stream in enumerate(run.streams)}
         self._waiting.clear()
         self._send(run)
 
     def end(self) -> None:
-        """The run is over: nothing more is fed."""
+        """The run is over: nothing more is fed than what waits."""
+        self.flush(self._sent)
+        self.t0_ns = None
         self._places.clear()
-        self._waiting.clear()
 
     def rows(self, samples: Iterable[Sample], now: float) -> None:
         """What one tick drained; goes out every PERIOD s (`now`, s)."""

@@ -37,6 +37,8 @@ class Watched:
 class Mismatch:
     """The run no longer fits what it was, or the twin. Times in s of the recording."""
 
+    t0_ns: int
+    """Of the run: it may be over when this comes."""
     thruster: str
     time: float
     began: float

@@ -49,7 +49,7 @@ class Watcher:
             self._take(message)
         found = self._watch.look() if self._watch is not None else None
         if found is not None and self._run is not None:
-            self._peer.send(_said(found, self._run.thruster))
+            self._peer.send(_said(found, self._run))
 
     def _take(self, message: Message) -> None:
         match message:
@@ -105,9 +105,10 @@ def feed(watch: Watch, run: Watched, rows: Rows) -> None:
                 watch.rotation_rate(time, value)
 
 
-def _said(alarm: Alarm, thruster: str) -> Mismatch:
+def _said(alarm: Alarm, run: Watched) -> Mismatch:
     return Mismatch(
-        thruster=thruster,
+        t0_ns=run.t0_ns,
+        thruster=run.thruster,
         time=alarm.time,
         began=alarm.began,
         place=alarm.place,

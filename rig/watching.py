@@ -19,17 +19,23 @@ def begin_watch(session: Session, thruster: str, t0_ns: int) -> None:
 
 
 def hear_watch(session: Session) -> None:
-    """A mismatch goes to the screens, into the recording's events and into the ledger. Never blocks."""
+    """A mismatch goes to the screens, into the recording's events and into the ledger. Never blocks.
+
+    One of a run that is over goes into the ledger alone: it is no matter of the recording that is open now.
+    """
     watch = session.loop.watcher
     if watch is None or not session.watched:
         return
     for found in watch.heard():
-        session.status.mismatch = found.headline
-        session.say("warning", f"mismatch: {found.statement}")
+        late = found.t0_ns != watch.t0_ns
         session.ledger.write(
             "mismatch", thruster=found.thruster, time=found.time, began=found.began, place=found.place,
-            size_N=found.size, e_value=found.e_value,
+            size_N=found.size, e_value=found.e_value, late=late,
         )  # fmt: skip
+        if late:
+            continue
+        session.status.mismatch = found.headline
+        session.say("warning", f"mismatch: {found.statement}")
         if session.campaign.watch.stop:
             session.loop.signals.append(Request("stop", f"the watch (watch.stop = true): {found.headline}"))
     if watch.failed:

@@ -109,6 +109,29 @@ def test_clean_campaign_of_two_thrusters_says_nothing_and_begins_anew_with_each(
         assert "not watched" not in world.texts
 
 
+def test_alarm_of_a_run_that_is_over_is_in_the_ledger_and_troubles_no_other_run(tmp_path):
+    plan = replace(WATCHED, shape=Levels(LEVELS[:4]))
+    with watched(tmp_path, thrusters=("T1", "T3"), plan=plan, watch=WatchConfig(stop=True)) as (world, link, watcher):
+        first: list[int | None] = []
+
+        def watch() -> None:
+            watcher.step()
+            first.append(link.t0_ns)
+            if world.session.status.thruster == "T3" and link.t0_ns is not None and not told:
+                told.append(next(t0 for t0 in first if t0 is not None))
+                late = Mismatch(told[0], "T1", 9.0, 4.0, "zero", "zero +1 N", "zero +1 N at rest", 1.0, 100.0)
+                watcher._peer.send(late)
+
+        told: list[int] = []
+        seen = play(world, watch)
+        assert told
+        assert world.session.status.outcome == "completed", "watch.stop stops the run that it is said of"
+        assert "mismatch" not in world.texts
+        assert not any(snapshot.mismatch for snapshot in seen)
+        facts = [fact for fact in read(tmp_path) if fact["fact"] == "mismatch"]
+        assert [(fact["thruster"], fact["late"]) for fact in facts] == [("T1", True)]
+
+
 def test_alarm_ends_the_campaign_where_that_is_asked_for(tmp_path):
     with watched(tmp_path, watch=WatchConfig(stop=True)) as (world, _, watcher):
         fouled_from(world, 28.0)
@@ -230,7 +253,7 @@ def test_process_watches_and_ends_with_its_link(tmp_path):
 def test_mismatch_crosses_the_link_whole():
     ours, theirs = pair("watcher")
     other = Peer(theirs, "controller")
-    said = Mismatch("T1", 9.0, 4.0, "zero", "zero +1 N", "zero +1 N at rest", 1.0, 100.0)
+    said = Mismatch(7, "T1", 9.0, 4.0, "zero", "zero +1 N", "zero +1 N at rest", 1.0, 100.0)
     other.send(said)
     assert WatchLink(ours, None).heard() == [said]
     ours.close()
