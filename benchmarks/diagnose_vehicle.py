@@ -32,9 +32,9 @@ def judged(effect: str, found: Diagnosis) -> str:
         return "named" if len(set(names)) == 1 and found.unexplained is None else "with more"
     if effect in rivals:
         return "rival"
-    if found.verdict == "unexplained":
-        return "unexplained"
-    return "wrong" if names else "missed"
+    if names:
+        return "wrong"
+    return "unexplained" if found.verdict == "unexplained" else "missed"
 
 
 def main(seeds: int, strength: float, effects: list[str]) -> None:

@@ -13,7 +13,8 @@ own: most recordings right, clean ones counted like the others.
 Right alone: the effect and nothing else. Right among: the effect and others; for ours also as a stated rival.
 Wrong: names without the effect. None: no name, though there is an effect. False alarm: any name on a clean recording.
 Error: rms on another recording of the same thruster with another plan, over that of its noise; kept columns and C by
-least squares on the first recording, the tare from the second. Seconds: the method, without making the columns.
+least squares on the first recording, the tare from the second; of ours the model that it found, without a look at the
+other recording's thrust. Seconds: the method, without making the columns.
 """
 
 from __future__ import annotations
@@ -35,12 +36,17 @@ from peers.columns import Problem, problem
 from peers.methods import GRIDS, TUNED, names
 
 from identification.mismatch.diagnose import diagnose
-from identification.mismatch.preparing import Refusal
+from identification.mismatch.diagnosis import Diagnosis
+from identification.mismatch.simulating import Drive, Prediction, others_of, simulate
+from identification.recording import Recording
+from rig.blind.store import version_of_diagnosis
+from sim_devices.concealed.version import version as version_of_world
 
 OURS = "rig diagnose"
 BARE = "C V|V| alone"
 STORE = Path(__file__).parents[1] / "build" / "peers.jsonl"
 FIRST_TUNING_SEED = 50_000
+CODE = f"{version_of_diagnosis()} in world {version_of_world()}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,6 +61,8 @@ class Answer:
     """Of the noise."""
     seconds: float
     setting: dict[str, Any] = field(default_factory=dict)
+    code: str = ""
+    """Of what made the recording and the answer: an answer of other code is not counted."""
 
     @property
     def outcome(self) -> str:
@@ -76,11 +84,22 @@ def drawn(number: int, first: int) -> Iterator[tuple[str, str, int]]:
 
 
 def ours(puzzle: Puzzle) -> tuple[tuple[str, ...], tuple[str, ...], float]:
-    found = diagnose([puzzle.fitted], [puzzle.unseen])
-    assert not isinstance(found, Refusal)
+    found = diagnose([puzzle.fitted])
+    assert isinstance(found, Diagnosis)
     named = tuple(f.effect for f in found.findings)
     rivals = tuple(r.effect for f in found.findings for r in f.rivals if r.effect not in named)
-    return named, rivals, found.heldout.after
+    return named, rivals, error_of(found, puzzle.unseen)
+
+
+def error_of(found: Diagnosis, unseen: Recording) -> float:
+    """N rms per sample of the model found, its tare by the unseen recording."""
+    command, thrust = unseen.first_of("command_voltage"), unseen.first_of("thrust")
+    assert found.twin is not None
+    assert command is not None
+    assert thrust is not None
+    model = simulate(found.twin, Drive(command.time, command.value, others=others_of(unseen)), thrust.time)
+    assert isinstance(model, Prediction)
+    return float(np.std(thrust.value - model.thrust))
 
 
 def answered(kind: str, effect: str, seed: int, methods: set[str]) -> Iterator[Answer]:
@@ -90,12 +109,13 @@ def answered(kind: str, effect: str, seed: int, methods: set[str]) -> Iterator[A
     if OURS in methods:
         began = process_time()
         named, rivals, error = ours(puzzle)
-        yield Answer(OURS, kind, effect, seed, named, rivals, error / truth.noise, process_time() - began)
+        took = process_time() - began
+        yield Answer(OURS, kind, effect, seed, named, rivals, error / truth.noise, took, code=CODE)
     if methods == {OURS}:
         return
     p = problem(puzzle)
     if BARE in methods:
-        yield Answer(BARE, kind, effect, seed, (), (), p.held_out([]) / truth.noise, 0.0)
+        yield Answer(BARE, kind, effect, seed, (), (), p.held_out([]) / truth.noise, 0.0, code=CODE)
     for method in methods & set(TUNED):
         yield _answer(method, p, TUNED[method], kind, effect, seed, truth.noise)
 
@@ -106,21 +126,34 @@ def _answer(
     began = process_time()
     named, kept = names(p, method, setting)
     took = process_time() - began
-    return Answer(method, kind, effect, seed, tuple(sorted(named)), (), p.held_out(kept) / noise, took, setting)
+    error = p.held_out(kept) / noise
+    return Answer(method, kind, effect, seed, tuple(sorted(named)), (), error, took, setting, CODE)
 
 
 def kept_answers() -> list[Answer]:
+    """By this code and at these settings; a line that was cut off is none."""
     if not STORE.exists():
         return []
-    lines = STORE.read_text(encoding="utf-8").splitlines()
-    return [Answer(**json.loads(line)) for line in lines]
+    found = (_answer_in(line) for line in STORE.read_text(encoding="utf-8").splitlines())
+    answers = [a for a in found if a is not None]
+    return [a for a in answers if a.code == CODE and a.setting == TUNED.get(a.method, {})]
+
+
+def _answer_in(line: str) -> Answer | None:
+    try:
+        told = json.loads(line)
+    except ValueError:
+        return None
+    return Answer(**{**told, "named": tuple(told["named"]), "rivals": tuple(told["rivals"])})
 
 
 def run(number: int) -> list[Answer]:
     STORE.parent.mkdir(exist_ok=True)
     answers = kept_answers()
     done = {(a.kind, a.effect, a.seed, a.method) for a in answers}
+    cut = STORE.exists() and not STORE.read_bytes().endswith(b"\n")
     with STORE.open("a", encoding="utf-8") as store:
+        store.write("\n" * cut)
         for one in drawn(number, 1000):
             new = list(answered(*one, {m for m in (OURS, BARE, *TUNED) if (*one, m) not in done}))
             store.writelines(json.dumps(asdict(a)) + "\n" for a in new)

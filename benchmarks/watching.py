@@ -129,14 +129,17 @@ def changes(campaigns: int, sigma: float) -> None:
             print(f"{about} no alarm", flush=True)
             continue
         first, last = found.first, found.watch.alarm
-        counts["early"] += first.time < start
+        if first.time < start:
+            counts["early"] += 1
+            print(f"{about} AN ALARM BEFORE IT BEGAN, {first.headline}", flush=True)
+            continue
         counts["right at once"] += is_right(effect, case, first.place)
         counts["right at the end"] += is_right(effect, case, last.place)
         delays[effect].append(first.time - start)
         off.append(first.began - start)
         print(f"{about} after {first.time - start:4.0f} s: {first.headline}; in the end {last.headline}", flush=True)
     everything = np.concatenate([np.array(d) for d in delays.values()])
-    print(f"{sigma:g} sigma: {counts} of {campaigns}; delay {_spread(everything)}")
+    print(f"{sigma:g} sigma: {counts} of {campaigns}, early ones in no delay; delay {_spread(everything)}")
     for effect, found_after in delays.items():
         print(f"  {effect}: delay {_spread(np.array(found_after))}")
     print(f"  begin as first said minus true: {_spread(np.array(off))}", flush=True)
