@@ -123,13 +123,21 @@ def judged(session: Session, output: Output) -> tuple[Outcome, str]:
 def missing_steps(plan: Iterable[Step], measured: Set[tuple[int, str]], points: Set[int]) -> list[Step]:
     """Steps that a run which says it is completed has not measured (docs/reliability.md, promise 27).
 
-    A hold needs its point; a tare, sine or swept ramp needs to have run to its end.
+    A hold needs its point; a tare, sine or swept ramp needs to have run to its end. A later tare that was not stable
+    leaves the one before in use: that it was tried is enough.
     """
+    steps = list(plan)
+    first = next((step.index for step in steps if step.phase == "tare"), None)
+
+    def ran(step: Step) -> bool:
+        tried = step.phase == "tare" and step.index != first and (step.index, "free") in measured
+        return tried or (step.index, step.phase) in measured
+
     return [
         step
-        for step in plan
+        for step in steps
         if (step.phase == "hold" and step.index not in points)
-        or ((step.phase in ("tare", "sine") or step.swept) and (step.index, step.phase) not in measured)
+        or ((step.phase in ("tare", "sine") or step.swept) and not ran(step))
     ]
 
 

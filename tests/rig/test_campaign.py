@@ -383,6 +383,19 @@ def test_pause_in_any_state_and_resume_gives_every_point(tmp_path, state):
         assert [point.step for point in world.session.status.points] == [s.index for s in plan if s.phase == "hold"]
 
 
+def test_later_tare_that_is_not_stable_leaves_the_one_before_and_completes(tmp_path):
+    with virtual(tmp_path) as world:
+
+        def each(now):
+            output = world.session.status.output
+            if output is not None and output.step > 1 and output.state == "tare":
+                world.cell.spoil = lambda value: value + 5.0 * now
+
+        play(world, each=each)
+        assert outcome(world) == ("completed", "")
+        assert "stays in use" in world.texts
+
+
 def test_hold_without_a_point_is_no_completed_run(tmp_path):
     """Promise 27: ended by `skip` before it had a sample after its settling time."""
     with virtual(tmp_path) as world:
