@@ -1,7 +1,7 @@
 """The guard: asked before every command whether the motor may go on. Pure: readings and time are arguments.
 
-It trips on a limit, on a value that is too old, NaN or frozen, on its own lateness, on a dead link, on a recorder that
-is gone or late, and on an operator who is gone. Whoever gets a Trip commands 0 V at once.
+It trips on a limit, on an emergency stop, on a value that is too old, NaN or frozen, on its own lateness, on a dead
+link, on a recorder that is gone or late, and on an operator who is gone. Whoever gets a Trip commands 0 V at once.
 """
 
 from __future__ import annotations
@@ -14,7 +14,9 @@ from typing import Literal, NamedTuple
 from drivers.protocols import LinkHealth, Stream
 from rig.config import LimitConfig
 
-Source = Literal["limit", "nan", "stale", "frozen", "rate", "corrupt", "late", "link", "recorder", "lease"]
+Source = Literal[
+    "limit", "emergency_stop", "nan", "stale", "frozen", "rate", "corrupt", "late", "link", "recorder", "lease"
+]
 
 MIN_AGE = 0.2
 """s, shortest default sample age (docs/reliability.md, promise 7: within max(3 sample periods, 0.2 s))."""
@@ -55,6 +57,8 @@ class Watch:
     max: float | None = None
     max_frozen: float | None = None
     """s; None: not judged. 0: by its earlier variation (`frozen_limit`)."""
+    stops: bool = False
+    """An emergency stop input: anything but 0 is pressed."""
 
 
 class Latest(NamedTuple):
@@ -118,13 +122,16 @@ def watches(
     limits: Iterable[LimitConfig], streams: Iterable[Stream], essential: Iterable[str] = (), thrust: str = ""
 ) -> tuple[Watch, ...]:
     """Resolve configured limits against the bench's streams; `essential` channels are watched for age and NaN anyway.
-    The `thrust` channel is watched for a frozen value as well, by its own earlier variation if nothing is configured.
+    The `thrust` channel is watched for a frozen value as well, by its own earlier variation if nothing is configured;
+    an emergency stop input always, whatever is configured.
 
     Channels are `<stream>.<channel>`. Raises ValueError naming a channel that no stream has.
     """
-    known = {f"{s.name}.{c.name}": (c.unit, max(3 * s.period_s, MIN_AGE)) for s in streams for c in s.channels}
+    channels = {f"{s.name}.{c.name}": (s, c) for s in streams for c in s.channels}
+    known = {name: (c.unit, max(3 * s.period_s, MIN_AGE)) for name, (s, c) in channels.items()}
+    stops = [name for name, (_, c) in channels.items() if c.quantity == "emergency_stop"]
     wanted = {limit.channel: limit for limit in limits}
-    wanted = {channel: wanted.get(channel, LimitConfig(channel)) for channel in (*wanted, *essential)}
+    wanted = {channel: wanted.get(channel, LimitConfig(channel)) for channel in (*wanted, *essential, *stops)}
     for channel in wanted:
         if channel not in known:
             raise ValueError(f"no device gives a channel {channel}; there are {', '.join(sorted(known))}")
@@ -137,6 +144,7 @@ def watches(
             c.min,
             c.max,
             learned.get(channel) if c.max_frozen is None else c.max_frozen,
+            channel in stops,
         )
         for channel, c in wanted.items()
     )
@@ -157,6 +165,9 @@ def assess(watch: Watch, newest: Latest | None, vitals: Vitals, allowed: Allowan
     if isnan(newest.value):
         cause = f"{watch.channel} is NaN: the device sent a row without a usable value"
         return Trip(cause, "nan", vitals.now, watch.channel, newest.value)
+    if watch.stops and newest.value != 0.0:
+        cause = f"EMERGENCY STOP: {watch.channel} is {newest.value:g}, released is 0"
+        return Trip(cause, "emergency_stop", vitals.now, watch.channel, newest.value, 0.0)
     return (
         _outside(watch, newest.value, vitals.now) or _stale(watch, newest, vitals.now) or _frozen(watch, newest, vitals)
     )

@@ -18,7 +18,9 @@ RATE_WINDOW = 64
 """Rows per stream over which its real rate is measured."""
 
 ReadingState = Literal["ok", "stale", "limit", "none"]
-_STATES: Mapping[str, ReadingState] = MappingProxyType({"limit": "limit", "nan": "none", "stale": "stale"})
+_STATES: Mapping[str, ReadingState] = MappingProxyType(
+    {"limit": "limit", "emergency_stop": "limit", "nan": "none", "stale": "stale"}
+)
 
 
 @dataclass(slots=True)

@@ -13,7 +13,7 @@ from rig.messages import Request, Snapshot
 from rig.plan import FixedDwell, Plan, TareConfig
 from rig.recorder_messages import Close, Open
 from rig.shapes import Ramp, Sine
-from tests.rig.virtual_bench import PLAN, VirtualBench, starter, virtual
+from tests.rig.virtual_bench import PLAN, StopInput, VirtualBench, starter, virtual
 
 HOLDS = [step.index for step in PLAN if step.phase == "hold"]
 
@@ -152,6 +152,34 @@ def test_stop_request_outside_a_run(tmp_path, state):
     with virtual(tmp_path, mount=mount) as world:
         play(world, [(state, 0.0, lambda: world.session.loop.signals.append(Request("stop", "a test")))])
         assert outcome(world) == ("aborted", "stopped by a test")
+        assert not world.recorder.of(Open)
+
+
+@pytest.mark.parametrize(("becomes", "cause"), [(1.0, "EMERGENCY STOP"), (None, "button.emergency_stop is stale")])
+def test_emergency_stop_ends_the_run_at_once_and_no_other_begins_while_it_is_pressed(tmp_path, becomes, cause):
+    """Promise 12: pressed, or its cable pulled."""
+    button = StopInput()
+    with virtual(tmp_path, button=button, thrusters=("T1", "T3")) as world:
+        at = []
+
+        def press():
+            at.append(world.clock.now_ns() * 1e-9)
+            button.pressed = becomes
+
+        play(world, [("hold", 6.0, press)])
+        assert outcome(world)[0] == "tripped"
+        assert cause in outcome(world)[1]
+        zero = next(t for t, volts in world.motor.sent if t > at[0] and volts == 0.0)
+        assert zero - at[0] < (0.1 if becomes else 0.3)
+        assert not [volts for t, volts in world.motor.sent if t > zero and volts]
+        assert len(world.recorder.of(Open)) == 1
+
+
+def test_a_pressed_emergency_stop_lets_nothing_begin(tmp_path):
+    with virtual(tmp_path, button=StopInput(pressed=1.0)) as world:
+        world.clock.at.append((10.0, lambda: world.session.loop.signals.append(Request("stop"))))
+        play(world)
+        assert not [volts for _, volts in world.motor.sent if volts]
         assert not world.recorder.of(Open)
 
 

@@ -100,6 +100,20 @@ def test_watches_take_their_defaults_from_the_streams():
     assert watches([LimitConfig("flow.flow_speed")], (FLOW,))[0].max_age == 0.75  # three periods
 
 
+def test_an_emergency_stop_input_is_always_watched():
+    stream = Stream("button", "line_stream", (Channel("emergency_stop", "emergency_stop", "1"),), 0.05)
+    for limits in ([], [LimitConfig("button.emergency_stop", max=9.0)]):
+        (watch,) = watches(limits, (stream,))
+        assert watch.stops
+        assert check([watch], {watch.channel: Latest(0.0, 9.99)}, Vitals(10.0, 0.0), Allowances()) is None
+        for value in (1.0, -1.0, 0.5):
+            trip = check([watch], {watch.channel: Latest(value, 9.99)}, Vitals(10.0, 0.0), Allowances())
+            assert (trip.source, trip.value) == ("emergency_stop", value)
+            assert trip.cause.startswith("EMERGENCY STOP: button.emergency_stop")
+        assert check([watch], {watch.channel: Latest(0.0, 9.5)}, Vitals(10.0, 0.0), Allowances()).source == "stale"
+        assert check([watch], {watch.channel: None}, Vitals(10.0, 0.0), Allowances()).source == "stale"
+
+
 def test_unknown_channel_is_named():
     with pytest.raises(ValueError, match=r"no device gives a channel flow\.speed; there are flow\.flow_speed"):
         watches([LimitConfig("flow.speed")], (FLOW,))

@@ -8,7 +8,7 @@ from __future__ import annotations
 import random
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from drivers.errors import LinkError
@@ -151,6 +151,38 @@ class Cell:
 
 
 @dataclass
+class StopInput:
+    """A mushroom button, twenty rows a second."""
+
+    name: str = "button"
+    pressed: float | None = 0.0
+    """None: its cable is pulled."""
+    rows: list[Sample] = field(default_factory=list)
+    due: float = 0.0
+
+    @property
+    def streams(self) -> tuple[Stream, ...]:
+        return (Stream(self.name, "virtual", (Channel("emergency_stop", "emergency_stop", "1"),), 0.05),)
+
+    def open(self) -> str:
+        return "virtual button 3"
+
+    def drain(self) -> list[Sample]:
+        rows, self.rows = self.rows, []
+        return rows
+
+    def health(self) -> LinkHealth:
+        return LinkHealth(True, 1, 0, ())
+
+    def close(self) -> None: ...
+
+    def step(self, now: float) -> None:
+        if now >= self.due and self.pressed is not None:
+            self.due = now + 0.05
+            self.rows.append(Sample(self.name, round(now * 1e9), (self.pressed,)))
+
+
+@dataclass
 class RecorderPeer:
     """The other end of the recorder's link: keeps what comes, and answers as the recorder process does."""
 
@@ -236,6 +268,7 @@ class VirtualBench:
     motor: Motor
     cell: Cell
     recorder: RecorderPeer
+    button: StopInput | None = None
     clock: Clock = field(init=False)
     session: Session = field(init=False)
     next_motor: float = 0.0
@@ -249,6 +282,8 @@ class VirtualBench:
         if now >= self.next_cell:
             self.next_cell = now + self.cell.period
             self.cell.step(now)
+        if self.button is not None:
+            self.button.step(now)
 
     def front(self) -> Peer:
         return connect(self.folder / "controller.sock", "the controller")
@@ -296,15 +331,25 @@ def campaign_config(folder: Path, bench: BenchConfig, **changes) -> CampaignConf
 
 @contextmanager
 def virtual(
-    folder: Path, before: tuple[Fact, ...] = (), mount=("true",), mount_timeout=1e6, loop_rate=50.0, **campaign
+    folder: Path,
+    before: tuple[Fact, ...] = (),
+    mount=("true",),
+    mount_timeout=1e6,
+    loop_rate=50.0,
+    button: StopInput | None = None,
+    **campaign,
 ) -> Iterator[VirtualBench]:
     """A session that nobody has run yet. What it opened is closed at the end, if its campaign did not do that."""
     ours, theirs = pair("recorder")
     motor = Motor()
-    world = VirtualBench(folder, motor, Cell(motor), RecorderPeer(Peer(theirs, "controller")))
+    world = VirtualBench(folder, motor, Cell(motor), RecorderPeer(Peer(theirs, "controller")), button)
     world.clock = Clock(world)
     config = bench_config(folder, mount=MountConfig(mount, mount_timeout), loop_rate=loop_rate)
-    bench = Bench(config, {}, {"load_cell": world.cell, "motor": motor})
+    if button is not None:
+        devices = {**config.devices, button.name: DeviceConfig(button.name, "line_stream", None)}
+        config = replace(config, devices=devices)
+    more = {} if button is None else {button.name: button}
+    bench = Bench(config, {}, {"load_cell": world.cell, "motor": motor, **more})
     log = LineWriter((folder / "controller.log").open("ab"), sync=False)
     clients = Clients(listen(folder / "controller.sock"))
     parts = (bench, RecorderLink(ours, None), Ledger.open(folder), log, clients, world.clock)
