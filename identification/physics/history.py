@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from identification.physics.filters import lag
 from identification.physics.kept import Kept
+from identification.physics.rate_gap import RateGap, rate_gap
 from identification.physics.tick_rows import TickRows, tick_rows
 from identification.recording import Floats
 
@@ -164,6 +165,11 @@ class History:
     def tick_rows(self) -> TickRows | None:
         """What the ticks of the command tell within the intervals; None where they tell nothing."""
         return tick_rows(self)
+
+    @cached_property
+    def rate_gap(self) -> RateGap | None:
+        """What takes the noise out of how far the measured rate is from a model."""
+        return rate_gap(self)
 
     def followed(self, value: Floats, rotor: tuple[float, float]) -> Floats:
         """(M,) means of the rate of a rotor that follows (filters.lag), sought from the last one: it is seldom far."""
