@@ -24,6 +24,8 @@ from identification.tails import chi2_sf, noncentral_chi2_sf
 
 SAME = 0.1
 """Parts of a run whose parameters differ by less count as the same."""
+ONE_SIDED = 0.1
+"""Of the size of what a term does: with less of it on one side there is nothing to compare."""
 OWN_SHARE = 0.01
 """Of what a term explains: less than this left over its own coordinate is the textbook's fault, not the name's."""
 INCONSTANT = 1e-3
@@ -82,8 +84,11 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
     if any(h.static for h in data.histories):
         del splits["in both halves of the run"]  # a table may stand in the order of its levels
     weights = Weights(state.weights.thrust)
+    whole = float(np.linalg.norm(weights.whiten(change, [])))
     for what, masks in splits.items():
         column = weights.whiten([c * m for c, m in zip(change, masks, strict=True)], [])
+        if not ONE_SIDED < float(np.linalg.norm(column)) / max(whole, 1e-300) < 1 - ONE_SIDED**2:
+            continue
         rest = column - basis @ (basis.T @ column)
         size = float(np.linalg.norm(rest))
         if size < 1e-3 * float(np.linalg.norm(column)) or size < 0.3:

@@ -27,6 +27,8 @@ PRESSED_SHARE = 0.3
 """Of its gain: a rival may be worse by this than a term whose parameters end at what is possible."""
 MOST_MERGERS = 3
 """Terms tried in the place of each pair."""
+MERGING = 0.5
+"""Of what a term must gain in their place: one that promises less by its tangent is not refitted."""
 RIVAL_STEPS = 15
 MOST_REFITS = 7
 BETTER = 0.5
@@ -92,14 +94,17 @@ def _one_for_two(
             other = found.terms[j]
             if other in tried:
                 continue
-            if len(tried) == MOST_MERGERS:
+            more = (price(other, data) - sum(price(t, data) for t in pair)) * logn
+            wanted = now.chi2 - more + (-BETTER if best is None else min(best[0], -BETTER))
+            if len(tried) == MOST_MERGERS or score[j] ** 2 < MERGING * (less.chi2 - wanted):
                 break
             tried.add(other)
             values = mirrored(other, found.values[j], data) if score[j] < 0 else found.values[j]
             bigger = less.model.plus(other)
             begin = refined(less, data, state.weights, other, values)
-            new = fit(bigger, extended(less.theta, less.model, other, begin, bigger), data, state.weights, RIVAL_STEPS)
-            loss = new.chi2 - now.chi2 + (price(other, data) - sum(price(t, data) for t in pair)) * logn
+            theta = extended(less.theta, less.model, other, begin, bigger)
+            new = fit(bigger, theta, data, state.weights, RIVAL_STEPS, wanted)
+            loss = new.chi2 - now.chi2 + more
             if loss < -BETTER and (best is None or loss < best[0]) and not at_bound(other, new, data, state.weights):
                 best = (float(loss), new)
     return best
