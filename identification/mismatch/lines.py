@@ -30,8 +30,8 @@ from identification.mismatch.spectrum import (
 )
 from identification.recording import Floats
 
-ALARM = 0.01
-"""Family-wise false-alarm rate."""
+ALARM = 0.005
+"""Family-wise false-alarm rate: half of what a diagnosis is allowed, the search for effects has its own."""
 MOST_LINES = 4
 LOWEST = 1.0
 """Hz: below this a residual is full of steps that are repeated, not of lines."""

@@ -37,6 +37,11 @@ CLEARER = 3.0
 MOST_HIDDEN = 3
 HIDDEN_PRICE = 0.5
 """Of the price of a term's parameters asked for what is hidden, beside the family-wise threshold."""
+OFFSET_PRICE = 0.35
+"""The same of a jump of the zero: of 336 clean recordings one gained more and was named."""
+STEADY = frozenset({"zero_drift"})
+"""Terms of one shape, that no instant or place is looked for: they pay for themselves alone. On 336 clean recordings of
+six kinds of noise their largest gain was 11.3; of a drift that an oracle sees at 8 sigma half gain more than 15."""
 SOUGHT = frozenset({"stand_resonance"})
 """Terms whose trials the data point to: they pay in full."""
 STATIC = ("command_voltage", "thrust")
@@ -187,7 +192,11 @@ def _larger(
 def _hidden(state: State, judged: Screening, data: Data) -> State | None:
     """The model with a term that the noise had taken for its own: they are told apart when estimated together."""
     least = CLEARER if not state.fit.model.terms else np.inf  # shape error would be taken for what is hidden
-    likely = [(t, v) for t, v, z in judged.best(MOST_HIDDEN) if z > (HIDDEN if "time" in t.coordinates else least)]
+    likely = [
+        (t, v)
+        for rank, (t, v, z) in enumerate(judged.best(2 * MOST_HIDDEN))
+        if (rank < MOST_HIDDEN or t.id in STEADY) and z > (HIDDEN if "time" in t.coordinates else least)
+    ]
     if not likely:
         return None
     now = refresh(state.fit.model, state.fit.theta, data, None, None)
@@ -199,13 +208,20 @@ def _hidden(state: State, judged: Screening, data: Data) -> State | None:
         first = fit(bigger, theta, data, state.weights)
         new = refresh(bigger, first.theta, data, None, now, now.noise)
         gain = now.fit.deviance - new.fit.deviance
-        share = 1.0 if term.id in SOUGHT else HIDDEN_PRICE
-        if gain > judged.threshold**2 + share * price(term, data) * np.log(data.size):
+        if gain > _asked_of_hidden(term, judged, data):
             found.append((gain, new))
     if not found:
         return None
     best = max(found, key=lambda each: each[0])[1].fit
     return refresh(best.model, best.theta, data, None, None)
+
+
+def _asked_of_hidden(term: Term, judged: Screening, data: Data) -> float:
+    """Gain in deviance from which a term that is told from noise by estimating both is believed."""
+    if term.id in STEADY:
+        return chi2_isf(ALARM / 20, price(term, data))
+    share = 1.0 if term.id in SOUGHT else OFFSET_PRICE if term.id == "zero_offset" else HIDDEN_PRICE
+    return float(judged.threshold**2 + share * price(term, data) * np.log(data.size))
 
 
 def _best_addition(state: State, judged: Screening, data: Data, refused: Collection[Term]) -> Fit | None:
