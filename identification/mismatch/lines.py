@@ -117,7 +117,7 @@ def _best(runs: Sequence[Series], alarm: float, lowest: float, unit: Literal["re
     fixed = _fixed(long, alarm, lowest)
     locked = None
     if all(r.turns is not None for _, r in long):
-        found = find_locked(long, alarm)
+        found = find_locked(long, alarm, in_turns=unit == "rev")
         locked = None if found is None else _locked(found, unit)
     if fixed is None or locked is None:
         return fixed or locked

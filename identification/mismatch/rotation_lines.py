@@ -18,6 +18,10 @@ from identification.mismatch.spectrum import Series
 from identification.recording import Floats
 from identification.tails import chi2_sf
 
+ODD = 0.02
+"""Of the false-alarm rate: what is left to waves that do not come a whole number of times a turn."""
+WHOLE = 0.003
+"""Relative: how well the scale of a measured rate is known."""
 LEAST_GAIN = 25.0
 """In chi-square."""
 TRIED = np.linspace(-1.0, 1.0, 41)
@@ -98,8 +102,11 @@ class _Waves:
         return self.gain - 2.0 * (self.weights.size - 1)
 
 
-def find_locked(runs: Sequence[tuple[int, Series]], alarm: float) -> Locked | None:
-    """The most significant rotor-locked line; None without one."""
+def find_locked(runs: Sequence[tuple[int, Series]], alarm: float, *, in_turns: bool = True) -> Locked | None:
+    """The most significant rotor-locked line; None without one.
+
+    `in_turns`: angles are those of the propeller, whose waves come a whole number of times a turn.
+    """
     top = max(float(np.quantile(speed_of(r), 0.99)) for _, r in runs)
     if not top > 0:
         return None
@@ -107,7 +114,7 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float) -> Locked | No
     if len(parts) < 2:
         return None
     candidate = most_significant(parts, top)
-    if not candidate.p_value < alarm:
+    if not candidate.p_value < (alarm if not in_turns or _is_whole(candidate) else ODD * alarm):
         return None
     found = _fitted(parts, candidate)
     if not found.gain > LEAST_GAIN:
@@ -115,6 +122,10 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float) -> Locked | No
     # a loud line was part of its own noise
     loud = [wave_of(found.parts, i, r.time, 2 * np.pi * found.ratio * r.turns) for i, r in runs if r.turns is not None]
     return _fitted(list(stretches(runs, top, loud)), candidate)
+
+
+def _is_whole(candidate: Candidate) -> bool:
+    return abs(candidate.ratio - max(round(candidate.ratio), 1)) < max(candidate.reach, WHOLE * candidate.ratio)
 
 
 def _fitted(parts: Sequence[Stretch], candidate: Candidate) -> Locked:
