@@ -23,10 +23,10 @@ def slip(history: History, x: Floats, k: float) -> Floats:
     gap = without_ticks(history.rate[rows] / k - there, history)
     if history.rate_gap is not None:
         return history.rate_gap.calmed(gap, history)
-    amount, missed = running(gap, np.ones_like(gap))
-    share, missed_by_share = running(gap, there)
-    by_share = missed_by_share < missed
-    out: Floats = np.interp(history.middle, history.rate_sampled[rows], share if by_share else amount)
+    amount, share = running(gap, np.ones_like(gap)), running(gap, there)
+    by_share = share.error < amount.error
+    found = share if by_share else amount
+    out: Floats = np.interp(history.middle, history.rate_sampled[rows], found.coefficient)
     return x * out if by_share else out
 
 
