@@ -22,8 +22,8 @@ from identification.mismatch.shape_error import allowed_in, corrections
 from identification.recording import Floats
 from identification.tails import chi2_sf, noncentral_chi2_sf
 
-ALARM = 0.01
-"""False-alarm rate of what is left, family-wise."""
+ALARM = 0.004
+"""False-alarm rate of what is left, family-wise: with the search for effects and for lines some 1 % of a diagnosis."""
 FAR = 4.0
 """Sigmas beyond which a row counts no more: one outlier is no structure."""
 PLAIN_P = 1e-7

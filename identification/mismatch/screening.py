@@ -9,11 +9,11 @@ by changing the sign of whole blocks of the residual at random (symmetric noise 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.mismatch.fitting import Fit, extended, raw, ticks_told
+from identification.mismatch.fitting import Fit, extended, raw, residual_of, ticks_told
 from identification.mismatch.jumps import likeliest_jumps
 from identification.mismatch.model import Data, Weights
 from identification.mismatch.rings import likeliest_rings
@@ -22,6 +22,10 @@ from identification.recording import Floats
 from identification.singular_values import thin_svd
 from identification.tails import normal_sf
 
+VALLEYS = 3
+"""Delays round which the likeliest is sought."""
+CLOSELY = np.linspace(0.85, 1.15, 21)
+"""Of such a delay."""
 SURROGATES = 1000
 BLOCKS = 120
 """Blocks whose signs are drawn, at most."""
@@ -105,9 +109,27 @@ def refined(fit: Fit, data: Data, weights: Weights, term: Term, values: tuple[fl
     trials = term.finer(values, data.scale)
     if not trials:
         return values
+    if term.id == "time_skew":
+        return _likeliest_delay(fit, data, weights, term, [values, *trials])
     found = directions(fit, data, weights, [term], trials)
     score = np.abs(found.columns.T @ fit.residual)
     return found.values[int(np.argmax(score))] if score.size else values
+
+
+def _likeliest_delay(
+    fit: Fit, data: Data, weights: Weights, term: Term, trials: Sequence[tuple[float, ...]]
+) -> tuple[float, ...]:
+    """The delay that leaves least: ticks that come again and again make a valley at each of them, and the shape of what
+    a delay changes does not tell one from the next, its size does."""
+    bigger = fit.model.plus(term)
+
+    def left(delay: float) -> float:
+        theta = replace(extended(fit.theta, fit.model, term, (delay,), bigger), shift=0.0)
+        residual = residual_of(bigger, theta, data, weights)
+        return float(residual @ residual)
+
+    likely = sorted({delay for (delay,) in trials}, key=left)[:VALLEYS]
+    return (min((delay * factor for delay in likely for factor in CLOSELY.tolist()), key=left),)
 
 
 def directions(

@@ -28,6 +28,8 @@ from identification.mismatch.state import State
 from identification.physics.term import Term
 
 MOST_PLACES = 3
+CLEAR = 1e-3
+"""p-value of a place below which it is told beside the clearest one."""
 LEAST_P = 1e-300
 
 
@@ -131,7 +133,7 @@ def places_of(found: Found, rng: np.random.Generator, *, pulsing: bool) -> tuple
         return ()
     out: list[Mismatch] = []
     for judged in seen.groups[:MOST_PLACES]:
-        if out and judged.p_value > ALARM / 10:
+        if out and judged.p_value > CLEAR:
             break
         where, share, _ = where_of(judged, found.before.fit, found.data)
         what = judged.coordinate.what
