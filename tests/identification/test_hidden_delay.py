@@ -25,7 +25,7 @@ def test_a_delay_does_not_hide_behind_the_one_that_clocks_are_allowed() -> None:
 
 
 def test_of_the_valleys_that_ticks_make_the_deepest_is_found() -> None:
-    """Of plain/time_skew/2 of a blind proof: a sine in ticks of 41 ms, 27 samples/s, and a delay of two ticks and some."""
+    """Of a blind proof: a sine in ticks of 41 ms, 27 samples/s, and a delay of two ticks and some."""
     seed = [2985077960, 1464087328, 1631050535, 244341674]
     case = concealed.case(np.random.default_rng(seed), ["time_skew"], 40.0)
     found = diagnose([recording(case)])
