@@ -57,7 +57,7 @@ class Child:
         """Raises Overdue after `limit` s without an answer, Ended when there will be none, BrokenOff when dismissed."""
         try:
             self._ask(line, limit)
-        except (Overdue, Ended) as end:
+        except (Overdue, Ended, OSError, ValueError) as end:  # its pipe may be closed under us
             if self.dismissed:
                 raise BrokenOff from end
             raise
