@@ -192,7 +192,7 @@ def test_two_devices_on_one_bus_get_their_own_frames(tmp_path):
         assert [f for _, f in low.take_all()] == [Frame(0x123, False, b"\x11\x22")]
         assert [f for _, f in high.take_all()] == [Frame(0x2AA, True, b"\xff")]
         bus.send(Frame(0x123, False, b"\x01"))
-        wait_until(lambda: peer.heard[-1] == b"t123101")
+        wait_until(lambda: peer.heard[-1:] == [b"t123101"])
         bus.close()
         bus.close()
     chunks = list(read_transcript(tmp_path / "can.txt"))
