@@ -1,0 +1,132 @@
+"""What a term gains that is told from noise only by estimating both: on clean recordings, and where it is concealed.
+
+    python benchmarks/hidden_gains.py [N [EFFECT [SIGMA]]]    # 8 recordings of each kind of noise, zero_drift, 8
+
+The search tries a term that no screening finds by estimating term and noise together (`mismatch.search._hidden`), and
+believes it from a gain in deviance on; those prices (STEADY, OFFSET_PRICE, HIDDEN_PRICE) were set by this table. On
+clean recordings every term that would be tried is told by the largest gains it reached; then the gains of EFFECT where
+an oracle sees it at SIGMA. `asked` is the median of what the search asks of it.
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
+
+import sys
+from collections import defaultdict
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from statistics import median
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+import numpy as np
+
+from identification.mismatch import search
+from identification.mismatch.baseline import baseline, start
+from identification.mismatch.diagnose import _histories
+from identification.mismatch.fitting import extended, fit
+from identification.mismatch.model import Data, Model
+from identification.mismatch.preparing import Refusal
+from identification.mismatch.screening import Screening, directions, refined, screen
+from identification.mismatch.shape_error import allowed, corrections
+from identification.mismatch.state import State, refresh
+from sim_devices import concealed
+from tests.concealed.recordings import recordings
+
+SEED = 90_000
+"""Apart from the cases of the tests and of every proof."""
+LEAST = 1.5
+"""Sigmas of the screening from which a term is looked at here: fewer than the search asks for."""
+SHOWN = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Gain:
+    """Of one term on one recording."""
+
+    term: str
+    screened: float
+    """Sigmas of the screening, which did not pass."""
+    gain: float
+    asked: float
+
+
+def gains(case: concealed.Case) -> tuple[Gain, ...]:
+    """Of every term that is likely enough; none where the screening finds one without this."""
+    histories = _histories(recordings(case))
+    if isinstance(histories, Refusal):
+        return ()
+    data, theta = start(histories)
+    terms = search.available(data)
+    state = baseline(data, theta, terms, Model())
+    found = directions(state.fit, data, state.weights, terms)
+    spared = allowed(corrections(state.fit, data, state.weights), found.columns)
+    judged = screen(state.fit, found, np.random.default_rng(0), search.ALARM, spared)
+    if judged.largest > judged.threshold:
+        return ()
+    return tuple(_tried(state, judged, data))
+
+
+def _tried(state: State, judged: Screening, data: Data) -> Iterator[Gain]:
+    now = refresh(state.fit.model, state.fit.theta, data, None, None)
+    for term, values, screened in judged.best(2 * search.MOST_HIDDEN):
+        if screened < LEAST:
+            continue
+        bigger = state.fit.model.plus(term)
+        begin = refined(state.fit, data, state.weights, term, values)
+        theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
+        first = fit(bigger, theta, data, state.weights)
+        new = refresh(bigger, first.theta, data, None, now, now.noise)
+        asked = search._asked_of_hidden(term, judged, data)
+        yield Gain(term.id, screened, now.fit.deviance - new.fit.deviance, asked)
+
+
+def clean(count: int) -> dict[str, list[Gain]]:
+    """By term."""
+    out: dict[str, list[Gain]] = defaultdict(list)
+    for kind in concealed.NOISE_KINDS:
+        for i in range(count):
+            for found in gains(concealed.case(np.random.default_rng([SEED, i]), noise=kind)):
+                out[found.term].append(found)
+    return out
+
+
+def hidden(effect: str, sigma: float, count: int) -> tuple[list[Gain], int]:
+    """Of the effect itself, in the form that gains most, and in how many recordings it could be drawn at all."""
+    out, drawn = [], 0
+    for i in range(count):
+        try:
+            case = concealed.case(np.random.default_rng([SEED, i, 1]), [effect], sigma)
+        except concealed.OutOfReach:
+            continue
+        drawn += 1
+        forms = [found for found in gains(case) if found.term == effect]
+        if forms:
+            out.append(max(forms, key=lambda each: each.gain - each.asked))
+    return out, drawn
+
+
+def main(count: int = 8, effect: str = "zero_drift", sigma: float = 8.0) -> None:
+    kinds = len(concealed.NOISE_KINDS)
+    print(f"{count * kinds} clean recordings, {kinds} kinds of noise\n")
+    print(f"{'term':<22}{'tried':>6}{'asked':>8}   largest gains")
+    for term, found in sorted(clean(count).items(), key=lambda each: -max(g.gain for g in each[1])):
+        largest = sorted((g.gain for g in found), reverse=True)[:SHOWN]
+        print(
+            f"{term:<22}{len(found):>6}{median(g.asked for g in found):>8.1f}   {' '.join(f'{x:.1f}' for x in largest)}"
+        )
+    found, drawn = hidden(effect, sigma, count * kinds)
+    print(f"\n{effect} at {sigma:g} sigma in {drawn} recordings: {len(found)} left to be told from noise", end="")
+    if found:
+        told = sum(g.gain > g.asked for g in found)
+        print(f", of which {told} gain what is asked; gains {' '.join(f'{g.gain:.1f}' for g in found)}")
+    else:
+        print()
+
+
+if __name__ == "__main__":
+    words = sys.argv[1:]
+    main(*(kind(word) for kind, word in zip((int, str, float), words, strict=False)))
