@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import hashlib
+from collections import deque
+from dataclasses import dataclass, field
 
 from rig.chronicle import Level
 from rig.config import CampaignConfig
 from rig.errors import DeviceError, LinkError
-from rig.preflight import all_checks, device_checks
+from rig.messages import Check
+from rig.preflight import all_checks, device_checks, flow_check
+from rig.readings import Readings
 from rig.session import Session, Stopped
 
 SETTLE_ROWS = 5
 """Rows of the slowest stream that are waited for before the preflight judges rates."""
+FLOW_WINDOW = 3.0
+"""s of measured flow that the preflight takes the mean of: water is never quite even."""
 UNSEEN = 60.0
 """s for which a campaign that nobody has started waits without any front end: it holds the bench."""
 
@@ -50,6 +56,7 @@ def _require_same_devices(session: Session) -> None:
 def preflight(session: Session) -> None:
     """Judge the bench until the operator starts it; the checks go on while he looks."""
     devices = list(session.status.checks)
+    flow = Flow(session.campaign.flow_speed)
     session.turn_for(SETTLE_ROWS * max(stream.period_s for _, stream in session.bench.streams()))
     started, seen = False, session.loop.now
     while not started:
@@ -61,6 +68,7 @@ def preflight(session: Session) -> None:
         checks = all_checks(
             session.campaign.bench, session.loop.readings, session.bench.motor.watchdog, session.loop.now
         )
+        checks += flow.checks(session.loop.readings, session.loop.now)
         session.status.checks = devices + checks
         failed = [check for check in checks if check.verdict == "failed"]
         if any(request.kind == "start" for request in requests):
@@ -71,6 +79,27 @@ def preflight(session: Session) -> None:
         level: Level = "warning" if check.verdict == "warning" else "info"
         session.say(level, f"preflight: {check.name}: {check.text}", of_bench=True)
     _start(session)
+
+
+@dataclass
+class Flow:
+    """The water that the campaign is meant for, and what was measured lately."""
+
+    wanted: float | None
+    """m/s; None: whatever it is."""
+    measured: deque[tuple[float, float]] = field(default_factory=deque)
+    """s, m/s"""
+
+    def checks(self, readings: Readings, now: float) -> list[Check]:
+        """One line or none."""
+        if self.wanted is None:
+            return []
+        values = [readings.fresh(name, now) for name, (_, _, what) in readings.place.items() if what == "flow_speed"]
+        self.measured += [(now, value) for value in values if value is not None]
+        while self.measured and self.measured[0][0] < now - FLOW_WINDOW:
+            self.measured.popleft()
+        check = flow_check(self.wanted, [value for _, value in self.measured])
+        return [] if check is None else [check]
 
 
 def _start(session: Session) -> None:

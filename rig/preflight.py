@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
+from statistics import fmean
 from typing import Literal
 
 from drivers.protocols import Stream, Watchdog
@@ -15,6 +16,12 @@ Verdict = Literal["waiting", "passed", "warning", "failed"]
 
 RATE_TOLERANCE = 0.25
 """Relative difference between a stream's real and nominal rate that is still taken as healthy."""
+FLOW_TOLERANCE = 0.1
+"""Of the speed that the campaign is meant for: measured flow that is farther off is told, from FLOW_TOO_FAR times that
+on the campaign is not begun."""
+LEAST_FLOW_TOLERANCE = 0.05
+"""m/s"""
+FLOW_TOO_FAR = 2.5
 
 
 def device_checks(identities: Mapping[str, str], failures: Mapping[str, str], names: Iterable[str]) -> list[Check]:
@@ -75,6 +82,19 @@ def stop_input_check(readings: Iterable[Reading]) -> Check | None:
     if any(r.value != 0 for r in inputs):
         return Check("emergency stop", "failed", "pressed or unknown; release it")
     return Check("emergency stop", "passed", "released")
+
+
+def flow_check(wanted: float, measured: Collection[float]) -> Check | None:
+    """Does the water move as the campaign is meant for? `measured`: m/s, of the last seconds; none: no flow meter."""
+    asked = f"the campaign is meant for {wanted:g} m/s"
+    if not measured:
+        return Check("flow", "warning", f"{asked}, which is not measured") if wanted else None
+    mean = fmean(measured)
+    apart = abs(mean - wanted) / max(FLOW_TOLERANCE * abs(wanted), LEAST_FLOW_TOLERANCE)
+    text = f"{mean:.3g} m/s measured; {asked}"
+    if apart > FLOW_TOO_FAR:
+        return Check("flow", "failed", f"{text}: set the water, or correct campaign.flow_speed")
+    return Check("flow", "warning" if apart > 1.0 else "passed", text)
 
 
 def limit_checks(readings: Iterable[Reading]) -> list[Check]:

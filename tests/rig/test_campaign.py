@@ -13,7 +13,7 @@ from rig.messages import Request, Snapshot
 from rig.plan import FixedDwell, Plan, TareConfig
 from rig.recorder_messages import Close, Open
 from rig.shapes import Ramp, Sine
-from tests.rig.virtual_bench import PLAN, StopInput, VirtualBench, starter, virtual
+from tests.rig.virtual_bench import PLAN, VirtualBench, flow_meter, starter, stop_input, virtual
 
 HOLDS = [step.index for step in PLAN if step.phase == "hold"]
 
@@ -158,13 +158,13 @@ def test_stop_request_outside_a_run(tmp_path, state):
 @pytest.mark.parametrize(("becomes", "cause"), [(1.0, "EMERGENCY STOP"), (None, "button.emergency_stop is stale")])
 def test_emergency_stop_ends_the_run_at_once_and_no_other_begins_while_it_is_pressed(tmp_path, becomes, cause):
     """Promise 12: pressed, or its cable pulled."""
-    button = StopInput()
-    with virtual(tmp_path, button=button, thrusters=("T1", "T3")) as world:
+    button = stop_input()
+    with virtual(tmp_path, inputs=(button,), thrusters=("T1", "T3")) as world:
         at = []
 
         def press():
             at.append(world.clock.now_ns() * 1e-9)
-            button.pressed = becomes
+            button.value = becomes
 
         play(world, [("hold", 6.0, press)])
         assert outcome(world)[0] == "tripped"
@@ -176,11 +176,31 @@ def test_emergency_stop_ends_the_run_at_once_and_no_other_begins_while_it_is_pre
 
 
 def test_a_pressed_emergency_stop_lets_nothing_begin(tmp_path):
-    with virtual(tmp_path, button=StopInput(pressed=1.0)) as world:
+    button = stop_input()
+    button.value = 1.0
+    with virtual(tmp_path, inputs=(button,)) as world:
         world.clock.at.append((10.0, lambda: world.session.loop.signals.append(Request("stop"))))
         play(world)
         assert not [volts for _, volts in world.motor.sent if volts]
         assert not world.recorder.of(Open)
+
+
+def test_a_campaign_waits_for_the_water_that_it_is_meant_for(tmp_path):
+    """The operator has 10 s more to turn the flow on; the check follows the water."""
+    meter, checks = flow_meter(0.02), []
+    with virtual(tmp_path, inputs=(meter,), flow_speed=0.5) as world:
+
+        def turn_on():
+            checks.append({c.name: c for c in world.session.status.checks}["flow"])
+            assert not world.recorder.of(Open)
+            meter.value = 0.51
+
+        world.clock.at.append((10.0, turn_on))
+        play(world)
+        assert checks[0].verdict == "failed"
+        assert checks[0].text.startswith("0.02 m/s measured; the campaign is meant for 0.5 m/s: set the water")
+        assert outcome(world)[0] == "completed"
+        assert "m/s measured; the campaign is meant for 0.5 m/s" in world.texts
 
 
 def test_stop_while_the_recorder_opens_and_while_it_closes_is_not_lost(tmp_path):

@@ -5,7 +5,15 @@ import pytest
 from drivers.protocols import Channel, Sample, Stream, Watchdog
 from rig.config import LimitConfig
 from rig.messages import Reading
-from rig.preflight import device_checks, limit_checks, rate_check, rest_check, stop_input_check, watchdog_check
+from rig.preflight import (
+    device_checks,
+    flow_check,
+    limit_checks,
+    rate_check,
+    rest_check,
+    stop_input_check,
+    watchdog_check,
+)
 from rig.readings import Readings
 
 CELL = Stream("cell", "virtual", (Channel("thrust", "thrust", "N"), Channel("stable", None, "1")), 0.01)
@@ -55,6 +63,30 @@ def test_emergency_stop(value, verdict):
 
 def test_no_emergency_stop_is_said():
     assert stop_input_check([]).verdict == "warning"
+
+
+@pytest.mark.parametrize(
+    ("wanted", "measured", "verdict"),
+    [
+        (0.5, [0.4, 0.6], "passed"),
+        (0.5, [0.56], "warning"),
+        (0.5, [0.63], "failed"),
+        (0.5, [-0.5], "failed"),
+        (0.0, [0.04], "passed"),
+        (0.0, [-0.1], "warning"),
+        (0.0, [0.2], "failed"),
+        (0.5, [], "warning"),
+    ],
+)
+def test_flow(wanted, measured, verdict):
+    check = flow_check(wanted, measured)
+    assert check is not None
+    assert check.verdict == verdict
+    assert f"{wanted:g} m/s" in check.text
+
+
+def test_still_water_without_a_flow_meter_needs_no_line():
+    assert flow_check(0.0, []) is None
 
 
 def test_limits():

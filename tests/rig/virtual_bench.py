@@ -151,21 +151,23 @@ class Cell:
 
 
 @dataclass
-class StopInput:
-    """A mushroom button, twenty rows a second."""
+class Input:
+    """An instrument of one channel, twenty rows a second."""
 
-    name: str = "button"
-    pressed: float | None = 0.0
+    name: str
+    quantity: str
+    unit: str
+    value: float | None = 0.0
     """None: its cable is pulled."""
     rows: list[Sample] = field(default_factory=list)
     due: float = 0.0
 
     @property
     def streams(self) -> tuple[Stream, ...]:
-        return (Stream(self.name, "virtual", (Channel("emergency_stop", "emergency_stop", "1"),), 0.05),)
+        return (Stream(self.name, "virtual", (Channel(self.quantity, self.quantity, self.unit),), 0.05),)
 
     def open(self) -> str:
-        return "virtual button 3"
+        return "virtual input 3"
 
     def drain(self) -> list[Sample]:
         rows, self.rows = self.rows, []
@@ -177,9 +179,19 @@ class StopInput:
     def close(self) -> None: ...
 
     def step(self, now: float) -> None:
-        if now >= self.due and self.pressed is not None:
+        if now >= self.due and self.value is not None:
             self.due = now + 0.05
-            self.rows.append(Sample(self.name, round(now * 1e9), (self.pressed,)))
+            self.rows.append(Sample(self.name, round(now * 1e9), (self.value,)))
+
+
+def stop_input() -> Input:
+    """A mushroom button: 1 is pressed."""
+    return Input("button", "emergency_stop", "1")
+
+
+def flow_meter(speed: float) -> Input:
+    """Reads `speed` m/s."""
+    return Input("flow", "flow_speed", "m/s", speed)
 
 
 @dataclass
@@ -268,7 +280,7 @@ class VirtualBench:
     motor: Motor
     cell: Cell
     recorder: RecorderPeer
-    button: StopInput | None = None
+    inputs: tuple[Input, ...] = ()
     clock: Clock = field(init=False)
     session: Session = field(init=False)
     next_motor: float = 0.0
@@ -282,8 +294,8 @@ class VirtualBench:
         if now >= self.next_cell:
             self.next_cell = now + self.cell.period
             self.cell.step(now)
-        if self.button is not None:
-            self.button.step(now)
+        for each in self.inputs:
+            each.step(now)
 
     def front(self) -> Peer:
         return connect(self.folder / "controller.sock", "the controller")
@@ -336,20 +348,18 @@ def virtual(
     mount=("true",),
     mount_timeout=1e6,
     loop_rate=50.0,
-    button: StopInput | None = None,
+    inputs: tuple[Input, ...] = (),
     **campaign,
 ) -> Iterator[VirtualBench]:
     """A session that nobody has run yet. What it opened is closed at the end, if its campaign did not do that."""
     ours, theirs = pair("recorder")
     motor = Motor()
-    world = VirtualBench(folder, motor, Cell(motor), RecorderPeer(Peer(theirs, "controller")), button)
+    world = VirtualBench(folder, motor, Cell(motor), RecorderPeer(Peer(theirs, "controller")), inputs)
     world.clock = Clock(world)
     config = bench_config(folder, mount=MountConfig(mount, mount_timeout), loop_rate=loop_rate)
-    if button is not None:
-        devices = {**config.devices, button.name: DeviceConfig(button.name, "line_stream", None)}
-        config = replace(config, devices=devices)
-    more = {} if button is None else {button.name: button}
-    bench = Bench(config, {}, {"load_cell": world.cell, "motor": motor, **more})
+    added = {each.name: DeviceConfig(each.name, "line_stream", None) for each in inputs}
+    config = replace(config, devices={**config.devices, **added})
+    bench = Bench(config, {}, {"load_cell": world.cell, "motor": motor, **{each.name: each for each in inputs}})
     log = LineWriter((folder / "controller.log").open("ab"), sync=False)
     clients = Clients(listen(folder / "controller.sock"))
     parts = (bench, RecorderLink(ours, None), Ledger.open(folder), log, clients, world.clock)
