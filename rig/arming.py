@@ -18,6 +18,8 @@ SETTLE_ROWS = 5
 """Rows of the slowest stream that are waited for before the preflight judges rates."""
 FLOW_WINDOW = 3.0
 """s of measured flow that the preflight takes the mean of: water is never quite even."""
+FLOW_PATIENCE = 60.0
+"""s that water gets to come to the speed that the campaign is meant for, before the preflight calls it a failure."""
 UNSEEN = 60.0
 """s for which a campaign that nobody has started waits without any front end: it holds the bench."""
 
@@ -56,7 +58,7 @@ def _require_same_devices(session: Session) -> None:
 def preflight(session: Session) -> None:
     """Judge the bench until the operator starts it; the checks go on while he looks."""
     devices = list(session.status.checks)
-    flow = Flow(session.campaign.flow_speed)
+    flow = Flow(session.campaign.flow_speed, session.loop.now + FLOW_PATIENCE)
     session.turn_for(SETTLE_ROWS * max(stream.period_s for _, stream in session.bench.streams()))
     started, seen = False, session.loop.now
     while not started:
@@ -70,7 +72,7 @@ def preflight(session: Session) -> None:
         )
         checks += flow.checks(session.loop.readings, session.loop.now)
         session.status.checks = devices + checks
-        failed = [check for check in checks if check.verdict == "failed"]
+        failed = [check for check in checks if check.verdict in ("failed", "waiting")]
         if any(request.kind == "start" for request in requests):
             started = not failed
             if failed:
@@ -87,6 +89,8 @@ class Flow:
 
     wanted: float | None
     """m/s; None: whatever it is."""
+    patient_until: float
+    """s"""
     measured: deque[tuple[float, float]] = field(default_factory=deque)
     """s, m/s"""
 
@@ -98,7 +102,7 @@ class Flow:
         self.measured += [(now, value) for value in values if value is not None]
         while self.measured and self.measured[0][0] < now - FLOW_WINDOW:
             self.measured.popleft()
-        check = flow_check(self.wanted, [value for _, value in self.measured])
+        check = flow_check(self.wanted, [value for _, value in self.measured], patient=now < self.patient_until)
         return [] if check is None else [check]
 
 

@@ -84,8 +84,11 @@ def stop_input_check(readings: Iterable[Reading]) -> Check | None:
     return Check("emergency stop", "passed", "released")
 
 
-def flow_check(wanted: float, measured: Collection[float]) -> Check | None:
-    """Does the water move as the campaign is meant for? `measured`: m/s, of the last seconds; none: no flow meter."""
+def flow_check(wanted: float, measured: Collection[float], *, patient: bool = False) -> Check | None:
+    """Does the water move as the campaign is meant for? `measured`: m/s, of the last seconds; none: no flow meter.
+
+    `patient`: it may be on its way there.
+    """
     asked = f"the campaign is meant for {wanted:g} m/s"
     if not measured:
         return Check("flow", "warning", f"{asked}, which is not measured") if wanted else None
@@ -93,7 +96,8 @@ def flow_check(wanted: float, measured: Collection[float]) -> Check | None:
     apart = abs(mean - wanted) / max(FLOW_TOLERANCE * abs(wanted), LEAST_FLOW_TOLERANCE)
     text = f"{mean:.3g} m/s measured; {asked}"
     if apart > FLOW_TOO_FAR:
-        return Check("flow", "failed", f"{text}: set the water, or correct campaign.flow_speed")
+        verdict: Verdict = "waiting" if patient else "failed"
+        return Check("flow", verdict, f"{text}: set the water, or correct campaign.flow_speed")
     return Check("flow", "warning" if apart > 1.0 else "passed", text)
 
 

@@ -186,7 +186,7 @@ def test_a_pressed_emergency_stop_lets_nothing_begin(tmp_path):
 
 
 def test_a_campaign_waits_for_the_water_that_it_is_meant_for(tmp_path):
-    """The operator has 10 s more to turn the flow on; the check follows the water."""
+    """It comes after 10 s; the check follows it."""
     meter, checks = flow_meter(0.02), []
     with virtual(tmp_path, inputs=(meter,), flow_speed=0.5) as world:
 
@@ -197,10 +197,30 @@ def test_a_campaign_waits_for_the_water_that_it_is_meant_for(tmp_path):
 
         world.clock.at.append((10.0, turn_on))
         play(world)
-        assert checks[0].verdict == "failed"
+        assert checks[0].verdict == "waiting"
         assert checks[0].text.startswith("0.02 m/s measured; the campaign is meant for 0.5 m/s: set the water")
         assert outcome(world)[0] == "completed"
         assert "m/s measured; the campaign is meant for 0.5 m/s" in world.texts
+
+
+def test_nothing_begins_in_water_that_the_campaign_is_not_meant_for(tmp_path):
+    """Not when the operator asks for it, and after a minute it is a failure, at which a headless run gives up."""
+    verdicts = []
+    with virtual(tmp_path, inputs=(flow_meter(0.02),), flow_speed=0.5) as world:
+
+        def look():
+            verdicts.append({c.name: c for c in world.session.status.checks}["flow"].verdict)
+            world.session.loop.signals.append(Request("start"))
+
+        world.clock.at += [
+            (30.0, look),
+            (70.0, look),
+            (71.0, lambda: world.session.loop.signals.append(Request("stop"))),
+        ]
+        play(world)
+        assert verdicts == ["waiting", "failed"]
+        assert world.texts.count("not started: flow: 0.02 m/s measured") == 2
+        assert not world.recorder.of(Open)
 
 
 def test_stop_while_the_recorder_opens_and_while_it_closes_is_not_lost(tmp_path):
