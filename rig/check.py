@@ -167,9 +167,7 @@ def print_report(report: CheckReport, console: Console) -> None:
     console.print(table)
     console.print(f"thrusters      {', '.join(campaign.thrusters)}", markup=False)
     if campaign.flow_speed is not None:
-        console.print(
-            f"flow speed     {campaign.flow_speed:g} m/s, to be set by hand before the run; the preflight compares where it is measured"
-        )
+        console.print(f"flow speed     {campaign.flow_speed:g} m/s, to be set by hand; the preflight compares")
     console.print(f"one run        {_clock(report.run.expected)} expected, {_clock(report.run.worst)} at worst")
     console.print(f"campaign       {_clock(report.total.expected)} expected, {_clock(report.total.worst)} at worst")
     console.print(f"peak voltage   {report.peak_voltage:g} V")
