@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch.aliases import within_samples
 from identification.mismatch.diagnosis import (
     Diagnosis,
     Rmse,
@@ -30,6 +31,7 @@ from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.rivals import EQUAL, Standing, settle_forms
 from identification.mismatch.search import STATIC, Found, prune, search
 from identification.mismatch.shape_error import SHAPE_ERROR, corrections
+from identification.mismatch.slow_change import beside_slow_change
 from identification.mismatch.state import State
 from identification.mismatch.sweeps import Limits
 from identification.mismatch.telling import (
@@ -50,6 +52,8 @@ from identification.twin import Twin
 
 COLOURED = 1e-25
 """p-value of whiteness below which no noise is blamed; 1/f noise alone was seen to reach 1e-21."""
+UNCARRIED = 6.0
+"""Sigmas of a direction of the last screening that no term made anything of: it is left, though nobody knows its shape."""
 DRIVER_NAMES = {"command_voltage": "V|V|", "motor_voltage": "V|V|", "rotation_rate": "n|n|"}
 
 
@@ -94,16 +98,39 @@ def diagnose(
     after, standing = found.after, None
     if after.fit.model.terms:
         after, standing = _settled(found)
-    left = _with_colour(judge_left(after.fit, found.data, after.weights, rng), after, found.data)
+    after, left = _left(found, after, rng)
     measured = replace(found.data, histories=histories)
     answer, after = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
     answer = _with_channels(answer, lines, faults)
     return with_twin(answer, after, found.data, recordings, baseline)
 
 
+def _left(found: Found, after: State, rng: np.random.Generator) -> tuple[State, Omnibus]:
+    """What no term carries, with the noise that shows it."""
+    data = found.data
+    left = _with_colour(judge_left(after.fit, data, after.weights, rng), after, data)
+    if left.p_value < ALARM or not left.groups:
+        return after, left
+    if after is found.after and found.last.largest > max(found.last.threshold, UNCARRIED):
+        best = found.last.directions.terms[int(np.argmax(found.last.z))]
+        return after, _foremost_over(replace(left, p_value=min(found.last.p_value, left.p_value)), best.coordinates)
+    beside = beside_slow_change(after, data)
+    if beside is None:
+        return after, left
+    return beside, _foremost_over(judge_left(beside.fit, data, beside.weights, rng), ("time",))
+
+
+def _foremost_over(left: Omnibus, quantities: Collection[str]) -> Omnibus:
+    """The same with these coordinates first."""
+    return replace(left, groups=tuple(sorted(left.groups, key=lambda g: g.coordinate.quantity not in quantities)))
+
+
 def _settled(found: Found) -> tuple[State, dict[Term, Standing] | None]:
     """With rivals exchanged, pruned as a search ends; as found where what was exchanged for a term is dropped again."""
     after, standing = settle_forms(found.after, found.data, found.terms)
+    slower = within_samples(after, found.data)
+    if slower is not after:
+        return slower, None
     if after is found.after:
         return after, standing
     pruned = prune(after, found.data)

@@ -144,7 +144,10 @@ def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]
         more = price(other, data) - extra_now
         extra = more * logn
         begun = extended(less.theta, less.model, other, begin, bigger)
-        new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - min(extra, 2.0 * more))
+        if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
+            new = fit(bigger, begun, data, state.weights)
+        else:
+            new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - min(extra, 2.0 * more))
         if at_bound(other, new, data, state.weights) or noise_goes_on(new, other, state.noise, data):
             continue
         loss = new.chi2 - now.chi2 + extra

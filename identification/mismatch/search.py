@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.mismatch.baseline import baseline, every_shape, pursue, start
-from identification.mismatch.fitting import Fit, at_bound, extended, fit
+from identification.mismatch.fitting import DELAYING, Fit, at_bound, extended, fit
 from identification.mismatch.model import Data, Model, Theta, price
 from identification.mismatch.screening import (
     Screening,
@@ -34,7 +34,12 @@ HIDDEN = 2.0
 """Sigmas from which a candidate is tried with noise of its own, where none passes."""
 CLEARER = 3.0
 """The same of a first term that takes its time only where the plan does: a staircase of minutes."""
+SLOW = frozenset({"time", "flow_speed"})
+"""Coordinates along which nothing changes quickly: slow noise takes for its own what an effect does over them."""
 MOST_HIDDEN = 3
+MOST_INSTANTS = 5
+APART = 0.05
+"""Of the run: trials of a jump that is hidden."""
 HIDDEN_PRICE = 0.5
 """Of the price of a term's parameters asked for what is hidden, beside the family-wise threshold."""
 OFFSET_PRICE = 0.35
@@ -165,16 +170,16 @@ def _lasting(
     """The larger model, pruned; of additions that are dropped again the next best. None where none lasts."""
     refused: set[Term] = set()
     found = judged.largest > judged.threshold
-    while True:
-        larger = _larger(state, judged, data, terms, refused) if found else _hidden(state, judged, data)
-        if larger is None:
-            return None
+    while larger := _larger(state, judged, data, terms, refused) if found else None:
         pruned = prune(larger, data)
         if frozenset(pruned.fit.model.terms) not in seen:
             return pruned
-        if not found:
-            return None
         refused |= set(larger.fit.model.terms) - set(state.fit.model.terms)
+    hidden = _hidden(state, judged, data)
+    if hidden is None:
+        return None
+    pruned = prune(hidden, data)
+    return None if frozenset(pruned.fit.model.terms) in seen else pruned
 
 
 def _larger(
@@ -195,8 +200,9 @@ def _hidden(state: State, judged: Screening, data: Data) -> State | None:
     likely = [
         (t, v)
         for rank, (t, v, z) in enumerate(judged.best(2 * MOST_HIDDEN))
-        if (rank < MOST_HIDDEN or t.id in STEADY) and z > (HIDDEN if "time" in t.coordinates else least)
+        if (rank < MOST_HIDDEN or t.id in STEADY) and z > (HIDDEN if SLOW & set(t.coordinates) else least)
     ]
+    likely = [each for t, v in likely for each in ((t, at) for at in _instants(judged, t, data) or (v,))]
     if not likely:
         return None
     now = refresh(state.fit.model, state.fit.theta, data, None, None)
@@ -216,6 +222,20 @@ def _hidden(state: State, judged: Screening, data: Data) -> State | None:
     return refresh(best.model, best.theta, data, None, None)
 
 
+def _instants(judged: Screening, term: Term, data: Data) -> list[tuple[float, ...]]:
+    """Of a jump in time the likeliest trials: which is the best depends on the noise, and that takes it for its own."""
+    if term.id != "zero_offset":
+        return []
+    out: list[tuple[float, ...]] = []
+    for j in np.argsort(-judged.plain):
+        at = judged.directions.values[j]
+        if judged.directions.terms[j] == term and all(abs(at[1] - v[1]) > APART * data.scale.duration for v in out):
+            out.append(at)
+        if len(out) == MOST_INSTANTS:
+            break
+    return out
+
+
 def _asked_of_hidden(term: Term, judged: Screening, data: Data) -> float:
     """Gain in deviance from which a term that is told from noise by estimating both is believed."""
     if term.id in STEADY:
@@ -224,9 +244,20 @@ def _asked_of_hidden(term: Term, judged: Screening, data: Data) -> float:
     return float(judged.threshold**2 + share * price(term, data) * np.log(data.size))
 
 
+def _candidates(judged: Screening, data: Data) -> list[tuple[Term, tuple[float, ...]]]:
+    """The likeliest terms, and those whose trials say little of what a fit would find: jumps between levels, of which
+    no trial is near unless it is the right one; and all that comes late where clocks that differ may hide it."""
+    likely = {term: values for term, values, _ in judged.best(CANDIDATES)}
+    late = any(term.id in DELAYING for term in likely)
+    for term, values, z in judged.best(len(judged.directions.terms), share=0.0):
+        if z > judged.threshold and (late and term.id in DELAYING or any(p.jumps for p in term.parameters(data.scale))):
+            likely.setdefault(term, values)
+    return list(likely.items())
+
+
 def _best_addition(state: State, judged: Screening, data: Data, refused: Collection[Term]) -> Fit | None:
     fits = []
-    for term, values, _ in judged.best(CANDIDATES):
+    for term, values in _candidates(judged, data):
         if term in refused:
             continue
         bigger = state.fit.model.plus(term)

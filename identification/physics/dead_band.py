@@ -32,7 +32,9 @@ class DeadBand:
         return (replace(known, jumps=True, blur=EDGE * scale.driver) if self.form == "jump" else known,)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return tuple((share * scale.driver,) for share in (0.01, 0.03, 0.07, 0.15, 0.3))
+        # what one jump changes is not what another does, unless they are near
+        shares = np.geomspace(0.01, 0.5, 22).tolist() if self.form == "jump" else (0.01, 0.03, 0.07, 0.15, 0.3)
+        return tuple((share * scale.driver,) for share in shares)
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         if self.form == "shrink":
