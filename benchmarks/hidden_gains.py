@@ -26,7 +26,7 @@ import numpy as np
 
 from identification.mismatch import search
 from identification.mismatch.baseline import baseline, start
-from identification.mismatch.diagnose import _histories
+from identification.mismatch.diagnosing import _histories
 from identification.mismatch.fitting import extended, fit
 from identification.mismatch.model import Data, Model
 from identification.mismatch.preparing import Refusal

@@ -35,7 +35,7 @@ from peers.cases import EFFECTS, STRENGTHS, Puzzle, made
 from peers.columns import Problem, problem
 from peers.methods import GRIDS, TUNED, names
 
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.simulating import Drive, Prediction, others_of, simulate
 from identification.recording import Recording

@@ -92,7 +92,7 @@ def diagnosed(
     limits: Limits | None = None,
 ) -> Diagnosis:
     """As identification has it, a refusal raised as RecordingError."""
-    from identification.mismatch.diagnose import diagnose
+    from identification.mismatch.diagnosing import diagnose
     from identification.mismatch.preparing import Refusal
 
     found = diagnose(recordings, holdout, seed, baseline, limits)

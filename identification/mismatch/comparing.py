@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.preparing import DRIVERS, Refusal
 from identification.mismatch.simulating import Drive, held, others_of, simulate

@@ -19,6 +19,7 @@ from identification.mismatch.remainder import FlexibleShape, Spline
 from identification.mismatch.state import State
 from identification.physics.free_form import WORDS, Flexible, Multiplier, spline
 from identification.physics.history import History
+from identification.physics.term import Term
 from identification.recording import Floats
 
 POINTS = 81
@@ -136,6 +137,9 @@ def _edges(values: Floats) -> Floats:
     return out
 
 
+CURVE = frozenset({"command_voltage", "motor_voltage", "rotation_rate", "thrust", "direction"})
+
+
 def with_flexible(found: Unexplained, extended: Extended | None, data: Data, others: Sequence[History]) -> Unexplained:
     """What is unexplained, with the flexible terms that model it, and a formula where one agrees everywhere."""
     if extended is None:
@@ -180,3 +184,15 @@ def refitted_names(named: Sequence[Named], final: State) -> list[Named]:
         replace(n, theta=places[n.term][0], std=tuple(map(float, std[places[n.term][1]]))) if n.term in places else n
         for n in named
     ]
+
+
+def shared(terms: Sequence[Term], extended: Extended) -> list[Term]:
+    """Of these terms those that change what a flexible one changes, over the same coordinate: beside a shape that may
+    be anything their values mean nothing."""
+    over = {q for term in extended.terms for q in _also(term.quantity)}
+    return [term for term in terms if over & {q for c in term.coordinates for q in _also(c)}]
+
+
+def _also(quantity: str) -> frozenset[str]:
+    """Coordinates of the same kind: the static curve is one over all that drives."""
+    return CURVE if quantity in CURVE else frozenset({quantity})

@@ -112,7 +112,7 @@ def by_runs(before: State, after: State, data: Data, others: Sequence[History], 
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
     errors = []
     for state in (before, after):
-        theta = _with_tares(state.fit.model, state.fit.theta, unseen)
+        theta = with_tares(state.fit.model, state.fit.theta, unseen)
         errors.append(rmse(state.fit.model, theta, unseen, every))
     noise = least_noise(after.fit, (after.noise, quiet), data, [np.ones(r.size, dtype=bool) for r in data.rows])
     names = ", ".join(h.recording_id for h in others)
@@ -147,13 +147,13 @@ def judge_runs(state: State, data: Data, others: Sequence[History]) -> Callable[
     """Judges fits on whole runs, their tares fitted; a fit that needs what one of these lacks is infinitely bad."""
     unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
-    first = _with_tares(state.fit.model, state.fit.theta, unseen)
+    first = with_tares(state.fit.model, state.fit.theta, unseen)
     w = weights(unseen, state.noise, forces(state.fit.model, first, unseen), None)
 
     def score(found: Fit) -> Score:
         if any(not set(term.needs) <= set(h.others) for term in found.model.terms for h in others):
             return Score(float("inf"), float("inf"))
-        theta = _with_tares(found.model, found.theta, unseen)
+        theta = with_tares(found.model, found.theta, unseen)
         thrust, _ = raw(found.model, theta, unseen, with_rate=False)
         left = w.whiten([y - f for y, f in zip(unseen.thrust, thrust, strict=True)], [])
         return Score(rmse(found.model, theta, unseen, every), float(left @ left))
@@ -161,7 +161,8 @@ def judge_runs(state: State, data: Data, others: Sequence[History]) -> Callable[
     return score
 
 
-def _with_tares(model: Model, theta: Theta, data: Data) -> Theta:
+def with_tares(model: Model, theta: Theta, data: Data) -> Theta:
+    """The same with the tares that the runs of `data` want, one each."""
     zero = replace(theta, tares=tuple(0.0 for _ in data.histories))
     thrust, _ = raw(model, zero, data, with_rate=False)
     tares = [

@@ -17,7 +17,7 @@ from identification.mismatch.fitting import Fit
 from identification.mismatch.jumps import APART, TRIED, jumps
 from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.pulses import Pulses, likeliest_pulses
-from identification.mismatch.screening import normal_scores, orthogonal_basis, quiet, surrogate_scores
+from identification.mismatch.screening import lengths, normal_scores, orthogonal_basis, quiet, surrogate_scores
 from identification.mismatch.shape_error import allowed_in, corrections
 from identification.recording import Floats
 from identification.tails import chi2_sf, noncentral_chi2_sf
@@ -195,8 +195,8 @@ class Place:
     what: str
 
 
-def locate(judged: Judged, fit: Fit, data: Data) -> Place:
-    """The stretch of the coordinate that holds most of it."""
+def locate(judged: Judged, fit: Fit, data: Data, weights: Weights) -> Place:
+    """The stretch of the coordinate that holds most of what its columns make of the residual: noise is everywhere."""
     c = judged.coordinate
     covariate = np.concatenate(c.covariate)
     residual = np.concatenate(
@@ -214,12 +214,25 @@ def locate(judged: Judged, fit: Fit, data: Data) -> Place:
     rows = np.bincount(index, minlength=k)
     spread = np.bincount(index, weights=count * (residual - mean[index]) ** 2, minlength=k) / np.maximum(weight, 1e-300)
     error = np.sqrt(spread / np.maximum(rows, 1))
-    power = np.bincount(index, weights=count * residual**2, minlength=k)
+    power = np.bincount(index, weights=count * _structure(c, residual, data, weights) ** 2, minlength=k)
     full = rows > 0
     low, high, share = _stretch(edges, np.asarray(power, dtype=np.float64))
     center = 0.5 * (edges[1:] + edges[:-1])
     table = tuple((float(center[i]), float(mean[i]), float(error[i])) for i in np.flatnonzero(full))
     return Place(c.quantity, c.unit, low, high, share, judged.p_value, table, c.what)
+
+
+def _structure(c: Coordinate, residual: Floats, data: Data, weights: Weights) -> Floats:
+    """(n,) N, of the residual what any shape over the coordinate is: least squares with the coloured noise."""
+    thrust = Weights(weights.thrust)
+    ends = np.cumsum([r.size for r in data.rows])[:-1]
+    columns = thrust.whiten(list(c.columns), [])
+    size = lengths(columns)
+    unit = columns / np.where(size > 0, size, 1.0)
+    left = thrust.whiten(list(np.split(residual, ends)), [])
+    inverse = np.linalg.pinv(unit.T @ unit, hermitian=True, rcond=1e-9)
+    out: Floats = np.concatenate(c.columns) @ (inverse @ (unit.T @ left) / np.where(size > 0, size, 1.0))
+    return out
 
 
 def _bins(covariate: Floats) -> Floats:

@@ -1,4 +1,4 @@
-"""What has no name stays in the model only where it predicts what was not fitted."""
+"""What was not fitted: a name must predict it, and what has no name stays in the model only where it does."""
 
 from __future__ import annotations
 
@@ -6,11 +6,25 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 from identification.mismatch.baseline import baseline
+from identification.mismatch.fitting import fit
 from identification.mismatch.flexible import better, split
 from identification.mismatch.model import Data, Model, Theta
 from identification.mismatch.state import State
 from identification.physics.history import History
 from identification.physics.term import Term
+
+WORSE = 9.0
+"""Of whitened chi-square on what was not fitted: a model that does so much better without a term doubts its name."""
+
+
+def unforeseen(after: State, data: Data, terms: Collection[Term], others: Sequence[History]) -> tuple[Term, ...]:
+    """Of these terms those without which the model predicts what was not fitted better: blocks of time, or `others`."""
+    if not terms:
+        return ()
+    part, judge, begin = split(after, data, others)
+    now = judge(begin.fit).chi2
+    less = {t: fit(*without_terms(begin, [t]), part, begin.weights) for t in begin.fit.model.terms if t in terms}
+    return tuple(t for t, fitted in less.items() if judge(fitted).chi2 < now - WORSE)
 
 
 def predicting(
@@ -23,14 +37,14 @@ def predicting(
     """
     if not doubted:
         return after
-    smaller, theta = less(after, doubted)
+    smaller, theta = without_terms(after, doubted)
     bare = baseline(data, theta, terms, smaller)
     _, judge, full = split(after, data, others)
     _, _, begin = split(bare, data, others)
     return after if better(judge(full.fit), judge(begin.fit), 0) else bare
 
 
-def less(state: State, terms: Collection[Term]) -> tuple[Model, Theta]:
+def without_terms(state: State, terms: Collection[Term]) -> tuple[Model, Theta]:
     """The rest of the model, its values as they were."""
     model, theta = state.fit.model, state.fit.theta
     kept = tuple(v for t, v in zip(model.terms, theta.terms, strict=True) if t not in terms)

@@ -135,19 +135,30 @@ def search(
     data, theta, first = given(data, theta) if given is not None else (data, theta, Model())
     data = replace(data, bands=bands)
     terms = available(data, without)
-    state = before = baseline(data, theta, terms, first)
+    before = baseline(data, theta, terms, first)
+    return _forward(data, terms, before, before, rng, trace)
+
+
+def resumed(found: Found, state: State, rng: np.random.Generator) -> Found:
+    """The search gone on with from `state`, a model of the same recordings that is not the one that was `found`."""
+    return _forward(found.data, found.terms, found.before, state, rng, None, frozenset(found.after.fit.model.terms))
+
+
+def _forward(
+    data: Data,
+    terms: Sequence[Term],
+    before: State,
+    state: State,
+    rng: np.random.Generator,
+    trace: list[str] | None,
+    *known: frozenset[Term],
+) -> Found:
+    """Larger models from `state` on while something passes, none of those that are `known`."""
     screenings = []
-    seen = {frozenset(state.fit.model.terms)}
+    seen = {frozenset(state.fit.model.terms), *known}
     while True:
         ids = {t.id for t in state.fit.model.terms}
-        left = [t for t in terms if t.id not in ids]
-        shapes = Counter(static_curve(t, measured=data.with_rate) for t in state.fit.model.terms)
-        left = [t for t in left if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < MOST_STATIC]
-        if ids & TWINS:
-            left = [t for t in left if t.id not in TWINS]
-        found = directions(state.fit, data, state.weights, left)
-        spared = allowed(corrections(state.fit, data, state.weights), found.columns)
-        judged = screen(state.fit, found, rng, ALARM, spared)
+        judged = _screened(state, data, terms, rng)
         screenings.append(judged)
         if trace is not None:
             trace.append(
@@ -161,7 +172,21 @@ def search(
             break
         state = larger
         seen.add(frozenset(state.fit.model.terms))
-    return Found(data, terms, before, state, tuple(screenings), judged)
+    return Found(data, tuple(terms), before, state, tuple(screenings), judged)
+
+
+def _screened(state: State, data: Data, terms: Sequence[Term], rng: np.random.Generator) -> Screening:
+    """What may still be added to the model, judged."""
+    inside = state.fit.model.terms
+    ids = {t.id for t in inside}
+    shapes = Counter(static_curve(t, measured=data.with_rate) for t in inside)
+    left = [t for t in terms if t.id not in ids]
+    left = [t for t in left if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < MOST_STATIC]
+    if ids & TWINS:
+        left = [t for t in left if t.id not in TWINS]
+    found = directions(state.fit, data, state.weights, left)
+    spared = allowed(corrections(state.fit, data, state.weights), found.columns)
+    return screen(state.fit, found, rng, ALARM, spared)
 
 
 def _lasting(
@@ -250,7 +275,8 @@ def _candidates(judged: Screening, data: Data) -> list[tuple[Term, tuple[float, 
     likely = {term: values for term, values, _ in judged.best(CANDIDATES)}
     late = any(term.id in DELAYING for term in likely)
     for term, values, z in judged.best(len(judged.directions.terms), share=0.0):
-        if z > judged.threshold and (late and term.id in DELAYING or any(p.jumps for p in term.parameters(data.scale))):
+        told = (late and term.id in DELAYING) or any(p.jumps for p in term.parameters(data.scale))
+        if told and z > judged.threshold:
             likely.setdefault(term, values)
     return list(likely.items())
 

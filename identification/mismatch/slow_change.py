@@ -1,8 +1,8 @@
 """A slow change of zero or gain that the noise had taken for its own: told from noise by estimating both together.
 
-A residual that wanders once over the run is what slow noise leaves, so a noise estimated on it is as slow as it wanders,
-and no test against that noise sees it. The restricted likelihood of noise and change together tells them apart: noise
-that wanders so far in one run must be there in every part of it.
+A residual that wanders once over the run is what slow noise leaves, so a noise estimated on it is as slow as that, and
+no test against that noise sees it. The restricted likelihood of noise and change together tells them apart: noise that
+wanders so far in one run must be there in every part of it.
 """
 
 from __future__ import annotations

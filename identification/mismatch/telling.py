@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -19,11 +20,12 @@ from identification.mismatch.faults import Fault
 from identification.mismatch.fitting import Fit, raw
 from identification.mismatch.intervals import Interval
 from identification.mismatch.lines import Line
-from identification.mismatch.model import Data
+from identification.mismatch.model import Data, Weights
 from identification.mismatch.naming import Named
 from identification.mismatch.omnibus import ALARM, Judged, judge_left, locate
+from identification.mismatch.preparing import DRIVERS
 from identification.mismatch.rivals import Rival
-from identification.mismatch.search import Found
+from identification.mismatch.search import STATIC, Found
 from identification.mismatch.state import State
 from identification.physics.term import Term
 
@@ -115,8 +117,10 @@ def _rival(rival: Rival, data: Data) -> RivalFinding:
     raise ValueError(f"{rival.term.id} is not in its own fit")
 
 
-def where_of(judged: Judged, fitted: Fit, data: Data) -> tuple[Where, float, tuple[tuple[float, float, float], ...]]:
-    place = locate(judged, fitted, data)
+def where_of(
+    judged: Judged, fitted: Fit, data: Data, weights: Weights
+) -> tuple[Where, float, tuple[tuple[float, float, float], ...]]:
+    place = locate(judged, fitted, data, weights)
     return Where(place.quantity, place.low, place.high, place.unit), place.share, place.table
 
 
@@ -126,19 +130,32 @@ def says(where: Where, share: float, what: str) -> str:
     return f"{100 * share:.0f} % of the residual lies at {place}: {what}."
 
 
-def places_of(found: Found, rng: np.random.Generator, *, pulsing: bool) -> tuple[Mismatch, ...]:
-    """Where the baseline fails, the clearest coordinates first. `pulsing`: pulses that come back were found."""
-    seen = judge_left(found.before.fit, found.data, found.before.weights, rng, pulsing=pulsing)
-    if seen.p_value >= ALARM and not found.after.fit.model.terms:
+def places_of(found: Found, after: State, rng: np.random.Generator, *, pulsing: bool) -> tuple[Mismatch, ...]:
+    """Where the baseline fails: coordinates of what was found first, the clearest first among them.
+
+    Its C and tares are those of the model `after`: with its own it shares out the mismatch over all there is.
+    `pulsing`: pulses that come back were found.
+    """
+    before, data = found.before.fit, found.data
+    seen = judge_left(before, data, found.before.weights, rng, pulsing=pulsing)
+    if seen.p_value >= ALARM and not after.fit.model.terms:
         return ()
-    out: list[Mismatch] = []
-    for judged in seen.groups[:MOST_PLACES]:
-        if out and judged.p_value > CLEAR:
-            break
-        where, share, _ = where_of(judged, found.before.fit, found.data)
-        what = judged.coordinate.what
-        out.append(Mismatch("thrust", where, share, judged.p_value, says(where, share, what)))
-    return tuple(out)
+    same = replace(before.theta, C=after.fit.theta.C, tares=after.fit.theta.tares, shift=after.fit.theta.shift)
+    bare = replace(before, theta=same)
+    clear = [g for i, g in enumerate(seen.groups) if i == 0 or g.p_value <= CLEAR]
+    own = {q for term in after.fit.model.terms for c in term.coordinates for q in (DRIVERS if c in STATIC else (c,))}
+    places = [
+        _mismatch(g, bare, data, after.weights) for g in sorted(clear, key=lambda g: g.coordinate.quantity not in own)
+    ]
+    told = [place for place, whole in places if not whole] or [place for place, _ in places]
+    return tuple(told[:MOST_PLACES])
+
+
+def _mismatch(judged: Judged, bare: Fit, data: Data, weights: Weights) -> tuple[Mismatch, bool]:
+    """Of one coordinate, and whether it is all of that coordinate, which says nothing."""
+    where, share, table = where_of(judged, bare, data, weights)
+    told = Mismatch("thrust", where, share, judged.p_value, says(where, share, judged.coordinate.what))
+    return told, where.low <= table[0][0] and where.high >= table[-1][0]
 
 
 def curves_of(before: State, after: State, data: Data) -> tuple[Curves, ...]:

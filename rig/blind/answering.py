@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
 from identification.mismatch.preparing import Refusal
 from identification.mismatch.simulating import Drive, Prediction, held, others_of, simulate

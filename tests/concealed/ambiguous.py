@@ -8,7 +8,7 @@ from itertools import groupby
 
 import numpy as np
 
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, NextExperiment, PlanStep
 from identification.mismatch.settle import Course, End, allowance, belief, next_step
 from identification.mismatch.sweeps import Limits

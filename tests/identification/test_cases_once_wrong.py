@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, Finding
 from sim_devices import concealed
 from sim_devices.concealed import Case

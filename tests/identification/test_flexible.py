@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from diagnosed_runs import C, run
 
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
 from identification.mismatch.formula import monomials_of, term_of
 from identification.mismatch.knots import Moments, choose, heights, nodes_of

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis
 from sim_devices import concealed
 from tests.concealed.recordings import recording

@@ -8,7 +8,7 @@ import pytest
 from diagnosed_runs import NOISE, TOP, C, dead_band, levels, run, table
 
 from identification.mismatch.baseline import baseline, start
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, Where, diagnosis_json
 from identification.mismatch.fitting import extended, fit
 from identification.mismatch.flatness import noise_goes_on

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import PlanStep
 from identification.mismatch.foreseeing import AFTER_STEP, Bench, Outlook, ending, intervals, one_zero, stretches
 from identification.mismatch.preparing import history_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.mismatch.baseline import baseline, start
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
 from identification.mismatch.model import Model
 from identification.mismatch.omnibus import PLAIN_P

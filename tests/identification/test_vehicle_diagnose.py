@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from identification.efficiency import Installation, Thruster
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
 from identification.mismatch.preparing import Refusal
 from identification.mismatch.vehicle.diagnose import diagnose_vehicle

@@ -17,22 +17,24 @@ from identification.mismatch.diagnosis import (
 from identification.mismatch.faults import Fault, find_faults, repaired
 from identification.mismatch.fitting import fit
 from identification.mismatch.flexible import Extended, extend, foremost
-from identification.mismatch.flexible_shape import refitted_names, with_flexible, with_held
+from identification.mismatch.flexible_shape import refitted_names, shared, with_flexible, with_held
 from identification.mismatch.full_rate import look
-from identification.mismatch.intervals import intervals
-from identification.mismatch.judging import by_blocks, by_runs, rmse, whiteness
+from identification.mismatch.intervals import Interval, intervals
+from identification.mismatch.judging import HeldOut, by_blocks, by_runs, rmse, whiteness
 from identification.mismatch.lines import Line
 from identification.mismatch.model import Data, Weights
 from identification.mismatch.naming import Named, name, with_doubts
 from identification.mismatch.next_experiment import propose
+from identification.mismatch.noise import Noise
 from identification.mismatch.omnibus import ALARM, Omnibus, judge_left
-from identification.mismatch.predicting import less, predicting
+from identification.mismatch.predicting import predicting, unforeseen, without_terms
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.rivals import EQUAL, Standing, settle_forms
-from identification.mismatch.search import STATIC, Found, prune, search
+from identification.mismatch.rotating import by_folds
+from identification.mismatch.search import STATIC, Found, prune, resumed, search
 from identification.mismatch.shape_error import SHAPE_ERROR, corrections
 from identification.mismatch.slow_change import beside_slow_change
-from identification.mismatch.state import State
+from identification.mismatch.state import State, refresh
 from identification.mismatch.sweeps import Limits
 from identification.mismatch.telling import (
     curves_of,
@@ -53,7 +55,7 @@ from identification.twin import Twin
 COLOURED = 1e-25
 """p-value of whiteness below which no noise is blamed; 1/f noise alone was seen to reach 1e-21."""
 UNCARRIED = 6.0
-"""Sigmas of a direction of the last screening that no term made anything of: it is left, though nobody knows its shape."""
+"""Sigmas of a direction of the last screening that no term made anything of: it is left, whatever its shape."""
 DRIVER_NAMES = {"command_voltage": "V|V|", "motor_voltage": "V|V|", "rotation_rate": "n|n|"}
 
 
@@ -86,8 +88,12 @@ def diagnose(
         return wrong
     rng = np.random.default_rng(seed)
     faults, histories = _faulty(recordings, histories)
+    of_others, others = _faulty(holdout, others)
     if isinstance(histories, Refusal):
         return histories
+    if isinstance(others, Refusal):
+        return others
+    faults += of_others
     given = None if baseline is None else starting(baseline)
     found = search(histories, rng, given=given, without=without)
     seen = look(found.after.fit, found.data, histories)
@@ -95,14 +101,25 @@ def diagnose(
     if seen is not None:
         lines = seen.lines
         found = search(seen.histories, rng, given=given, bands=seen.bands, without=without)
-    after, standing = found.after, None
-    if after.fit.model.terms:
-        after, standing = _settled(found)
+    found, after, standing = _gone_on(found, rng)
     after, left = _left(found, after, rng)
     measured = replace(found.data, histories=histories)
     answer, after = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
     answer = _with_channels(answer, lines, faults)
     return with_twin(answer, after, found.data, recordings, baseline)
+
+
+def _gone_on(found: Found, rng: np.random.Generator) -> tuple[Found, State, dict[Term, Standing] | None]:
+    """With rivals exchanged; and once more what lies beyond, where the exchange made another model of it."""
+    if not found.after.fit.model.terms:
+        return found, found.after, None
+    after, standing = _settled(found)
+    if frozenset(after.fit.model.terms) == frozenset(found.after.fit.model.terms):
+        return found, after, standing
+    again = resumed(found, after, rng)
+    if again.after is after:
+        return found, after, standing
+    return again, *_settled(again)
 
 
 def _left(found: Found, after: State, rng: np.random.Generator) -> tuple[State, Omnibus]:
@@ -175,6 +192,7 @@ def _answer(
     structure = left.p_value < ALARM
     every_name = name(after, data, found.terms, standing)
     named = with_doubts(every_name, left if structure else None, measured=data.with_rate)
+    named = _foreseen(named, after, data, others)
     earned = [n for n in named if not n.doubts]
     doubted = [n for n in named if n.doubts]
     open_ended = (structure or bool(doubted)) and bool(left.groups)
@@ -184,11 +202,10 @@ def _answer(
     verdict = _verdict(earned, unexplained)
     unnamed = [n.term for n in doubted]
     after = predicting(after, data, found.terms, unnamed, others) if free is None else free.state
-    earned = refitted_names(earned, after)
-    known = intervals(after.fit, data, after.weights, [n.term for n in earned])
+    earned, known = _with_values(earned, found.after, after, data, free)
     every = [np.ones(r.size, dtype=bool) for r in data.rows]
     quiet = found.after.noise
-    held = by_runs(before, after, data, others, quiet) if others else by_blocks(before, after, data, measured, quiet)
+    held = _held_out(before, after, data, measured, others, quiet, free)
     n, p = after.fit.residual.size, int(after.fit.free.sum())
     answer = Diagnosis(
         recordings=tuple(r.recording_id for r in recordings),
@@ -196,7 +213,7 @@ def _answer(
         verdict=verdict,
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
-        mismatch=places_of(found, rng, pulsing=left.pulses is not None),
+        mismatch=places_of(found, after, rng, pulsing=left.pulses is not None),
         findings=tuple(finding_of(n, data, known) for n in earned),
         unexplained=unexplained,
         model_terms=tuple(t.id for t in after.fit.model.terms),
@@ -212,6 +229,45 @@ def _answer(
         curves=curves_of(before, after, data),
     )
     return answer, after
+
+
+def _foreseen(named: Sequence[Named], after: State, data: Data, others: Sequence[History]) -> tuple[Named, ...]:
+    """With a doubt where a model without the term predicts what was not fitted better."""
+    worse = unforeseen(after, data, [n.term for n in named if not n.doubts], others)
+    doubt = "what was not fitted is predicted better without it"
+    return tuple(replace(n, doubts=(*n.doubts, doubt)) if n.term in worse else n for n in named)
+
+
+def _held_out(
+    before: State,
+    after: State,
+    data: Data,
+    measured: Data,
+    others: Sequence[History],
+    quiet: Noise,
+    free: Extended | None,
+) -> HeldOut:
+    """On the runs held out; where none are on each run in turn; on blocks of time where one run is all there is, and
+    where flexible terms were chosen on the rest of these."""
+    if others:
+        return by_runs(before, after, data, others, quiet)
+    judge = by_folds if free is None else by_blocks
+    return judge(before, after, data, measured, quiet)
+
+
+def _with_values(
+    earned: Sequence[Named], before: State, after: State, data: Data, free: Extended | None
+) -> tuple[list[Named], dict[Term, tuple[Interval, ...]]]:
+    """Names with their values and intervals in the final model, `after`; of those that share a coordinate with a
+    flexible term in the model without any."""
+    alone = shared([n.term for n in earned], free) if free is not None else []
+    named = refitted_names([n for n in earned if n.term not in alone], after)
+    known = intervals(after.fit, data, after.weights, [n.term for n in named])
+    if free is not None and alone:
+        bare = refresh(*without_terms(before, free.dropped), data, None, None)  # what it leaves is noise to it
+        named += refitted_names([n for n in earned if n.term in alone], bare)
+        known |= intervals(bare.fit, data, bare.weights, alone)
+    return sorted(named, key=lambda n: -n.chi2_gain), known
 
 
 def _verdict(earned: Sequence[Named], unexplained: Unexplained | None) -> Verdict:
@@ -272,7 +328,7 @@ def _located(
     """What is left without the terms whose names were not earned: they are no physics, and would hide its place."""
     if not doubted:
         return after, left
-    bare = replace(after, fit=fit(*less(after, [n.term for n in doubted]), data, after.weights))
+    bare = replace(after, fit=fit(*without_terms(after, [n.term for n in doubted]), data, after.weights))
     seen = judge_left(bare.fit, data, after.weights, rng)
     return (bare, seen) if seen.p_value < ALARM else (after, left)
 
@@ -299,7 +355,7 @@ def _unexplained(
         clear = [g.coordinate.quantity for g in left.groups if g.p_value < ALARM]
         quantity = foremost(after, data, clear or [quantity], left.pulses)
     judged = next((g for g in left.groups if g.coordinate.quantity == quantity), left.groups[0])
-    where, share, table = where_of(judged, after.fit, data)
+    where, share, table = where_of(judged, after.fit, data, after.weights)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in doubted)
     text = f"Something is left that no term of the catalogue carries: {says(where, share, judged.coordinate.what)}"
     if doubted:
