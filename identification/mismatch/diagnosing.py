@@ -303,7 +303,9 @@ def _faulty(
 def _with_channels(answer: Diagnosis, lines: Sequence[Line], faults: Sequence[Fault]) -> Diagnosis:
     """The answer with periodic disturbances and channel faults among its findings, faults first."""
     grave = [f for f in faults if f.grave and f.kind != "nan"]
-    found = (*map(fault_finding, grave), *answer.findings, *map(line_finding, lines))
+    alone = {f.recording_id for f in grave} <= set(answer.recordings) and len(answer.recordings) == 1
+    faulty = (f if alone else replace(f, statement=f"{f.recording_id}: {f.statement}") for f in grave)
+    found = (*map(fault_finding, faulty), *answer.findings, *map(line_finding, lines))
     notes = [f"{f.recording_id}: {f.statement}" for f in faults if f not in grave]
     notes += [f"for the model this was put right: {f.statement}" for f in grave if f.repairable]
     verdict = "explained" if answer.verdict == "adequate" and found else answer.verdict
