@@ -13,6 +13,8 @@ from identification.mismatch.state import State
 from identification.physics.history import History
 from identification.physics.term import Term
 
+EVENTS = frozenset({"zero_offset", "zero_drift"})
+"""Of one run's own clock: another run need not repeat them."""
 WORSE = 9.0
 """Of whitened chi-square on what was not fitted: a model that does so much better without a term doubts its name."""
 
@@ -23,7 +25,8 @@ def unforeseen(after: State, data: Data, terms: Collection[Term], others: Sequen
         return ()
     part, judge, begin = split(after, data, others)
     now = judge(begin.fit).chi2
-    less = {t: fit(*without_terms(begin, [t]), part, begin.weights) for t in begin.fit.model.terms if t in terms}
+    asked = [t for t in begin.fit.model.terms if t in terms and not (others and t.id in EVENTS)]
+    less = {t: fit(*without_terms(begin, [t]), part, begin.weights) for t in asked}
     return tuple(t for t, fitted in less.items() if judge(fitted).chi2 < now - WORSE)
 
 

@@ -47,3 +47,58 @@ def test_a_limit_that_only_the_highest_level_meets_is_named() -> None:
     assert finding.effect == "command_saturation"
     low, high = finding.parameters["limit"].interval
     assert low < case.effects[0].parameters["limit"] < high
+
+
+def test_a_dead_band_that_jumps_is_found_beside_a_rate_that_shows_it() -> None:
+    """A jump changes what another does only where they are near: a coarse trial saw a rotation coupling instead."""
+    seed = [3874759649, 376861768, 2604729295, 3745126922]
+    case = concealed.case(np.random.default_rng(seed), ["dead_band"], 40.0)
+    found = diagnose([recording(case)])
+    assert isinstance(found, Diagnosis)
+    (finding,) = found.findings
+    assert finding.effect == "dead_band"
+    low, high = finding.parameters["half_width"].interval
+    truth = case.effects[0].parameters["half_width"]
+    assert low < truth < high
+    place = next(m.where for m in found.mismatch if m.where.quantity == "command_voltage")
+    assert place.low < -0.9 * truth
+    assert 0.9 * truth < place.high < 5 * truth
+
+
+def test_another_form_of_the_same_physics_gets_steps_enough() -> None:
+    seed = [1905205035, 698026874, 738330421, 2921075916]
+    finding = only_finding(concealed.case(np.random.default_rng(seed), ["heating"], 40.0))
+    assert (finding.effect, finding.form) == ("heating", "magnet")
+
+
+def test_clocks_that_agree_are_tried_where_a_step_stands_at_the_edge_of_a_sample() -> None:
+    seed = [3703502255, 2795828790, 3282270480, 4125542750]
+    case = concealed.case(np.random.default_rng(seed), ["load_cell_creep"], 40.0)
+    finding = only_finding(case)
+    low, high = finding.parameters["time_constant"].interval
+    assert low < case.effects[0].parameters["time_constant"] < high
+
+
+def test_ringing_is_told_below_half_the_sampling_rate() -> None:
+    seed = [2259617203, 768869458, 698337856, 953426928]
+    case = concealed.case(np.random.default_rng(seed), ["stand_resonance"], 15.0)
+    finding = only_finding(case)
+    low, high = finding.parameters["frequency"].interval
+    assert low < case.effects[0].parameters["frequency"] < high
+
+
+def test_after_an_exchange_the_search_goes_on() -> None:
+    """A jump and a saturation, found first, are one creep; what was saturated besides was never looked for."""
+    seed = [4043480491, 1705828569, 877514933, 1778045264]
+    case = concealed.case(np.random.default_rng(seed), ["load_cell_creep", "load_cell_saturation"], 20.0)
+    found = diagnose([recording(case)])
+    assert isinstance(found, Diagnosis)
+    assert {f.effect for f in found.findings} == {"load_cell_creep", "load_cell_saturation"}
+
+
+def test_a_jump_of_the_zero_hides_beside_another_effect() -> None:
+    seed = [867076386, 1321258062, 4228449733, 1763088089]
+    case = concealed.case(np.random.default_rng(seed), ["zero_offset", "recirculation"], 20.0)
+    found = diagnose([recording(case)])
+    assert isinstance(found, Diagnosis)
+    assert {f.effect for f in found.findings} == {"zero_offset", "recirculation"}

@@ -174,6 +174,53 @@ def test_held_out_runs_judge_both_models():
     assert other.heldout.after > 3 * other.heldout.noise, "a run without the effect is not described by it"
 
 
+def test_of_several_runs_each_is_judged_by_the_others():
+    """A zero of its own in each, and a dead band in all."""
+    runs = [run(seed=seed, volts=dead_band(0.8), tare=float(seed)) for seed in range(3)]
+    found = diagnose(runs)
+    assert found.heldout.what.startswith("each run by a model fitted to the others")
+    assert found.heldout.after == pytest.approx(NOISE, rel=0.03)
+    assert found.heldout.before > 2 * NOISE
+
+
+def test_a_short_run_judges_no_other():
+    found = diagnose([run(seed=1, volts=dead_band(0.8)), run(seed=2, seconds=40.0, volts=dead_band(0.8))])
+    assert found.heldout.what.startswith("every fourth of the blocks of time")
+
+
+def test_a_hold_out_that_lies_is_found_and_put_right():
+    lying = run(lambda t, V, F: -F, seed=2)
+    found = diagnose([run(seed=1)], holdout=[lying])
+    (fault,) = found.findings
+    assert fault.effect == "channel_fault"
+    assert lying.recording_id in fault.statement
+    assert found.heldout.after < 1.1 * NOISE
+
+
+def test_a_name_keeps_its_value_beside_a_shape_over_its_own_coordinate():
+    """In reverse 0.8 of the forward thrust, and a bump of the static curve that no term carries."""
+
+    def bumped(t, V, F):
+        return np.where(F < 0, 0.8, 1.0) * F * (1 + 0.15 * np.exp(-(((np.abs(V) - 8.0) / 1.5) ** 2)))
+
+    found = diagnose([run(bumped, seconds=300.0)])
+    assert found.unexplained is not None
+    for finding in found.findings:
+        if finding.effect == "asymmetry":
+            assert finding.parameters["ratio"].value == pytest.approx(0.8, abs=0.02)
+
+
+def test_a_name_must_predict_what_was_not_fitted():
+    found = diagnose([run(seed=1, volts=dead_band(0.8))], holdout=[run(seed=2)])
+    assert found.verdict == "unexplained"
+    assert any("predicted better without it" in text for text in found.unexplained.resembles)
+
+
+def test_a_jump_of_one_run_need_not_be_in_another():
+    found = diagnose([run(lambda t, V, F: F + 3.0 * (t > 75.0), seed=1)], holdout=[run(seed=2)])
+    assert [f.effect for f in found.findings] == ["zero_offset"]
+
+
 def test_blocks_kept_back_say_what_they_are(dead):
     assert "every fourth of the blocks of time" in dead.heldout.what
     assert dead.heldout.after == pytest.approx(NOISE, rel=0.1)
