@@ -6,7 +6,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from identification.mismatch import diagnose, search
+from identification.mismatch import diagnosing, search
 
 
 def state(*terms):
@@ -24,8 +24,16 @@ def larger(_state, _judged, _data, _terms, refused):
 def test_what_is_dropped_again_gives_way_to_the_next_best(monkeypatch, lasting, found):
     monkeypatch.setattr(search, "_larger", larger)
     monkeypatch.setattr(search, "prune", lambda s, _data: s if s in lasting else BASE)
+    monkeypatch.setattr(search, "_hidden", lambda *_: None)
     judged = SimpleNamespace(largest=5.0, threshold=4.0)
     assert search._lasting(BASE, judged, None, (), {frozenset()}) is found
+
+
+def test_what_noise_hides_is_tried_where_nothing_that_passes_lasts(monkeypatch):
+    monkeypatch.setattr(search, "_larger", lambda *_: None)
+    monkeypatch.setattr(search, "_hidden", lambda *_: LAG)
+    monkeypatch.setattr(search, "prune", lambda s, _data: s)
+    assert search._lasting(BASE, SimpleNamespace(largest=5.0, threshold=4.0), None, (), {frozenset()}) is LAG
 
 
 def test_what_noise_hides_is_tried_once(monkeypatch):
@@ -42,8 +50,9 @@ def test_what_noise_hides_is_tried_once(monkeypatch):
     ],
 )
 def test_an_exchange_that_is_dropped_again_is_none(monkeypatch, exchanged, pruned, kept):
-    monkeypatch.setattr(diagnose, "settle_forms", lambda *_: (exchanged, {"c": None}))
-    monkeypatch.setattr(diagnose, "prune", lambda *_: pruned)
-    after, standing = diagnose._settled(SimpleNamespace(after=state("a", "b"), data=None, terms=()))
+    monkeypatch.setattr(diagnosing, "settle_forms", lambda *_: (exchanged, {"c": None}))
+    monkeypatch.setattr(diagnosing, "prune", lambda *_: pruned)
+    monkeypatch.setattr(diagnosing, "within_samples", lambda found, _data: found)
+    after, standing = diagnosing._settled(SimpleNamespace(after=state("a", "b"), data=None, terms=()))
     assert after.fit.model.terms == kept.fit.model.terms
     assert standing is None
