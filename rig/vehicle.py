@@ -20,6 +20,7 @@ from identification.vehicle_replay import Replay, replay
 from identification.vehicle_rivals import rivals
 from identification.vehicle_trials import Trial, ballast_of, trial
 from rig.errors import ConfigError, RecordingError, RigError
+from rig.file_lists import ListCommand, ListOption
 from rig.installation import InstallationFile, Vehicle, load_installation
 from rig.vehicle_recordings import Named, check, load_named, matched
 from rig.vehicle_thrusters import Calibration, installed, read_fits, straight_ahead
@@ -222,7 +223,7 @@ def _comparators(fit: VehicleFit) -> dict[str, tuple[InertiaFit | Unusable, ...]
     return {axis: rivals(result) for axis, result in fit.axes.items() if result.moving}
 
 
-@click.command("vehicle")
+@click.command("vehicle", cls=ListCommand)
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--thrusters",
@@ -238,7 +239,12 @@ def _comparators(fit: VehicleFit) -> dict[str, tuple[InertiaFit | Unusable, ...]
     "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
 )
 @click.option(
-    "--holdout", multiple=True, type=click.Path(path_type=Path), help="Recordings to simulate that are not fitted."
+    "--holdout",
+    cls=ListOption,
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="FILE...",
+    help="Recordings to simulate that are not fitted: every file up to the next option (may be repeated).",
 )
 @click.option(
     "--comparators", is_flag=True, help="Derivative, Kalman and annealing estimates of the inertia beside ours."
