@@ -4,7 +4,7 @@
 
 FOLDER holds the recordings, a folder for each table; default: `../shared/recordings` beside the project. They are not
 part of the project: `origin` in `rig/maps/*.toml` says who published them. What
-is done here is `rig import` and then `rig diagnose FILES [--holdout FILE]`. Printed are verdict, statement and the
+is done here is `rig import` and then `rig diagnose FILES [--holdout FILE...]`. Printed are verdict, statement and the
 error of what was not fitted: other runs where there are several, otherwise blocks of time (levels of a table).
 `--whole` prints all that `rig diagnose` says. Boats and ROVs: `real_vehicle_diagnosis.py`.
 """

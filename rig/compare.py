@@ -2,36 +2,62 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from rig.diagnose import PATH, read, tell
+from rig.answer_files import PATH, Wanted, answer_options, holdout_option, wanted_of
+from rig.diagnose import NOTHING, read, recordings_in, refuse_both, tell
 from rig.errors import RecordingError, RigError
+from rig.file_lists import ListCommand
+
+if TYPE_CHECKING:
+    from identification.mismatch.comparing import Compared
 
 
-@click.command("compare")
+def compare_files(
+    sim: Path, real: Path, holdout: Iterable[Path] = (), seed: int = 0, wanted: Wanted = NOTHING
+) -> Compared:
+    """The real recording diagnosed against the simulated one; its twin knows the hashes of both files.
+
+    `holdout`: further real runs, which are only predicted. Raises RecordingError or ConfigError for what cannot be
+    used.
+    """
+    from identification.mismatch.comparing import compare
+    from identification.mismatch.preparing import Refusal
+    from rig.twin import stamped
+
+    held = recordings_in(holdout, "rig compare") if holdout else []
+    refuse_both([sim, real], held)
+    simulation, measured = read([sim, real])
+    wanted.refuse([measured])
+    found = compare(simulation, measured, seed, read(held), wanted.limits)
+    if isinstance(found, Refusal):
+        raise RecordingError(found.reason)
+    if found.real.twin is None:
+        return found
+    twin = stamped(found.real.twin, {simulation.recording_id: sim, measured.recording_id: real})
+    return replace(found, real=replace(found.real, twin=twin))
+
+
+@click.command("compare", cls=ListCommand)
 @click.argument("sim", type=PATH)
 @click.argument("real", type=PATH)
-@click.option("--json", "json_path", type=PATH, help="Write the diagnosis here; - is standard output.")
-@click.option(
-    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
-)
+@holdout_option
+@answer_options
 @click.option("--seed", default=0, show_default=True, help="Of the surrogates that the false-alarm rate is judged by.")
-def compare_command(sim: Path, real: Path, json_path: Path | None, report: Path | None, seed: int) -> None:
+def compare_command(sim: Path, real: Path, holdout: tuple[Path, ...], seed: int, **outputs: Any) -> None:
     """Diagnose the recording REAL against the recording SIM that any program simulated with the same command.
 
     Exit status 0 for every honest verdict, 2 for input that cannot be used (one sentence why).
     """
-    from identification.mismatch.comparing import compare
-    from identification.mismatch.preparing import Refusal
-
     try:
-        simulation, measured = read([sim, real])
-        found = compare(simulation, measured, seed)
-        if isinstance(found, Refusal):
-            raise RecordingError(found.reason)
-        tell(found.real, json_path, report, None)
+        wanted = wanted_of(**outputs)
+        found = compare_files(sim, real, holdout, seed, wanted)
+        tell(found.real, wanted, [found.recording])
     except (RigError, OSError) as error:
         click.echo(f"rig compare: {error}", err=True)
         raise SystemExit(2) from error

@@ -8,21 +8,25 @@ from dataclasses import replace
 from importlib import import_module
 from itertools import chain
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from rig.answer_files import PATH, Wanted, answer_options, holdout_option, wanted_of
 from rig.diagnose_vehicle import VehicleFiles, diagnose_vehicle_files, is_vehicle, refuse_for_tunnel
 from rig.errors import RecordingError, RigError
-from rig.next_plan import asked, limits_of, write_next
+from rig.file_lists import ListCommand
+from rig.next_plan import write_next
 
 if TYPE_CHECKING:  # numpy and scipy come up when a diagnosis is made, not for `rig diagnose --help`
     from identification.mismatch.diagnosis import Diagnosis
     from identification.mismatch.sweeps import Limits
     from identification.recording import Recording
     from identification.twin import Twin
+    from rig.config import CampaignConfig
 
 NO_VEHICLE = VehicleFiles()
+NOTHING = Wanted()
 WHAT = "expected one or more recordings (*.h5) of one thruster"
 
 
@@ -50,6 +54,14 @@ def read(paths: Iterable[Path]) -> list[Recording]:
     return [load(path) for path in paths]
 
 
+def refuse_both(files: Iterable[Path], held: Iterable[Path]) -> None:
+    """Raises RecordingError for a file that is fitted and held out."""
+    fitted = {path.resolve() for path in files}
+    for path in held:
+        if path.resolve() in fitted:
+            raise RecordingError(f"{path} is both to be diagnosed and held out; hold out another recording")
+
+
 def diagnose_files(
     paths: Iterable[Path],
     holdout: Iterable[Path] = (),
@@ -59,29 +71,40 @@ def diagnose_files(
     any_thruster: bool = False,
     limits: Limits | None = None,
     vehicle: VehicleFiles = NO_VEHICLE,
+    wanted: Wanted = NOTHING,
 ) -> Diagnosis:
     """The diagnosis of recordings of one thruster, against C V|V| or a twin; its own twin knows the files' hashes.
 
     Of recordings of a vehicle, against its drag and its thrusters' models; `vehicle` says what is known of it.
-    Raises RecordingError for what cannot be diagnosed, TwinError for a twin that cannot be read.
+    `limits`: of the next experiment. `wanted`: what is to be written of the answer; what cannot be is refused before
+    anything is computed. Raises RecordingError or ConfigError for what cannot be used, TwinError for such a twin.
     """
     from rig.twin import read_twin, stamped
 
-    files = recordings_in(paths)
+    files, held = recordings_in(paths), recordings_in(holdout) if holdout else []
+    refuse_both(files, held)
     baseline = None if twin is None else read_twin(twin)
     recordings = read(files)
+    wanted.refuse(recordings)
     if is_vehicle(recordings):
-        if baseline is not None:
-            raise RecordingError(f"--twin is of a thruster, and {files[0]} is a recording of a vehicle")
-        held = list(holdout)
+        _refuse_for_vehicle(files, twin, limits)
         kept = dict(zip(held, read(held), strict=True))
         return diagnose_vehicle_files(dict(zip(files, recordings, strict=True)), kept, seed, vehicle)
     refuse_for_tunnel(vehicle)
     if baseline is not None and any_thruster:
         baseline = replace(baseline, thruster=recordings[0].thruster)
-    found = diagnosed(recordings, read(holdout), seed, baseline, limits)
+    found = diagnosed(recordings, read(held), seed, baseline, limits)
     by_id = {r.recording_id: path for r, path in zip(recordings, files, strict=True)}
     return found if found.twin is None else replace(found, twin=stamped(found.twin, by_id))
+
+
+def _refuse_for_vehicle(files: Sequence[Path], twin: Path | None, limits: Limits | None) -> None:
+    if twin is not None:
+        raise RecordingError(f"--twin is of a thruster, and {files[0]} is a recording of a vehicle")
+    if limits is not None:
+        raise RecordingError(
+            f"--campaign and --budget are of an experiment on the bench, and {files[0]} is a recording of a vehicle"
+        )
 
 
 def diagnosed(
@@ -101,53 +124,47 @@ def diagnosed(
     return found
 
 
-def tell(
-    found: Diagnosis, json_path: Path | None, report: Path | None, save_twin: Path | None, files: Iterable[Path] = ()
-) -> None:
-    """Twin, page and JSON where they are wanted; text for a person unless the JSON goes to standard output.
+def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = ()) -> None:
+    """Twin, page, JSON and plan where they are wanted; text for a person unless the JSON goes to standard output.
 
-    `files`: the recordings diagnosed; with them the page draws each effect by itself.
+    `recordings`: those diagnosed; with them the page draws each effect by itself. Raises OSError, ConfigError.
     """
     from identification.mismatch.diagnosis import diagnosis_json
     from rig.diagnose_text import diagnosis_text
 
-    if save_twin is not None and found.response != "thrust":
-        raise RecordingError("--save-twin keeps the model of a thruster; these are recordings of a vehicle")
-    if save_twin is not None and found.twin is not None:
+    if wanted.save_twin is not None and found.twin is not None:
         from rig.twin import write_twin
 
-        write_twin(found.twin, save_twin)
-    if report is not None:
+        write_twin(found.twin, wanted.save_twin)
+    if wanted.report is not None:
         page = "rig.report.diagnosis" if found.response == "thrust" else "rig.report.diagnosis_vehicle"
-        import_module(page).write(found, report, read(files))  # matplotlib: only for a page
-    if json_path is not None:
+        import_module(page).write(found, wanted.report, recordings)  # matplotlib: only for a page
+    if wanted.json_path is not None:
         text = json.dumps(diagnosis_json(found), indent=1, allow_nan=False)
-        if str(json_path) == "-":
+        if wanted.alone:
             click.echo(text)
-            return
-        json_path.write_text(text + "\n", encoding="utf-8")
-    click.echo(diagnosis_text(found))
+        else:
+            wanted.json_path.write_text(text + "\n", encoding="utf-8")
+    if not wanted.alone:
+        click.echo(diagnosis_text(found))
+    if wanted.plan is not None and wanted.campaign is not None:
+        _plan(found, wanted.campaign, wanted.plan, err=wanted.alone)
 
 
-PATH = click.Path(path_type=Path)
+def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) -> None:
+    """The next experiment as a campaign, or why there is none."""
+    if found.next_experiment is None:
+        click.echo(f"no next experiment is needed, for no finding has a rival; {plan} was not written", err=True)
+    for file in write_next(found, campaign, plan):
+        click.echo(f"next experiment written to {file}; next: rig check {file}", err=err)
 
 
-@click.command("diagnose")
+@click.command("diagnose", cls=ListCommand)
 @click.argument("files", nargs=-1, required=True, type=PATH)
 @click.option("--twin", type=PATH, help="Diagnose against this twin instead of C V|V|.")
 @click.option("--any-thruster", is_flag=True, help="The twin may be of another thruster.")
-@click.option(
-    "--holdout", type=PATH, multiple=True, help="Recording that is not fitted, only predicted (may be repeated)."
-)
-@click.option("--json", "json_path", type=PATH, help="Write the diagnosis here; - is standard output.")
-@click.option(
-    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
-)
-@click.option(
-    "--save-twin",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="Write the fitted model here, as a twin (JSON).",
-)
+@holdout_option
+@answer_options
 @click.option("--thrusters", multiple=True, type=PATH, help="Vehicle: what `rig fit --json` wrote of its thrusters.")
 @click.option("--installation", type=PATH, help="Vehicle: which thruster sits where (TOML), as for `rig vehicle`.")
 @click.option(
@@ -155,27 +172,19 @@ PATH = click.Path(path_type=Path)
 )
 @click.option("--mass-std", type=float, default=0.0, metavar="KG", help="Standard deviation of --mass.  [default: 0]")
 @click.option("--axis", type=click.Choice(["surge", "sway", "heave", "yaw"]), help="Vehicle: only trials of this axis.")
-@click.option("--plan", type=PATH, help="Write the next experiment here, as a campaign; needs --campaign.")
-@click.option("--campaign", type=PATH, help="Campaign of the recordings: bench and pacing of the next experiment.")
-@click.option("--budget", type=float, metavar="S", help="Longest next experiment.  [default: 300]")
 @click.option("--seed", default=0, show_default=True, help="Of the surrogates that the false-alarm rate is judged by.")
 def diagnose_command(
     files: tuple[Path, ...],
     twin: Path | None,
     any_thruster: bool,
     holdout: tuple[Path, ...],
-    json_path: Path | None,
-    report: Path | None,
-    save_twin: Path | None,
     thrusters: tuple[Path, ...],
     installation: Path | None,
     mass: float | None,
     mass_std: float,
     axis: str | None,
-    plan: Path | None,
-    campaign: Path | None,
-    budget: float | None,
     seed: int,
+    **outputs: Any,
 ) -> None:
     """Find the physics that C V|V| leaves out of recordings of one thruster; a folder stands for its *.h5.
 
@@ -184,17 +193,19 @@ def diagnose_command(
     Exit status 0 for every honest verdict, 2 for input that cannot be used (one sentence why).
     """
     try:
-        held = recordings_in(holdout) if holdout else []
-        bench = asked(plan, campaign)
-        limits = limits_of(bench, budget)
+        wanted = wanted_of(**outputs)
         vehicle = VehicleFiles(thrusters, installation, mass, mass_std, axis or "")
-        found = diagnose_files(files, held, seed, twin, any_thruster=any_thruster, limits=limits, vehicle=vehicle)
-        if plan is not None and found.response != "thrust":
-            raise RecordingError("--plan writes a campaign of the bench; these are recordings of a vehicle")
-        tell(found, json_path, report, save_twin, recordings_in(files))
-        if plan is not None and bench is not None:
-            for file in write_next(found, bench, plan):
-                click.echo(f"next experiment written to {file}; next: rig check {file}", err=str(json_path) == "-")
+        found = diagnose_files(
+            files,
+            holdout,
+            seed,
+            twin,
+            any_thruster=any_thruster,
+            limits=wanted.limits,
+            vehicle=vehicle,
+            wanted=wanted,
+        )
+        tell(found, wanted, read(recordings_in(files)) if wanted.report is not None else ())
     except (RigError, OSError) as error:
         click.echo(f"rig diagnose: {error}", err=True)
         raise SystemExit(2) from error

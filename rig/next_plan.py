@@ -16,11 +16,13 @@ if TYPE_CHECKING:
 
 
 def asked(plan: Path | None, campaign: Path | None) -> CampaignConfig | None:
-    """The campaign whose bench is used. Raises ConfigError for a plan without one, before anything is computed."""
+    """The campaign whose bench is used. Raises ConfigError for a plan without one, or in its place."""
     if plan is not None and campaign is None:
         raise ConfigError("--plan needs --campaign, the campaign file of the recordings: it names bench and pacing")
     if campaign is None:
         return None
+    if plan is not None:
+        _require_apart(plan, campaign)
     from rig.loading import load_campaign  # pydantic and every driver: not for a diagnosis without a plan
 
     return load_campaign(campaign)
@@ -53,17 +55,27 @@ def limits_of(
     )
 
 
+def require_thruster(campaign: CampaignConfig, thruster: str) -> None:
+    """Raises ConfigError for a campaign of other thrusters."""
+    if thruster not in campaign.thrusters:
+        raise ConfigError(
+            f"{campaign.path}: the recordings are of thruster {thruster}, but the campaign has "
+            f"{', '.join(campaign.thrusters)}; give the campaign they were made with"
+        )
+
+
+def _require_apart(plan: Path, campaign: Path) -> None:
+    if plan.resolve() == campaign.resolve():
+        raise ConfigError(f"{plan}: this is the campaign that the plan is made from; choose another name for --plan")
+
+
 def next_template(found: Diagnosis, campaign: CampaignConfig, *, attended: bool = False) -> Template:
     """The campaign's bench and pacing for one thruster; no zero returns but the last, for the steps hold rests.
 
     `attended`: the run stops when its front end is gone, whatever the campaign allows.
     """
     assert found.next_experiment is not None
-    if found.thruster not in campaign.thrusters:
-        raise ConfigError(
-            f"{campaign.path}: the recordings are of thruster {found.thruster}, but the campaign has "
-            f"{', '.join(campaign.thrusters)}; give the campaign they were made with"
-        )
+    require_thruster(campaign, found.thruster)
     shortest = min(step.duration for step in found.next_experiment.steps)
     template = template_of(campaign)
     return replace(
@@ -77,12 +89,11 @@ def next_template(found: Diagnosis, campaign: CampaignConfig, *, attended: bool 
 
 
 def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path, *, attended: bool = False) -> tuple[Path, ...]:
-    """Write the sweep; one file for each flow speed. Raises PlanError when there is nothing to tell apart."""
+    """Write the sweep, one file for each flow speed; none when nothing is to be told apart. Raises ConfigError."""
     proposed = found.next_experiment
     if proposed is None:
-        raise PlanError("--plan: no next experiment is needed, for no finding has a rival; nothing was written")
-    if path.resolve() == campaign.path.resolve():
-        raise ConfigError(f"{path}: this is the campaign that the plan is made from; choose another name for --plan")
+        return ()
+    _require_apart(path, campaign.path)
     flows = {step.flow_speed for step in proposed.steps}
     levels = [
         Level(step.command_voltage, step.duration, step.flow_speed if len(flows) > 1 or step.flow_speed else None)

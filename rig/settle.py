@@ -16,9 +16,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rig.answer_files import Wanted
 from rig.config import CampaignConfig
 from rig.design_ask import seconds
-from rig.diagnose import diagnose_files, recordings_in, tell
+from rig.diagnose import diagnose_files, read, recordings_in, tell
 from rig.errors import ConfigError, RigError
 from rig.loading import load_bench, load_campaign
 from rig.next_plan import limits_of, write_next
@@ -113,8 +114,6 @@ class Settling:
 
     def _written(self, found: Diagnosis, number: int) -> tuple[Path, ...]:
         """The plans of the next experiment: one for each flow speed, none when there is no experiment."""
-        if found.next_experiment is None:
-            return ()
         return write_next(found, self.campaign, self.folder / f"round-{number}.toml", attended=True)
 
     def _needs(self, plans: Sequence[Path]) -> float:
@@ -290,5 +289,5 @@ def settle_command(
         else:
             json_path.write_text(text + "\n", encoding="utf-8")
     with contextlib.redirect_stdout(sys.stderr) if alone else contextlib.nullcontext():
-        tell(found, None, report, None, settling.files)
+        tell(found, Wanted(report=report), read(settling.files) if report is not None else ())
     return 1 if end.reason == "aborted" else 0

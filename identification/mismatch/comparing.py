@@ -9,6 +9,7 @@ See docs/decisions/0005-a-simulation-is-a-baseline.md.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -18,6 +19,7 @@ from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.preparing import DRIVERS, Refusal
 from identification.mismatch.simulating import Drive, held, others_of, simulate
+from identification.mismatch.sweeps import Limits
 from identification.recording import Channel, Floats, Recording
 from identification.twin import Twin
 
@@ -43,10 +45,22 @@ class Compared:
     """s by which the simulation's clock is late."""
     subtracted: float
     """N rms of what the simulation has beyond its own description."""
+    recording: Recording
+    """The real recording as it was diagnosed: less what the simulation has beyond its own description."""
 
 
-def compare(simulation: Recording, real: Recording, seed: int = 0) -> Compared | Refusal:
-    """What the simulation leaves out relative to the real recording."""
+def compare(
+    simulation: Recording,
+    real: Recording,
+    seed: int = 0,
+    holdout: Sequence[Recording] = (),
+    limits: Limits | None = None,
+) -> Compared | Refusal:
+    """What the simulation leaves out relative to the real recording.
+
+    `holdout`: real runs that are only predicted, by the description of the simulation, for nobody simulated them.
+    `limits`: of the next experiment, as for diagnose().
+    """
     drives = _driver(simulation), _driver(real)
     sim_driver, real_driver = drives
     if sim_driver is None or real_driver is None or sim_driver.quantity != real_driver.quantity:
@@ -69,12 +83,14 @@ def compare(simulation: Recording, real: Recording, seed: int = 0) -> Compared |
         return left
     exact = twin.covariance if np.all(left == 0) else tuple((0.0,) * len(twin.names) for _ in twin.names)
     origin = f"the simulation {_name(simulation)}"
-    twin = replace(twin, thruster=real.thruster, origin=origin, sources=(), covariance=exact)
-    found = diagnose([_less(real, left)], seed=seed, baseline=twin)
+    sources = tuple(s for s in twin.sources if s.recording_id != real.recording_id)
+    twin = replace(twin, thruster=real.thruster, origin=origin, sources=sources, covariance=exact)
+    recording = _less(real, left)
+    found = diagnose([recording], holdout, seed, twin, limits)
     if isinstance(found, Refusal):
         return found
     rms = float(np.sqrt(np.nanmean(left**2)))
-    return Compared(_told(found, known, offset, rms), known, offset, rms)
+    return Compared(_told(found, known, offset, rms, len(holdout)), known, offset, rms, recording)
 
 
 def _name(recording: Recording) -> str:
@@ -210,12 +226,16 @@ def _less(real: Recording, left: Floats) -> Recording:
     return _with_thrust(real, thrust, thrust.value - left)
 
 
-def _told(found: Diagnosis, known: Diagnosis, offset: float, rms: float) -> Diagnosis:
+def _told(found: Diagnosis, known: Diagnosis, offset: float, rms: float, held_out: int) -> Diagnosis:
     """With what was done to the simulation."""
     terms = ", ".join(known.model_terms) or "nothing else"
     notes = [f"The simulation was found to be {known.baseline_model} with {terms}; these are part of the baseline."]
     if rms > 0:
-        notes.append(f"What it has beyond that ({rms:.3g} N rms) was subtracted as it is.")
+        notes.append(
+            f"What it has beyond that ({rms:.3g} N rms) was subtracted as it is; a twin that is saved does not hold it."
+        )
+    if rms > 0 and held_out:
+        notes.append("It was not subtracted from what was held out: those runs were not simulated.")
     if offset:
         notes.append(f"Its clock was moved by {-offset:+.4g} s, so that the commands begin together.")
     return replace(found, notes=(*found.notes, *notes))

@@ -83,7 +83,7 @@ def diagnose(
     others = _histories(holdout) if holdout else ()
     if isinstance(others, Refusal):
         return others
-    wrong = unfit(recordings, holdout, histories, baseline)
+    wrong = unfit(recordings, holdout, histories, others, baseline)
     if wrong is not None:
         return wrong
     rng = np.random.default_rng(seed)

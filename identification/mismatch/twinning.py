@@ -168,7 +168,11 @@ def _covariance(state: State, data: Data, before: Twin | None) -> tuple[tuple[fl
 
 
 def unfit(
-    recordings: Sequence[Recording], holdout: Sequence[Recording], histories: Sequence[History], twin: Twin | None
+    recordings: Sequence[Recording],
+    holdout: Sequence[Recording],
+    histories: Sequence[History],
+    others: Sequence[History],
+    twin: Twin | None,
 ) -> Refusal | None:
     """Why these cannot be diagnosed together, or against this twin."""
     thruster, driver = recordings[0].thruster, histories[0].driver_quantity
@@ -183,6 +187,12 @@ def unfit(
         return Refusal(
             f"{twice.source or twice.recording_id} is both to be diagnosed and held out; hold out another recording"
         )
+    for recording, history in zip(holdout, others, strict=True):
+        if history.driver_quantity != driver:
+            return Refusal(
+                f"{recording.source or recording.recording_id} is driven by {history.driver_quantity}, the recordings "
+                f"to be diagnosed by {driver}; hold out a recording with {driver}"
+            )
     for recording, history in zip(recordings, histories, strict=True):
         few = _too_little(recording.source or recording.recording_id, history)
         if few is not None:
@@ -199,7 +209,7 @@ def unfit(
             f"the twin is driven by {twin.driver_quantity}, the recording by {driver}; both must be the same"
         )
     for term in twin.terms:
-        for history in histories:
+        for history in (*histories, *others):
             lacking = sorted(set(term.term.needs) - set(history.others))
             if lacking:
                 return Refusal(

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
+from report_reading import open_fonts
 
 from rig.cli import rig
 from rig.diagnose_text import diagnosis_text
@@ -19,6 +20,7 @@ from rig.simulate import timed
 from rig.twin import read_twin, twin_json, write_twin
 
 ROOT = Path(__file__).parents[2]
+RIGHT = Path(__file__).parent / "wrong" / "right.toml"
 
 
 def example(name: str):
@@ -185,22 +187,62 @@ def test_ramps_and_sines_of_a_plan_become_rows():
     assert max(v for _, v in rows) == pytest.approx(3.0)
 
 
-def test_compare_names_what_the_simulation_leaves_out(folder, dead):
-    path = dead[0]
+def noiseless(columns: dict) -> None:
+    start, level, *_ = columns["command"]
+    time, _, *rest = columns["cell"]
+    volts = level[np.searchsorted(start, time, side="right") - 1]
+    columns["cell"] = (time, 0.4 * volts * np.abs(volts), *rest)
 
-    def noiseless(columns: dict) -> None:
-        start, level, *_ = columns["command"]
-        time, _, *rest = columns["cell"]
-        volts = level[np.searchsorted(start, time, side="right") - 1]
-        columns["cell"] = (time, 0.4 * volts * np.abs(volts), *rest)
 
-    simulation = bad.recording(folder / "foreign.h5", "model 7", change=noiseless)
-    result = run("compare", simulation, path, "--json", "-")
+@pytest.fixture(scope="module")
+def simulation(folder):
+    open_fonts()
+    return bad.recording(folder / "foreign.h5", "model 7", change=noiseless)
+
+
+def test_compare_names_what_the_simulation_leaves_out(simulation, dead):
+    result = run("compare", simulation, dead[0], "--json", "-")
     assert result.exit_code == 0, result.output
     said = json.loads(result.output)
     named = {f["effect"] for f in said["findings"]} | {r for f in said["findings"] for r in f["rivals"]}
     assert "dead_band" in named
     assert "the simulation foreign.h5" in said["baseline"]["model"]
+
+
+def test_compare_writes_and_holds_out_as_diagnose_does(simulation, dead, folder, tmp_path):
+    kept = bad.recording(folder / "kept.h5", seed=3, change=dead_band)
+    out = {name: tmp_path / name for name in ("found.json", "found.html", "T1.twin.json", "next.toml")}
+    options = ("--json", out["found.json"], "--report", out["found.html"], "--save-twin", out["T1.twin.json"])
+    bench = ("--plan", out["next.toml"], "--campaign", RIGHT, "--budget", 60)
+    result = run("compare", simulation, dead[0], "--holdout", kept, *options, *bench)
+    assert result.exit_code == 0, result.output
+    said = json.loads(out["found.json"].read_text())
+    assert load(kept).recording_id in said["fit"]["heldout"]["what"]
+    assert said["fit"]["heldout"]["rmse_after"] < 0.7 * said["fit"]["heldout"]["rmse_before"]
+    assert out["next.toml"].exists() == (said["next_experiment"] is not None)
+    assert ("no next experiment is needed" in result.stderr) == (said["next_experiment"] is None)
+    assert "the simulation foreign.h5" in out["found.html"].read_text()
+    twin = read_twin(out["T1.twin.json"])
+    assert {s.recording_id for s in twin.sources} == {load(path).recording_id for path in (simulation, dead[0])}
+    assert all(len(s.sha256) == 64 for s in twin.sources)
+    again = run("diagnose", dead[0], "--twin", out["T1.twin.json"], "--json", "-")
+    assert json.loads(again.output)["verdict"] == "adequate"
+
+
+def test_compare_draws_each_effect_by_itself(simulation, dead):
+    from identification.mismatch.reported_runs import runs_of
+    from rig.compare import compare_files
+
+    found = compare_files(simulation, dead[0])
+    (one,) = runs_of(found.real, [found.recording])
+    assert {(f.effect, f.form) for f in found.real.findings} <= set(one.effects)
+
+
+def test_compare_holds_out_neither_of_the_two(simulation, dead):
+    for one in (simulation, dead[0]):
+        result = run("compare", simulation, dead[0], "--holdout", one)
+        assert result.exit_code == 2
+        assert "is both to be diagnosed and held out" in result.output
 
 
 def test_compare_refuses_another_command(folder, dead):

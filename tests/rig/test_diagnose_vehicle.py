@@ -97,6 +97,7 @@ def test_text_json_and_page_of_a_vehicle(folder: Path) -> None:
     assert "Motion and residual" in page
 
 
+RIGHT = str(Path(__file__).parent / "wrong" / "right.toml")
 BAD = {
     "mass": (("one.h5", "--mass", "-3"), "--mass -3: expected a number of kg above 0"),
     "std alone": (("one.h5", "--mass-std", "1"), "--mass-std needs --mass"),
@@ -106,12 +107,20 @@ BAD = {
     "a thruster alone": (("tunnel.h5", "--mass", "3"), "these are recordings of a thruster"),
     "no fit": (("one.h5", "--thrusters", "absent.json"), "there is no such file"),
     "no installation": (("one.h5", "--installation", "absent.toml"), "absent.toml"),
+    "a budget": (("one.h5", "--budget", "60"), "--campaign and --budget are of an experiment on the bench"),
+    "a campaign": (("one.h5", "--campaign", RIGHT), "--campaign and --budget are of an experiment on the bench"),
+    "a plan": (("one.h5", "--campaign", RIGHT, "--plan", "next.toml"), "--plan writes a campaign of the bench"),
+    "held out too": (("one.h5", "--holdout", "two.h5", "one.h5"), "is both to be diagnosed and held out"),
     "a twin": (("one.h5", "--save-twin", "twin.json"), "--save-twin keeps the model of a thruster"),
 }
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_cannot_be_used_is_one_sentence_and_exit_status_2(name: str, folder: Path) -> None:
+def test_what_cannot_be_used_is_one_sentence_and_exit_status_2(
+    name: str, folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """None of it after a computation."""
+    monkeypatch.setattr("identification.mismatch.vehicle.diagnose._diagnosed", lambda *_: pytest.fail("computed"))
     arguments, says = BAD[name]
     said = run("diagnose", *(folder / a if a.endswith((".h5", ".json", ".toml")) else a for a in arguments))
     assert said.exit_code == 2

@@ -1,5 +1,6 @@
 """The next experiment as a campaign: what is written is what `rig check` accepts, and what is refused."""
 
+import json
 from dataclasses import replace
 from math import inf
 from pathlib import Path
@@ -7,8 +8,11 @@ from pathlib import Path
 import pytest
 
 from identification.mismatch.diagnosis import Diagnosis, HeldOutRmse, NextExperiment, PlanStep, Rmse
+from identification.recording import Recording
+from rig.answer_files import Wanted
 from rig.check import check_campaign
 from rig.cli import main
+from rig.diagnose import tell
 from rig.errors import ConfigError, PlanError
 from rig.loading import load_campaign
 from rig.next_plan import asked, limits_of, write_next
@@ -44,12 +48,13 @@ def test_one_file_for_each_flow_speed(campaign, tmp_path):
 
 
 def test_refusals(campaign, tmp_path):
-    with pytest.raises(PlanError, match="no finding has a rival"):
-        write_next(replace(FOUND, next_experiment=None), campaign, tmp_path / "next.toml")
+    assert write_next(replace(FOUND, next_experiment=None), campaign, tmp_path / "next.toml") == ()
     with pytest.raises(ConfigError, match="recordings are of thruster T9"):
         write_next(replace(FOUND, thruster="T9"), campaign, tmp_path / "next.toml")
     with pytest.raises(ConfigError, match="choose another name"):
         write_next(FOUND, campaign, campaign.path)
+    with pytest.raises(ConfigError, match="choose another name"):
+        asked(RIGHT, RIGHT)
     with pytest.raises(ConfigError, match="--plan needs --campaign"):
         asked(tmp_path / "next.toml", None)
     with pytest.raises(PlanError, match="--budget must be above 0 s"):
@@ -70,3 +75,48 @@ def test_a_plan_without_a_campaign_is_refused_before_anything_is_read(tmp_path, 
         main(["diagnose", str(tmp_path / "none.h5"), "--plan", str(tmp_path / "next.toml")])
     assert left.value.code == 2
     assert "--plan needs --campaign" in capsys.readouterr().err
+
+
+UNWRITABLE = {
+    "no folder": (("--plan", "absent/next.toml"), "there is no folder"),
+    "a folder": (("--json", "."), "this is a folder"),
+    "no folder for a twin": (("--save-twin", "absent/T1.json"), "there is no folder"),
+    "the campaign itself": (("--plan", str(RIGHT)), "choose another name for --plan"),
+    "no budget": (("--budget", "0"), "--budget must be above 0 s"),
+}
+
+
+@pytest.mark.parametrize("command", ["diagnose", "compare"])
+@pytest.mark.parametrize("name", UNWRITABLE)
+def test_what_cannot_be_written_is_refused_before_anything_is_read(name, command, tmp_path, capsys):
+    (option, value), says = UNWRITABLE[name]
+    files = [str(tmp_path / "none.h5")] * (2 if command == "compare" else 1)
+    given = value if option == "--budget" else str(tmp_path / value)
+    with pytest.raises(SystemExit) as left:
+        main([command, *files, "--campaign", str(RIGHT), option, given])
+    assert left.value.code == 2
+    said = capsys.readouterr().err
+    assert said.startswith(f"rig {command}: ")
+    assert says in said
+    assert said.count("\n") == 1
+
+
+def test_a_campaign_of_other_thrusters_is_refused_before_anything_is_computed(campaign, tmp_path):
+    other = Recording("a", "T9", ())
+    with pytest.raises(ConfigError, match="recordings are of thruster T9"):
+        Wanted(plan=tmp_path / "next.toml", campaign=campaign).refuse([other])
+    Wanted(campaign=campaign).refuse([other])
+
+
+def test_no_next_experiment_is_an_answer(campaign, tmp_path, capsys):
+    plan = tmp_path / "next.toml"
+    tell(replace(FOUND, verdict="adequate", next_experiment=None), Wanted(plan=plan, campaign=campaign))
+    said = capsys.readouterr()
+    assert said.err == f"no next experiment is needed, for no finding has a rival; {plan} was not written\n"
+    assert "T1: adequate" in said.out
+    assert not plan.exists()
+    tell(FOUND, Wanted(json_path=Path("-"), plan=plan, campaign=campaign))
+    said = capsys.readouterr()
+    assert json.loads(said.out)["next_experiment"]["why"] == NEXT.why
+    assert f"next experiment written to {plan}" in said.err
+    assert plan.exists()
