@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from math import floor, isfinite, log10
 from textwrap import wrap
 
-from identification.mismatch.diagnosis import Diagnosis, Finding, Unexplained, Value, Where
+from identification.mismatch.diagnosis import NOT_WHITE, Diagnosis, Finding, Unexplained, Value, Where
 from identification.mismatch.remainder import FlexibleShape, FormulaFound
 
 WIDTH = 100
@@ -175,9 +175,8 @@ def _fit(d: Diagnosis) -> Iterator[str]:
     if d.heldout.after > WORSE * d.heldout.before:
         yield "  the error on what was not fitted GROWS: this model describes the runs, it does not predict others"
     yield from _para(f"not fitted: {d.heldout.what}", "  ")
-    yield from _para(
-        f"chi2 per degree of freedom {d.chi2_per_dof:.3f}; what remains is white with {rarity(d.whiteness_p)}", "  "
-    )
+    white = f"white ({rarity(d.whiteness_p)})" if d.white else f"NOT white ({rarity(d.whiteness_p)}): {NOT_WHITE}"
+    yield from _para(f"chi2 per degree of freedom {d.chi2_per_dof:.3f}; what remains is {white}", "  ")
 
 
 def _next(d: Diagnosis) -> Iterator[str]:

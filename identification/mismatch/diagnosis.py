@@ -14,6 +14,13 @@ from identification.twin import Twin
 QUANTILE = 1.959964
 """Standard errors to the end of a 95 % interval."""
 
+WHITE = 0.01
+"""p-value of whiteness below which what remains is called not white."""
+NOT_WHITE = (
+    "intervals and p-values rest on the noise model, which does not describe all of it: they may be surer than they "
+    "should"
+)
+
 Verdict = Literal["adequate", "explained", "ambiguous", "unexplained"]
 
 
@@ -171,6 +178,11 @@ class Diagnosis:
     """Of the response and its errors."""
     force_unit: str = "N"
     """Of the shape of what is not explained: of a vehicle a force all the same."""
+
+    @property
+    def white(self) -> bool:
+        """Whether the whitened residual is white, as far as its correlations tell."""
+        return self.whiteness_p >= WHITE
 
     @property
     def statement(self) -> str:

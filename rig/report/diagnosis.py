@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite, sqrt
 from pathlib import Path
 
-from identification.mismatch.diagnosis import Diagnosis, NextExperiment, Value
+from identification.mismatch.diagnosis import NOT_WHITE, Diagnosis, NextExperiment, Value
 from identification.mismatch.reported_runs import Run, runs_of
 from identification.recording import Recording
 from rig.report import page as pages
@@ -24,8 +24,6 @@ from rig.report.diagnosis_words import driver_quantity, effect_name, rarity, val
 from rig.report.page import Page, Remark, Section, Sentences, Table, columns, sentences
 from rig.report.rivals import told_apart
 
-WHITE = 0.01
-"""p below which what remains is called not white."""
 MOST_ROWS = 12
 """Rows of a table of steps that stays open."""
 VERDICTS: Mapping[str, Remark] = {
@@ -158,13 +156,14 @@ def after_table(d: Diagnosis) -> tuple[Table, Sentences]:
         own = [_beyond(x, held.noise) for x in (held.before, held.after)]
         told = ["within noise" if x == 0 else f"{x:.3g}" for x in own]
         rows.append(("not fitted, noise taken out", *told, "", _change(*own) if own[1] > 0 else ""))
-    white = d.whiteness_p >= WHITE
+    white = "white" if d.white else "not white"
+    meaning = "" if d.white else f": {NOT_WHITE}"
     judged = (
         Remark(words(f"Not fitted: {d.heldout.what}.")),
         Remark(f"χ² per degree of freedom of the weighted residual: {d.chi2_per_dof:.3f}."),
         Remark(
-            f"What remains is {'white' if white else 'not white'} ({rarity(d.whiteness_p)}).",
-            "good" if white else "doubt",
+            f"What remains is {white} ({rarity(d.whiteness_p)}){meaning}.",
+            "good" if d.white else "doubt",
         ),
     )
     table = Table("Baseline and model", head, tuple(rows), columns(head, head[0]))

@@ -7,6 +7,7 @@ import pytest
 from report_reading import open_fonts, read
 
 from identification.mismatch.diagnosis import (
+    NOT_WHITE,
     Curves,
     Diagnosis,
     Finding,
@@ -24,6 +25,7 @@ from identification.mismatch.preparing import history_of
 from identification.physics.term import Scale
 from identification.recording import Channel, Recording
 from identification.twin import Source, Twin, TwinNoise, TwinTerm
+from rig.diagnose_text import diagnosis_text
 from rig.report.diagnosis import diagnosis_page, write
 from rig.report.look import svg
 from rig.report.page import html
@@ -216,3 +218,23 @@ def test_finding_without_a_coordinate_is_a_sentence():
 def test_same_answer_same_bytes():
     few = answer(curves=(), mismatch=(HIGH,), findings=(), unexplained=ODD, verdict="unexplained")
     assert html(diagnosis_page(few)) == html(diagnosis_page(few))
+
+
+@pytest.mark.parametrize(("p", "says"), [(0.4, "white (p = 0.4)"), (0.01, "white (p = 0.01)")])
+def test_text_and_page_call_white_what_is(p, says):
+    d = answer(whiteness_p=p)
+    for told in (said(d), read(html(diagnosis_page(d))).text):
+        assert f"hat remains is {says}" in told
+        assert NOT_WHITE not in told
+
+
+def test_text_and_page_say_that_what_remains_is_not_white_and_what_that_means():
+    d = answer(whiteness_p=0.0099)
+    assert f"what remains is NOT white (p = 0.0099): {NOT_WHITE}" in said(d)
+    page = read(html(diagnosis_page(d))).text
+    assert "What remains is not white (p = 0.0099): " in page
+    assert NOT_WHITE in page
+
+
+def said(d):
+    return " ".join(diagnosis_text(d).split())
