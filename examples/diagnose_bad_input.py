@@ -112,6 +112,8 @@ def cases(folder: Path) -> dict[str, list[str]]:
         "two thrusters": [str(good), str(folder / "T2.h5")],
         "the same file twice": [str(good), str(good)],
         "hold-out of another thruster": [str(good), "--holdout", str(folder / "T2.h5")],
+        "one file fitted and held out": [str(good), "--holdout", str(folder / "T2.h5"), str(good)],
+        "a twin for a folder that is not there": [str(good), "--save-twin", str(folder / "absent" / "T1.json")],
         "a twin of another thruster": [str(good), "--twin", str(twin)],
         "a twin that is none": [str(good), "--twin", str(good)],
         "a twin with a key missing": [str(folder / "T2.h5"), "--twin", str(broken)],

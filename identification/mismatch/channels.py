@@ -101,14 +101,22 @@ def _fewest(H: Floats, value: Floats) -> list[int]:
     return best
 
 
+def neighbour_of(recording: Recording) -> Channel | None:
+    """Thrust of another thruster, or else its command, where one was recorded beside this one."""
+    beside = (
+        channel
+        for quantity in ("thrust", "command_voltage")
+        for channel in recording.all_of(quantity)
+        if channel.thruster not in (None, "", recording.thruster)
+    )
+    return next(beside, None)
+
+
 def neighbour_at(recording: Recording, at: Floats) -> Floats | None:
     """Thrust of another thruster, or its command squared, where one was recorded beside this one."""
-    for quantity in ("thrust", "command_voltage"):
-        for channel in recording.all_of(quantity):
-            if channel.thruster not in (None, "", recording.thruster):
-                if quantity == "thrust":
-                    return followed(channel, at)
-                value = channel.held_at(at)
-                out: Floats = np.where(np.isfinite(value), value * np.abs(value), 0.0)
-                return out
-    return None
+    channel = neighbour_of(recording)
+    if channel is None or channel.quantity == "thrust":
+        return None if channel is None else followed(channel, at)
+    value = channel.held_at(at)
+    out: Floats = np.where(np.isfinite(value), value * np.abs(value), 0.0)
+    return out

@@ -21,6 +21,7 @@ from identification.mismatch.flexible_shape import refitted_names, shared, with_
 from identification.mismatch.full_rate import look
 from identification.mismatch.intervals import Interval, intervals
 from identification.mismatch.judging import HeldOut, by_blocks, by_runs, rmse, whiteness
+from identification.mismatch.lacking import held_by_all, predictable
 from identification.mismatch.lines import Line
 from identification.mismatch.model import Data, Weights
 from identification.mismatch.naming import Named, name, with_doubts
@@ -29,6 +30,7 @@ from identification.mismatch.noise import Noise
 from identification.mismatch.omnibus import ALARM, Omnibus, judge_left
 from identification.mismatch.predicting import predicting, unforeseen, without_terms
 from identification.mismatch.preparing import Refusal, history_of
+from identification.mismatch.proxies import proxies
 from identification.mismatch.rivals import EQUAL, Standing, settle_forms
 from identification.mismatch.rotating import by_folds
 from identification.mismatch.search import STATIC, Found, prune, resumed, search
@@ -94,6 +96,7 @@ def diagnose(
     if isinstance(others, Refusal):
         return others
     faults += of_others
+    histories, notes = held_by_all(recordings, histories)
     given = None if baseline is None else starting(baseline)
     found = search(histories, rng, given=given, without=without)
     seen = look(found.after.fit, found.data, histories)
@@ -104,8 +107,11 @@ def diagnose(
     found, after, standing = _gone_on(found, rng)
     after, left = _left(found, after, rng)
     measured = replace(found.data, histories=histories)
+    others, unpredicted = predictable(holdout, others, after)
     answer, after = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
     answer = _with_channels(answer, lines, faults)
+    told = (*notes, *unpredicted, *proxies(after.fit.model, answer.findings, recordings, histories))
+    answer = replace(answer, notes=(*answer.notes, *told))
     return with_twin(answer, after, found.data, recordings, baseline)
 
 
