@@ -189,6 +189,6 @@ def _next(d: Diagnosis) -> Iterator[str]:
     flow = any(step.flow_speed for step in n.steps)
     for step in n.steps[:MOST_STEPS]:
         water = f", flow {step.flow_speed:.3g} m/s" if flow else ""
-        yield f"  {step.command_voltage:+8.3g} V for {step.duration:.3g} s{water}"
+        yield f"  {step.command_voltage:+8.3g} {n.unit} for {step.duration:.3g} s{water}"
     if len(n.steps) > MOST_STEPS:
         yield f"  ... and {len(n.steps) - MOST_STEPS} more; all of them are in the JSON"

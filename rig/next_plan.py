@@ -89,10 +89,16 @@ def next_template(found: Diagnosis, campaign: CampaignConfig, *, attended: bool 
 
 
 def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path, *, attended: bool = False) -> tuple[Path, ...]:
-    """Write the sweep, one file for each flow speed; none when nothing is to be told apart. Raises ConfigError."""
+    """Write the sweep, one file for each flow speed; none when nothing is to be told apart. Raises ConfigError, also
+    when the levels are no voltages."""
     proposed = found.next_experiment
     if proposed is None:
         return ()
+    if proposed.quantity != "command_voltage":
+        raise ConfigError(
+            f"--plan: the recordings have no command in V, so the levels of the next experiment are in {proposed.unit}; "
+            "a campaign is driven in V; nothing was written"
+        )
     _require_apart(path, campaign.path)
     flows = {step.flow_speed for step in proposed.steps}
     levels = [

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from identification.mismatch.coordinates import coordinates
 from identification.mismatch.fitting import Fit, extended, fit, raw
 from identification.mismatch.jumps import jumps
-from identification.mismatch.model import Data, Model, Theta, Weights
+from identification.mismatch.model import Data, Model, Spread, Theta, Weights
 from identification.mismatch.screening import (
     MOST_PLAIN,
     PLAIN,
@@ -47,7 +48,22 @@ def start(histories: Sequence[History]) -> tuple[Data, Theta]:
     moving = histories[0].driver_quantity == "command_voltage" and not any(h.static for h in histories)
     most = min(CLOCKS, max(h.jitter for h in histories)) if moving else 0.0
     data = Data(tuple(histories), scale_of(histories, C or 1e-12), with_rate=with_rate, most_shift=most)
+    data = replace(data, spread=level_spread(data, C))
     return data, Theta(C, (), tuple(float(ym - C * fm) for fm, ym in means), k=_k(histories))
+
+
+def level_spread(data: Data, C: float) -> Spread | None:
+    """What the thrust C n|n| is off by where a noisy driver stood still: at all of a level alike, so that levels
+    scatter more than their samples say."""
+    parts: list[list[Floats]] = [[] for _ in data.histories]
+    for i, h in enumerate(data.histories):
+        for error in h.level_errors.T:
+            for k, other in enumerate(data.histories):
+                column = np.zeros(other.rows.size)
+                parts[k].append((2 * C * np.abs(h.driver) * error)[h.rows] if k == i else column)
+    if not parts[0]:
+        return None
+    return Spread(tuple(np.column_stack(p) for p in parts), tuple(np.empty((h.rates.size, len(parts[0]))) * 0 for h in data.histories))
 
 
 def _k(histories: Sequence[History]) -> float:

@@ -127,6 +127,7 @@ class HeldOutRmse:
 @dataclass(frozen=True, slots=True)
 class PlanStep:
     command_voltage: float
+    """V, or what the `quantity` of its experiment is measured in."""
     duration: float
     flow_speed: float = 0.0
 
@@ -136,6 +137,12 @@ class NextExperiment:
     why: str
     steps: tuple[PlanStep, ...]
     expected_power: float
+    quantity: str = "command_voltage"
+    """What the steps hold: `rotation_rate` where the recordings have no voltage."""
+
+    @property
+    def unit(self) -> str:
+        return "rev/s" if self.quantity == "rotation_rate" else "V"
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,7 +252,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, object]:
         else {
             "why": d.next_experiment.why,
             "steps": [
-                {"command_voltage": s.command_voltage, "duration": s.duration, "flow_speed": s.flow_speed}
+                {d.next_experiment.quantity: s.command_voltage, "duration": s.duration, "flow_speed": s.flow_speed}
                 for s in d.next_experiment.steps
             ],
             "expected_power": _number(d.next_experiment.expected_power),

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch.calming import Level, calmed
+from identification.mismatch.measured import ENOUGH, NOISES, jumped, known, noise_of, with_jumps
 from identification.recording import Channel, Floats
 
 FINEST = 0.01
@@ -36,6 +38,12 @@ LARGEST_TICK = 0.08
 """...larger than this share of the largest driver."""
 REST = 3.0
 """Spacings of the samples: a command that stood for longer was held."""
+LOUD = 1e-4
+"""Of the largest driver: noise of a measured driver that is averaged."""
+LOST = 0.5
+"""Of the noise of a thrust sample: an error of the driver that makes less is not seen."""
+HALF = 0.5
+"""Of the samples: where fewer are clear of the driver's noise, none is left out."""
 STEP = 0.02
 """Share of the largest driver: a change of a command that is a step."""
 
@@ -58,7 +66,10 @@ def _gaps(time: Floats, good: NDArray[np.bool_]) -> Floats:
 
 
 class Held:
-    """The driver as a function of time: constant between rows of a command, a straight line between measurements."""
+    """The driver as a function of time: constant between rows of a command, a straight line between measurements.
+
+    A measurement that jumped from one sample to the next did so half way between them.
+    """
 
     def __init__(self, channel: Channel, end: float) -> None:
         good = np.isfinite(channel.value)
@@ -70,6 +81,21 @@ class Held:
         for begun, ended in self.unknown:
             known[channel.time == ended] = begun
         self.time, self.value = distinct(known[good], channel.value[good])
+        self.noise = 0.0 if self.stepwise else noise_of(self.value)
+        """Standard deviation of a sample, in the driver's unit."""
+        self._samples = self.time, self.value
+        self.levels: tuple[Level, ...] = ()
+        """Of a measured driver with noise: where it stood still."""
+        self._error = np.zeros(self.time.size)
+        self._jumped = np.zeros(max(self.time.size - 1, 0), dtype=bool)
+        self.loud = self.noise > LOUD * float(np.max(np.abs(self.value)))
+        if not self.stepwise:
+            self._jumped = jumped(self.value, self.noise)
+            if self.loud:
+                calm = calmed(self.time, self.value, self._jumped, self.noise)
+                self.value, self.levels, self._error = calm.value, calm.levels, calm.error
+                self._samples = self.time, self.value
+            self.time, self.value = with_jumps(self.time, self.value, self._jumped)
         last = max(end, float(self.time[-1]))
         knots = np.append(self.time, last + 1.0)
         if self.stepwise:
@@ -109,6 +135,39 @@ class Held:
         out: Floats = total / np.diff(edges) - mean * np.abs(mean)
         return out
 
+    @property
+    def jumps(self) -> Floats:
+        """s: where a measured driver went to another level between two samples."""
+        time = self._samples[0]
+        out: Floats = 0.5 * (time[1:] + time[:-1])[self._jumped]
+        return out
+
+    def at(self, time: Floats) -> Floats:
+        """(N,) a measured driver at each time."""
+        return np.asarray(np.interp(time, self.time, self.value), dtype=np.float64)
+
+    @property
+    def finest(self) -> float:
+        """s: between samples of a measured driver whose noise is seen; 0 of all others."""
+        return float(np.median(np.diff(self._samples[0]))) if self.loud and self.time.size > 1 else 0.0
+
+    def clear(self, time: Floats, force: Floats) -> NDArray[np.bool_]:
+        """(N,) whether the error of a measured driver is lost in the noise of the thrust `force` in N; all, where that
+        would leave too little."""
+        n = self.at(time)
+        beside = n * np.abs(n) - np.mean(n * np.abs(n))
+        C = float(beside @ force) / max(float(beside @ beside), 1e-300)
+        off = 2 * abs(C) * np.abs(n) * np.interp(time, self._samples[0], self._error)
+        told = off <= LOST * noise_of(force)
+        return told if np.count_nonzero(told) > HALF * time.size else np.ones(time.size, dtype=bool)
+
+    def known(self, time: Floats) -> NDArray[np.bool_]:
+        """(N,) whether a measured driver is known at each time; all, where that would leave too little."""
+        if self._jumped.size == 0:
+            return np.ones(time.size, dtype=bool)
+        told = known(*self._samples, self._jumped, self.noise, time)
+        return told if np.count_nonzero(told) > ENOUGH * time.size else np.ones(time.size, dtype=bool)
+
     def starts(self, rest: float) -> Floats:
         """Times at which it begins to move, and not by a step, after it stood for more than `rest` s."""
         change = np.diff(self.value)
@@ -119,7 +178,7 @@ class Held:
 
     def changes(self) -> Floats:
         """Times at which it has moved by MOVES of its size since the last such time."""
-        step = MOVES * float(np.max(np.abs(self.value)))
+        step = max(MOVES * float(np.max(np.abs(self.value))), NOISES * self.noise)
         index, last = [0], self.value[0]
         if self.value.size < 200_000:
             for i, v in enumerate(self.value.tolist()):
@@ -138,7 +197,7 @@ def edges_of(time: Floats, held: Held, most: int) -> Floats:
     changes = held.changes()
     index = np.searchsorted(changes, candidates, side="right") - 1
     since = np.where(index >= 0, candidates - changes[np.maximum(index, 0)], COARSEST / GROWTH)
-    finest = max(FINEST, spacing)
+    finest = max(FINEST, spacing, held.finest)
     width = np.clip(GROWTH * since, finest, max(COARSEST, finest))
     wanted = np.concatenate([[0.0], np.cumsum(np.diff(candidates) / width[1:])])
     shrink = min(1.0, most / max(float(wanted[-1]), 1.0))
@@ -148,8 +207,18 @@ def edges_of(time: Floats, held: Held, most: int) -> Floats:
     gap = np.flatnonzero(np.diff(time) > GAP * spacing)
     if 0 < gap.size < most // 4:  # samples at the end of a long interval would stand for its middle
         edges = np.union1d(edges, np.concatenate([time[gap] + 0.5 * spacing, time[gap + 1] - 0.5 * spacing]))
-    edges = _with_starts(edges, candidates, held, spacing, most)
+    edges = _with_starts(_with_jumps(edges, held, most), candidates, held, spacing, most)
     return _with_windows(_with_steps(edges, held, spacing, most), time, held, spacing, most)
+
+
+def _with_jumps(edges: Floats, held: Held, most: int) -> Floats:
+    """Two levels of a measured driver share no interval."""
+    inside = held.jumps[(held.jumps > edges[0]) & (held.jumps < edges[-1])]
+    if not 0 < inside.size < most // 4:
+        return edges
+    out = np.union1d(edges, inside)
+    result: Floats = out[np.concatenate([[True], np.diff(out) > 1e-6])]
+    return result
 
 
 def _with_starts(edges: Floats, candidates: Floats, held: Held, spacing: float, most: int) -> Floats:

@@ -9,7 +9,7 @@ GOOD or the budget is spent; then pieces that are not needed are left out again.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations
 
 import numpy as np
@@ -99,6 +99,8 @@ def propose(state: State, data: Data, named: Sequence[Named], limits: Limits | N
     if contest is None:
         return None
     limits = limits or Limits()
+    if data.scale.driver_unit != "V":
+        limits = replace(limits, max_voltage=None, slew=None)  # of a bench, in V
     bench = Bench(state, data, _slew(data, limits))
     largest = _largest(data, state, limits)
     known = blocks(largest, _flows(data, limits))
@@ -160,7 +162,8 @@ class _Tried:
         if worst >= GOOD:
             chosen = self._shortened(chosen)
             worst, at = self._judged(chosen)
-        return NextExperiment(self._why(chosen, at), self._steps(chosen), self._expected(at))
+        held = "command_voltage" if self.driver_unit == "V" else "rotation_rate"
+        return NextExperiment(self._why(chosen, at), self._steps(chosen), self._expected(at), held)
 
     def _steps(self, chosen: Sequence[int]) -> tuple[PlanStep, ...]:
         return put_together([self.every[k] for k in chosen], self.every)

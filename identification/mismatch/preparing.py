@@ -25,6 +25,8 @@ MOST_INTERVALS = 6000
 MOST_MOVING = 10000
 """The same where the driver hardly ever stands still: within an interval a kink of the curve is not seen."""
 MANY_CHANGES = 1500
+MOST_LEVELS = 300
+"""Of a measured driver, whose errors are told from noise."""
 AFTER_UNKNOWN = 1.0
 """s after a stretch of unknown command before thrust counts again."""
 LEAST_DWELL = 0.5
@@ -104,11 +106,17 @@ def _driven(time: Floats, force: Floats, held: Held) -> tuple[Floats, Floats]:
 
 
 def _clear_of_steps(time: Floats, force: Floats, held: Held) -> tuple[Floats, Floats]:
-    """Without samples so near to a step of the command that the clocks cannot say which level they belong to."""
+    """Without samples so near to a step of the command that the clocks cannot say which level they belong to, or of
+    which a measured driver does not say what drove them."""
+    if not held.stepwise:
+        told = held.known(time)
+        time, force = time[told], force[told]
+        clear = held.clear(time, force)
+        return time[clear], force[clear]
     size = float(np.max(np.abs(held.value)))
     big = np.abs(np.diff(held.value, prepend=0.0)) > STEP * size  # the first row is a step from nothing
     steps = held.time[big]
-    if not (held.stepwise and steps.size) or time.size < 4 * steps.size:
+    if not steps.size or time.size < 4 * steps.size:
         return time, force
     least = jitter_of(time)
     after = np.searchsorted(steps, time + min(JITTER_BEFORE, least), side="right") - 1
@@ -190,6 +198,8 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         sampled=sampled,
         within=within,
         tick=max(float(np.median(np.diff(held.time))), 1e-6) if held.time.size > 1 else 1.0,
+        driver_noise=held.noise,
+        level_errors=_level_errors(held, edges),
         ticks=(held.time, held.value) if held.stepwise else None,
         sample_time=time[inside],
         sample_thrust=force[inside],
@@ -204,7 +214,16 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
         static=_is_table(held, time.size),
     )
-    return with_leads(history)
+    return with_leads(history, None if held.stepwise else held.at(history.thrust_samples.time))
+
+
+def _level_errors(held: Held, edges: Floats) -> Floats:
+    """(M, k) of each level at which a measured driver stood still: the error of its mean, which all of it shares."""
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    if not 0 < len(held.levels) <= MOST_LEVELS:
+        return np.empty((middle.size, 0))
+    columns = [np.where((middle >= v.begun) & (middle <= v.ended), v.error, 0.0) for v in held.levels]
+    return np.column_stack(columns)
 
 
 def _rate_per_driver(driven: Floats, rate: Floats, edges: Floats) -> float:

@@ -26,6 +26,8 @@ CHANGED = 0.01
 """Share of the largest driver: a smaller difference between neighbouring intervals is no step."""
 BACK = 0.005
 """Share of the largest driver by which it must come back to have turned round."""
+NOISES = 5.0
+"""Standard deviations of a measured driver: a smaller difference may be its noise."""
 MOST_LEADS = 160
 """Remembered: those of all trials of a screening, twice."""
 MOST_LATELY = 12
@@ -128,6 +130,10 @@ class History:
     """(M,) or (1,): driver |driver| at the samples less what the line through its means and the lead make of it."""
     tick: float = 1.0
     """s between changes of the command where it ticks on."""
+    driver_noise: float = 0.0
+    """Of a sample of a measured driver, standard deviation in its unit."""
+    level_errors: Floats = field(default_factory=lambda: np.empty((0, 0)), repr=False)
+    """(M, k) in the driver's unit: what each level of a measured driver may be off by, one standard deviation."""
     rate_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     ticks: tuple[Floats, Floats] | None = field(default=None, repr=False)
     """s, driver: every change of a command that is held between."""
@@ -249,7 +255,8 @@ class History:
     @cached_property
     def level_start(self) -> NDArray[np.intp]:
         """(M,) index of the interval in which the present level began."""
-        new = np.abs(np.diff(self.driver, prepend=np.nan)) > CHANGED * self.size
+        least = max(CHANGED * self.size, NOISES * self.driver_noise)
+        new = np.abs(np.diff(self.driver, prepend=np.nan)) > least
         new[0] = True
         return np.maximum.accumulate(np.where(new, np.arange(new.size), 0))
 
@@ -263,7 +270,7 @@ class History:
     def direction_of_change(self) -> Floats:
         """(M,) 1 where the driver last went up, -1 where it went down, 0 before its first change; moving or held."""
         out = np.zeros(self.driver.size)
-        way, furthest, play = 0.0, float(self.driver[0]), BACK * self.size
+        way, furthest, play = 0.0, float(self.driver[0]), max(BACK * self.size, NOISES * self.driver_noise)
         for i, value in enumerate(self.driver.tolist()):
             if (value - furthest) * way > 0:
                 furthest = value

@@ -31,10 +31,13 @@ def each_lead(history: History, value: Floats, means: Floats, size: float) -> Fl
     return _ticks(value - within_intervals(means, history.edges, history.sample_time), size)
 
 
-def with_leads(history: History) -> History:
-    """With what its command itself does at the samples; a measured driver has no ticks, but curves all the same."""
+def with_leads(history: History, measured: Floats | None = None) -> History:
+    """With what its driver itself does at the samples: a command by its ticks, or `measured` (N,) at each sample.
+
+    What is measured is paired with the thrust of the same instant, however quickly it moves.
+    """
     if history.ticks is None:
-        return replace(history, curved=history.excess)
+        return history if measured is None else _paired(history, measured)
     driver, size, samples = history.driver, history.size, history.thrust_samples
     value = _held(history, samples)
     beside = lead(history, samples.means(value), driver, samples, size)
@@ -44,6 +47,19 @@ def with_leads(history: History) -> History:
         return out
     turning = history.rate_samples
     return replace(out, rate_lead=lead(history, turning.means(_held(history, turning)), driver, turning, size))
+
+
+def _paired(history: History, value: Floats) -> History:
+    driver, samples = history.driver, history.thrust_samples
+    beside = lead(history, samples.means(value), driver, samples, np.inf)
+    line = reconstructed(driver * np.abs(driver), history.middle, samples.middle)
+    curved = samples.means(value * np.abs(value)) - line - 2 * np.abs(driver) * beside
+    return replace(
+        history,
+        lead=beside,
+        curved=np.where(samples.count > 0, curved, 0.0),
+        sample_lead=each_lead(history, value, driver, np.inf),
+    )
 
 
 def _held(history: History, samples: Samples) -> Floats:

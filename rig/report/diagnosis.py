@@ -232,7 +232,7 @@ def next_section(n: NextExperiment | None) -> tuple[Section, ...]:
     """The sweep that decides."""
     if n is None or not n.steps:
         return ()
-    head = ("step", "voltage / V", "duration / s", "flow / (m/s)")
+    head = ("step", "voltage / V" if n.unit == "V" else "rotation rate / (rev/s)", "duration / s", "flow / (m/s)")
     rows = tuple(
         (str(i), f"{s.command_voltage:+.4g}".replace("-", "−"), f"{s.duration:.4g}", f"{s.flow_speed:.3g}")
         for i, s in enumerate(n.steps, 1)

@@ -49,6 +49,9 @@ def test_one_file_for_each_flow_speed(campaign, tmp_path):
 
 def test_refusals(campaign, tmp_path):
     assert write_next(replace(FOUND, next_experiment=None), campaign, tmp_path / "next.toml") == ()
+    turning = replace(FOUND, next_experiment=replace(NEXT, quantity="rotation_rate"))
+    with pytest.raises(ConfigError, match="levels of the next experiment are in rev/s; a campaign is driven in V"):
+        write_next(turning, campaign, tmp_path / "next.toml")
     with pytest.raises(ConfigError, match="recordings are of thruster T9"):
         write_next(replace(FOUND, thruster="T9"), campaign, tmp_path / "next.toml")
     with pytest.raises(ConfigError, match="choose another name"):

@@ -1,0 +1,136 @@
+"""The noise of a measured driver averaged, and nothing else: noise in what explains would be taken for physics.
+
+A lag or a ringing stand averages too: beside a driver with its noise it would explain the thrust better than none.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.recording import Floats
+
+REACHES = (2, 4, 8, 16, 32, 64, 128, 256)
+"""Samples on either side that are averaged."""
+AGREES = 2.0
+"""Standard deviations by which what longer and shorter reaches make of a sample may differ (Lepski)."""
+TWICE = 1.8
+"""Variance of a straight line fitted twice, by that of one fitted once."""
+SIDES = (1, 1), (1, 0), (0, 1)
+"""Whether samples before, and after, are looked at: beside a kink those on one side."""
+BENT = 3.5
+"""Standard deviations of a second difference."""
+LATER = (1.0, 0.75, 0.5, 0.25)
+"""Parts of what lies between two jumps that may stand still: a rotor takes its time."""
+FEW = 8
+"""Samples that tell that a level stands still."""
+STILL = 2.5
+"""Standard deviations: slope and correlation of neighbours of a level that stands still."""
+SPREAD = 3.0
+"""The same of its variance."""
+
+
+@dataclass(frozen=True, slots=True)
+class Level:
+    """A level that stood still: index of its first sample and one past its last, their times in s, their mean and its
+    standard error."""
+
+    first: int
+    last: int
+    begun: float
+    ended: float
+    value: float
+    error: float
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Calmed:
+    """A driver without most of its noise."""
+
+    value: Floats
+    error: Floats
+    """(n,) standard error beside that of a level."""
+    levels: tuple[Level, ...]
+
+
+def calmed(time: Floats, value: Floats, jumps: NDArray[np.bool_], noise: float) -> Calmed:
+    """(n,) the driver without most of its white noise (standard deviation `noise`), no jump (n-1,) rounded off.
+
+    A level that stands still is its mean. Elsewhere each sample is taken from a straight line through its neighbours,
+    fitted once more to what that leaves, so that curves are followed; as many neighbours as agree with fewer.
+    """
+    first = np.concatenate([[0], np.flatnonzero(jumps | _bent(value, jumps, noise)) + 1])
+    size = np.diff(np.append(first, value.size))
+    level = np.repeat(np.arange(first.size), size)
+    index = np.arange(value.size)
+    begin, end = first[level], (first + size)[level]
+    out, least = value.copy(), np.ones(value.size)
+    for before, after in SIDES:
+        low, high = value - AGREES * noise, value + AGREES * noise
+        agree = np.ones(value.size, dtype=bool)
+        for reach in REACHES:
+            window = np.maximum(index - before * reach, begin), np.minimum(index + after * reach + 1, end)
+            line, share = _line(time, value, *window)
+            if before and after:
+                line, share = line + _line(time, value - line, *window)[0], np.minimum(TWICE * share, 1.0)
+            error = AGREES * noise * np.sqrt(share)
+            low, high = np.maximum(low, line - error), np.minimum(high, line + error)
+            agree &= low <= high
+            better = agree & (share < least)
+            out[better], least[better] = line[better], share[better]
+    levels = [found for i, n in zip(first, size, strict=True) if (found := _still(time, value, i, i + n, noise))]
+    for one in levels:
+        least[first[level[one.first]] : one.first] = 1.0  # on its way there
+        out[one.first : one.last], least[one.first : one.last] = one.value, 0.0
+    return Calmed(out, noise * np.sqrt(least), tuple(levels))
+
+
+def _bent(value: Floats, jumps: NDArray[np.bool_], noise: float) -> NDArray[np.bool_]:
+    """(n-1,) beside samples at which it bends by far more than noise: no line goes through these."""
+    bent = (np.abs(np.diff(value, 2)) > BENT * np.sqrt(6.0) * noise) & ~(jumps[1:] | jumps[:-1])
+    out = np.zeros(value.size - 1, dtype=bool)
+    out[:-1] |= bent
+    out[1:] |= bent
+    return out
+
+
+def _line(time: Floats, value: Floats, begin: NDArray[np.intp], end: NDArray[np.intp]) -> tuple[Floats, Floats]:
+    """(n,) straight lines through the samples begin..end round each sample, there; and their variance by that of a
+    sample. Windows of fewer than three leave the sample."""
+    t, v = (time - time.mean()).astype(np.longdouble), value.astype(np.longdouble)  # sums of squares, then differences
+    n = end - begin
+    at, mean, squares, products = (_sums(q, begin, end) for q in (t, v, t * t, t * v))
+    at, mean = at / n, mean / n
+    enough = n > 2
+    spread = np.where(enough, squares - n * at**2, 1.0)
+    line = np.where(enough, mean + (products - n * at * mean) / spread * (t - at), v)
+    share = np.where(enough, 1 / n + (t - at) ** 2 / spread, 1.0)
+    return line.astype(np.float64), share.astype(np.float64)
+
+
+def _sums(value: NDArray[np.longdouble], begin: NDArray[np.intp], end: NDArray[np.intp]) -> NDArray[np.longdouble]:
+    total = np.concatenate([np.zeros(1, dtype=np.longdouble), np.cumsum(value)])
+    out: NDArray[np.longdouble] = total[end] - total[begin]
+    return out
+
+
+def _still(time: Floats, value: Floats, first: int, last: int, noise: float) -> Level | None:
+    """The samples first..last, or the later part of them, where white noise alone moves them."""
+    for share in LATER:
+        begin = last - int(share * (last - first))
+        n = last - begin
+        if n < FEW:
+            break
+        mean = float(value[begin:last].mean())
+        off, late = value[begin:last] - mean, time[begin:last] - time[begin:last].mean()
+        slope, along = off @ late / np.sqrt(late @ late), off[1:] @ off[:-1] / np.sqrt(n)
+        variance = off @ off / (n - 1)
+        if (
+            variance < noise**2 * (1 + SPREAD * np.sqrt(2 / n))
+            and abs(slope) < STILL * noise
+            and along < STILL * noise**2
+        ):
+            return Level(begin, last, float(time[begin]), float(time[last - 1]), mean, noise / float(np.sqrt(n)))
+    return None
