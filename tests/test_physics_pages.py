@@ -27,9 +27,17 @@ SECTIONS = (
     "Example",
 )
 LONG = Scale(
-    driver=17.0, driver_unit="V", thrust=131.0, duration=611.0, interval=0.013, flow=0.7, reading=139.0, noise=0.1
+    driver=17.0,
+    driver_unit="V",
+    thrust=131.0,
+    duration=611.0,
+    interval=0.013,
+    flow=0.7,
+    reading=139.0,
+    noise=0.1,
+    torque=6.1,
 )
-SHORT = replace(LONG, driver=44.0, thrust=2.3, duration=37.0, interval=0.002, reading=3.1)
+SHORT = replace(LONG, driver=44.0, thrust=2.3, duration=37.0, interval=0.002, reading=3.1, torque=0.09)
 
 
 def page(effect: str) -> str:
@@ -54,6 +62,7 @@ def size(expression: str, scale: Scale) -> float:
         "V_max": scale.driver,
         "T_max": scale.thrust,
         "U_max": scale.flow,
+        "Q_max": scale.torque,
         "duration": scale.duration,
         "interval": scale.interval,
         "reading": scale.reading,

@@ -66,8 +66,7 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
         return followed(channel, at)
     time, value = channel.time[good], channel.value[good]
     size = float(np.max(np.abs(driven))) or 1.0
-    index = np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)
-    then = held.value[index] if held.stepwise else np.interp(time, held.time, held.value)
+    then = _driven_at(held, time)
     charge = np.cumsum(np.abs(driven / size) ** 3 * dt)
     drawn = np.interp(time, at, charge)
 
@@ -85,6 +84,36 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     if missed > (1 - REST_TOLD) * float(np.mean(rest**2)):
         return by_load
     return by_load + np.interp(at, time, calm)
+
+
+def torque(channel: Channel, held: Held, at: Floats, driven: Floats) -> Floats | None:
+    """What the driver makes of it, and the rest, whose noise is averaged between steps: noise in a torque would hide
+    how much of it the cell feels."""
+    good = np.isfinite(channel.value)
+    if np.count_nonzero(good) < 2 * LOADS:
+        return followed(channel, at)
+    time, value = channel.time[good], channel.value[good]
+    size = float(np.max(np.abs(driven))) or 1.0
+    then = _driven_at(held, time)
+
+    def columns(v: Floats) -> Floats:
+        u = v / size
+        return np.column_stack([np.ones(u.size), u, np.abs(u), u * np.abs(u), u**2])
+
+    law = np.linalg.lstsq(columns(then), value, rcond=None)[0]
+    calm, _ = _calmest(value - columns(then) @ law, (1, *REACHES), np.abs(np.diff(then)) > STEP * size)
+    out: Floats = columns(driven) @ law + np.interp(at, time, calm)
+    return out
+
+
+def _driven_at(held: Held, time: Floats) -> Floats:
+    """(n,) the driver at each time."""
+    if not held.stepwise:
+        line: Floats = np.interp(time, held.time, held.value)
+        return line
+    index = np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)
+    out: Floats = held.value[index]
+    return out
 
 
 def _fewest(H: Floats, value: Floats) -> list[int]:

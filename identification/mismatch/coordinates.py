@@ -220,6 +220,8 @@ def _channels(view: _View) -> Iterator[Coordinate]:
             if float(np.ptp(every)) > 1e-9 * max(float(np.max(np.abs(every))), 1e-12):
                 gains = (view.force, size)
                 yield _splines(quantity, unit, value, _knots(value, 6), gains, f"it follows {quantity}")
+    if data.scale.torque > 0 and all("torque" in h.others for h in data.histories):
+        yield _torque(view)
     if all(h.rate is not None for h in data.histories):
         columns = []
         for h, r, (_, x), rate, s in zip(data.histories, data.rows, view.whole, view.rate, size, strict=True):
@@ -227,3 +229,16 @@ def _channels(view: _View) -> Iterator[Coordinate]:
             columns.append(np.column_stack([gap, gap * s, gap * rate]))
         what = "thrust follows the measured rate where it leaves the command"
         yield Coordinate("rotation_rate", view.of("rotation_rate"), "rev/s", tuple(columns), what)
+
+
+def _torque(view: _View) -> Coordinate:
+    """Beyond what the driver makes of it: a torque is a response as the thrust is, and has the same static curves."""
+    torque, knots = view.of("torque"), _knots(view.driver, MOST_HATS)
+    curve = [hats(v, knots) for v in view.driver]
+    law = np.linalg.lstsq(np.concatenate(curve), np.concatenate(torque), rcond=None)[0]
+    columns = []
+    for q, known, rate in zip(torque, curve, view.rate, strict=True):
+        gap = (q - known @ law) / view.data.scale.torque
+        columns.append(np.column_stack([gap, gap * np.abs(rate), gap * rate]))
+    what = "thrust follows the measured torque where it leaves the command"
+    return Coordinate("torque", torque, "N.m", tuple(columns), what)

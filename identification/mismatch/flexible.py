@@ -35,7 +35,7 @@ MONOTONE = 0.9
 """Rank correlation with time above which a recorded quantity goes one way only."""
 LOCATED = 0.8
 """Share of the best coordinate's gain at which the located one is kept."""
-FOLLOW_LOAD = ("bus_voltage", "current", "load_history")
+FOLLOW_LOAD = ("bus_voltage", "current", "torque", "load_history")
 """Quantities that a thruster's own load moves."""
 AS_GOOD = 1.02
 """Held-out RMSE over that of terms without an earned name at which a shape that claims nothing takes their place."""

@@ -6,7 +6,7 @@ from identification.mismatch.coordinates import FOLLOWED, LOADS
 from identification.mismatch.model import Data
 from identification.physics.free_form import Flexible, Multiplier
 
-UNITS = dict(FOLLOWED)
+UNITS = {**dict(FOLLOWED), "torque": "N.m"}
 """Of the recorded quantities."""
 
 

@@ -8,7 +8,7 @@ GOOD or the budget is spent; then pieces that are not needed are left out again.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 
@@ -42,23 +42,23 @@ MOST_SHORTENED = 4
 """Blocks without which a sweep is tried."""
 TARGETS = (30.0, 60.0, 120.0, 400.0)
 """Expected chi-square between two rivals that is aimed at: raised while the probability is not GOOD."""
-BEYOND = {
-    "torque_crosstalk": "the torque channel, or dead weights on the cell",
-    "load_cell_nonlinearity": "dead weights on the cell",
-    "load_cell_saturation": "dead weights on the cell",
-    "winding_resistance": "the measured rotation rate or current",
-    "command_saturation": "the measured rotation rate",
-    "rotation_coupling": "the measured rotation rate",
-    "cavitation": "the measured rotation rate, or another depth",
-    "supply_sag": "another supply voltage at the same levels",
-    "heating": "the motor temperature",
-    "speed_of_advance": "other flow speeds, recorded",
-    "strut_drag": "other flow speeds, recorded",
-    "thruster_interaction": "the neighbour switched on and off at one level",
-    "motor_lag": "the measured rotation rate",
-    "time_skew": "the measured rotation rate",
+BEYOND: Mapping[str, tuple[tuple[str, str], ...]] = {
+    "torque_crosstalk": (("torque", "the torque channel"), ("", "dead weights on the cell")),
+    "load_cell_nonlinearity": (("", "dead weights on the cell"),),
+    "load_cell_saturation": (("", "dead weights on the cell"),),
+    "winding_resistance": (("rotation_rate", "the measured rotation rate"), ("current", "the measured current")),
+    "command_saturation": (("rotation_rate", "the measured rotation rate"),),
+    "rotation_coupling": (("rotation_rate", "the measured rotation rate"),),
+    "cavitation": (("rotation_rate", "the measured rotation rate"), ("", "another depth")),
+    "supply_sag": (("", "another supply voltage at the same levels"),),
+    "heating": (("motor_temperature", "the motor temperature"),),
+    "speed_of_advance": (("", "other flow speeds, recorded"),),
+    "strut_drag": (("", "other flow speeds, recorded"),),
+    "thruster_interaction": (("", "the neighbour switched on and off at one level"),),
+    "motor_lag": (("rotation_rate", "the measured rotation rate"),),
+    "time_skew": (("rotation_rate", "the measured rotation rate"),),
 }
-"""What else would tell an effect from others, when no sweep does."""
+"""What else would tell an effect from others, when no sweep does: its quantity, if it is a channel, and its name."""
 
 
 def _utility(apart: Floats, target: float) -> Floats:
@@ -146,6 +146,7 @@ class _Tried:
     def __init__(self, bench: Bench, contest: _Contest, every: tuple[Block, ...], budget: float, data: Data) -> None:
         self.bench, self.contest, self.every, self.budget = bench, contest, every, budget
         self.driver_unit = data.scale.driver_unit
+        self.recorded = set.intersection(*(set(h.others) for h in data.histories))
         self.parts = _looked_at(bench, contest.fits, every)
         self.seconds = np.array([block.seconds for block in every])
         self.pairs = list(permutations(range(len(contest.fits)), 2))
@@ -251,14 +252,12 @@ class _Tried:
         seconds = ending(self._steps(chosen), self.bench.slew)[-1]
         out = []
         for a, b in sorted({(min(pair), max(pair)) for pair, p in at.items() if p < FAIR}):
+            one, other = self.contest.names[a], self.contest.names[b]
             longer = seconds * PLAIN / max(min(apart[a, b], apart[b, a]), 1e-9)
             if longer <= MOST_LONGER * self.budget:
                 takes = f"about {max(longer, seconds) / 60:.0f} min of such a sweep"
             else:
-                takes = (
-                    f"no sweep within these limits, but {_other_means(self.contest.names[a], self.contest.names[b])}"
-                )
-            one, other = self.contest.names[a], self.contest.names[b]
+                takes = f"no sweep within these limits, but {_other_means(one, other, self.recorded)}"
             out.append(f"to tell {one} from {other} takes {takes}" if a == 0 else f"{one} and {other} stay alike")
         return out
 
@@ -284,7 +283,8 @@ def _looked_at(bench: Bench, fits: Sequence[Fit], every: Sequence[Block]) -> Pie
     return pieces([one_zero(view, len(runs)) for view in views], block, len(every))
 
 
-def _other_means(one: str, other: str) -> str:
+def _other_means(one: str, other: str, recorded: Collection[str]) -> str:
+    """What else would tell two answers apart, but for channels that were `recorded` already."""
     ids = [effect for name in (one, other) for effect in name.split(" with ")]
-    means = list(dict.fromkeys(BEYOND[effect] for effect in ids if effect in BEYOND))
-    return ", or ".join(means) if means else "a quieter cell or larger levels"
+    means = [what for effect in ids for channel, what in BEYOND.get(effect, ()) if channel not in recorded]
+    return ", or ".join(dict.fromkeys(means)) if means else "a quieter cell or larger levels"

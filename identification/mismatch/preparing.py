@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.channels import followed, jumps, neighbour_at, supply
+from identification.mismatch.channels import followed, jumps, neighbour_at, supply, torque
 from identification.mismatch.grid import STEP, Held, distinct, edges_of
 from identification.physics.history import CHANGED, History
 from identification.physics.tick_leads import with_leads
@@ -256,11 +256,12 @@ def _explaining(recording: Recording, driver: Channel, held: Held, edges: Floats
         channel = recording.first_of(quantity)
         if channel is None or channel is driver:
             continue
-        values = (
-            supply(channel, held, middle, driven, np.diff(edges))
-            if quantity == "bus_voltage"
-            else followed(channel, middle)
-        )
+        if quantity == "bus_voltage":
+            values = supply(channel, held, middle, driven, np.diff(edges))
+        elif quantity == "torque":
+            values = torque(channel, held, middle, driven)
+        else:
+            values = followed(channel, middle)
         if values is not None:
             out[quantity] = values
     neighbour = neighbour_at(recording, middle)

@@ -54,7 +54,7 @@ STATIC = ("command_voltage", "thrust")
 MOST_STATIC = 2
 """Shapes on one static curve: any curve can be made of more."""
 TWINS = {"asymmetry", "torque_crosstalk"}
-"""The same curve in other words: never both."""
+"""The same curve in other words: never both, unless a torque was recorded."""
 MOVING = {
     "motor_lag",
     "inflow_dynamics",
@@ -72,13 +72,15 @@ MOVING = {
 """Not to be seen in a static table."""
 
 
-PROXIES = {"supply_sag": "bus_voltage", "heating": "motor_temperature"}
+PROXIES = {"supply_sag": "bus_voltage", "heating": "motor_temperature", "torque_crosstalk": "torque"}
 """Effects with forms that do without the channel that shows them; where it was recorded they must use it."""
 
 
 def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
     """Terms of the catalogue whose channels were recorded in every run, but for the effects `without`."""
     have = set.intersection(*(set(h.others) for h in data.histories))
+    if data.scale.torque <= 0:
+        have.discard("torque")  # a channel of zeros
     static = any(h.static for h in data.histories)
     out = []
     for term in CATALOGUE:
@@ -182,7 +184,7 @@ def _screened(state: State, data: Data, terms: Sequence[Term], rng: np.random.Ge
     shapes = Counter(static_curve(t, measured=data.with_rate) for t in inside)
     left = [t for t in terms if t.id not in ids]
     left = [t for t in left if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < MOST_STATIC]
-    if ids & TWINS:
+    if ids & TWINS and data.scale.torque <= 0:
         left = [t for t in left if t.id not in TWINS]
     found = directions(state.fit, data, state.weights, left)
     spared = allowed(corrections(state.fit, data, state.weights), found.columns)

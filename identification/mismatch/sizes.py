@@ -26,7 +26,17 @@ def scale_of(histories: Sequence[History], C: float) -> Scale:
         flow=max(flows, default=0.0),
         reading=max(float(np.nanmax(np.abs(h.thrust))) for h in histories),
         noise=float(np.median([_scatter(h) for h in histories])),
+        torque=_full_torque(histories) * driver**2,
     )
+
+
+def _full_torque(histories: Sequence[History]) -> float:
+    """N m per unit of the driver squared; 0 where not every run has a torque. A peak while it starts counts little."""
+    if not all("torque" in h.others for h in histories):
+        return 0.0
+    power = sum(float(np.sum(np.abs(h.others["torque"]) * h.driver**2 * h.dt)) for h in histories)
+    size = sum(float(np.sum(h.driver**4 * h.dt)) for h in histories)
+    return power / size if size > 0 else 0.0
 
 
 def _resolution(history: History) -> float:

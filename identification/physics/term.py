@@ -36,6 +36,8 @@ class Scale:
     """N, the largest |thrust| that was read, tare and all."""
     noise: float = 0.0
     """N, standard deviation of one thrust sample between neighbours."""
+    torque: float = 0.0
+    """N m: |torque| at the largest driver, by a square law through all of it; 0 where none was recorded."""
 
 
 @dataclass(frozen=True, slots=True)

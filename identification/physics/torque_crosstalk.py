@@ -1,17 +1,23 @@
-"""The cell feels the torque: + c x^2, even in the direction; its odd part can not be told from C."""
+"""The cell feels the torque: as it was measured, or + c x^2, even in the direction: its odd part is lost in C."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import ClassVar
 
+import numpy as np
+
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+
+TORQUE = "torque"
+MOST = 0.1
+"""Of full thrust: what is larger is the propeller's own, or the noise of a torque that follows the thrust."""
 
 
 @dataclass(frozen=True, slots=True)
 class TorqueCrosstalk:
-    """The cell feels the torque: + c x^2, even in the direction; its odd part can not be told from C."""
+    """No torque was recorded: + c x^2, even in the direction; its odd part can not be told from C."""
 
     id: ClassVar[str] = "torque_crosstalk"
     stage: ClassVar[Stage] = "stand"
@@ -25,8 +31,8 @@ class TorqueCrosstalk:
             Parameter(
                 "coefficient",
                 f"N/{scale.driver_unit}^2",
-                -0.1 * scale.thrust / scale.driver**2,
-                0.1 * scale.thrust / scale.driver**2,
+                -MOST * scale.thrust / scale.driver**2,
+                MOST * scale.thrust / scale.driver**2,
                 0.0,
             ),
         )
@@ -48,4 +54,42 @@ class TorqueCrosstalk:
         )
 
 
-FORMS = (TorqueCrosstalk(),)
+@dataclass(frozen=True, slots=True)
+class MeasuredTorque:
+    """+ c Q, Q the recorded torque, signed: seen where Q is no multiple of x|x|, else it is lost in C."""
+
+    id: ClassVar[str] = "torque_crosstalk"
+    stage: ClassVar[Stage] = "stand"
+    physics: ClassVar[str] = "the cell feels the torque of the propeller"
+    needs: ClassVar[tuple[str, ...]] = (TORQUE,)
+    coordinates: ClassVar[tuple[str, ...]] = (TORQUE,)
+    form: ClassVar[str] = "measured"
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        most = MOST * _lever(scale)
+        return (Parameter("coefficient", "1/m", -most, most, 0.0),)
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ((0.01 * _lever(scale),),)
+
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        out: Floats = value + theta[0] * now.history.others[TORQUE]
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        share = 100 * abs(theta[0]) / _lever(scale)
+        return (
+            f"Torque cross-talk: the cell shows {theta[0]:.3g} N per N m of the measured torque, {share:.2g} % of full "
+            "thrust at full torque; take that off, and check the cell with a pure moment."
+        )
+
+
+def _lever(scale: Scale) -> float:
+    """1/m: full thrust over full torque."""
+    return scale.thrust / scale.torque if scale.torque > 0 else np.inf
+
+
+FORMS = (TorqueCrosstalk(), MeasuredTorque())

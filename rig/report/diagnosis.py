@@ -199,7 +199,7 @@ def rivals_section(d: Diagnosis) -> tuple[Section, ...]:
             f"{round(rival.bic_loss, 1) + 0.0:.1f}".replace("-", "−"),
             _odds(rival.bic_loss),
             words(rival.statement),
-            told_apart(f.effect, rival.effect) or "–",
+            told_apart(f.effect, rival.effect, f.form, rival.form) or "–",
         )
         for f in d.findings
         for rival in f.rivals

@@ -36,12 +36,21 @@ REVEALED_BY: Mapping[str, str] = {
 }
 
 
-def told_apart(effect: str, rival: str) -> str:
+RECORDED: Mapping[tuple[str, str], str] = {
+    ("torque_crosstalk", "measured"): "dead weights on the load cell, with and without a moment",
+}
+"""The same of forms that read a channel: what it takes beside that."""
+
+
+def told_apart(effect: str, rival: str, form: str = "", rival_form: str = "") -> str:
     """What would decide between two effects, as a clause.
 
     >>> told_apart("zero_drift", "unheard_of")
     'rests again and again: a zero that moves shows there, a gain does not (zero drift)'
     """
+    forms = ((effect, form), (rival, rival_form))
     return "; ".join(
-        f"{REVEALED_BY[name]} ({name.replace('_', ' ')})" for name in (effect, rival) if name in REVEALED_BY
+        f"{RECORDED.get((name, of), REVEALED_BY[name])} ({name.replace('_', ' ')})"
+        for name, of in forms
+        if name in REVEALED_BY
     )

@@ -143,7 +143,9 @@ def _recirculation(values: Values, form: str, k: float, _driver: float) -> Table
     return {**values, "coefficient": values["coefficient"] / k**2, "form": form}
 
 
-def _crosstalk(values: Values, _form: str, k: float, _driver: float) -> Table:
+def _crosstalk(values: Values, form: str, k: float, _driver: float) -> Table:
+    if form == "measured":
+        raise WorldError("the twin's torque_crosstalk follows a recorded torque, which the bench cannot foresee")
     return {"coefficient": values["coefficient"] / k**2}
 
 

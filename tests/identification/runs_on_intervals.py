@@ -27,6 +27,7 @@ def history(n=400, volts=1.0, newtons=1.0, seed=1, flow=1.0):
         "bus_voltage": volts * (30.0 - 0.02 * np.abs(levels_squared(driver / volts))),
         "flow_speed": flow * np.where(np.sin(0.3 * edges[1:]) > 0, 0.7, -0.2),
         "motor_temperature": 20.0 + 15.0 * (1 - np.exp(-edges[1:] / 60.0)),
+        "torque": newtons * np.where(driver > 0, 3.0, -2.6) * levels_squared(driver / volts) / 144.0,
         "neighbour_thrust": newtons * 40.0 * (np.sin(0.5 * edges[1:]) > 0),
     }
     return History(
@@ -61,6 +62,7 @@ def scale(h, volts=1.0, newtons=1.0, noise=1.0, flow=1.0):
         flow=0.7 * flow,
         reading=75.0 * newtons,
         noise=noise * newtons,
+        torque=3.0 * newtons,
     )
 
 

@@ -365,6 +365,8 @@ def test_forms_that_read_another_channel():
     on = H.others["neighbour_thrust"] > 0
     assert term("thruster_interaction").apply(T, m, (0.2,)) == pytest.approx(np.where(on, 0.8 * T, T))
     assert np.array_equal(term("rotation_coupling").apply(x, moment(replace(H, rate=None), S), (1.0,)), x)
+    torque = H.others["torque"]
+    assert term("torque_crosstalk", "measured").apply(T, m, (0.7,)) == pytest.approx(T + 0.7 * torque)
     ratio = H.others["bus_voltage"] / H.others["bus_voltage"].max()
     assert term("supply_sag").apply(x, m, (1.0,)) == pytest.approx(x * ratio)
     heated = replace(H, others={"current": np.where(np.arange(H.driver.size) < 200, 8.0, 0.0)})

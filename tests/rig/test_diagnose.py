@@ -382,6 +382,7 @@ def test_every_term_of_the_catalogue_that_the_world_knows_builds_its_effect():
         ("inflow_dynamics", "momentum"),
         ("rotation_coupling", ""),
         ("thruster_interaction", ""),
+        ("torque_crosstalk", "measured"),
         ("reversal_loss", "step"),
     }
 
@@ -389,4 +390,4 @@ def test_every_term_of_the_catalogue_that_the_world_knows_builds_its_effect():
 def read_scale():
     from identification.physics.term import Scale
 
-    return Scale(20.0, "V", 160.0, 300.0, 0.01, 1.0, 170.0, 0.2)
+    return Scale(20.0, "V", 160.0, 300.0, 0.01, 1.0, 170.0, 0.2, 7.0)
