@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Literal
 
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.free_form import Flexible
@@ -40,6 +41,30 @@ class TwinTerm:
 
 
 TERMS: Mapping[tuple[str, str], Term] = {(term.id, term.form): term for term in CATALOGUE}
+
+
+@dataclass(frozen=True, slots=True)
+class TwinLine:
+    """A periodic disturbance of the reading: a sin(2 pi f t + p), or a sin(2 pi z theta + p) while the rotor turns."""
+
+    amplitude: float
+    """N."""
+    amplitude_std: float
+    frequency: float
+    """f, Hz; of a line that goes with the rotor what it was at the mean speed."""
+    frequency_std: float
+    ratio: float | None = None
+    """z, periods per `turns` of theta; None at a fixed frequency."""
+    ratio_std: float = 0.0
+    turns: Literal["rev", "V s"] = "rev"
+    """Of theta: V s where no rate was recorded."""
+    phase: float | None = None
+    """p, rad, on the clock of the first recording behind it; None where it slipped."""
+    phase_std: float = 0.0
+
+    @property
+    def kind(self) -> Literal["fixed", "rotation"]:
+        return "fixed" if self.ratio is None else "rotation"
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +113,8 @@ class Twin:
     """The largest |driver| it was fitted with."""
     rate_per_driver: float | None = None
     """rev/s per unit of the driver; None where no rotation rate was recorded."""
+    lines: tuple[TwinLine, ...] = ()
+    """Periodic disturbances, the clearest first."""
     created: str = ""
     """ISO 8601 UTC."""
     software: str = ""

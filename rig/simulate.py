@@ -215,8 +215,11 @@ def simulate_command(
         twin = read_twin(twin_path)
         wanted = asked(plan, twin, flow)
         found = simulated(twin, wanted, rate, seed)
+        from identification.mismatch.simulating import wave_notes
+
         noise = "without noise" if seed is None else f"with noise of seed {seed}"
         notes = f"Simulated, not measured: {plan.name} on {twin.origin}, {noise}, without a tare."
+        notes = " ".join([notes, *wave_notes(twin)])
         digests = [hashlib.sha256(path.read_bytes()).hexdigest() for path in (twin_path, plan)]
         write_simulation(output, twin, wanted, found, notes, f"{digests} {seed} {rate} {flow}")
     except (RigError, OSError) as error:

@@ -1,4 +1,4 @@
-"""A twin as a file: JSON, `thruster-rig-twin` version 1. Reading says what is wrong in one sentence."""
+"""A twin as a file: JSON, `thruster-rig-twin` version 1 or 2. Reading says what is wrong in one sentence."""
 
 from __future__ import annotations
 
@@ -17,11 +17,12 @@ import numpy as np
 
 from identification.physics.free_form import MULTIPLIERS, Flexible
 from identification.physics.term import Scale, Term
-from identification.twin import TERMS, Source, Twin, TwinNoise, TwinTerm, names_of
+from identification.twin import TERMS, Source, Twin, TwinLine, TwinNoise, TwinTerm, names_of
 from rig.errors import TwinError
 
 FORMAT = "thruster-rig-twin"
-VERSION = 1
+VERSION = 2
+"""2 has lines; what has none is written as 1, for earlier programs that would drop them unseen."""
 DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
 ASYMMETRY = 1e-9
 """Relative: a covariance matrix less symmetric than this is none."""
@@ -31,7 +32,7 @@ def twin_json(twin: Twin) -> dict[str, object]:
     """Everything that is in the file."""
     return {
         "format": FORMAT,
-        "version": VERSION,
+        "version": VERSION if twin.lines else 1,
         "thruster": twin.thruster,
         "driver": twin.driver_quantity,
         "C": twin.C,
@@ -47,12 +48,27 @@ def twin_json(twin: Twin) -> dict[str, object]:
         ],
         "covariance": {"names": list(twin.names), "matrix": [list(row) for row in twin.covariance]},
         "noise": asdict(twin.noise),
+        **({"lines": [_line_json(line) for line in twin.lines]} if twin.lines else {}),
         "recordings": [asdict(source) for source in twin.sources],
         "interval": twin.interval,
         "highest_driver": twin.highest_driver,
         "rate_per_driver": twin.rate_per_driver,
         "created": twin.created,
         "software": twin.software,
+    }
+
+
+def _line_json(line: TwinLine) -> dict[str, object]:
+    def entry(value: float, std: float, unit: str) -> dict[str, object]:
+        return {"value": value, "std": std, "unit": unit}
+
+    return {
+        "kind": line.kind,
+        "turns": line.turns,
+        "amplitude": entry(line.amplitude, line.amplitude_std, "N"),
+        "frequency": entry(line.frequency, line.frequency_std, "Hz"),
+        "ratio": None if line.ratio is None else entry(line.ratio, line.ratio_std, f"1/({line.turns})"),
+        "phase": None if line.phase is None else entry(line.phase, line.phase_std, "rad"),
     }
 
 
@@ -173,6 +189,7 @@ def _twin(top: Table) -> Twin:
         names=names,
         covariance=_covariance(top.table("covariance"), names),
         noise=_noise(top.table("noise")),
+        lines=tuple(map(_line, top.tables("lines"))) if "lines" in top.content else (),
         sources=tuple(_source(each) for each in top.tables("recordings")),
         interval=top.number("interval", 1e-6),
         highest_driver=top.number("highest_driver", 0.0),
@@ -289,6 +306,34 @@ def _noise(table: Table) -> TwinNoise:
     if len(noise.bands) != len(noise.band) or len(bands) != len(noise.bands):
         raise table.wrong("bands", f"pairs, as many as band has numbers ({len(noise.band)})")
     return noise
+
+
+def _line(table: Table) -> TwinLine:
+    def entry(key: str, least: float = -np.inf) -> tuple[float, float]:
+        inner = table.table(key)
+        return inner.number("value", least), inner.number("std", 0.0)
+
+    kind, turns = table.text("kind"), table.text("turns")
+    if kind not in ("fixed", "rotation"):
+        raise table.wrong("kind", "fixed or rotation")
+    if turns not in ("rev", "V s"):
+        raise table.wrong("turns", "rev or V s")
+    if kind == "rotation" and table.get("ratio") is None:
+        raise table.wrong("ratio", "an object: the line goes with the rotor")
+    (amplitude, amplitude_std), (frequency, frequency_std) = entry("amplitude", 0.0), entry("frequency", 0.0)
+    ratio, ratio_std = (None, 0.0) if kind == "fixed" else entry("ratio", 0.0)
+    phase, phase_std = (None, 0.0) if table.get("phase") is None else entry("phase")
+    return TwinLine(
+        amplitude,
+        amplitude_std,
+        frequency,
+        frequency_std,
+        ratio,
+        ratio_std,
+        "rev" if turns == "rev" else "V s",
+        phase,
+        phase_std,
+    )
 
 
 def _source(table: Table) -> Source:

@@ -84,7 +84,8 @@ def compare(
     exact = twin.covariance if np.all(left == 0) else tuple((0.0,) * len(twin.names) for _ in twin.names)
     origin = f"the simulation {_name(simulation)}"
     sources = tuple(s for s in twin.sources if s.recording_id != real.recording_id)
-    twin = replace(twin, thruster=real.thruster, origin=origin, sources=sources, covariance=exact)
+    lines = twin.lines if np.all(left == 0) else ()  # else they were subtracted as they are
+    twin = replace(twin, thruster=real.thruster, origin=origin, sources=sources, covariance=exact, lines=lines)
     recording = _less(real, left)
     found = diagnose([recording], holdout, seed, twin, limits)
     if isinstance(found, Refusal):
@@ -210,7 +211,7 @@ def _beyond(simulation: Recording, twin: Twin, known: Diagnosis, real: Recording
         return np.zeros(measured.time.size)
     good = np.isfinite(thrust.value)
     drive = replace(_drive(driver), others=others_of(simulation))
-    found = simulate(twin, drive, thrust.time[good])
+    found = simulate(replace(twin, lines=()), drive, thrust.time[good])
     if isinstance(found, Refusal):
         return found
     tare = next((v.value for name, v in known.model.items() if name == "tare"), 0.0)

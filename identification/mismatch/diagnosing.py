@@ -42,12 +42,12 @@ from identification.mismatch.telling import (
     curves_of,
     fault_finding,
     finding_of,
-    line_finding,
     places_of,
     says,
     values_of,
     where_of,
 )
+from identification.mismatch.telling_lines import with_lines
 from identification.mismatch.twinning import starting, unfit, with_twin
 from identification.physics.history import History
 from identification.physics.term import Term
@@ -109,10 +109,10 @@ def diagnose(
     measured = replace(found.data, histories=histories)
     others, unpredicted = predictable(holdout, others, after)
     answer, after = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
-    answer = _with_channels(answer, lines, faults)
+    answer = with_twin(_with_channels(answer, faults), after, found.data, recordings, baseline)
+    answer = with_lines(answer, lines, after, found.data, baseline, limits)
     told = (*notes, *unpredicted, *proxies(after.fit.model, answer.findings, recordings, histories))
-    answer = replace(answer, notes=(*answer.notes, *told))
-    return with_twin(answer, after, found.data, recordings, baseline)
+    return replace(answer, notes=(*answer.notes, *told))
 
 
 def _gone_on(found: Found, rng: np.random.Generator) -> tuple[Found, State, dict[Term, Standing] | None]:
@@ -306,17 +306,16 @@ def _faulty(
     return faults, _histories(mended)
 
 
-def _with_channels(answer: Diagnosis, lines: Sequence[Line], faults: Sequence[Fault]) -> Diagnosis:
-    """The answer with periodic disturbances and channel faults among its findings, faults first."""
+def _with_channels(answer: Diagnosis, faults: Sequence[Fault]) -> Diagnosis:
+    """The answer with channel faults, first among its findings."""
     grave = [f for f in faults if f.grave and f.kind != "nan"]
     alone = {f.recording_id for f in grave} <= set(answer.recordings) and len(answer.recordings) == 1
     faulty = (f if alone else replace(f, statement=f"{f.recording_id}: {f.statement}") for f in grave)
-    found = (*map(fault_finding, faulty), *answer.findings, *map(line_finding, lines))
+    found = (*map(fault_finding, faulty), *answer.findings)
     notes = [f"{f.recording_id}: {f.statement}" for f in faults if f not in grave]
     notes += [f"for the model this was put right: {f.statement}" for f in grave if f.repairable]
     verdict = "explained" if answer.verdict == "adequate" and found else answer.verdict
-    terms = (*answer.model_terms, *("periodic_disturbance" for _ in lines))
-    return replace(answer, verdict=verdict, findings=found, notes=(*answer.notes, *notes), model_terms=terms)
+    return replace(answer, verdict=verdict, findings=found, notes=(*answer.notes, *notes))
 
 
 def _with_colour(left: Omnibus, after: State, data: Data) -> Omnibus:

@@ -200,9 +200,7 @@ class Diagnosis:
             case "explained":
                 return "Left out: " + " ".join(f.statement for f in self.findings)
             case "ambiguous":
-                rivals = "; ".join(
-                    f"{f.effect} or {' or '.join(r.effect for r in f.rivals)}" for f in self.findings if f.rivals
-                )
+                rivals = "; ".join(_either(f) for f in self.findings if f.rivals)
                 sure = " ".join(f.statement for f in self.findings if not f.rivals)
                 known = f" Left out besides: {sure}" if sure else ""
                 return f"These recordings cannot tell {rivals}: run the next experiment.{known}"
@@ -210,6 +208,13 @@ class Diagnosis:
                 assert self.unexplained is not None
                 known = " Known: " + " ".join(f.statement for f in self.findings) if self.findings else ""
                 return self.unexplained.statement + known
+
+
+def _either(f: Finding) -> str:
+    """It or its rivals; by form, where they are one effect."""
+    every = [(f.effect, f.form), *((r.effect, r.form) for r in f.rivals)]
+    same = len({effect for effect, _ in every}) < len(every)
+    return " or ".join(f"{effect} ({form})" if same and form else effect for effect, form in every)
 
 
 def diagnosis_json(d: Diagnosis) -> dict[str, object]:

@@ -95,6 +95,8 @@ def _scale_std(fitted: Fit, data: Data) -> float:
 
 def _with_scale(line: Line, scale_std: float, series: Sequence[Series]) -> Line:
     """A line locked to the rotor, with the error that the scale of its turns adds to periods per turn and phase."""
+    if line.rival is not None:
+        line = replace(line, rival=_with_scale(line.rival, scale_std, series))
     if line.ratio is None or line.ratio_std is None:
         return line
     ratio_std = float(np.hypot(line.ratio_std, line.ratio * scale_std))

@@ -15,8 +15,10 @@ from typing import Literal
 
 import numpy as np
 
+from identification.mismatch.line_as_turning import as_turning
 from identification.mismatch.line_width import peak_p_value
 from identification.mismatch.rotation_lines import Locked, Part, find_locked, wave_of
+from identification.mismatch.rotor_stretches import speed_of
 from identification.mismatch.spectrum import (
     FAR,
     Series,
@@ -69,11 +71,16 @@ class Line:
     gain: float
     """In chi-square."""
     statement: str
-    rival: Literal["", "fixed", "rotation"] = ""
-    """The other kind, where it explains the line about as well."""
+    rival: Line | None = None
+    """Of the other kind, where it explains it about as well."""
     parts: tuple[Part, ...] = ()
     unit: Literal["rev", "V s"] = "rev"
     """Of the turns: V s where no rate was recorded."""
+    band: tuple[float, float] = (0.0, 0.0)
+    """Hz, in which it shows: the frequency -+ 1/T of the longest run; of a rotor-locked line over nine tenths of the
+    time in which it turns."""
+    power: float = 0.0
+    """N^2, mean square over all samples."""
 
     def at(self, time: Floats, turns: Floats | None = None, run: int = 0) -> Floats:
         """(n,) N, the line at these times (and turns) of that run."""
@@ -102,12 +109,24 @@ def find_lines(
         best = _best(left, alarm, lowest, turns_unit)
         if best is None:
             break
-        found.append(best)
+        found.append(_placed(best, left))
         left = [
             replace(r, residual=r.residual - best.at(r.time, r.turns, i)) if r.time.size else r
             for i, r in enumerate(left)
         ]
     return tuple(found)
+
+
+def _placed(line: Line, runs: Sequence[Series]) -> Line:
+    """With its band and power."""
+    waves = [line.at(r.time, r.turns, i) for i, r in enumerate(runs)]
+    power = sum(float(w @ w) for w in waves) / sum(w.size for w in waves)
+    low = high = line.frequency
+    if line.ratio is not None:
+        turning = [speed_of(r)[w != 0] for r, w in zip(runs, waves, strict=True) if np.count_nonzero(w) > 1]
+        low, high = line.ratio * np.quantile(np.concatenate(turning), (0.05, 0.95))
+    resolution = 1 / max(float(np.ptp(r.time)) for r in runs if r.time.size)
+    return replace(line, band=(max(float(low) - resolution, 0.0), float(high) + resolution), power=power)
 
 
 def _best(runs: Sequence[Series], alarm: float, lowest: float, unit: Literal["rev", "V s"]) -> Line | None:
@@ -119,10 +138,13 @@ def _best(runs: Sequence[Series], alarm: float, lowest: float, unit: Literal["re
     if all(r.turns is not None for _, r in long):
         found = find_locked(long, alarm, in_turns=unit == "rev")
         locked = None if found is None else _locked(found, unit)
+    if fixed is not None and locked is None and all(r.turns is not None for _, r in long):
+        turning = as_turning(long, fixed.frequency, fixed.amplitude_std, fixed.p_value)
+        locked = None if turning is None or fixed.gain - turning.gain > EQUAL else _locked(turning, unit)
     if fixed is None or locked is None:
         return fixed or locked
     better, other = (fixed, locked) if fixed.gain >= locked.gain else (locked, fixed)
-    return replace(better, rival=other.kind) if better.gain - other.gain < EQUAL else better
+    return replace(better, rival=other) if better.gain - other.gain < EQUAL else better
 
 
 def _fixed(runs: Sequence[tuple[int, Series]], alarm: float, lowest: float) -> Line | None:

@@ -102,7 +102,7 @@ def propose(state: State, data: Data, named: Sequence[Named], limits: Limits | N
     if data.scale.driver_unit != "V":
         limits = replace(limits, max_voltage=None, slew=None)  # of a bench, in V
     bench = Bench(state, data, _slew(data, limits))
-    largest = _largest(data, state, limits)
+    largest = largest_level(data, state, limits)
     known = blocks(largest, _flows(data, limits))
     shortest = next(b for b in known if not b.name)
     every = [b for b in known if b.seconds + 2 * REST <= limits.budget] or [shortest]
@@ -110,7 +110,7 @@ def propose(state: State, data: Data, named: Sequence[Named], limits: Limits | N
     return tried.answer()
 
 
-def _largest(data: Data, state: State, limits: Limits) -> float:
+def largest_level(data: Data, state: State, limits: Limits) -> float:
     largest = data.scale.driver if limits.max_voltage is None else min(limits.max_voltage, data.scale.driver)
     C = abs(state.fit.theta.C)
     if limits.max_thrust is not None and C > 0:

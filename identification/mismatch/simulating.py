@@ -14,8 +14,10 @@ from scipy.signal import lfilter
 from identification.mismatch.channels import neighbour_at
 from identification.mismatch.model import Model, Theta, predict
 from identification.mismatch.preparing import FOLLOWED, Refusal
+from identification.mismatch.turns import turned
 from identification.mismatch.twinning import given
-from identification.physics.history import History
+from identification.physics.filters import within_intervals
+from identification.physics.history import TURNING, History
 from identification.physics.term import Scale
 from identification.recording import Floats, Recording
 from identification.twin import Twin, TwinNoise
@@ -63,10 +65,33 @@ def simulate(twin: Twin, drive: Drive, times: Floats, rng: np.random.Generator |
     scale = Scale(twin.highest_driver or 1.0, "", 0.0, float(times[-1] - times[0]), FINE)
     theta = Theta(twin.C, (), (0.0,), k=twin.rate_per_driver or 1.0)
     force, x = predict(Model((), given(twin)), theta, history, scale)
-    thrust = force[at]
+    thrust = force[at] + waves(twin, history, x, times)
     if rng is not None and times.size > 1:
         thrust = thrust + drawn(twin.noise, thrust, float(np.median(np.diff(times))), rng)
     return Prediction(times, thrust, None if twin.rate_per_driver is None else twin.rate_per_driver * x[at])
+
+
+def waves(twin: Twin, history: History, x: Floats, times: Floats) -> Floats:
+    """(n,) N, the twin's periodic disturbances; `x` (M,) the rotor's rate in units of the driver. A phase that is not
+    known is 0."""
+    out = np.zeros(times.size)
+    turning = within_intervals(np.abs(x), history.edges, times) > TURNING * (twin.highest_driver or 1.0)
+    for line in twin.lines:
+        scale = 1.0 if line.turns == "V s" else twin.rate_per_driver or 1.0
+        moving = line.ratio is not None
+        cycles = line.frequency * times if line.ratio is None else line.ratio * turned(history.edges, scale * x, times)
+        out += np.where(turning | (not moving), line.amplitude * np.sin(2 * pi * cycles + (line.phase or 0.0)), 0.0)
+    return out
+
+
+def wave_notes(twin: Twin) -> tuple[str, ...]:
+    """What a reader of a prediction should know of its periodic disturbances, a sentence each."""
+    out = []
+    for line in twin.lines:
+        what = f"{line.frequency:.4g} Hz" if line.ratio is None else f"{line.ratio:.4g} periods per {line.turns}"
+        phase = "its phase is not known: 0 here" if line.phase is None else "phase of the first recording's clock"
+        out.append(f"A line of {line.amplitude:.3g} N at {what} is in it ({phase}).")
+    return tuple(out)
 
 
 def _history(twin: Twin, drive: Drive, times: Floats) -> tuple[History, NDArray[np.intp]]:

@@ -19,7 +19,6 @@ from identification.mismatch.diagnosis import (
 from identification.mismatch.faults import Fault
 from identification.mismatch.fitting import Fit, raw
 from identification.mismatch.intervals import Interval
-from identification.mismatch.lines import Line
 from identification.mismatch.model import Data, Weights
 from identification.mismatch.naming import Named
 from identification.mismatch.omnibus import ALARM, Judged, judge_left, locate
@@ -39,20 +38,6 @@ def fault_finding(fault: Fault) -> Finding:
     values = {k: Value(v.value, v.std, v.unit) for k, v in fault.parameters.items()}
     p = max(fault.p_value, LEAST_P)
     return Finding("channel_fault", fault.kind, fault.statement, values, p, -2 * float(np.log(p)), 1.0, ())
-
-
-def line_finding(line: Line) -> Finding:
-    values = {
-        "amplitude": Value(line.amplitude, line.amplitude_std, "N"),
-        "frequency": Value(line.frequency, line.frequency_std, "Hz"),
-    }
-    if line.ratio is not None and line.ratio_std is not None:
-        name, unit = ("periods_per_turn", "1") if line.unit == "rev" else ("periods_per_volt_second", "1/(V s)")
-        values[name] = Value(line.ratio, line.ratio_std, unit)
-    if line.phase is not None and line.phase_std is not None:
-        values["phase"] = Value(line.phase, line.phase_std, "rad")
-    p = max(line.p_value, LEAST_P)
-    return Finding("periodic_disturbance", line.kind, line.statement, values, p, line.gain, 1.0, ())
 
 
 Intervals = Mapping[Term, tuple[Interval, ...]]

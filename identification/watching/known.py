@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import isfinite, sqrt
 
 import numpy as np
@@ -52,7 +53,8 @@ def _settled(twin: Twin, drive: float, bus: float, flow: float) -> float:
     times = np.arange(0.0, SETTLED, STEP)
     ends = np.array([0.0, SETTLED])
     others = {"flow_speed": (ends, np.full(2, flow)), "bus_voltage": (ends, np.full(2, bus))}
-    found = simulate(twin, Drive(np.array([0.0]), np.array([drive]), others=others), times)
+    steady = replace(twin, lines=())  # a wave is no part of a hold's mean
+    found = simulate(steady, Drive(np.array([0.0]), np.array([drive]), others=others), times)
     assert not isinstance(found, Refusal)  # what it needs was looked at before
     return float(found.thrust[-1])
 

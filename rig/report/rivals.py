@@ -29,7 +29,7 @@ REVEALED_BY: Mapping[str, str] = {
     "reversal_loss": "the same step with and without a change of sign before it",
     "strut_drag": "flow with the propeller at rest",
     "torque_crosstalk": "dead weights on the load cell, or a torque channel",
-    "periodic_disturbance": "the same level at two sampling rates; rest with the power on",
+    "periodic_disturbance": "two levels, and rest with the power on; the same level at two sampling rates",
     "rotation_coupling": "the same command at another load or supply, the rotation rate measured",
     "thruster_interaction": "the neighbour switched on and off at one level",
     "channel_fault": "one channel at a time against a known load or speed",
@@ -48,9 +48,10 @@ def told_apart(effect: str, rival: str, form: str = "", rival_form: str = "") ->
     >>> told_apart("zero_drift", "unheard_of")
     'rests again and again: a zero that moves shows there, a gain does not (zero drift)'
     """
-    forms = ((effect, form), (rival, rival_form))
-    return "; ".join(
+    forms = dict.fromkeys(((effect, form), (rival, rival_form)))
+    told = (
         f"{RECORDED.get((name, of), REVEALED_BY[name])} ({name.replace('_', ' ')})"
         for name, of in forms
         if name in REVEALED_BY
     )
+    return "; ".join(dict.fromkeys(told))

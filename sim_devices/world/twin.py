@@ -15,7 +15,9 @@ from sim_devices.tables import WorldError
 from sim_devices.world.settings import Thruster
 
 FORMAT = "thruster-rig-twin"
-VERSION = 1
+VERSIONS = (1, 2)
+WHOLE = 0.02
+"""Of a turn: how far from a whole number the periods per turn of a blade pass may be."""
 Values = Mapping[str, float]
 Table = dict[str, Any]
 
@@ -55,8 +57,8 @@ def _read(path: Path) -> Mapping[str, Any]:
         raise WorldError(f"twin: {path} cannot be read ({error.strerror})") from error
     except (UnicodeDecodeError, json.JSONDecodeError) as error:
         raise WorldError(f"twin: {path} is not JSON: {error}") from error
-    if not isinstance(content, dict) or content.get("format") != FORMAT or content.get("version") != VERSION:
-        raise WorldError(f"twin: {path} is not a {FORMAT} of version {VERSION}")
+    if not isinstance(content, dict) or content.get("format") != FORMAT or content.get("version") not in VERSIONS:
+        raise WorldError(f"twin: {path} is not a {FORMAT} of version {' or '.join(map(str, VERSIONS))}")
     return content
 
 
@@ -77,7 +79,27 @@ def world_of(content: Mapping[str, Any]) -> tuple[Table, dict[str, Table]]:
         effects[name] = TERMS[name](values, str(term["form"]), abs(k), float(term["scale"]["driver"]))
         if name == "heating":
             thruster["heating_time"] = values["time_constant"]
+    lines = content.get("lines", [])
+    if len(lines) > 1:
+        raise WorldError(f"the twin has {len(lines)} periodic disturbances; the world has one at a time")
+    if lines:
+        effects["periodic_disturbance"] = _line(lines[0], abs(k))
     return thruster, effects
+
+
+def _line(line: Mapping[str, Any], k: float) -> Table:
+    """A phase that is not known is 0: the table of the effect has it so."""
+    table: Table = {"amplitude": float(line["amplitude"]["value"])}
+    if line["phase"] is not None:
+        table["phase"] = float(line["phase"]["value"])
+    if line["kind"] == "fixed":
+        return {**table, "frequency": float(line["frequency"]["value"])}
+    per_turn = float(line["ratio"]["value"]) / (1.0 if line["turns"] == "rev" else k)
+    if round(per_turn) < 1 or abs(per_turn - round(per_turn)) > WHOLE:
+        raise WorldError(
+            f"the twin has a periodic disturbance of {per_turn:.4g} periods per turn; the world has whole numbers only"
+        )
+    return {**table, "blades": round(per_turn)}
 
 
 _PLAIN = Thruster(C=1.0)

@@ -116,7 +116,7 @@ def test_a_twin_file_reads_back_as_it_was_written(dead, tmp_path):
     ("change", "words"),
     [
         (lambda t: t.update(format="other"), "its format is 'other'"),
-        (lambda t: t.update(version=2), "is later than 1"),
+        (lambda t: t.update(version=3), "is later than 2"),
         (lambda t: t.pop("C"), "C is missing"),
         (lambda t: t.update(C="much"), "C must be a finite number, got 'much'"),
         (lambda t: t.update(driver="wind"), "driver must be one of command_voltage"),
@@ -334,7 +334,7 @@ def test_the_simulated_bench_runs_on_a_twin(dead, tmp_path):
         (lambda t: t["terms"].append(t["terms"][0]), "is there twice"),
         (lambda t: t.update(driver="rotation_rate"), "commanded in volts"),
         (lambda t: t.pop("C"), "not as --save-twin writes it"),
-        (lambda t: t.update(version=9), "is not a thruster-rig-twin of version 1"),
+        (lambda t: t.update(version=9), "is not a thruster-rig-twin of version 1 or 2"),
     ],
 )
 def test_a_twin_that_the_world_cannot_act_is_said(dead, tmp_path, change, words):
@@ -385,6 +385,69 @@ def test_every_term_of_the_catalogue_that_the_world_knows_builds_its_effect():
         ("torque_crosstalk", "measured"),
         ("reversal_loss", "step"),
     }
+
+
+def with_line(folder, dead, **line):
+    """The twin of the dead band with a periodic disturbance in its file."""
+    told = {
+        "kind": "fixed",
+        "turns": "rev",
+        "amplitude": {"value": 0.3, "std": 0.01, "unit": "N"},
+        "frequency": {"value": 7.3, "std": 0.001, "unit": "Hz"},
+        "ratio": None,
+        "phase": {"value": 1.0, "std": 0.1, "unit": "rad"},
+    }
+    content = json.loads(dead[2].read_text()) | {"version": 2, "lines": [told | line]}
+    path = folder / "line.twin.json"
+    path.write_text(json.dumps(content))
+    return path
+
+
+def test_a_prediction_has_the_line_and_says_what_is_known_of_its_phase(dead, tmp_path):
+    path = with_line(tmp_path, dead)
+    assert read_twin(path).lines[0].frequency == 7.3
+    bare = run("simulate", dead[0], "--twin", dead[2], "-o", tmp_path / "bare.h5")
+    told = run("simulate", dead[0], "--twin", path, "-o", tmp_path / "line.h5")
+    assert bare.exit_code == told.exit_code == 0, told.output
+    assert "A line of 0.3 N at 7.3 Hz is in it (phase of the first recording's clock)." in " ".join(told.output.split())
+    with_, without = (load(tmp_path / name).first_of("thrust") for name in ("line.h5", "bare.h5"))
+    wave = 0.3 * np.sin(2 * np.pi * 7.3 * with_.time + 1.0)
+    assert with_.value - without.value == pytest.approx(wave, abs=1e-3)
+    unknown = run("simulate", dead[0], "--twin", with_line(tmp_path, dead, phase=None), "-o", tmp_path / "slipped.h5")
+    assert "its phase is not known: 0 here" in " ".join(unknown.output.split())
+
+
+def test_a_line_that_is_no_line_is_one_sentence(dead, tmp_path):
+    for line, words in (
+        ({"kind": "both"}, "lines[0].kind must be fixed or rotation"),
+        ({"kind": "rotation"}, "lines[0].ratio must be an object"),
+        ({"turns": "laps"}, "lines[0].turns must be rev or V s"),
+    ):
+        with pytest.raises(TwinError) as error:
+            read_twin(with_line(tmp_path, dead, **line))
+        assert words in str(error.value)
+
+
+RATIO = {"value": 3.001, "std": 0.001, "unit": "1/(rev)"}
+
+
+def test_the_simulated_bench_has_the_line_or_says_that_it_cannot(dead, tmp_path):
+    from sim_devices.tables import WorldError
+    from sim_devices.world.twin import with_twin
+
+    def effects(**line):
+        path = with_line(tmp_path, dead, **line)
+        return with_twin({"twin": path.name}, tmp_path)["effects"]["periodic_disturbance"]
+
+    assert effects() == {"amplitude": 0.3, "frequency": 7.3, "phase": 1.0}
+    assert effects(kind="rotation", ratio=RATIO, phase=None) == {"amplitude": 0.3, "blades": 3}
+    with pytest.raises(WorldError, match=r"2\.4 periods per turn; the world has whole numbers only"):
+        effects(kind="rotation", ratio=RATIO | {"value": 2.4})
+    path = with_line(tmp_path, dead)
+    content = json.loads(path.read_text())
+    path.write_text(json.dumps(content | {"lines": 2 * content["lines"]}))
+    with pytest.raises(WorldError, match="2 periodic disturbances; the world has one at a time"):
+        with_twin({"twin": path.name}, tmp_path)
 
 
 def read_scale():
