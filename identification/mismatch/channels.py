@@ -14,6 +14,8 @@ from identification.recording import Channel, Floats, Recording
 CALMED = ("flow_speed", "motor_temperature", "water_temperature")
 REACHES = (4, 16, 64, 256)
 """Samples on either side that are averaged: as many as let the neighbours foretell each sample best."""
+NO_MORE = 3.0
+"""Standard errors of a narrow window's mean by which that of a wider one may differ."""
 REST_TOLD = 0.005
 """Of the supply's variance beside its load: less foretold by the neighbours is noise."""
 LOADS = 6
@@ -59,6 +61,23 @@ def _calm(value: Floats, reach: int, apart: NDArray[np.bool_] | None) -> tuple[F
     return out, float(np.mean(missed**2)) if missed.size else np.inf
 
 
+def _calm_where_it_rests(value: Floats, apart: NDArray[np.bool_]) -> Floats:
+    """Running mean over a window that grows at each sample as long as what it adds changes no more than noise does
+    (Lepski's rule): narrow while it follows a step, wide where it rests; never across a jump or where `apart`."""
+    starts = np.concatenate([[0], np.flatnonzero(jumps(value) | apart) + 1, [value.size]])
+    index = np.arange(value.size)
+    which = np.searchsorted(starts, index, side="right") - 1
+    total = np.concatenate([[0.0], np.cumsum(value - value[0])])
+    std = float(np.median(np.abs(np.diff(value)))) / 0.6745 / np.sqrt(2)
+    out, many, grows = value, np.ones(value.size), np.ones(value.size, dtype=bool)
+    for reach in (1, 2, *REACHES):
+        low, high = np.maximum(index - reach, starts[which]), np.minimum(index + reach + 1, starts[which + 1])
+        mean = value[0] + (total[high] - total[low]) / (high - low)
+        grows &= np.abs(mean - out) <= NO_MORE * std / np.sqrt(many)
+        out, many = np.where(grows, mean, out), np.where(grows, high - low, many)
+    return out
+
+
 def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats) -> Floats | None:
     """Supply voltage: what the load makes of it, and the slow rest, so that it is known between its samples."""
     good = np.isfinite(channel.value)
@@ -86,12 +105,12 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     return by_load + np.interp(at, time, calm)
 
 
-def torque(channel: Channel, held: Held, at: Floats, driven: Floats) -> Floats | None:
-    """What the driver makes of it, and the rest, whose noise is averaged between steps: noise in a torque would hide
-    how much of it the cell feels."""
+def torque(channel: Channel, held: Held, edges: Floats, driven: Floats) -> Floats | None:
+    """(M,) what the driver makes of it, and the rest, whose noise is averaged between steps: noise in a torque would
+    hide how much of it the cell feels."""
     good = np.isfinite(channel.value)
     if np.count_nonzero(good) < 2 * LOADS:
-        return followed(channel, at)
+        return followed(channel, 0.5 * (edges[1:] + edges[:-1]))
     time, value = channel.time[good], channel.value[good]
     size = float(np.max(np.abs(driven))) or 1.0
     then = _driven_at(held, time)
@@ -101,9 +120,19 @@ def torque(channel: Channel, held: Held, at: Floats, driven: Floats) -> Floats |
         return np.column_stack([np.ones(u.size), u, np.abs(u), u * np.abs(u), u**2])
 
     law = np.linalg.lstsq(columns(then), value, rcond=None)[0]
-    calm, _ = _calmest(value - columns(then) @ law, (1, *REACHES), np.abs(np.diff(then)) > STEP * size)
-    out: Floats = columns(driven) @ law + np.interp(at, time, calm)
+    calm = _calm_where_it_rests(value - columns(then) @ law, np.abs(np.diff(then)) > STEP * size)
+    out: Floats = columns(driven) @ law + _means(time, calm, edges)
     return out
+
+
+def _means(time: Floats, value: Floats, edges: Floats) -> Floats:
+    """(M,) of the samples in each interval; interpolated where there are none."""
+    inside = (time >= edges[0]) & (time < edges[-1])
+    index = np.searchsorted(edges, time[inside], side="right") - 1
+    count = np.bincount(index, minlength=edges.size - 1)
+    total = np.bincount(index, weights=value[inside], minlength=edges.size - 1)
+    between = np.interp(0.5 * (edges[1:] + edges[:-1]), time, value)
+    return np.where(count > 0, total / np.maximum(count, 1), between)
 
 
 def _driven_at(held: Held, time: Floats) -> Floats:

@@ -259,7 +259,7 @@ def _explaining(recording: Recording, driver: Channel, held: Held, edges: Floats
         if quantity == "bus_voltage":
             values = supply(channel, held, middle, driven, np.diff(edges))
         elif quantity == "torque":
-            values = torque(channel, held, middle, driven)
+            values = torque(channel, held, edges, driven)
         else:
             values = followed(channel, middle)
         if values is not None:

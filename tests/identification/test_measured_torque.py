@@ -122,11 +122,11 @@ def test_the_noise_of_a_torque_is_averaged_between_steps():
     noisy = Q + 0.1 * np.random.default_rng(1).standard_normal(t.size)
     command = recorded().first_of("command_voltage")
     held = Held(command, float(t[-1]))
-    at = t[:-1] + 0.5 / RATE
-    driven = held.value[np.searchsorted(held.time, at, side="right") - 1]
-    found = torque(Channel("torque", "cell", "torque", "N.m", t, noisy), held, at, driven)
+    edges = t - 0.5 / RATE
+    driven = held.mean(edges)
+    found = torque(Channel("torque", "cell", "torque", "N.m", t, noisy), held, edges, driven)
     true = FULL * driven * np.abs(driven) / TOP**2 * np.where(driven < 0, 0.9, 1.0)
-    inside = np.abs(at[:, None] - held.time).min(axis=1) > 0.5
+    inside = np.abs(t[:-1, None] - held.time).min(axis=1) > 0.5
     assert np.std((found - true)[inside]) < 0.3 * 0.1
 
 
