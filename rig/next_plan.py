@@ -96,8 +96,8 @@ def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path, *, attend
         return ()
     if proposed.quantity != "command_voltage":
         raise ConfigError(
-            f"--plan: the recordings have no command in V, so the levels of the next experiment are in {proposed.unit}; "
-            "a campaign is driven in V; nothing was written"
+            "--plan: the recordings have no command in V, so the levels of the next experiment are in "
+            f"{proposed.unit}; a campaign is driven in V; nothing was written"
         )
     _require_apart(path, campaign.path)
     flows = {step.flow_speed for step in proposed.steps}

@@ -63,7 +63,10 @@ def level_spread(data: Data, C: float) -> Spread | None:
                 parts[k].append((2 * C * np.abs(h.driver) * error)[h.rows] if k == i else column)
     if not parts[0]:
         return None
-    return Spread(tuple(np.column_stack(p) for p in parts), tuple(np.empty((h.rates.size, len(parts[0]))) * 0 for h in data.histories))
+    return Spread(
+        tuple(np.column_stack(p) for p in parts),
+        tuple(np.empty((h.rates.size, len(parts[0]))) * 0 for h in data.histories),
+    )
 
 
 def _k(histories: Sequence[History]) -> float:

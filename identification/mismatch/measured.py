@@ -27,7 +27,7 @@ def noise_of(value: Floats) -> float:
     """Standard deviation of a sample, robust: from third differences, in which ramps and slow sines vanish."""
     if value.size < 5:
         return 0.0
-    return float(np.median(np.abs(np.diff(value, 3)))) / 0.6745 / np.sqrt(20.0)
+    return float(np.median(np.abs(np.diff(value, 3))) / (0.6745 * np.sqrt(20.0)))
 
 
 def jumped(value: Floats, noise: float) -> NDArray[np.bool_]:

@@ -7,7 +7,7 @@ import pytest
 from diagnosed_runs import TOP, levels, run
 
 from identification.mismatch.channels import torque
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.grid import Held
 from identification.mismatch.model import Data
 from identification.mismatch.preparing import history_of

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosed_runs import NOISE, C, levels, run
 
-from identification.mismatch.diagnose import diagnose
+from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import diagnosis_json
 from identification.mismatch.simulating import Drive, simulate, wave_notes
 from identification.mismatch.turns import turned
