@@ -180,6 +180,8 @@ def two_levels(line: Line, state: State, data: Data, limits: Limits) -> NextExpe
     At the second level only the true kind gains, in proportion to the time; chi-square apart is normal, its standard
     deviation twice the root of its mean.
     """
+    volts = data.scale.driver_unit == "V"
+    limits = limits if volts else replace(limits, max_voltage=None)  # of a bench, in V
     top = largest_level(data, state, limits)
     gain = line.gain / sum(float(h.edges[-1] - h.edges[0]) for h in data.histories)
     longest = max(0.5 * (limits.budget - 2 * REST), SHORTEST)
@@ -188,4 +190,5 @@ def two_levels(line: Line, state: State, data: Data, limits: Limits) -> NextExpe
     power = float(normal_sf((EQUAL - apart) / (2 * np.sqrt(apart)))) if apart > 0 else 0.5
     steps = ((0.0, REST), (float(f"{top:.6g}"), seconds), (float(f"{SECOND_LEVEL * top:.3g}"), seconds), (0.0, REST))
     why = f"separates a line at {line.frequency:.4g} Hz from one that goes with the rotor: two levels of one direction"
-    return NextExperiment(why, tuple(PlanStep(volts, s) for volts, s in steps), power)
+    held = "command_voltage" if volts else "rotation_rate"
+    return NextExperiment(why, tuple(PlanStep(level, s) for level, s in steps), power, held)
