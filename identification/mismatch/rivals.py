@@ -83,9 +83,7 @@ def _one_for_two(
     now = state.fit
     logn = float(np.log(max(now.residual.size, 2)))
     for pair in combinations(now.model.terms, 2):
-        less = now
-        for term in pair:
-            less = fit_without(replace(state, fit=less), term, data)
+        less = fit_without(replace(state, fit=fit_without(state, pair[0], data)), pair[1], data)
         others = [t for t in terms if t.id not in {u.id for u in less.model.terms} and t not in pair]
         found = directions(less, data, state.weights, others)
         score = found.columns.T @ less.residual

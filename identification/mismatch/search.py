@@ -27,6 +27,8 @@ from identification.tails import chi2_isf
 ALARM = 0.01
 """Family-wise false-alarm rate of the search."""
 CANDIDATES = 5
+MOST_MORE = 3
+"""Candidates beside these whose trials say little."""
 NEARLY = 0.93
 """Of the best gain: a candidate with fewer parameters that reaches it goes first; swaps come later (rivals.py)."""
 MOST_TERMS = 6
@@ -272,13 +274,14 @@ def _asked_of_hidden(term: Term, judged: Screening, data: Data) -> float:
 
 
 def _candidates(judged: Screening, data: Data) -> list[tuple[Term, tuple[float, ...]]]:
-    """The likeliest terms, and those whose trials say little of what a fit would find: jumps between levels, of which
-    no trial is near unless it is the right one; and all that comes late where clocks that differ may hide it."""
+    """The likeliest terms, and a few of those whose trials say little of what a fit would find: jumps between levels,
+    of which no trial is near unless it is the right one, and what comes late where clocks that differ may hide it."""
     likely = {term: values for term, values, _ in judged.best(CANDIDATES)}
     late = any(term.id in DELAYING for term in likely)
+    most = len(likely) + MOST_MORE
     for term, values, z in judged.best(len(judged.directions.terms), share=0.0):
         told = (late and term.id in DELAYING) or any(p.jumps for p in term.parameters(data.scale))
-        if told and z > judged.threshold:
+        if told and z > judged.threshold and len(likely) < most:
             likely.setdefault(term, values)
     return list(likely.items())
 

@@ -350,6 +350,7 @@ def test_a_jump_of_the_reading_gets_knots_beside_it():
     assert any(0 < b - a < 1.0 and abs(a - 188.3) < 1.0 for a, b in pairwise(shape.knots))
 
 
+@pytest.mark.timeout(300)  # six terms are tried in its place, and exchanged
 def test_what_only_reversals_lose_is_seen_after_steps():
     def lossy(t, V, F):
         changed = np.concatenate([[0], np.flatnonzero(np.diff(V)) + 1])
