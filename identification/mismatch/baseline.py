@@ -63,10 +63,8 @@ def level_spread(data: Data, C: float) -> Spread | None:
                 parts[k].append((2 * C * np.abs(h.driver) * error)[h.rows] if k == i else column)
     if not parts[0]:
         return None
-    return Spread(
-        tuple(np.column_stack(p) for p in parts),
-        tuple(np.empty((h.rates.size, len(parts[0]))) * 0 for h in data.histories),
-    )
+    still = tuple(np.zeros((h.rates.size, len(parts[0]))) for h in data.histories)
+    return Spread(tuple(np.column_stack(p) for p in parts), still)
 
 
 def _k(histories: Sequence[History]) -> float:

@@ -14,12 +14,15 @@ from identification.recording import Floats
 
 REACHES = (2, 4, 8, 16, 32, 64, 128, 256)
 """Samples on either side that are averaged."""
-AGREES = 2.0
-"""Standard deviations by which what longer and shorter reaches make of a sample may differ (Lepski)."""
+AGREES = 2.5
+"""Standard deviations by which what longer and shorter reaches make of a sample may differ (Lepski); the last but one
+that agrees is used, for the last is as wrong as may be."""
 TWICE = 1.8
 """Variance of a straight line fitted twice, by that of one fitted once."""
-SIDES = (1, 1), (1, 0), (0, 1)
-"""Whether samples before, and after, are looked at: beside a kink those on one side."""
+KINKED = 4.0
+"""Times the usual variance: beside a kink few samples agree, and what they make of it is as good as one."""
+KINK = 2.5
+"""Standard deviations by which the lines on both sides may miss each other."""
 BENT = 3.5
 """Standard deviations of a second difference."""
 LATER = (1.0, 0.75, 0.5, 0.25)
@@ -67,19 +70,21 @@ def calmed(time: Floats, value: Floats, jumps: NDArray[np.bool_], noise: float) 
     index = np.arange(value.size)
     begin, end = first[level], (first + size)[level]
     out, least = value.copy(), np.ones(value.size)
-    for before, after in SIDES:
-        low, high = value - AGREES * noise, value + AGREES * noise
-        agree = np.ones(value.size, dtype=bool)
-        for reach in REACHES:
-            window = np.maximum(index - before * reach, begin), np.minimum(index + after * reach + 1, end)
-            line, share = _line(time, value, *window)
-            if before and after:
-                line, share = line + _line(time, value - line, *window)[0], np.minimum(TWICE * share, 1.0)
-            error = AGREES * noise * np.sqrt(share)
-            low, high = np.maximum(low, line - error), np.minimum(high, line + error)
-            agree &= low <= high
-            better = agree & (share < least)
-            out[better], least[better] = line[better], share[better]
+    low, high = value - AGREES * noise, value + AGREES * noise
+    agree = np.ones(value.size, dtype=bool)
+    shorter, its_share = value, least
+    for reach in REACHES:
+        window = np.maximum(index - reach, begin), np.minimum(index + reach + 1, end)
+        agree &= _no_kink(time, value, *window, noise)
+        line, share = _line(time, value, *window)
+        line, share = line + _line(time, value - line, *window)[0], np.minimum(TWICE * share, 1.0)
+        error = AGREES * noise * np.sqrt(share)
+        low, high = np.maximum(low, line - error), np.minimum(high, line + error)
+        agree &= low <= high
+        better = agree & (its_share < least)
+        out[better], least[better] = shorter[better], its_share[better]
+        shorter, its_share = line, share
+    least[least > KINKED * float(np.median(least))] = 1.0
     levels = [found for i, n in zip(first, size, strict=True) if (found := _still(time, value, i, i + n, noise))]
     for one in levels:
         least[first[level[one.first]] : one.first] = 1.0  # on its way there
@@ -116,21 +121,34 @@ def _sums(value: NDArray[np.longdouble], begin: NDArray[np.intp], end: NDArray[n
     return out
 
 
+def _no_kink(
+    time: Floats, value: Floats, begin: NDArray[np.intp], end: NDArray[np.intp], noise: float
+) -> NDArray[np.bool_]:
+    """(n,) whether the lines through the samples before and after each one meet there; a curve bends both alike."""
+    index = np.arange(value.size)
+    left, its = _line(time, value, begin, index + 1)
+    right, other = _line(time, value, index, end)
+    out: NDArray[np.bool_] = np.abs(left - right) <= KINK * noise * np.sqrt(its + other)
+    return out
+
+
 def _still(time: Floats, value: Floats, first: int, last: int, noise: float) -> Level | None:
     """The samples first..last, or the later part of them, where white noise alone moves them."""
     for share in LATER:
         begin = last - int(share * (last - first))
-        n = last - begin
-        if n < FEW:
-            break
-        mean = float(value[begin:last].mean())
-        off, late = value[begin:last] - mean, time[begin:last] - time[begin:last].mean()
-        slope, along = off @ late / np.sqrt(late @ late), off[1:] @ off[:-1] / np.sqrt(n)
-        variance = off @ off / (n - 1)
-        if (
-            variance < noise**2 * (1 + SPREAD * np.sqrt(2 / n))
-            and abs(slope) < STILL * noise
-            and along < STILL * noise**2
-        ):
+        if _stands(time[begin:last], value[begin:last], noise):
+            begin = begin if share == 1.0 else (begin + last) // 2  # the end of its way is lost in noise
+            n, mean = last - begin, float(value[begin:last].mean())
             return Level(begin, last, float(time[begin]), float(time[last - 1]), mean, noise / float(np.sqrt(n)))
     return None
+
+
+def _stands(time: Floats, value: Floats, noise: float) -> bool:
+    """Whether there is no more than white noise in these samples."""
+    n = value.size
+    if n < FEW:
+        return False
+    off, late = value - value.mean(), time - time.mean()
+    slope, along = float(off @ late) / float(np.sqrt(late @ late)), float(off[1:] @ off[:-1]) / float(np.sqrt(n))
+    narrow = float(off @ off) / (n - 1) < noise**2 * (1 + SPREAD * float(np.sqrt(2 / n)))
+    return narrow and abs(slope) < STILL * noise and along < STILL * noise**2

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.calming import Level, calmed
-from identification.mismatch.measured import ENOUGH, NOISES, jumped, known, noise_of, with_jumps
+from identification.mismatch.measured import NOISES, measured
 from identification.recording import Channel, Floats
 
 FINEST = 0.01
@@ -38,12 +37,6 @@ LARGEST_TICK = 0.08
 """...larger than this share of the largest driver."""
 REST = 3.0
 """Spacings of the samples: a command that stood for longer was held."""
-LOUD = 1e-4
-"""Of the largest driver: noise of a measured driver that is averaged."""
-LOST = 0.5
-"""Of the noise of a thrust sample: an error of the driver that makes less is not seen."""
-HALF = 0.5
-"""Of the samples: where fewer are clear of the driver's noise, none is left out."""
 STEP = 0.02
 """Share of the largest driver: a change of a command that is a step."""
 
@@ -81,21 +74,9 @@ class Held:
         for begun, ended in self.unknown:
             known[channel.time == ended] = begun
         self.time, self.value = distinct(known[good], channel.value[good])
-        self.noise = 0.0 if self.stepwise else noise_of(self.value)
-        """Standard deviation of a sample, in the driver's unit."""
-        self._samples = self.time, self.value
-        self.levels: tuple[Level, ...] = ()
-        """Of a measured driver with noise: where it stood still."""
-        self._error = np.zeros(self.time.size)
-        self._jumped = np.zeros(max(self.time.size - 1, 0), dtype=bool)
-        self.loud = self.noise > LOUD * float(np.max(np.abs(self.value)))
-        if not self.stepwise:
-            self._jumped = jumped(self.value, self.noise)
-            if self.loud:
-                calm = calmed(self.time, self.value, self._jumped, self.noise)
-                self.value, self.levels, self._error = calm.value, calm.levels, calm.error
-                self._samples = self.time, self.value
-            self.time, self.value = with_jumps(self.time, self.value, self._jumped)
+        self.measured = None if self.stepwise else measured(self.time, self.value)
+        if self.measured is not None:
+            self.time, self.value = self.measured.with_jumps()
         last = max(end, float(self.time[-1]))
         knots = np.append(self.time, last + 1.0)
         if self.stepwise:
@@ -136,37 +117,15 @@ class Held:
         return out
 
     @property
-    def jumps(self) -> Floats:
-        """s: where a measured driver went to another level between two samples."""
-        time = self._samples[0]
-        out: Floats = 0.5 * (time[1:] + time[:-1])[self._jumped]
-        return out
-
-    def at(self, time: Floats) -> Floats:
-        """(N,) a measured driver at each time."""
-        return np.asarray(np.interp(time, self.time, self.value), dtype=np.float64)
+    def noise(self) -> float:
+        """Standard deviation of a sample of a measured driver, in its unit; 0 of a command."""
+        return 0.0 if self.measured is None else self.measured.noise
 
     @property
     def finest(self) -> float:
         """s: between samples of a measured driver whose noise is seen; 0 of all others."""
-        return float(np.median(np.diff(self._samples[0]))) if self.loud and self.time.size > 1 else 0.0
-
-    def clear(self, time: Floats, force: Floats) -> NDArray[np.bool_]:
-        """(N,) whether the error of a measured driver is lost in the noise of the thrust `force` in N; all, where that
-        would leave too little."""
-        n = self.at(time)
-        beside = n * np.abs(n) - np.mean(n * np.abs(n))
-        C = float(beside @ force) / max(float(beside @ beside), 1e-300)
-        off = 2 * abs(C) * np.abs(n) * np.interp(time, self._samples[0], self._error)
-        told = off <= LOST * noise_of(force)
-        return told if np.count_nonzero(told) > HALF * time.size else np.ones(time.size, dtype=bool)
-
-    def known(self, time: Floats) -> NDArray[np.bool_]:
-        """(N,) whether a measured driver is known at each time; all, where that would leave too little."""
-        if self._jumped.size == 0:
-            return np.ones(time.size, dtype=bool)
-        told = known(*self._samples, self._jumped, self.noise, time)
-        return told if np.count_nonzero(told) > ENOUGH * time.size else np.ones(time.size, dtype=bool)
+        loud = self.measured is not None and self.measured.loud
+        return float(np.median(np.diff(self.measured.time))) if self.measured and loud else 0.0
 
     def starts(self, rest: float) -> Floats:
         """Times at which it begins to move, and not by a step, after it stood for more than `rest` s."""
@@ -213,7 +172,8 @@ def edges_of(time: Floats, held: Held, most: int) -> Floats:
 
 def _with_jumps(edges: Floats, held: Held, most: int) -> Floats:
     """Two levels of a measured driver share no interval."""
-    inside = held.jumps[(held.jumps > edges[0]) & (held.jumps < edges[-1])]
+    jumps = held.measured.jumps if held.measured is not None else np.empty(0)
+    inside = jumps[(jumps > edges[0]) & (jumps < edges[-1])]
     if not 0 < inside.size < most // 4:
         return edges
     out = np.union1d(edges, inside)

@@ -108,11 +108,9 @@ def _driven(time: Floats, force: Floats, held: Held) -> tuple[Floats, Floats]:
 def _clear_of_steps(time: Floats, force: Floats, held: Held) -> tuple[Floats, Floats]:
     """Without samples so near to a step of the command that the clocks cannot say which level they belong to, or of
     which a measured driver does not say what drove them."""
-    if not held.stepwise:
-        told = held.known(time)
-        time, force = time[told], force[told]
-        clear = held.clear(time, force)
-        return time[clear], force[clear]
+    if held.measured is not None:
+        known = held.measured.known(time, force)
+        return time[known], force[known]
     size = float(np.max(np.abs(held.value)))
     big = np.abs(np.diff(held.value, prepend=0.0)) > STEP * size  # the first row is a step from nothing
     steps = held.time[big]
@@ -214,15 +212,16 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
         static=_is_table(held, time.size),
     )
-    return with_leads(history, None if held.stepwise else held.at(history.thrust_samples.time))
+    return with_leads(history, None if held.measured is None else held.measured.at(history.thrust_samples.time))
 
 
 def _level_errors(held: Held, edges: Floats) -> Floats:
     """(M, k) of each level at which a measured driver stood still: the error of its mean, which all of it shares."""
     middle = 0.5 * (edges[1:] + edges[:-1])
-    if not 0 < len(held.levels) <= MOST_LEVELS:
+    levels = () if held.measured is None else held.measured.levels
+    if not 0 < len(levels) <= MOST_LEVELS:
         return np.empty((middle.size, 0))
-    columns = [np.where((middle >= v.begun) & (middle <= v.ended), v.error, 0.0) for v in held.levels]
+    columns = [np.where((middle >= v.begun) & (middle <= v.ended), v.error, 0.0) for v in levels]
     return np.column_stack(columns)
 
 

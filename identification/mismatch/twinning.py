@@ -42,9 +42,17 @@ def starting(twin: Twin) -> Callable[[Data, Theta], tuple[Data, Theta, Model]]:
     def begin(data: Data, theta: Theta) -> tuple[Data, Theta, Model]:
         model = Model((), given(twin))
         theta = replace(theta, C=twin.C)
-        return replace(data, spread=spread(twin, data, theta)), theta, model
+        return replace(data, spread=_both(data.spread, spread(twin, data, theta))), theta, model
 
     return begin
+
+
+def _both(one: Spread | None, other: Spread | None) -> Spread | None:
+    if one is None or other is None:
+        return one or other
+    thrust = tuple(np.column_stack(pair) for pair in zip(one.thrust, other.thrust, strict=True))
+    rate = tuple(np.column_stack(pair) for pair in zip(one.rate, other.rate, strict=False))
+    return Spread(thrust, rate)
 
 
 def spread(twin: Twin, data: Data, theta: Theta) -> Spread | None:
