@@ -201,13 +201,14 @@ def test_a_name_keeps_its_value_beside_a_shape_over_its_own_coordinate():
     """In reverse 0.8 of the forward thrust, and a bump of the static curve that no term carries."""
 
     def bumped(t, V, F):
-        return np.where(F < 0, 0.8, 1.0) * F * (1 + 0.15 * np.exp(-(((np.abs(V) - 8.0) / 1.5) ** 2)))
+        return np.where(F < 0, 0.8, 1.0) * F * np.where(np.abs(V) == 8.0, 1.06, 1.0)
 
     found = diagnose([run(bumped, seconds=300.0)])
     assert found.unexplained is not None
-    for finding in found.findings:
-        if finding.effect == "asymmetry":
-            assert finding.parameters["ratio"].value == pytest.approx(0.8, abs=0.02)
+    assert [f.covariate for f in found.unexplained.flexible] == ["command_voltage"]
+    (finding,) = found.findings
+    assert finding.effect == "asymmetry"
+    assert finding.parameters["ratio"].value == pytest.approx(0.8, abs=0.02)
 
 
 def test_a_name_must_predict_what_was_not_fitted():
