@@ -378,7 +378,7 @@ def test_scores_of_another_version_or_design_are_asked_again():
         ("a.jsonl", b"scores\n"),
         ("a.jsonl", b"null\n"),
         ("a.jsonl.gz", b"{}"),
-        ("a.jsonl.gz", compress(b"{}")[:12] + b"broken broken"),
+        ("a.jsonl.gz", compress(b"{}", mtime=0)[:12] + b"broken broken"),
         ("a.jsonl", b"\xff\xfe"),
     ],
 )
