@@ -46,6 +46,8 @@ def jumps(
     of = [np.ones(at.size) for at in runs] if of is None else of
     when = np.unique(np.quantile(np.concatenate(runs), np.linspace(0.01, 0.99, TRIED)))
     thrust = Weights(weights.thrust)
+    residual, basis = residual[: data.size], basis[: data.size]
+    residual = residual - basis @ (basis.T @ residual)  # no trifle where a step is nearly what the model follows
     some = np.unique(np.linspace(0, when.size - 1, SIZED).astype(int))
     size = np.interp(np.arange(when.size), some, np.sqrt(np.maximum(_sizes(runs, of, when[some], thrust, basis), 0.0)))
     rough = np.abs(_products(runs, of, when, thrust, residual)) / np.where(size > 0, size, np.inf)
@@ -71,7 +73,7 @@ def _products(runs: Sequence[Floats], of: Sequence[Floats], when: Floats, thrust
 def _sizes(runs: Sequence[Floats], of: Sequence[Floats], when: Floats, thrust: Weights, basis: Floats) -> Floats:
     """Squared length of the whitened step at each instant beside what the model can follow."""
     columns = thrust.whiten([size[:, None] * (at[:, None] >= when) for at, size in zip(runs, of, strict=True)], [])
-    columns -= basis[: columns.shape[0]] @ (basis[: columns.shape[0]].T @ columns)
+    columns -= basis @ (basis.T @ columns)
     out: Floats = np.einsum("ij,ij->j", columns, columns)
     return out
 
