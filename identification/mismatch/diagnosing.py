@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ from identification.mismatch.diagnosis import (
 )
 from identification.mismatch.faults import Fault, find_faults, repaired
 from identification.mismatch.fitting import fit
-from identification.mismatch.flexible import Extended, extend, foremost
+from identification.mismatch.flexible import Extended, Parted, extend, foremost, split
 from identification.mismatch.flexible_shape import refitted_names, shared, with_flexible, with_held
 from identification.mismatch.full_rate import look
 from identification.mismatch.intervals import Interval, intervals
@@ -108,7 +108,8 @@ def diagnose(
     after, left = _left(found, after, rng)
     measured = replace(found.data, histories=histories)
     others, unpredicted = predictable(holdout, others, after)
-    answer, after = _answer(recordings, replace(found, after=after), left, others, rng, limits, standing, measured)
+    given_to_it = _Evidence(recordings, found.data, measured, others)
+    answer, after = _answer(given_to_it, replace(found, after=after), left, rng, limits, standing)
     answer = with_twin(_with_channels(answer, faults), after, found.data, recordings, baseline)
     answer = with_lines(answer, lines, after, found.data, baseline, limits)
     told = (*notes, *unpredicted, *proxies(after.fit.model, answer.findings, recordings, histories))
@@ -183,40 +184,51 @@ def _histories(recordings: Sequence[Recording]) -> tuple[History, ...] | Refusal
     return tuple(out)
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Evidence:
+    """What an answer is judged by."""
+
+    recordings: Sequence[Recording]
+    data: Data
+    """What was fitted: periodic disturbances that were found are taken out."""
+    measured: Data
+    """The same runs with these still in them."""
+    others: Sequence[History]
+    """Whole runs held out."""
+
+
 def _answer(
-    recordings: Sequence[Recording],
+    evidence: _Evidence,
     found: Found,
     left: Omnibus,
-    others: Sequence[History],
     rng: np.random.Generator,
     limits: Limits | None,
     standing: dict[Term, Standing] | None,
-    measured: Data,
 ) -> tuple[Diagnosis, State]:
     """The answer, and the final model: with flexible terms where no physics carries what is left."""
-    data, before, after = found.data, found.before, found.after
+    data, before, others = found.data, found.before, evidence.others
     structure = left.p_value < ALARM
-    every_name = name(after, data, found.terms, standing)
+    every_name = name(found.after, data, found.terms, standing)
     named = with_doubts(every_name, left if structure else None, measured=data.with_rate)
-    named = _foreseen(named, after, data, others)
+    parted = split(found.after, data, others)
+    named = _foreseen(named, parted, same_run=not others)
     earned = [n for n in named if not n.doubts]
     doubted = [n for n in named if n.doubts]
-    open_ended = (structure or bool(doubted)) and bool(left.groups)
-    bare, place = _located(after, data, left, doubted, rng) if open_ended else (after, left)
-    free = extend(after, before, data, _foremost(place, doubted, data), doubted, others, rng) if open_ended else None
-    unexplained = _unexplained(place, bare, data, doubted, free, others) if open_ended else None
-    verdict = _verdict(earned, unexplained)
+    free, unexplained = None, None
+    if (structure or doubted) and left.groups:
+        bare, place = _located(found.after, data, left, doubted, rng)
+        free = extend(found.after, before, data, _foremost(place, doubted, data), doubted, parted, rng)
+        unexplained = _unexplained(place, bare, data, doubted, free, others)
     unnamed = [n.term for n in doubted]
-    after = predicting(after, data, found.terms, unnamed, others) if free is None else free.state
+    after = predicting(found.after, parted, data, found.terms, unnamed, others) if free is None else free.state
     earned, known = _with_values(earned, found.after, after, data, free)
     every = [np.ones(r.size, dtype=bool) for r in data.rows]
-    quiet = found.after.noise
-    held = _held_out(before, after, data, measured, others, quiet, free)
+    held = _held_out(before, after, evidence, found.after.noise, free)
     n, p = after.fit.residual.size, int(after.fit.free.sum())
     answer = Diagnosis(
-        recordings=tuple(r.recording_id for r in recordings),
-        thruster=recordings[0].thruster,
-        verdict=verdict,
+        recordings=tuple(r.recording_id for r in evidence.recordings),
+        thruster=evidence.recordings[0].thruster,
+        verdict=_verdict(earned, unexplained),
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
         mismatch=places_of(found, after, rng, pulsing=left.pulses is not None),
@@ -225,7 +237,7 @@ def _answer(
         model_terms=tuple(t.id for t in after.fit.model.terms),
         model=values_of(after.fit, data, known),
         train=Rmse(
-            rmse(before.fit.model, before.fit.theta, measured, every),
+            rmse(before.fit.model, before.fit.theta, evidence.measured, every),
             rmse(after.fit.model, after.fit.theta, data, every),
         ),
         heldout=with_held(held, free),
@@ -237,28 +249,20 @@ def _answer(
     return answer, after
 
 
-def _foreseen(named: Sequence[Named], after: State, data: Data, others: Sequence[History]) -> tuple[Named, ...]:
+def _foreseen(named: Sequence[Named], parted: Parted, *, same_run: bool) -> tuple[Named, ...]:
     """With a doubt where a model without the term predicts what was not fitted better."""
-    worse = unforeseen(after, data, [n.term for n in named if not n.doubts], others)
+    worse = unforeseen(parted, [n.term for n in named if not n.doubts], same_run=same_run)
     doubt = "what was not fitted is predicted better without it"
     return tuple(replace(n, doubts=(*n.doubts, doubt)) if n.term in worse else n for n in named)
 
 
-def _held_out(
-    before: State,
-    after: State,
-    data: Data,
-    measured: Data,
-    others: Sequence[History],
-    quiet: Noise,
-    free: Extended | None,
-) -> HeldOut:
+def _held_out(before: State, after: State, evidence: _Evidence, quiet: Noise, free: Extended | None) -> HeldOut:
     """On the runs held out; where none are on each run in turn; on blocks of time where one run is all there is, and
     where flexible terms were chosen on the rest of these."""
-    if others:
-        return by_runs(before, after, data, others, quiet)
+    if evidence.others:
+        return by_runs(before, after, evidence.data, evidence.others, quiet)
     judge = by_folds if free is None else by_blocks
-    return judge(before, after, data, measured, quiet)
+    return judge(before, after, evidence.data, evidence.measured, quiet)
 
 
 def _with_values(

@@ -47,6 +47,17 @@ SLACK = 1.002
 Judge = Callable[[Fit], Score]
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Parted:
+    """A model fitted to one part of the data, and what judges it on the rest."""
+
+    data: Data
+    """What is fitted."""
+    judge: Judge
+    state: State
+    """The model fitted to that."""
+
+
 @dataclass(frozen=True, eq=False)
 class Extended:
     """A model with flexible terms, on all rows."""
@@ -70,17 +81,17 @@ def extend(
     data: Data,
     located: str,
     doubted: Sequence[Named],
-    others: Sequence[History],
+    parted: Parted,
     rng: np.random.Generator,
 ) -> Extended | None:
     """The model with up to MOST_TERMS flexible terms; None where none improves what was not fitted.
 
     None also where they predict it worse than the baseline, `before`.
 
-    `located`: the coordinate over which it is left; `doubted`: terms whose name was not earned;
-    `others`: whole runs to judge on, blocks of time when empty.
+    `located`: the coordinate over which it is left; `doubted`: terms whose name was not earned; `parted`: `after`,
+    fitted to a part of the data.
     """
-    part, judge, begin = split(after, data, others)
+    part, judge, begin = parted.data, parted.judge, parted.state
     first = judge(begin.fit)
     plain = judge(fit(before.fit.model, before.fit.theta, part, begin.weights))
     for smaller in _bases(begin, part, [n.term for n in doubted]):
@@ -126,16 +137,16 @@ def _anew(whole: State, terms: Sequence[Flexible], data: Data) -> tuple[State, l
     return whole, final
 
 
-def split(after: State, data: Data, others: Sequence[History]) -> tuple[Data, Judge, State]:
-    """What is fitted, what judges it, and the present model fitted to that part."""
+def split(after: State, data: Data, others: Sequence[History]) -> Parted:
+    """All of it is fitted where `others`, whole runs, are there to judge on; otherwise blocks of time are kept back."""
     if others:
-        return data, judge_runs(after, data, others), after
+        return Parted(data, judge_runs(after, data, others), after)
     keep = [blocks(h) for h in data.histories]
     part = replace(data, keep=tuple(keep))
     begin = refitted(after, data, keep)
     w = weights(part, after.noise, forces(begin.model, begin.theta, part), after.rate_noise)
     state = State(begin, after.noise, after.rate_noise, w, part.thrust_rows)
-    return part, judge_blocks(state, data, keep), state
+    return Parted(part, judge_blocks(state, data, keep), state)
 
 
 def _bases(begin: State, part: Data, doubted: Sequence[Term]) -> list[State]:

@@ -15,7 +15,8 @@ from identification.mismatch.model import Data, Weights, predict
 from identification.mismatch.pulses import Pulses
 from identification.mismatch.screening import orthogonal_basis
 from identification.mismatch.state import State
-from identification.physics.free_form import Flexible, Multiplier, lately, spline, turned
+from identification.physics.free_form import Flexible, Multiplier, lately, turned
+from identification.physics.splines import spline
 from identification.recording import Floats
 
 JUMPS = 3

@@ -17,8 +17,9 @@ from identification.mismatch.model import Data, Weights
 from identification.mismatch.naming import Named
 from identification.mismatch.remainder import FlexibleShape, Spline
 from identification.mismatch.state import State
-from identification.physics.free_form import WORDS, Flexible, Multiplier, spline
+from identification.physics.free_form import WORDS, Flexible, Multiplier
 from identification.physics.history import History
+from identification.physics.splines import spline
 from identification.physics.term import Term
 from identification.recording import Floats
 

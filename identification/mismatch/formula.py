@@ -72,7 +72,8 @@ class _Grid:
 def find_formula(extended_by: Extended, data: Data, others: Sequence[History]) -> FormulaFound | None:
     """The formula in the place of the flexible terms; None where none agrees with what was not fitted."""
     bare = without_flexible(extended_by, data)
-    part, judge, begin = split(bare, data, others)
+    parted = split(bare, data, others)
+    part, judge, begin = parted.data, parted.judge, parted.state
     grid = _grid(begin, part)
     if grid is None:
         return None

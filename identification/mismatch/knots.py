@@ -15,7 +15,7 @@ from typing import Literal
 
 import numpy as np
 
-from identification.physics.free_form import spline
+from identification.physics.splines import spline
 from identification.recording import Floats
 
 Degree = Literal[1, 3]

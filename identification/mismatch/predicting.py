@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from identification.mismatch.baseline import baseline
 from identification.mismatch.fitting import fit
-from identification.mismatch.flexible import better, split
+from identification.mismatch.flexible import Parted, better, split
 from identification.mismatch.model import Data, Model, Theta
 from identification.mismatch.state import State
 from identification.physics.history import History
@@ -19,32 +19,36 @@ WORSE = 9.0
 """Of whitened chi-square on what was not fitted: a model that does so much better without a term doubts its name."""
 
 
-def unforeseen(after: State, data: Data, terms: Collection[Term], others: Sequence[History]) -> tuple[Term, ...]:
-    """Of these terms those without which the model predicts what was not fitted better: blocks of time, or `others`."""
-    if not terms:
-        return ()
-    part, judge, begin = split(after, data, others)
-    now = judge(begin.fit).chi2
-    asked = [t for t in begin.fit.model.terms if t in terms and not (others and t.id in EVENTS)]
-    less = {t: fit(*without_terms(begin, [t]), part, begin.weights) for t in asked}
-    return tuple(t for t, fitted in less.items() if judge(fitted).chi2 < now - WORSE)
+def unforeseen(parted: Parted, terms: Collection[Term], *, same_run: bool) -> tuple[Term, ...]:
+    """Of these terms those without which the model predicts what was not fitted better.
+
+    `same_run`: that is blocks of time of the runs that were fitted.
+    """
+    state, now = parted.state, parted.judge(parted.state.fit).chi2
+    asked = [t for t in state.fit.model.terms if t in terms and (same_run or t.id not in EVENTS)]
+    less = {t: fit(*without_terms(state, [t]), parted.data, state.weights) for t in asked}
+    return tuple(t for t, fitted in less.items() if parted.judge(fitted).chi2 < now - WORSE)
 
 
 def predicting(
-    after: State, data: Data, terms: Sequence[Term], doubted: Collection[Term], others: Sequence[History]
+    after: State,
+    parted: Parted,
+    data: Data,
+    terms: Sequence[Term],
+    doubted: Collection[Term],
+    others: Sequence[History],
 ) -> State:
     """The model, without the terms whose name was not earned where these make the prediction no better.
 
     Both are fitted to a part of the data and judged on the rest; with `others`, on those runs. `terms`: whose shapes
-    are taken out of the noise of the smaller one, as before any was found.
+    are taken out of the noise of the smaller one, as before any was found. `parted`: `after`, so fitted.
     """
     if not doubted:
         return after
     smaller, theta = without_terms(after, doubted)
     bare = baseline(data, theta, terms, smaller)
-    _, judge, full = split(after, data, others)
-    _, _, begin = split(bare, data, others)
-    return after if better(judge(full.fit), judge(begin.fit), 0) else bare
+    smaller_fit = split(bare, data, others).state.fit
+    return after if better(parted.judge(parted.state.fit), parted.judge(smaller_fit), 0) else bare
 
 
 def without_terms(state: State, terms: Collection[Term]) -> tuple[Model, Theta]:

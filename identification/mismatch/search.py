@@ -36,11 +36,11 @@ HIDDEN = 2.0
 """Sigmas from which a candidate is tried with noise of its own, where none passes."""
 CLEARER = 3.0
 """The same of a first term that takes its time only where the plan does: a staircase of minutes."""
-SLOW = frozenset({"time", "flow_speed"})
+SLOW_COORDINATES = frozenset({"time", "flow_speed"})
 """Coordinates along which nothing changes quickly: slow noise takes for its own what an effect does over them."""
 MOST_HIDDEN = 3
 MOST_INSTANTS = 5
-APART = 0.05
+INSTANTS_APART = 0.05
 """Of the run: trials of a jump that is hidden."""
 HIDDEN_PRICE = 0.5
 """Of the price of a term's parameters asked for what is hidden, beside the family-wise threshold."""
@@ -229,7 +229,7 @@ def _hidden(state: State, judged: Screening, data: Data) -> State | None:
     likely = [
         (t, v)
         for rank, (t, v, z) in enumerate(judged.best(2 * MOST_HIDDEN))
-        if (rank < MOST_HIDDEN or t.id in STEADY) and z > (HIDDEN if SLOW & set(t.coordinates) else least)
+        if (rank < MOST_HIDDEN or t.id in STEADY) and z > (HIDDEN if SLOW_COORDINATES & set(t.coordinates) else least)
     ]
     likely = [each for t, v in likely for each in ((t, at) for at in _instants(judged, t, data) or (v,))]
     if not likely:
@@ -258,7 +258,9 @@ def _instants(judged: Screening, term: Term, data: Data) -> list[tuple[float, ..
     out: list[tuple[float, ...]] = []
     for j in np.argsort(-judged.plain):
         at = judged.directions.values[j]
-        if judged.directions.terms[j] == term and all(abs(at[1] - v[1]) > APART * data.scale.duration for v in out):
+        if judged.directions.terms[j] == term and all(
+            abs(at[1] - v[1]) > INSTANTS_APART * data.scale.duration for v in out
+        ):
             out.append(at)
         if len(out) == MOST_INSTANTS:
             break

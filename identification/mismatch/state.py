@@ -11,7 +11,7 @@ from identification.mismatch.fitting import Fit, bounds_of, columns_of, fit, raw
 from identification.mismatch.model import Data, Model, Theta, Weights, weights
 from identification.mismatch.noise import Noise, Rows
 from identification.mismatch.noise_likelihood import fit_noise
-from identification.physics.free_form import spline
+from identification.physics.splines import spline
 from identification.physics.term import Term
 from identification.recording import Floats
 from identification.singular_values import thin_svd

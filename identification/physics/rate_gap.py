@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from identification.physics.filters import reconstructed
+from identification.physics.splines import spline
 from identification.physics.wandering import Smoother
 from identification.recording import Floats
 
@@ -39,7 +40,7 @@ class RateGap:
     def calmed(self, gap: Floats, history: History) -> Floats:
         """(M,) of a gap (m,) at the rows of the rate."""
         c, wandering = self.smoother(gap, history.middle)
-        out: Floats = hats(history.driver, self.nodes) @ c
+        out = spline(history.driver, self.nodes, c, 1)
         return out + (history.driver * wandering if self.by_share else wandering)
 
 
@@ -52,7 +53,7 @@ def rate_gap(history: History) -> RateGap | None:
     nodes = np.unique(np.quantile(driver, np.linspace(0.0, 1.0, min(NODES, max(rows.size // ROWS_A_NODE, 2)))))
     if nodes.size < 2:
         return None
-    columns = hats(driver, nodes)
+    columns = spline(driver, nodes, np.eye(nodes.size), 1)
     gap = without_ticks(history.rate[rows] / history.rate_per_driver - driver, history)
     left = gap - columns @ np.linalg.lstsq(columns, gap, rcond=1e-10)[0]
     one = np.ones_like(gap)
@@ -76,11 +77,6 @@ def without_ticks(gap: Floats, history: History) -> Floats:
     power = float(lead @ lead)
     followed = min(max(float(gap @ lead) / power, 0.0), 1.0) if power > 0 else 0.0
     return gap - followed * lead
-
-
-def hats(at: Floats, nodes: Floats) -> Floats:
-    """(n, p) straight lines between nodes, constant beyond."""
-    return np.column_stack([np.interp(at, nodes, one) for one in np.eye(nodes.size)])
 
 
 class Running(NamedTuple):

@@ -99,18 +99,7 @@ def _bare(
     with_flow = bool(named & NEEDS_FLOW) or rng.random() < 0.3
     drift = float(rng.uniform(4.0, 8.0)) * float(rng.choice((-1.0, 1.0))) if named & NEEDS_DRIFT else 0.0
     kind = plan or str(rng.choice(KINDS))
-    made, start, smooth = [], 0.0, bool(named & NEEDS_SLEW)
-    for _ in range(runs):
-        flow = (
-            flow_steps(rng, scale.flow, long, reversed_too=bool(named & NEEDS_REVERSED_FLOW))
-            if with_flow
-            else ((0.0, 0.0),)
-        )
-        tare = full * float(rng.uniform(-0.02, 0.02))
-        made.append(
-            Run(profile(kind, top, long, grid, rng, smooth=smooth), flow, tare, start, int(rng.integers(2**62)))
-        )
-        start += long
+    made = [_run(rng, scale, kind, i * long, long, named, with_flow=with_flow) for i in range(runs)]
     loud = full * _log(rng, 5e-4, 0.01)
     noise_kind = noise or str(rng.choice(NOISE_KINDS))
     forced = {"flow_speed"} if named & NEEDS_FLOW else set()
@@ -130,6 +119,18 @@ def _bare(
         temperature_drift=drift / (long * runs),
         with_steps=bool(rng.random() < 0.7),
     )
+
+
+def _run(
+    rng: Rng, scale: Scale, kind: str, start: float, long: float, named: frozenset[str], *, with_flow: bool
+) -> Run:
+    """One run of the plan, `long` s from `start` on of the campaign's clock."""
+    flow: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
+    if with_flow:
+        flow = flow_steps(rng, scale.flow, long, reversed_too=bool(named & NEEDS_REVERSED_FLOW))
+    tare = scale.thrust * float(rng.uniform(-0.02, 0.02))
+    steps = profile(kind, scale.voltage, long, scale.grid, rng, smooth=bool(named & NEEDS_SLEW))
+    return Run(steps, flow, tare, start, int(rng.integers(2**62)))
 
 
 def _log(rng: Rng, low: float, high: float) -> float:

@@ -17,8 +17,9 @@ from identification.mismatch.preparing import history_of
 from identification.mismatch.simulating import Drive, Prediction, others_of, simulate
 from identification.mismatch.sizes import scale_of
 from identification.physics.formula_form import Monomial
-from identification.physics.free_form import MULTIPLIERS, Flexible, spline, turned
+from identification.physics.free_form import MULTIPLIERS, Flexible, turned
 from identification.physics.history import History
+from identification.physics.splines import spline
 from identification.physics.term import Moment, Scale
 from identification.recording import Channel
 from rig.diagnose_text import diagnosis_text

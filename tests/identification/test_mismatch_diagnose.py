@@ -12,6 +12,7 @@ from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, Where, diagnosis_json
 from identification.mismatch.fitting import extended, fit
 from identification.mismatch.flatness import noise_goes_on
+from identification.mismatch.flexible import split
 from identification.mismatch.model import Model
 from identification.mismatch.naming import doubts
 from identification.mismatch.noise import Noise
@@ -615,7 +616,8 @@ def unnamed(recording, term, values):
     first = found.before.fit
     bigger = first.model.plus(term)
     fitted = fit(bigger, extended(first.theta, first.model, term, values, bigger), found.data, found.before.weights)
-    return predicting(replace(found.before, fit=fitted), found.data, found.terms, [term], ())
+    after = replace(found.before, fit=fitted)
+    return predicting(after, split(after, found.data, ()), found.data, found.terms, [term], ())
 
 
 def test_a_term_without_a_name_stays_where_it_predicts():
