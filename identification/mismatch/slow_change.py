@@ -27,15 +27,19 @@ def beside_slow_change(state: State, data: Data) -> State | None:
     """The same model with its noise estimated beside such a change; None where noise explains the residual as well."""
     if any(h.static for h in data.histories):
         return None
+    found = [(p, beside) for p, beside in slow_changes(state, data) if p < ALARM]
+    return min(found, key=lambda each: each[0])[1] if found else None
+
+
+def slow_changes(state: State, data: Data) -> list[tuple[float, State]]:
+    """The p-value of each kind of change, and the model with its noise estimated beside it."""
     now = refresh(state.fit.model, state.fit.theta, data, None, None)
     found = []
     for columns in slow_columns(now, data):
-        new = refresh(now.fit.model, now.fit.theta, data, columns, now, now.noise)
-        gain = now.fit.deviance - new.fit.deviance + _taken(new, data, columns)
-        p = chi2_sf(gain, columns.shape[1])
-        if p < ALARM:
-            found.append((p, new))
-    return min(found, key=lambda each: each[0])[1] if found else None
+        beside = refresh(now.fit.model, now.fit.theta, data, columns, now, now.noise)
+        gain = now.fit.deviance - beside.fit.deviance + _taken(beside, data, columns)
+        found.append((chi2_sf(gain, columns.shape[1]), beside))
+    return found
 
 
 def slow_columns(state: State, data: Data) -> tuple[Floats, ...]:
