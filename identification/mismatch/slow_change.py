@@ -38,7 +38,7 @@ def slow_changes(state: State, data: Data) -> list[tuple[float, State]]:
     for columns in slow_columns(now, data):
         beside = refresh(now.fit.model, now.fit.theta, data, columns, now, now.noise)
         gain = now.fit.deviance - beside.fit.deviance + _taken(beside, data, columns)
-        found.append((chi2_sf(gain, columns.shape[1]), beside))
+        found.append((float(chi2_sf(gain, columns.shape[1])), beside))
     return found
 
 
