@@ -6,6 +6,9 @@ The search tries a term that no screening finds by estimating term and noise tog
 believes it from a gain in deviance on; those prices (STEADY, OFFSET_PRICE, HIDDEN_PRICE) were set by this table. On
 clean recordings every term that would be tried is told by the largest gains it reached; then the gains of EFFECT where
 an oracle sees it at SIGMA. `asked` is the median of what the search asks of it.
+
+Zero and gain that wander over the run are told from noise in the same way, by a p-value (`slow_change.ALARM`): the
+smallest on the clean recordings, and where EFFECT is concealed and in no catalogue.
 """
 
 from __future__ import annotations
@@ -32,6 +35,7 @@ from identification.mismatch.model import Data, Model
 from identification.mismatch.preparing import Refusal
 from identification.mismatch.screening import Screening, directions, refined, screen
 from identification.mismatch.shape_error import allowed, corrections
+from identification.mismatch.slow_change import ALARM, slow_changes
 from identification.mismatch.state import State, refresh
 from sim_devices import concealed
 from tests.concealed.recordings import recordings
@@ -54,20 +58,30 @@ class Gain:
     asked: float
 
 
-def gains(case: concealed.Case) -> tuple[Gain, ...]:
-    """Of every term that is likely enough; none where the screening finds one without this."""
+@dataclass(frozen=True, slots=True)
+class Seen:
+    """On one recording where the screening finds nothing."""
+
+    gains: tuple[Gain, ...] = ()
+    """Of every term that is likely enough."""
+    slow: tuple[float, ...] = ()
+    """p-values of a zero, a gain and a gain that wander, the last one quicker."""
+
+
+def seen(case: concealed.Case, *without: str) -> Seen:
+    """Of effects `without` nothing is asked: they are in no catalogue."""
     histories = _histories(recordings(case))
     if isinstance(histories, Refusal):
-        return ()
+        return Seen()
     data, theta = start(histories)
-    terms = search.available(data)
+    terms = search.available(data, without)
     state = baseline(data, theta, terms, Model())
     found = directions(state.fit, data, state.weights, terms)
     spared = allowed(corrections(state.fit, data, state.weights), found.columns)
     judged = screen(state.fit, found, np.random.default_rng(0), search.ALARM, spared)
     if judged.largest > judged.threshold:
-        return ()
-    return tuple(_tried(state, judged, data))
+        return Seen()
+    return Seen(tuple(_tried(state, judged, data)), tuple(p for p, _ in slow_changes(state, data)))
 
 
 def _tried(state: State, judged: Screening, data: Data) -> Iterator[Gain]:
@@ -84,47 +98,53 @@ def _tried(state: State, judged: Screening, data: Data) -> Iterator[Gain]:
         yield Gain(term.id, screened, now.fit.deviance - new.fit.deviance, asked)
 
 
-def clean(count: int) -> dict[str, list[Gain]]:
-    """By term."""
-    out: dict[str, list[Gain]] = defaultdict(list)
+def clean(count: int) -> tuple[dict[str, list[Gain]], list[tuple[float, ...]]]:
+    """Gains by term, and the p-values of slow changes."""
+    gains: dict[str, list[Gain]] = defaultdict(list)
+    slow = []
     for kind in concealed.NOISE_KINDS:
         for i in range(count):
-            for found in gains(concealed.case(np.random.default_rng([SEED, i]), noise=kind)):
-                out[found.term].append(found)
-    return out
+            found = seen(concealed.case(np.random.default_rng([SEED, i]), noise=kind))
+            slow.append(found.slow)
+            for gain in found.gains:
+                gains[gain.term].append(gain)
+    return gains, [each for each in slow if each]
 
 
-def hidden(effect: str, sigma: float, count: int) -> tuple[list[Gain], int]:
-    """Of the effect itself, in the form that gains most, and in how many recordings it could be drawn at all."""
-    out, drawn = [], 0
+def hidden(effect: str, sigma: float, count: int) -> tuple[list[Gain], list[tuple[float, ...]], int]:
+    """Of the effect itself, in the form that gains most; of slow changes, in no catalogue; how many could be drawn."""
+    gains, slow, drawn = [], [], 0
     for i in range(count):
         try:
             case = concealed.case(np.random.default_rng([SEED, i, 1]), [effect], sigma)
         except concealed.OutOfReach:
             continue
         drawn += 1
-        forms = [found for found in gains(case) if found.term == effect]
+        forms = [found for found in seen(case).gains if found.term == effect]
         if forms:
-            out.append(max(forms, key=lambda each: each.gain - each.asked))
-    return out, drawn
+            gains.append(max(forms, key=lambda each: each.gain - each.asked))
+        slow.append(seen(case, effect).slow)
+    return gains, [each for each in slow if each], drawn
 
 
 def main(count: int = 8, effect: str = "zero_drift", sigma: float = 8.0) -> None:
     kinds = len(concealed.NOISE_KINDS)
     print(f"{count * kinds} clean recordings, {kinds} kinds of noise\n")
     print(f"{'term':<22}{'tried':>6}{'asked':>8}   largest gains")
-    for term, found in sorted(clean(count).items(), key=lambda each: -max(g.gain for g in each[1])):
+    gains, slow = clean(count)
+    for term, found in sorted(gains.items(), key=lambda each: -max(g.gain for g in each[1])):
         largest = sorted((g.gain for g in found), reverse=True)[:SHOWN]
-        print(
-            f"{term:<22}{len(found):>6}{median(g.asked for g in found):>8.1f}   {' '.join(f'{x:.1f}' for x in largest)}"
-        )
-    found, drawn = hidden(effect, sigma, count * kinds)
-    print(f"\n{effect} at {sigma:g} sigma in {drawn} recordings: {len(found)} left to be told from noise", end="")
-    if found:
-        told = sum(g.gain > g.asked for g in found)
-        print(f", of which {told} gain what is asked; gains {' '.join(f'{g.gain:.1f}' for g in found)}")
-    else:
-        print()
+        asked = median(g.asked for g in found)
+        print(f"{term:<22}{len(found):>6}{asked:>8.1f}   {' '.join(f'{x:.1f}' for x in largest)}")
+    mine, unknown, drawn = hidden(effect, sigma, count * kinds)
+    told = sum(g.gain > g.asked for g in mine)
+    print(f"\n{effect} at {sigma:g} sigma in {drawn} recordings: {len(mine)} left to be told from noise, of which")
+    print(f"{told} gain what is asked; gains {' '.join(f'{g.gain:.1f}' for g in mine)}")
+    print(f"\n{'slow changes':<30}{'recordings':>10}{f'p < {ALARM:g}':>12}   smallest")
+    for what, each in (("clean", slow), (f"{effect}, in no catalogue", unknown)):
+        least = sorted(min(p) for p in each)
+        smallest = " ".join(f"{p:.1g}" for p in least[:SHOWN])
+        print(f"{what:<30}{len(each):>10}{sum(p < ALARM for p in least):>12}   {smallest}")
 
 
 if __name__ == "__main__":
