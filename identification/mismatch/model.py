@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.noise import Noise, Rows, Whitener
+from identification.mismatch.noise import Noise, Rows, Whitener, rows_of
 from identification.mismatch.tick_response import told
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.history import History
@@ -177,7 +177,7 @@ class Data:
     @cached_property
     def thrust_rows(self) -> tuple[Rows, ...]:
         return tuple(
-            Rows(h.sampled[r], n := h.count[r].astype(np.float64), np.ones(r.size), h.spacing * n)
+            rows_of(h.sampled[r], h.count[r].astype(np.float64), h.spacing)
             for h, r in zip(self.histories, self.rows, strict=True)
         )
 
@@ -187,8 +187,7 @@ class Data:
         for h in self.histories:
             assert h.rate_count is not None
             r = h.rate_rows
-            n = h.rate_count[r].astype(np.float64)
-            out.append(Rows(h.middle[r], n, np.ones(r.size), h.rate_spacing * n))
+            out.append(rows_of(h.middle[r], h.rate_count[r].astype(np.float64), h.rate_spacing))
         return tuple(out)
 
     @cached_property

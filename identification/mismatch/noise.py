@@ -18,6 +18,8 @@ from identification.recording import Floats
 
 MOST_GROWTH = 60.0
 """Exponent of what lies farther apart than any correlation reaches."""
+WITHIN = 0.999
+"""Of the room that rows take: what is nearer is no rounding."""
 MOST_REMEMBERED = 8
 """Sets of scales and bands whose matrices are kept with the rows."""
 
@@ -36,6 +38,21 @@ class Rows:
     """(n,) s over which the samples of a row are spread."""
     memo: dict[object, Shape] = field(default_factory=dict, init=False, repr=False)
     """(scales, bands) -> the matrices of the noise on these rows at unit variances."""
+
+
+def rows_of(time: Floats, count: Floats, spacing: float) -> Rows:
+    """Rows of samples (n,) that are mostly `spacing` s apart.
+
+    Where a log wrote them in bursts they are closer: rows that lay over each other would have no covariance.
+    """
+    width, apart = spacing * count, np.diff(time)
+    reach = np.where(count > 1, width, 0.0)
+    pair = 0.5 * (reach[1:] + reach[:-1])
+    tight = apart < WITHIN * pair
+    share = np.ones(apart.size)
+    share[tight] = apart[tight] / pair[tight]
+    room = np.minimum(np.append(share, 1.0), np.append(1.0, share))[: time.size]
+    return Rows(time, count, np.ones(time.size), room * width)
 
 
 @dataclass(frozen=True, eq=False, slots=True)

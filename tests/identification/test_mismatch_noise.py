@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.noise import Noise, Rows, Whitener
+from identification.mismatch.noise import Noise, Rows, Whitener, rows_of
 from identification.mismatch.noise_likelihood import fit_noise
 from identification.mismatch.restricted import Response, likelihood
 
@@ -271,3 +271,23 @@ def test_a_short_run_has_one_slow_scale_at_most():
     r = Rows(np.linspace(0, 0.5, 120), np.ones(120), np.ones(120), np.full(120, 0.1))
     y = np.random.default_rng(13).standard_normal(120)
     assert len(fitted(r, y).scales) <= 1
+
+
+def test_rows_of_samples_in_bursts_have_a_covariance():
+    """A log may write four samples at once: at the usual spacing its rows would lie over each other."""
+    time = np.array([0.0, 0.67, 1.49, 1.55, 1.70, 2.07])
+    count = np.array([4.0, 1.0, 1.0, 1.0, 1.0, 4.0])
+    quick = Noise(1e-6, 0.0, (0.15,), (1.6,))
+    time = np.concatenate([time + 2.2 * k for k in range(40)])
+    count = np.tile(count, 40)
+    rows = rows_of(time, count, 0.344)
+    assert np.all(np.isfinite(Whitener(quick, rows, np.zeros(time.size)).whiten(np.ones(time.size))))
+    reach = np.where(count > 1, rows.width, 0.0)
+    assert np.all(0.5 * (reach[1:] + reach[:-1]) <= np.diff(time) * (1 + 1e-12))
+
+
+def test_rows_of_even_samples_are_as_wide_as_these_say():
+    rows = rows_of(0.02 * np.arange(30.0), np.full(30, 2.0), 0.01)
+    assert np.all(rows.width == 0.02)
+    for size in (0, 1):
+        assert rows_of(np.zeros(size), np.full(size, 3.0), 0.01).width.tolist() == [0.03] * size
