@@ -28,7 +28,7 @@ from identification.mismatch.naming import Named, name, with_doubts
 from identification.mismatch.next_experiment import propose
 from identification.mismatch.noise import Noise
 from identification.mismatch.omnibus import ALARM, Omnibus, judge_left
-from identification.mismatch.predicting import predicting, unforeseen, without_terms
+from identification.mismatch.predicting import predicting, predicts, unforeseen, without_terms
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.proxies import proxies
 from identification.mismatch.rivals import EQUAL, Standing, settle_forms
@@ -58,6 +58,7 @@ COLOURED = 1e-25
 """p-value of whiteness below which no noise is blamed; 1/f noise alone was seen to reach 1e-21."""
 UNCARRIED = 6.0
 """Sigmas of a direction of the last screening that no term made anything of: it is left, whatever its shape."""
+ALONE = "without terms that have no name it predicts what was not fitted worse than the baseline"
 DRIVER_NAMES = {"command_voltage": "V|V|", "motor_voltage": "V|V|", "rotation_rate": "n|n|"}
 
 
@@ -214,13 +215,16 @@ def _answer(
     named = _foreseen(named, parted, same_run=not others)
     earned = [n for n in named if not n.doubts]
     doubted = [n for n in named if n.doubts]
-    free, unexplained = None, None
-    if (structure or doubted) and left.groups:
-        bare, place = _located(found.after, data, left, doubted, rng)
-        free = extend(found.after, before, data, _foremost(place, doubted, data), doubted, parted, rng)
-        unexplained = _unexplained(place, bare, data, doubted, free, others)
+    open_ended = (structure or bool(doubted)) and bool(left.groups)
+    bare, place = _located(found.after, data, left, doubted, rng) if open_ended else (found.after, left)
+    located = _foremost(place, doubted, data) if open_ended else ""
+    free = extend(found.after, before, data, located, doubted, parted, rng) if open_ended else None
     unnamed = [n.term for n in doubted]
     after = predicting(found.after, parted, data, found.terms, unnamed, others) if free is None else free.state
+    if earned and doubted and free is None and not predicts(after, before, data, others):
+        after, doubted, earned = before, [*doubted, *(replace(n, doubts=(ALONE,)) for n in earned)], []
+        bare, place = _located(found.after, data, left, doubted, rng)
+    unexplained = _unexplained(place, bare, data, doubted, free, others) if open_ended else None
     earned, known = _with_values(earned, found.after, after, data, free)
     every = [np.ones(r.size, dtype=bool) for r in data.rows]
     held = _held_out(before, after, evidence, found.after.noise, free)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
+import numpy as np
+
 from identification.mismatch.baseline import baseline
 from identification.mismatch.fitting import fit
 from identification.mismatch.flexible import Parted, better, split
@@ -13,8 +15,8 @@ from identification.mismatch.state import State
 from identification.physics.history import History
 from identification.physics.term import Term
 
-EVENTS = frozenset({"zero_offset", "zero_drift"})
-"""Of one run's own clock: another run need not repeat them."""
+EVENTS = frozenset({"zero_offset", "zero_drift", "time_skew"})
+"""Of one run's own clocks: another run need not repeat them."""
 WORSE = 9.0
 """Of whitened chi-square on what was not fitted: a model that does so much better without a term doubts its name."""
 
@@ -22,12 +24,14 @@ WORSE = 9.0
 def unforeseen(parted: Parted, terms: Collection[Term], *, same_run: bool) -> tuple[Term, ...]:
     """Of these terms those without which the model predicts what was not fitted better.
 
-    `same_run`: that is blocks of time of the runs that were fitted.
+    `same_run`: that is blocks of time of the runs that were fitted. The noise of other runs may be another, which is
+    why their errors must fall as well.
     """
-    state, now = parted.state, parted.judge(parted.state.fit).chi2
+    state, now = parted.state, parted.judge(parted.state.fit)
     asked = [t for t in state.fit.model.terms if t in terms and (same_run or t.id not in EVENTS)]
-    less = {t: fit(*without_terms(state, [t]), parted.data, state.weights) for t in asked}
-    return tuple(t for t, fitted in less.items() if parted.judge(fitted).chi2 < now - WORSE)
+    less = {t: parted.judge(fit(*without_terms(state, [t]), parted.data, state.weights)) for t in asked}
+    most = np.inf if same_run else now.rmse
+    return tuple(t for t, score in less.items() if score.chi2 < now.chi2 - WORSE and score.rmse < most)
 
 
 def predicting(
@@ -49,6 +53,13 @@ def predicting(
     bare = baseline(data, theta, terms, smaller)
     smaller_fit = split(bare, data, others).state.fit
     return after if better(parted.judge(parted.state.fit), parted.judge(smaller_fit), 0) else bare
+
+
+def predicts(state: State, before: State, data: Data, others: Sequence[History]) -> bool:
+    """Whether the model predicts what was not fitted better than the baseline, `before`."""
+    parted = split(state, data, others)
+    plain = fit(before.fit.model, before.fit.theta, parted.data, parted.state.weights)
+    return parted.judge(parted.state.fit).rmse < parted.judge(plain).rmse
 
 
 def without_terms(state: State, terms: Collection[Term]) -> tuple[Model, Theta]:

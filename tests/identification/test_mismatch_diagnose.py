@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 from diagnosed_runs import NOISE, TOP, C, dead_band, levels, run, table
 
+from identification.mismatch import diagnosing
 from identification.mismatch.baseline import baseline, start
 from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, Where, diagnosis_json
 from identification.mismatch.fitting import extended, fit
 from identification.mismatch.flatness import noise_goes_on
 from identification.mismatch.flexible import split
+from identification.mismatch.judging import Score
 from identification.mismatch.model import Model
 from identification.mismatch.naming import doubts
 from identification.mismatch.noise import Noise
-from identification.mismatch.predicting import predicting
+from identification.mismatch.predicting import predicting, predicts, unforeseen
 from identification.mismatch.preparing import Refusal, history_of
 from identification.mismatch.search import search
 from identification.physics.dead_band import DeadBand
@@ -216,6 +218,22 @@ def test_a_name_must_predict_what_was_not_fitted():
     found = diagnose([run(seed=1, volts=dead_band(0.8))], holdout=[run(seed=2)])
     assert found.verdict == "unexplained"
     assert any("predicted better without it" in text for text in found.unexplained.resembles)
+
+
+def test_names_go_where_without_those_that_are_not_earned_they_predict_worse_than_the_baseline(monkeypatch):
+    runs = [run(lambda t, V, F: np.where(F < 0, 0.8, 1.0) * F, seed=1, volts=dead_band(0.8))]
+    others = [run(lambda t, V, F: np.where(F < 0, 0.8, 1.0) * F, seed=2)]
+    found = diagnose(runs, holdout=others)
+    assert [f.effect for f in found.findings] == ["asymmetry"]
+    assert [text.split(":")[0] for text in found.unexplained.resembles] == ["dead_band"]
+    assert found.heldout.after < found.heldout.before
+    monkeypatch.setattr(diagnosing, "predicts", lambda *_: False)
+    alone = diagnose(runs, holdout=others)
+    assert alone.verdict == "unexplained"
+    assert alone.findings == ()
+    assert f"asymmetry: {diagnosing.ALONE}" in alone.unexplained.resembles
+    assert set(alone.model) == {"C", "tare"}
+    assert alone.heldout.after == pytest.approx(alone.heldout.before)
 
 
 def test_a_jump_of_one_run_need_not_be_in_another():
@@ -630,3 +648,40 @@ def test_a_term_without_a_name_goes_where_it_only_describes():
     knocked = run(lambda t, _V, F: F + 3.0 * ((t > 128.0) & (t < 144.0)))
     after = unnamed(knocked, ZeroOffset(), (3.0, 128.0))
     assert after.fit.model.terms == ()
+
+
+@pytest.fixture(scope="module")
+def late():
+    """Found in a run with a dead band whose force comes late."""
+    return search(
+        (history_of(run(lambda t, _V, F: np.interp(t - 0.2, t, F), volts=dead_band(0.8))),), np.random.default_rng(0)
+    )
+
+
+def judged(parted, chi2, rmse):
+    """The same, whose models have these scores where they lack a term."""
+    every = len(parted.state.fit.model.terms)
+    return replace(
+        parted,
+        judge=lambda fitted: Score(1.0, 100.0) if len(fitted.model.terms) == every else Score(rmse, chi2),
+    )
+
+
+def test_a_clock_of_one_run_is_not_that_of_another(late):
+    assert {t.id for t in late.after.fit.model.terms} == {"dead_band", "time_skew"}
+    better = judged(split(late.after, late.data, ()), 50.0, 0.9)
+    terms = late.after.fit.model.terms
+    assert {t.id for t in unforeseen(better, terms, same_run=True)} == {"dead_band", "time_skew"}
+    assert {t.id for t in unforeseen(better, terms, same_run=False)} == {"dead_band"}
+
+
+def test_of_other_runs_the_error_must_fall_as_well(late):
+    quieter = judged(split(late.after, late.data, ()), 50.0, 1.1)
+    terms = late.after.fit.model.terms
+    assert unforeseen(quieter, terms, same_run=False) == ()
+    assert len(unforeseen(quieter, terms, same_run=True)) == 2
+
+
+def test_what_predicts_is_better_than_the_baseline(late):
+    assert predicts(late.after, late.before, late.data, ())
+    assert not predicts(late.before, late.after, late.data, ())
