@@ -2,6 +2,7 @@
 
     python -m venv build/peers-venv; build/peers-venv/bin/pip install -e '.[benchmark]'     SysIdentPy wants numpy < 2.4
     build/peers-venv/bin/python benchmarks/peers.py N          N recordings of each kind; resumes from build/peers.jsonl
+    build/peers-venv/bin/python benchmarks/peers.py N --json FILE     the figures for `rig prove --beside`
     build/peers-venv/bin/python benchmarks/peers.py tune N     every setting of every grid on N recordings of each kind
 
 Kinds: clean, one effect at 15 sigma (clear), one effect at 40 sigma (plain); effects in turn, all else drawn at random
@@ -19,11 +20,13 @@ other recording's thrust. Seconds: the method, without making the columns.
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import sys
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
+from importlib.metadata import version
 from pathlib import Path
 from time import process_time
 from typing import Any
@@ -33,46 +36,24 @@ os.environ.update(dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
 import numpy as np
 from peers.cases import EFFECTS, STRENGTHS, Puzzle, made
 from peers.columns import Problem, problem
+from peers.counting import Answer, counted, table
 from peers.methods import GRIDS, TUNED, names
 
 from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.simulating import Drive, Prediction, others_of, simulate
 from identification.recording import Recording
+from rig.blind.beside import Peers, write
 from rig.blind.store import version_of_diagnosis
 from sim_devices.concealed.version import version as version_of_world
 
 OURS = "rig diagnose"
 BARE = "C V|V| alone"
 STORE = Path(__file__).parents[1] / "build" / "peers.jsonl"
+FIRST_SEED = 1000
 FIRST_TUNING_SEED = 50_000
+PACKAGES = ("pysindy", "sysidentpy", "statsmodels", "numpy")
 CODE = f"{version_of_diagnosis()} in world {version_of_world()}"
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    method: str
-    kind: str
-    effect: str
-    seed: int
-    named: tuple[str, ...]
-    rivals: tuple[str, ...]
-    error: float
-    """Of the noise."""
-    seconds: float
-    setting: dict[str, Any] = field(default_factory=dict)
-    code: str = ""
-    """Of what made the recording and the answer: an answer of other code is not counted."""
-
-    @property
-    def outcome(self) -> str:
-        if not self.effect:
-            return "false alarm" if self.named else "quiet"
-        if self.effect in self.named:
-            return "alone" if len(set(self.named)) == 1 and not self.rivals else "among"
-        if self.effect in self.rivals:
-            return "among"
-        return "wrong" if self.named else "none"
 
 
 def drawn(number: int, first: int) -> Iterator[tuple[str, str, int]]:
@@ -154,36 +135,20 @@ def run(number: int) -> list[Answer]:
     cut = STORE.exists() and not STORE.read_bytes().endswith(b"\n")
     with STORE.open("a", encoding="utf-8") as store:
         store.write("\n" * cut)
-        for one in drawn(number, 1000):
+        for one in drawn(number, FIRST_SEED):
             new = list(answered(*one, {m for m in (OURS, BARE, *TUNED) if (*one, m) not in done}))
             store.writelines(json.dumps(asdict(a)) + "\n" for a in new)
             store.flush()
             answers += new
             print(*one, "; ".join(f"{a.method} {a.outcome}" for a in new), file=sys.stderr)
-    wanted = set(drawn(number, 1000))
+    wanted = set(drawn(number, FIRST_SEED))
     return [a for a in answers if (a.kind, a.effect, a.seed) in wanted]
 
 
-def table(answers: list[Answer]) -> None:
-    columns = "| right alone | right among names | wrong | none |"
-    print(f"| method | strength {columns} error, median | error, 95 % | false alarms | CPU s, median |")
-    print("|---|---|---|---|---|---|---|---|---|---|")
-    for method in (OURS, *TUNED, BARE):
-        mine = [a for a in answers if a.method == method]
-        clean = [a for a in mine if not a.effect]
-        alarms = sum(a.outcome == "false alarm" for a in clean)
-        for kind in ("clear", "plain"):
-            some = [a for a in mine if a.kind == kind]
-            if not some:
-                continue
-            counts = [sum(a.outcome == o for a in some) for o in ("alone", "among", "wrong", "none")]
-            shares = " | ".join(f"{100 * c / len(some):.0f} %" for c in counts)
-            errors = [a.error for a in some]
-            seconds = np.median([a.seconds for a in some])
-            print(
-                f"| {method} | {STRENGTHS[kind]:.0f} | {shares} | {np.median(errors):.3f} "
-                f"| {np.quantile(errors, 0.95):.2f} | {alarms} of {len(clean)} | {seconds:.1f} |"
-            )
+def figures(answers: list[Answer], each: int) -> Peers:
+    found = counted(answers, (OURS, *TUNED, BARE), STRENGTHS, BARE)
+    packages = {name: version(name) for name in PACKAGES}
+    return Peers(version_of_diagnosis(), version_of_world(), FIRST_SEED, each, packages, found)
 
 
 def tune(number: int) -> None:
@@ -208,10 +173,19 @@ def _tuned_so_far(right: dict[tuple[str, str], list[bool]]) -> None:
 
 
 def main() -> None:
-    if sys.argv[1:2] == ["tune"]:
-        tune(int(sys.argv[2]) if len(sys.argv) > 2 else 5)
-    else:
-        table(run(int(sys.argv[1]) if len(sys.argv) > 1 else 5))
+    options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    options.add_argument("what", nargs="*", metavar="[tune] N", help="recordings of each kind (default 5)")
+    options.add_argument("--json", type=Path, metavar="FILE", help="write the figures here, for `rig prove --beside`")
+    given = options.parse_args()
+    tuning = given.what[:1] == ["tune"]
+    each = int(given.what[tuning]) if given.what[tuning:] else 5
+    if tuning:
+        tune(each)
+        return
+    found = figures(run(each), each)
+    print(table(found.methods))
+    if given.json is not None:
+        write(given.json, found)
 
 
 if __name__ == "__main__":

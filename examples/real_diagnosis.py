@@ -1,12 +1,13 @@
 """What C V|V| leaves out of thrust recordings that others have made: fitted on one part, judged on another.
 
-    python examples/real_diagnosis.py [FOLDER] [--whole] [--only NAME] [--reports FOLDER]
+    python examples/real_diagnosis.py [FOLDER] [--whole] [--only NAME] [--reports FOLDER] [--json FILE]
 
 FOLDER holds the recordings, a folder for each table; default: `../shared/recordings` beside the project. They are not
 part of the project: `origin` in `rig/maps/*.toml` says who published them. What
 is done here is `rig import` and then `rig diagnose FILES [--holdout FILE...]`. Printed are verdict, statement and the
 error of what was not fitted: other runs where there are several, otherwise blocks of time (levels of a table).
-`--whole` prints all that `rig diagnose` says. Boats and ROVs: `real_vehicle_diagnosis.py`.
+`--whole` prints all that `rig diagnose` says; `--json` writes what `rig prove --beside` shows.
+Boats and ROVs: `real_vehicle_diagnosis.py`.
 """
 
 from __future__ import annotations
@@ -19,9 +20,11 @@ from time import process_time
 import click
 
 from identification.mismatch.diagnosis import Diagnosis
+from rig.blind import beside
+from rig.blind.beside import RealRecordings, real_case, unanswered
+from rig.blind.store import version_of_diagnosis
 from rig.diagnose import diagnose_files
 from rig.diagnose_text import diagnosis_text
-from rig.errors import RecordingError
 from rig.importer import import_file
 from rig.importing.mapping import read_map
 from rig.report.diagnosis import write
@@ -86,10 +89,12 @@ def short(case: Case, found: Diagnosis, took: float) -> str:
 @click.option("--whole", is_flag=True)
 @click.option("--only", default="")
 @click.option("--reports", type=click.Path(path_type=Path))
-def main(root: Path, whole: bool, only: str, reports: Path | None) -> None:
+@click.option("--json", "json_path", type=click.Path(path_type=Path))
+def main(root: Path, whole: bool, only: str, reports: Path | None, json_path: Path | None) -> None:
     if not root.is_dir():
         print(f"{root} is not there; the real recordings are not part of the project")
         return
+    told = []
     for case in CASES:
         if only not in case.name:
             continue
@@ -97,13 +102,17 @@ def main(root: Path, whole: bool, only: str, reports: Path | None) -> None:
         with tempfile.TemporaryDirectory() as temporary:
             try:
                 found = diagnosed(root, case, Path(temporary))
-            except RecordingError as error:
-                print(f"{case.name}: {error}\n", flush=True)
+            except Exception as error:  # noqa: BLE001  # a crash is an answer too, and does not end the others
+                told.append(unanswered(case.name, error))
+                print(f"{case.name}: {told[-1].verdict}\n  {told[-1].statement}\n", flush=True)
                 continue
+        told.append(real_case(case.name, found))
         print(diagnosis_text(found) if whole else short(case, found, process_time() - begun), end="\n\n", flush=True)
         if reports is not None:
             reports.mkdir(parents=True, exist_ok=True)
             write(found, reports / f"{case.name.replace(' ', '_')}.html")
+    if json_path is not None:
+        beside.write(json_path, RealRecordings(version_of_diagnosis(), tuple(told)))
 
 
 if __name__ == "__main__":

@@ -1,21 +1,26 @@
 """What the model of a vehicle leaves out of recordings that others have made: a boat on a lake, an ROV in a tank.
 
-    python examples/real_vehicle_diagnosis.py [FOLDER] [--whole]
+    python examples/real_vehicle_diagnosis.py [FOLDER] [--whole] [--json FILE]
 
 FOLDER holds the recordings, a folder for each table; default: `../shared/recordings` beside the project. They are not
 part of the project: `origin` in `rig/maps/*.toml` says who published them. What
 is done here is `rig import` and then `rig diagnose FILES --installation examples/usv_lake.toml`. Printed are verdict,
-statement and the error of runs that were not fitted; `--whole` prints all that `rig diagnose` says.
+statement and the error of runs that were not fitted; `--whole` prints all that `rig diagnose` says; `--json` writes
+what `rig prove --beside` shows.
 """
 
 from __future__ import annotations
 
 import shutil
-import sys
 import tempfile
 from pathlib import Path
 
+import click
+
 from identification.mismatch.diagnosis import Diagnosis
+from rig.blind import beside
+from rig.blind.beside import RealRecordings, real_case, unanswered
+from rig.blind.store import version_of_diagnosis
 from rig.diagnose import diagnose_files
 from rig.diagnose_text import diagnosis_text
 from rig.diagnose_vehicle import VehicleFiles
@@ -45,17 +50,28 @@ def short(name: str, found: Diagnosis) -> str:
     return f"{name}: {found.verdict}\n  {found.statement}\n  not fitted: {error}; {held.what}"
 
 
-def main(root: Path, *, whole: bool) -> None:
+@click.command(help=__doc__)
+@click.argument("root", metavar="FOLDER", type=click.Path(path_type=Path), default=HERE)
+@click.option("--whole", is_flag=True)
+@click.option("--json", "json_path", type=click.Path(path_type=Path))
+def main(root: Path, whole: bool, json_path: Path | None) -> None:
     if not root.is_dir():
         print(f"{root} is not there; the real recordings are not part of the project")
         return
+    told = []
     for name, pattern, curve in VEHICLES:
         with tempfile.TemporaryDirectory() as temporary:
-            found = diagnosed(root, name, pattern, curve, Path(temporary))
-            print(diagnosis_text(found) if whole else short(name, found), flush=True)
-            print()
+            try:
+                found = diagnosed(root, name, pattern, curve, Path(temporary))
+            except Exception as error:  # noqa: BLE001  # a crash is an answer too, and does not end the others
+                told.append(unanswered(name, error))
+                print(f"{name}: {told[-1].verdict}\n  {told[-1].statement}\n", flush=True)
+                continue
+        print(diagnosis_text(found) if whole else short(name, found), end="\n\n", flush=True)
+        told.append(real_case(name, found))
+    if json_path is not None:
+        beside.write(json_path, RealRecordings(version_of_diagnosis(), tuple(told)))
 
 
 if __name__ == "__main__":
-    folders = [Path(text) for text in sys.argv[1:] if not text.startswith("--")]
-    main(folders[0] if folders else HERE, whole="--whole" in sys.argv)
+    main()

@@ -14,6 +14,7 @@ import click
 from rig.errors import RigError
 
 if TYPE_CHECKING:
+    from rig.blind.beside import Beside
     from rig.blind.collecting import Collected
     from rig.blind.design import Job
     from rig.blind.store import Store
@@ -102,11 +103,24 @@ def still_wrong(found: Collected) -> str:
     return "\n".join([*rows, f"{len(found.scores) - len(rows)} of {len(found.scores)} came out right this time"])
 
 
-def leave(found: Collected, seeds: int, draw: str, json_path: Path | None, report: Path | None) -> None:
+def read_beside(paths: Sequence[Path], *, shown: bool) -> list[Beside]:
+    """What the page and the JSON show besides the proof, if they are wanted. Raises ProofError."""
+    from rig.blind.beside import read
+    from rig.blind.store import ProofError
+
+    if paths and not shown:
+        raise ProofError("--beside is for the page and the JSON, and neither is asked for; give --report or --json too")
+    return [read(path) for path in paths]
+
+
+def leave(
+    found: Collected, seeds: int, draw: str, beside: Sequence[Beside], json_path: Path | None, report: Path | None
+) -> None:
     """Write figures and page where they are wanted. Raises OSError."""
+    from rig.blind.beside import beside_json
     from rig.blind.figures import tables
 
-    figures = tables(found.scores, seeds, found.versions, found.undrawn, draw)
+    figures = tables(found.scores, seeds, found.versions, found.undrawn, draw) | beside_json(beside)
     if json_path is not None:
         json_path.parent.mkdir(parents=True, exist_ok=True)
         json_path.write_text(json.dumps(figures, indent=1, allow_nan=False) + "\n", encoding="utf-8")
@@ -114,7 +128,7 @@ def leave(found: Collected, seeds: int, draw: str, json_path: Path | None, repor
         from rig.report.page import write
         from rig.report.proof import proof_page
 
-        write(proof_page(found, figures), report)
+        write(proof_page(found, figures, beside), report)
 
 
 def one_case(name: str, draw: str, limit: float, *, verbose: bool) -> str:
@@ -183,6 +197,15 @@ def _told(store: Store, job: Job, *, verbose: bool) -> str:
     type=click.Path(dir_okay=False, path_type=Path),
     help="File of scores: what it holds by this version of the diagnosis is not asked again; all are written to it.",
 )
+@click.option(
+    "--beside",
+    "beside_paths",
+    type=click.Path(dir_okay=False, path_type=Path),
+    multiple=True,
+    metavar="FILE",
+    help="Show this on the page and in the JSON too: what benchmarks/peers.py or an example with real recordings "
+    "wrote with --json (may be repeated).",
+)
 @click.option("--keep", is_flag=True, help="Keep the recordings (some 5 MB each).")
 @click.option("--no-run", is_flag=True, help="Only tell what is in the store.")
 @click.option("--case", metavar="CELL/EFFECT/NUMBER", help="Make and answer this one case, print truth and answer.")
@@ -201,6 +224,7 @@ def prove_command(
     renew: bool,
     failures: bool,
     scores_path: Path | None,
+    beside_paths: tuple[Path, ...],
     keep: bool,
     no_run: bool,
     case: str | None,
@@ -217,6 +241,7 @@ def prove_command(
     from rig.blind.store import Store, version_of_diagnosis
 
     try:
+        beside = read_beside(beside_paths, shown=bool(report or json_path))
         if case is not None:
             click.echo(one_case(case, draw, limit, verbose=verbose))
             return
@@ -232,7 +257,7 @@ def prove_command(
         if scores_path is not None:
             elsewhere.write(scores_path, [*told, *found.known])
         click.echo(still_wrong(found) if failures else summary(found))
-        leave(found, seeds, draw, json_path, report)
+        leave(found, seeds, draw, beside, json_path, report)
     except (RigError, OSError) as error:
         click.echo(f"rig prove: {error}", err=True)
         raise SystemExit(2) from error

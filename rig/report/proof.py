@@ -6,6 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
+from rig.blind.beside import Beside
 from rig.blind.collecting import Collected
 from rig.blind.design import STRENGTHS
 from rig.blind.figures import besides, by_label, cell, confusion, counts, goals, instead
@@ -14,6 +15,7 @@ from rig.blind.scoring import AS_RIVAL, Score
 from rig.report import figures_proof
 from rig.report.figures_proof import Row
 from rig.report.page import Page, Picture, Remark, Section, Sentences, Table
+from rig.report.proof_beside import peers_section, real_section
 from rig.report.proof_parts import SIGNS, alarms_section, models_section, open_section, power_section
 
 UNNAMED = (AS_RIVAL, "unexplained", "adequate", "failed")
@@ -23,8 +25,8 @@ MOST_SAID = 4
 """Cases told of one cell in the list of the worst."""
 
 
-def proof_page(found: Collected, figures: dict[str, Any]) -> Page:
-    """`figures`: of blind.figures.tables."""
+def proof_page(found: Collected, figures: dict[str, Any], beside: Sequence[Beside] = ()) -> Page:
+    """`figures`: of blind.figures.tables; `beside`: what others find."""
     scores, told = found.scores, goals(found.scores)
     parts = [
         _goals(told, besides(scores)),
@@ -35,6 +37,8 @@ def proof_page(found: Collected, figures: dict[str, Any]) -> Page:
         alarms_section(scores),
         models_section(scores, figures),
         power_section(scores, figures),
+        peers_section(beside, found.versions),
+        real_section(beside, found.versions),
         _worst(figures),
         _made(found, figures),
     ]
