@@ -26,6 +26,8 @@ ALARM = 0.004
 """False-alarm rate of what is left, family-wise: with the search for effects and for lines some 1 % of a diagnosis."""
 FAR = 4.0
 """Sigmas beyond which a row counts no more: one outlier is no structure."""
+ROUNDING = 1e-9
+"""Of a coordinate's reach: such an edge is 0."""
 PLAIN_P = 1e-7
 """Of one group: what is plainly no noise, whatever its kind."""
 
@@ -217,6 +219,7 @@ def locate(judged: Judged, fit: Fit, data: Data, weights: Weights) -> Place:
     power = np.bincount(index, weights=count * _structure(c, residual, data, weights) ** 2, minlength=k)
     full = rows > 0
     low, high, share = _stretch(edges, np.asarray(power, dtype=np.float64))
+    low, high = (0.0 if abs(edge) < ROUNDING * (edges[-1] - edges[0]) else edge for edge in (low, high))
     center = 0.5 * (edges[1:] + edges[:-1])
     table = tuple((float(center[i]), float(mean[i]), float(error[i])) for i in np.flatnonzero(full))
     return Place(c.quantity, c.unit, low, high, share, judged.p_value, table, c.what)
