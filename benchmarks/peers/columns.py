@@ -12,12 +12,13 @@ second response; a method with one response could not.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.mismatch.baseline import raw_directions, start
 from identification.mismatch.fitting import Fit, fit, raw
+from identification.mismatch.full_rate import series_of
 from identification.mismatch.model import Data, Model, Theta, weights
 from identification.mismatch.noise import Noise
 from identification.mismatch.preparing import Refusal, history_of
@@ -40,13 +41,25 @@ class Rows:
     """(n, q) N, change by each trial."""
     count: np.ndarray
     """(n,) samples."""
-    within: float
-    """N^2, squares of the samples about the means of their rows, summed."""
 
     @property
     def base(self) -> np.ndarray:
         """(n, 2) weighted columns of C and tare."""
         return np.column_stack([self.slope, np.ones(self.slope.size)]) * np.sqrt(self.count)[:, None]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Samples:
+    """The thrust of another recording at its samples: what the command does within a row is foreseen."""
+
+    thrust: np.ndarray
+    """(N,) N."""
+    slope: np.ndarray
+    """(N,) V^2, over C."""
+    row: np.ndarray
+    """(N,) the row of each."""
+    columns: np.ndarray
+    """(n, q) N, change of each row by each trial."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -57,7 +70,7 @@ class Problem:
     y: np.ndarray
     names: tuple[str, ...]
     fitted: Rows
-    unseen: Rows
+    unseen: Samples
 
     def held_out(self, kept: list[int]) -> float:
         """N rms per sample on the unseen recording: kept columns and C by least squares of the fitted one, its tare
@@ -67,9 +80,7 @@ class Problem:
         size = np.linalg.norm(seen, axis=0)
         found = np.linalg.lstsq(seen / size, self.fitted.thrust * root, rcond=1e-12)[0] / size
         u = self.unseen
-        left = u.thrust - u.slope * found[0] - u.columns[:, kept] @ found[2:]
-        left = left - np.average(left, weights=u.count)
-        return float(np.sqrt((u.count @ left**2 + u.within) / u.count.sum()))
+        return float(np.std(u.thrust - u.slope * found[0] - (u.columns[:, kept] @ found[2:])[u.row]))
 
 
 def problem(puzzle: Puzzle) -> Problem:
@@ -82,7 +93,7 @@ def problem(puzzle: Puzzle) -> Problem:
     there = Data((unseen,), data.scale)
     far = _fit(there, Theta(first.theta.C, (), (0.0,)), steps=0)
     names = [t.id for t in terms for _ in t.trials(data.scale)]
-    return _plain(_rows(first, data, terms), _rows(far, there, terms), names)
+    return _plain(_rows(first, data, terms), _samples(far, there, terms), names)
 
 
 def _fit(data: Data, theta: Theta, steps: int = 25) -> Fit:
@@ -95,11 +106,18 @@ def _rows(first: Fit, data: Data, terms: tuple[Term, ...]) -> Rows:
     (force,), _ = raw(Model(), first.theta, data, with_rate=False)
     r = history.rows
     slope = (force - first.theta.tares[0]) / first.theta.C
-    count = history.count[r].astype(np.float64)
-    return Rows(history.thrust[r], slope, raw_directions(first, data, terms), count, float(history.within[r].sum()))
+    return Rows(history.thrust[r], slope, raw_directions(first, data, terms), history.count[r].astype(np.float64))
 
 
-def _plain(seen: Rows, there: Rows, names: list[str]) -> Problem:
+def _samples(far: Fit, there: Data, terms: tuple[Term, ...]) -> Samples:
+    (history,), (series,) = there.histories, series_of(far, there)
+    slope = (history.sample_thrust - series.residual - far.theta.tares[0]) / far.theta.C
+    interval = np.searchsorted(history.edges, series.time, side="right") - 1
+    row = np.searchsorted(history.rows, np.clip(interval, 0, history.driver.size - 1))
+    return Samples(history.sample_thrust, slope, row, raw_directions(far, there, terms))
+
+
+def _plain(seen: Rows, there: Samples, names: list[str]) -> Problem:
     root = np.sqrt(seen.count)
     Q, _ = np.linalg.qr(seen.base)
     A = seen.columns * root[:, None]
@@ -113,5 +131,5 @@ def _plain(seen: Rows, there: Rows, names: list[str]) -> Problem:
     y = seen.thrust * root
     y = y - Q @ (Q.T @ y)
     scatter = float(np.median(np.abs(np.diff(y)))) / (0.6745 * np.sqrt(2))
-    kept = [Rows(s.thrust, s.slope, s.columns[:, good], s.count, s.within) for s in (seen, there)]
+    kept = replace(seen, columns=seen.columns[:, good]), replace(there, columns=there.columns[:, good])
     return Problem(A[:, first], y / scatter, tuple(names[j] for j in good), *kept)
