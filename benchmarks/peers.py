@@ -26,6 +26,7 @@ import os
 import sys
 from collections.abc import Iterator
 from dataclasses import asdict
+from hashlib import sha256
 from importlib.metadata import version
 from pathlib import Path
 from time import process_time
@@ -54,6 +55,12 @@ FIRST_SEED = 1000
 FIRST_TUNING_SEED = 50_000
 PACKAGES = ("pysindy", "sysidentpy", "statsmodels", "numpy")
 CODE = f"{version_of_diagnosis()} in world {version_of_world()}"
+COLUMNS = sha256(b"".join(p.read_bytes() for p in sorted((Path(__file__).parent / "peers").glob("*.py")))).hexdigest()
+
+
+def code_of(method: str) -> str:
+    """What an answer goes with: those of the peers with the columns that they are given, too."""
+    return CODE if method == OURS else f"{CODE}, columns {COLUMNS[:12]}"
 
 
 def drawn(number: int, first: int) -> Iterator[tuple[str, str, int]]:
@@ -96,7 +103,7 @@ def answered(kind: str, effect: str, seed: int, methods: set[str]) -> Iterator[A
         return
     p = problem(puzzle)
     if BARE in methods:
-        yield Answer(BARE, kind, effect, seed, (), (), p.held_out([]) / truth.noise, 0.0, code=CODE)
+        yield Answer(BARE, kind, effect, seed, (), (), p.held_out([]) / truth.noise, 0.0, code=code_of(BARE))
     for method in methods & set(TUNED):
         yield _answer(method, p, TUNED[method], kind, effect, seed, truth.noise)
 
@@ -108,7 +115,7 @@ def _answer(
     named, kept = names(p, method, setting)
     took = process_time() - began
     error = p.held_out(kept) / noise
-    return Answer(method, kind, effect, seed, tuple(sorted(named)), (), error, took, setting, CODE)
+    return Answer(method, kind, effect, seed, tuple(sorted(named)), (), error, took, setting, code_of(method))
 
 
 def kept_answers() -> list[Answer]:
@@ -117,7 +124,7 @@ def kept_answers() -> list[Answer]:
         return []
     found = (_answer_in(line) for line in STORE.read_text(encoding="utf-8").splitlines())
     answers = [a for a in found if a is not None]
-    return [a for a in answers if a.code == CODE and a.setting == TUNED.get(a.method, {})]
+    return [a for a in answers if a.code == code_of(a.method) and a.setting == TUNED.get(a.method, {})]
 
 
 def _answer_in(line: str) -> Answer | None:
