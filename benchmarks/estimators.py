@@ -1,6 +1,6 @@
 """Monte Carlo of every estimator: bias, variance over the Cramér-Rao bound, coverage of the 68 and 95 % intervals.
 
-    python benchmarks/estimators.py [RUNS] [--only NAME] [--noise NAME] [--list] [--markdown]
+    python benchmarks/estimators.py [RUNS] [--only NAME] [--noise NAME] [--list] [--markdown] [--stored]
 
 RUNS (2000) data sets each, more where they are cheap. What was drawn is kept in build/estimators, so that a run that
 was broken off goes on where it was, and a larger RUNS adds to a smaller one. `--only` takes a part of a name. `var/CRB`

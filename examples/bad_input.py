@@ -51,7 +51,7 @@ def _run(name: str, levels: tuple[float, ...], noise: float = 0.3) -> Bad:
 
 
 def cases() -> tuple[Bad, ...]:
-    """What must-show 6 of the work order names, and some neighbours."""
+    """One thing wrong in each, and a good one to compare with."""
     good = _run("good, for comparison", LEVELS)
     holes, gone, infinite = good.thrust.copy(), np.full(good.thrust.size, np.nan), good.thrust.copy()
     holes[::3] = np.nan

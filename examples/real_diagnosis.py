@@ -2,7 +2,7 @@
 
     python examples/real_diagnosis.py [FOLDER] [--whole] [--only NAME] [--reports FOLDER] [--json FILE]
 
-FOLDER holds the recordings, a folder for each table; default: `../shared/recordings` beside the project. They are not
+FOLDER holds the recordings in the folders of CASES; default: `../shared/recordings` beside the project. They are not
 part of the project: `origin` in `rig/maps/*.toml` says who published them. What
 is done here is `rig import` and then `rig diagnose FILES [--holdout FILE...]`. Printed are verdict, statement and the
 error of what was not fitted: other runs where there are several, otherwise blocks of time (levels of a table).

@@ -2,7 +2,7 @@
 
     python examples/real_recordings.py [FOLDER]
 
-FOLDER holds the recordings, a folder for each table; default: `../shared/recordings` beside the project. They are not
+FOLDER holds the recordings in the folders of SOURCES; default: `../shared/recordings` beside the project. They are not
 part of the project: `origin` in `rig/maps/*.toml` says who published them.
 """
 

@@ -2,8 +2,8 @@
 
     python examples/real_vehicle_diagnosis.py [FOLDER] [--whole] [--json FILE]
 
-FOLDER holds the recordings, a folder for each table; default: `../shared/recordings` beside the project. They are not
-part of the project: `origin` in `rig/maps/*.toml` says who published them. What
+FOLDER holds the recordings in `usv_lake` and `rov_depth`; default: `../shared/recordings` beside the project. They are
+not part of the project: `origin` in `rig/maps/*.toml` says who published them. What
 is done here is `rig import` and then `rig diagnose FILES --installation examples/usv_lake.toml`. Printed are verdict,
 statement and the error of runs that were not fitted; `--whole` prints all that `rig diagnose` says; `--json` writes
 what `rig prove --beside` shows.

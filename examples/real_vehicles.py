@@ -2,8 +2,8 @@
 
     python examples/real_vehicles.py [FOLDER]
 
-FOLDER holds the recordings, a folder for each table; default: `../shared/recordings` beside the project. They are not
-part of the project: `origin` in `rig/maps/*.toml` says who published them. What
+FOLDER holds the recordings in `usv_lake` and `rov_depth`; default: `../shared/recordings` beside the project. They are
+not part of the project: `origin` in `rig/maps/*.toml` says who published them. What
 is done here file by file is `rig import` and then `rig vehicle --installation examples/usv_lake.toml`.
 """
 
