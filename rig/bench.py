@@ -68,7 +68,7 @@ class Bench:
 
 def build(config: BenchConfig) -> Bench:
     """Construct the devices of a bench file; opens nothing."""
-    buses = {name: CanBus(bus.interface, bus.channel, bus.bitrate) for name, bus in config.can.items()}
+    buses = {name: CanBus(bus.interface, bus.channel, bus.bitrate, bus.capture) for name, bus in config.can.items()}
     instruments: dict[str, Instrument] = {}
     for name, device in config.devices.items():
         kind = KINDS[device.kind]

@@ -18,6 +18,8 @@ class CanBusConfig:
     channel: str = ""
     """Port; a relative path with a slash is relative to the bench file."""
     bitrate: int = 500_000
+    capture: str = ""
+    """File that every frame is written to, with its time."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -22,9 +22,9 @@ from rig.errors import ConfigError, PlanError
 from rig.loading import load_bench, load_campaign
 from rig.plan import TareConfig
 from rig.plan_file import Template, template_of
-from rig.sequencer import settings_for
 from rig.shapes import require, require_above_zero, require_not_negative
 from rig.steady import LEAST_SAMPLES
+from rig.ticks import proof_settings
 
 GRID = 20
 """Candidates from 0 V to the highest, on each side."""
@@ -160,15 +160,12 @@ def _places(options: Options) -> tuple[BenchConfig, Template, float, float]:
     if options.campaign is not None:
         campaign = load_campaign(options.campaign)
         bench, template, top = campaign.bench, template_of(campaign), campaign.plan.peak()
-        checked = settings_for(campaign, "").proof
-        proof = checked.expected if checked else 0.0
     else:
         assert options.bench is not None
         bench = load_bench(options.bench)
         names = options.thruster or ("T1",)
         template = Template("design", bench.path, names, Path("recordings"), bench.slew, TareConfig(), SETTLE)
-        top, proof = bench.max_voltage, 0.0
-        template = replace(template, prove_watchdog=False)
+        top = bench.max_voltage
     changed = {
         key: value
         for key, value in (
@@ -187,6 +184,7 @@ def _places(options: Options) -> tuple[BenchConfig, Template, float, float]:
     )
     wanted = options.max_voltage or min(top, allowed)
     require(wanted <= allowed, f"--max-voltage is {wanted:g} V, but {bench.path} allows at most {allowed:g} V")
+    proof = proof_settings(bench, template.slew).expected if template.prove_watchdog else 0.0
     return bench, template, proof, wanted
 
 

@@ -138,6 +138,13 @@ def _assignments(texts: tuple[str, ...]) -> dict[str, float]:
     return found
 
 
+def _refuse_without_map(file: Path, options: Mapping[str, object]) -> None:
+    """Raises ConfigError where an option was given that changes a map."""
+    given = [name for name, value in options.items() if value]
+    if given:
+        raise ConfigError(f"{file}: {', '.join(given)} is for a map: give --map, or write it into the JSON itself")
+
+
 def _list_maps(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
     if wanted and not context.resilient_parsing:
         for name in shipped():
@@ -170,6 +177,7 @@ def import_command(
 ) -> None:
     """Exit status 0; RigError is for the caller (rig.cli) to print."""
     if map_name is None:
+        _refuse_without_map(file, {"--set": assignments, "--thruster": thruster, "--kind": kind})
         summary = import_plain(file, output or file.with_suffix(".h5"), notes)
         click.echo(f"{summary.path}: {summary.rows} rows")
         return

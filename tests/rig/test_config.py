@@ -4,6 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from drivers.can_bus import Frame
+from drivers.transcript import read_transcript
+from rig.bench import build
 from rig.errors import ConfigError
 from rig.loading import load_bench, load_campaign
 from rig.plan import FixedDwell, SteadyDwell
@@ -120,6 +123,22 @@ def test_ports_relative_and_not(tmp_path):
     ):
         path.write_text(text.replace('port = "/dev/null"', f'port = "{port}"', 1))
         assert load_bench(path).devices["load_cell"].options.port == expected
+
+
+def test_every_frame_of_a_bus_is_captured(tmp_path):
+    text = (WRONG / "right_bench.toml").read_text()
+    path, out = tmp_path / "bench.toml", tmp_path / "can.txt"
+    path.write_text(
+        text.replace(
+            'interface = "slcan"\nchannel = "/dev/null"',
+            f'interface = "virtual"\nchannel = "desk"\ncapture = "{out}"',
+        )
+    )
+    bus = build(load_bench(path)).buses["bus0"]
+    bus.open()
+    bus.send(Frame(0x123, False, b"\x01"))
+    bus.close()
+    assert [(c.direction, c.data) for c in read_transcript(out)] == [(">", b"123#01")]
 
 
 def test_file_that_is_no_text(tmp_path):

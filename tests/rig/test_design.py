@@ -215,9 +215,11 @@ def test_a_bench_alone_will_do(tmp_path, capsys):
     plan = tmp_path / "plan.toml"
     options = ["--time", "120", "--thruster", "T7", "--slew", "10", "--levels", "5,10,-5,-10", "-o", str(plan)]
     assert main(["design", "--bench", str(BENCH), *options, "--json", "-"]) == 0
-    remarks = json.loads(capsys.readouterr().out)["remarks"]
-    assert any("1 N in a mean over one second" in text for text in remarks)
+    content = json.loads(capsys.readouterr().out)
+    assert any("1 N in a mean over one second" in text for text in content["remarks"])
     campaign = load_campaign(plan)
+    assert campaign.prove_watchdog
+    assert check_campaign(plan).run.expected == pytest.approx(content["total"], abs=0.05)
     assert campaign.thrusters == ("T7",)
     assert {abs(s.voltage) for s in campaign.plan if s.phase == "hold"} <= {5.0, 10.0}
 

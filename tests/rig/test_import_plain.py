@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from rig.errors import RecordingError
+from rig.errors import ConfigError, RecordingError
 from rig.hdf5 import load
 from rig.importer import import_command, import_plain
 
@@ -88,6 +88,15 @@ def test_what_is_wrong_is_said_and_nothing_is_written(tmp_path, change, said):
     with pytest.raises(RecordingError) as caught:
         import_plain(source, tmp_path / "a.h5")
     assert said in str(caught.value)
+    assert not list(tmp_path.glob("*.h5*"))
+
+
+@pytest.mark.parametrize("option", [("--thruster", "T1"), ("--kind", "bollard"), ("--set", "nominal_voltage=48")])
+def test_what_changes_a_map_is_refused_without_one(tmp_path, option):
+    (tmp_path / "a.json").write_text(json.dumps(DOCUMENT))
+    said = CliRunner().invoke(import_command, [str(tmp_path / "a.json"), *option])
+    assert isinstance(said.exception, ConfigError)
+    assert f"{option[0]} is for a map" in str(said.exception)
     assert not list(tmp_path.glob("*.h5*"))
 
 
