@@ -68,7 +68,11 @@ def preflight(session: Session) -> None:
         if session.loop.now - seen > UNSEEN:
             raise Stopped("aborted", f"nobody started the campaign, and no front end was there for {UNSEEN:g} s")
         checks = all_checks(
-            session.campaign.bench, session.loop.readings, session.bench.motor.watchdog, session.loop.now
+            session.campaign.bench,
+            session.loop.readings,
+            session.bench.motor.watchdog,
+            session.loop.now,
+            proving=session.campaign.prove_watchdog,
         )
         checks += flow.checks(session.loop.readings, session.loop.now)
         session.status.checks = devices + checks

@@ -175,6 +175,10 @@ def print_report(report: CheckReport, console: Console) -> None:
         console.print("peak thrust    not checked: the campaign gives no expected_C")
     else:
         console.print(f"peak thrust    {report.peak_thrust:.4g} N expected, from expected_C")
+    if not campaign.prove_watchdog:
+        console.print(
+            "watchdog       not proved (prove_watchdog = false): what the motor controller does is not measured"
+        )
     console.print("The campaign may run. Nothing was opened.")
 
 

@@ -55,6 +55,12 @@ def test_a_peak_thrust_that_is_not_checked_is_said_so():
     assert "not checked" in printed(replace(check_campaign(WRONG / "right.toml"), peak_thrust=None))
 
 
+def test_a_watchdog_that_is_not_proved_is_said_so():
+    report = check_campaign(WRONG / "right.toml")
+    assert "not proved" not in printed(report)
+    assert "not proved" in printed(replace(report, campaign=replace(report.campaign, prove_watchdog=False)))
+
+
 def test_hours_are_shown_as_such():
     report = check_campaign(WRONG / "right.toml")
     assert "1:02:03 expected" in printed(replace(report, total=report.total._replace(expected=3723.0)))

@@ -43,8 +43,15 @@ def test_rate(rate, verdict):
 
 @pytest.mark.parametrize(("timeout", "verdict"), [(None, "failed"), (1.01, "failed"), (1.0, "passed")])
 def test_watchdog(timeout, verdict):
-    check = watchdog_check(Watchdog(timeout, "commands", "coast", resumes_by_itself=True), 1.0)
+    check = watchdog_check(Watchdog(timeout, "commands", "coast", resumes_by_itself=True), 1.0, proving=True)
     assert check.verdict == verdict
+
+
+@pytest.mark.parametrize(("timeout", "verdict"), [(None, "failed"), (1.01, "failed"), (1.0, "warning")])
+def test_a_watchdog_that_is_not_proved_is_said_so(timeout, verdict):
+    check = watchdog_check(Watchdog(timeout, "commands", "coast", resumes_by_itself=True), 1.0, proving=False)
+    assert check.verdict == verdict
+    assert verdict == "failed" or "not proved" in check.text
 
 
 @pytest.mark.parametrize(("rate", "verdict"), [(0.0, "passed"), (-0.5, "passed"), (0.6, "failed"), (None, "failed")])
