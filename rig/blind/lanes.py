@@ -198,7 +198,7 @@ def carry_out(jobs: Sequence[Job], lanes: Sequence[Lane], renew: bool, told: Cal
     """All jobs, in order, on all lanes; `told` after each, in this thread. Raises ProofError; Ctrl+C ends it."""
     waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
     done: queue.SimpleQueue[Job | BaseException] = queue.SimpleQueue()
-    stop = Event()
+    stop, patience = Event(), 0.0
     for job in jobs:
         waiting.put(job)
     threads = [Thread(target=_drive, args=(lane, waiting, done, stop, renew), daemon=True) for lane in lanes]
@@ -210,11 +210,11 @@ def carry_out(jobs: Sequence[Job], lanes: Sequence[Lane], renew: bool, told: Cal
             if isinstance(found, BaseException):
                 raise found
             told(found)
+        patience = STOPPING
     finally:
         stop.set()
-        finished = waiting.empty()
         for lane in lanes:
-            lane.close(STOPPING if finished else 0.0)
+            lane.close(patience)
         for thread in threads:
             if thread.is_alive():
                 thread.join(STOPPING)

@@ -18,7 +18,7 @@ from rig.blind.answering import answered
 from rig.blind.collecting import Collected, Known, collected, not_good
 from rig.blind.design import Job, Order, design, matches
 from rig.blind.figures import confusion, goals, half, half_named, tables, twins, worst
-from rig.blind.lanes import BrokenOff, Child, Ended, Lane, Overdue, carry_out, concealable
+from rig.blind.lanes import STOPPING, BrokenOff, Child, Ended, Lane, Overdue, carry_out, concealable
 from rig.blind.meaning import SAME, true_values
 from rig.blind.places import PLACES
 from rig.blind.rates import Goal, Rate, of_rate
@@ -448,6 +448,30 @@ def test_what_is_broken_off_is_no_answer(tmp_path):
     assert lane.diagnosis.process is None
     assert not list(store.answers.rglob("*.json"))
     assert len(store.pending(jobs[0])) == 2
+
+
+def test_a_proof_that_is_broken_off_waits_for_nobody(tmp_path):
+    """Though no job is waiting any more: the last diagnoses may think for minutes, one lane after the other."""
+    jobs = design(WORLD, CATALOGUE, 2, ["plain/heating"])
+    store = Store(tmp_path)
+    (tmp_path / "sealed").mkdir()
+    for job in jobs:
+        seal = truth("heating") | {"asked": job.asked()}
+        (tmp_path / "sealed" / f"{job.token}.json").write_text(json.dumps(seal), encoding="utf-8")
+        (store.opened / job.token).mkdir(parents=True)
+        store.recordings_are_whole(job)
+    quick, slow = lanes = [Lane(store, name, 60.0, "code") for name in "01"]
+    quick.diagnosis = Child([sys.executable, "-c", "input(); print('answered')"], tmp_path / "quick.log")
+    slow.diagnosis = Child([sys.executable, "-c", "import time; time.sleep(60)"], tmp_path / "slow.log")
+
+    def interrupted(_):
+        raise KeyboardInterrupt
+
+    begun = monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        carry_out(jobs, lanes, renew=False, told=interrupted)
+    assert monotonic() - begun < STOPPING
+    assert not list(store.answers.rglob("*.json"))
 
 
 def _raised(act):
