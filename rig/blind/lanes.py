@@ -1,7 +1,7 @@
 """Jobs carried out: on each lane a process of the world and one of the diagnosis, which share files and nothing else.
 
 A diagnosis that takes longer than its limit is killed and its answer is `timeout`; of one that dies it is `died`. Both
-are failures of the diagnosis. A world that fails ends the proof. What is broken off by us is no answer.
+are failures of the diagnosis. A world that fails ends the proof. What is broken off, by us or by Ctrl+C, is no answer.
 """
 
 from __future__ import annotations
@@ -115,6 +115,7 @@ class Child:
                     stderr=log,
                     env={**os.environ, **ONE_THREAD},
                     bufsize=0,
+                    start_new_session=True,  # Ctrl+C in the terminal is for us: its death would be an answer
                 )
         return self.process
 

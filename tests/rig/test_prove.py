@@ -1,6 +1,7 @@
 """The blind proof: its design, its scoring on made-up answers, its page, and a tiny form end to end."""
 
 import json
+import os
 import sys
 from dataclasses import replace
 from gzip import compress
@@ -448,6 +449,14 @@ def test_what_is_broken_off_is_no_answer(tmp_path):
     assert lane.diagnosis.process is None
     assert not list(store.answers.rglob("*.json"))
     assert len(store.pending(jobs[0])) == 2
+
+
+def test_ctrl_c_in_the_terminal_does_not_reach_a_child(tmp_path):
+    """It goes to the group of the processes that the terminal started; a child that died of it counted as a failure."""
+    child = Child([sys.executable, "-c", "input(); print('ok')"], tmp_path / "log")
+    child.ask({}, 30.0)
+    assert os.getpgid(child.process.pid) == child.process.pid != os.getpgrp()
+    child.close()
 
 
 def test_a_proof_that_is_broken_off_waits_for_nobody(tmp_path):
