@@ -104,12 +104,20 @@ def work(opened: Path, answers: Path, line: Mapping[str, Any]) -> None:
     answer, arrays = answered(opened / line["token"], line["without"])
     out = answers / line["token"]
     out.mkdir(parents=True, exist_ok=True)
-    if arrays:
-        model, baseline = (arrays[name].astype(np.float32) for name in ("model", "baseline"))
-        np.savez_compressed(out / f"{line['tag']}.npz", model=model, baseline=baseline)
+    _predict(out / f"{line['tag']}.npz", arrays)
     part = out / f"{line['tag']}.json.part"
     part.write_text(json.dumps({**answer, "code": line["code"]}, indent=1) + "\n", encoding="utf-8")
     part.replace(out / f"{line['tag']}.json")
+
+
+def _predict(file: Path, arrays: Mapping[str, Floats]) -> None:
+    """Whole or not at all; what another version of the diagnosis predicted does not stay beside this answer."""
+    file.unlink(missing_ok=True)
+    if arrays:
+        model, baseline = (arrays[name].astype(np.float32) for name in ("model", "baseline"))
+        part = file.with_suffix(".part.npz")
+        np.savez_compressed(part, model=model, baseline=baseline)
+        part.replace(file)
 
 
 def main(arguments: Sequence[str]) -> None:

@@ -14,7 +14,7 @@ from blind_scores import CATALOGUE, WORLD, answer, finding, order, truth, whole_
 from click.testing import CliRunner
 from report_reading import open_fonts
 
-from rig.blind import elsewhere
+from rig.blind import answering, elsewhere
 from rig.blind.answering import answered
 from rig.blind.collecting import Collected, Known, collected, not_good
 from rig.blind.design import Job, Order, design, matches
@@ -321,6 +321,19 @@ def test_a_diagnosis_that_crashes_has_an_answer(tmp_path):
     said, arrays = answered(tmp_path)  # no recording at all
     assert said["error"] == "refused: no recording was given"
     assert arrays == {}
+
+
+def test_predictions_of_an_earlier_answer_do_not_stay_beside_a_new_one(tmp_path, monkeypatch):
+    (job,) = design(WORLD, CATALOGUE, 1, ["plain/heating/0"])
+    store, line = Store(tmp_path), {"token": job.token, "tag": "whole", "without": [], "code": "abc"}
+    arrays = {"model": np.ones(3), "baseline": np.zeros(3)}
+    monkeypatch.setattr(answering, "answered", lambda *_: (answer("explained"), arrays))
+    answering.work(store.opened, store.answers, line)
+    assert store.predictions(job, job.orders[0])["model"].tolist() == [1.0, 1.0, 1.0]
+    arrays.clear()
+    answering.work(store.opened, store.answers, line)
+    assert store.predictions(job, job.orders[0]) is None
+    assert [path.name for path in (store.answers / job.token).iterdir()] == ["whole.json"]
 
 
 def test_a_child_that_is_late_is_killed_and_started_again(tmp_path):
