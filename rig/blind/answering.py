@@ -84,7 +84,7 @@ def predictions(found: Diagnosis, file: Path) -> tuple[str | None, dict[str, Flo
 
 
 def _predicted(found: Diagnosis, driven: Recording, at: Floats) -> dict[str, Floats]:
-    """Raises ValueError for what the twin cannot predict."""
+    """Raises ValueError for what the twin cannot predict, or where its prediction runs away."""
     command = driven.first_of("command_voltage")
     assert command is not None
     assert found.twin is not None
@@ -94,6 +94,8 @@ def _predicted(found: Diagnosis, driven: Recording, at: Floats) -> dict[str, Flo
     model = simulate(found.twin, drive, at)
     if not isinstance(model, Prediction):
         raise ValueError(model.reason)
+    if not np.all(np.isfinite(model.thrust)):
+        raise ValueError("the prediction is no finite thrust")
     volts = held(drive, at)
     baseline: Floats = found.baseline["C"].value * volts * np.abs(volts)
     return {"model": model.thrust, "baseline": baseline}

@@ -7,6 +7,7 @@ from dataclasses import replace
 from gzip import compress
 from threading import Thread
 from time import monotonic, sleep
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,6 +15,7 @@ from blind_scores import CATALOGUE, WORLD, answer, finding, order, truth, whole_
 from click.testing import CliRunner
 from report_reading import open_fonts
 
+from identification.mismatch.simulating import Prediction
 from rig.blind import answering, elsewhere
 from rig.blind.answering import answered
 from rig.blind.collecting import Collected, Known, collected, not_good
@@ -334,6 +336,20 @@ def test_predictions_of_an_earlier_answer_do_not_stay_beside_a_new_one(tmp_path,
     answering.work(store.opened, store.answers, line)
     assert store.predictions(job, job.orders[0]) is None
     assert [path.name for path in (store.answers / job.token).iterdir()] == ["whole.json"]
+
+
+def test_a_prediction_that_runs_away_is_none(tmp_path, monkeypatch):
+    """It would make every quantile of the errors no number, and the JSON of the proof impossible."""
+    columns = [{"stream": "drive", "name": "u", "quantity": "command_voltage", "unit": "V", "thruster": ""}]
+    about = np.array(json.dumps({"recording_id": "a", "thruster": "T1", "columns": columns, "steps": []}))
+    t = np.arange(3.0)
+    np.savez(tmp_path / "drive.npz", about=about, time0=t, value0=t, at=t)
+    found = SimpleNamespace(twin="a twin", baseline={"C": SimpleNamespace(value=0.4)})
+    for thrust, predicted in (([0.0, 1.0, 2.0], ["model", "baseline"]), ([0.0, np.inf, 2.0], [])):
+        monkeypatch.setattr(answering, "simulate", lambda *_, thrust=thrust: Prediction(t, np.array(thrust), None))
+        why, arrays = answering.predictions(found, tmp_path / "drive.npz")
+        assert list(arrays) == predicted
+        assert (why is None) == bool(predicted)
 
 
 def test_a_child_that_is_late_is_killed_and_started_again(tmp_path):
