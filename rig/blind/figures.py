@@ -268,7 +268,7 @@ def twins(scores: Iterable[Score]) -> list[dict[str, Any]]:
                 "runs": len(group),
                 "left": [round(left[0], 1), round(left[-1], 1)],
                 "rivals_stated": rate(stated).json(),
-                "said_instead": dict(Counter(n for s in group for n in (s.named or (s.said,))).most_common()),
+                "said_instead": dict(Counter(n for s in group for n in (s.named or (s.answer,))).most_common()),
             }
         )
     return rows

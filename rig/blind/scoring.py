@@ -134,7 +134,7 @@ class Score:
     def good(self) -> bool:
         """As it should be, by the measure of its cell."""
         if self.order.cell in OPEN_CELLS:
-            return self.outcome in LOCATED or not self.counted
+            return self.outcome in LOCATED or not (self.counted or self.failed)
         return self.right
 
     @property
@@ -155,9 +155,10 @@ def scored(
     predicted: Mapping[str, Floats] | None = None,
 ) -> Score:
     """`thrust`: true and measured of the other run, `predicted`: by model and baseline; None where there is none."""
-    hidden = concealed(truth)
+    hidden, near = concealed(truth), nearest(order, truth)
     if answer["error"]:
-        return Score(order, hidden, answer["error"], failed=True, seconds=answer["seconds"], case=described(truth))
+        seconds = answer["seconds"]
+        return Score(order, hidden, answer["error"], failed=True, near=near, seconds=seconds, case=described(truth))
     found = answer["diagnosis"]
     findings, unexplained = found["findings"], found["unexplained"]
     return Score(
@@ -169,7 +170,7 @@ def scored(
         place=unexplained["where"]["quantity"] if unexplained else "",
         resembles=tuple(unexplained["resembles"]) if unexplained else (),
         statement=found["statement"],
-        near=nearest(order, truth),
+        near=near,
         held_out=held_out(*thrust, predicted) if thrust and predicted else None,
         intervals=intervals(findings, truth) if len(hidden) == 1 else (),
         seconds=answer["seconds"],

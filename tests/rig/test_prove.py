@@ -175,6 +175,15 @@ def test_twins_are_not_counted_and_listed():
     assert shown["open world: a wrong name instead"].n == 0
 
 
+def test_a_crash_on_a_twin_is_a_failure_that_the_open_world_does_not_count():
+    hidden = truth("dead_band", twins=[{"rival": "exponent", "form": "below", "left": 2.5}])
+    crash = {"seconds": 1.0, "error": "ValueError: x", "code": ""}
+    found = scored(order("removed/dead_band/0", "dead_band"), hidden, crash)
+    assert (found.failed, found.counted, found.good) == (True, False, False)
+    assert twins([found])[0]["said_instead"] == {"failed": 1}
+    assert {g.what: g for g in goals([found])}["open world: unexplained, right place"].n == 0
+
+
 def test_what_a_measured_rate_explains_is_a_twin():
     hidden = truth("motor_lag", twins=[{"rival": "time_skew", "form": "", "left": 30.0}])
     with_rate = hidden | {"channels": ["rotation_rate"]}
