@@ -255,7 +255,7 @@ def prove_command(
             run(kept, pending, lanes or os.cpu_count() or 1, limit, renew=renew, keep=keep)
         found = collected(kept, jobs, known, version)
         if scores_path is not None:
-            elsewhere.write(scores_path, [*told, *found.known])
+            elsewhere.add(scores_path, found.known)
         click.echo(still_wrong(found) if failures else summary(found))
         leave(found, seeds, draw, beside, json_path, report)
     except (RigError, OSError) as error:

@@ -48,6 +48,11 @@ def write(path: Path, known: Iterable[Known]) -> None:
     beside.replace(path)
 
 
+def add(path: Path, known: Iterable[Known]) -> None:
+    """To what the file holds by now, for another proof may have written it meanwhile. Raises ProofError, OSError."""
+    write(path, [*read(path), *known])
+
+
 def usable(known: Iterable[Known], jobs: Sequence[Job], version: str, *, others: bool = False) -> dict[str, Known]:
     """By the ids of the orders of these jobs, those by this `version` of the diagnosis; or, as asked, by `others`."""
     asked = {order.id: job.digest for job in jobs for order in job.orders}

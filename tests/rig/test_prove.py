@@ -445,6 +445,15 @@ def test_what_a_file_of_scores_holds_is_counted_and_not_asked(tmp_path):
     assert {k.score.order.id for k in elsewhere.read(file)} == {"plain/heating/0", "plain/dead_band/0"}
 
 
+def test_scores_that_another_proof_wrote_meanwhile_are_kept(tmp_path, monkeypatch):
+    file = tmp_path / "scores.jsonl"
+    theirs = Known(Score(Order("clean/white/7"), (), "adequate"), "abc", "0")
+    monkeypatch.setattr("rig.prove.run", lambda *_, **__: elsewhere.write(file, [theirs]))
+    words = ["--only", "plain/heating/0", "--seeds", "1", "--store", str(tmp_path / "s"), "--scores", str(file)]
+    assert CliRunner().invoke(prove_command, words).exit_code == 0
+    assert elsewhere.read(file) == [theirs]
+
+
 def test_a_newer_score_from_elsewhere_counts_before_an_older_answer_of_the_store(tmp_path):
     (job,) = design(WORLD, CATALOGUE, 1, ["plain/heating/0"])
     order = job.orders[0]
