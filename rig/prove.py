@@ -249,7 +249,8 @@ def prove_command(
         told, version = elsewhere.read(scores_path) if scores_path is not None else [], version_of_diagnosis()
         known = elsewhere.usable(told, jobs, version, others=no_run)
         if failures:
-            jobs, renew = not_good(collected(kept, jobs), jobs), True
+            so_far = elsewhere.usable(told, jobs, version, others=True)
+            jobs, renew = not_good(collected(kept, jobs, so_far, version), jobs), True
         if not no_run:
             pending = elsewhere.unanswered(jobs, known)
             run(kept, pending, lanes or os.cpu_count() or 1, limit, renew=renew, keep=keep)

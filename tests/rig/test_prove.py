@@ -454,6 +454,18 @@ def test_scores_that_another_proof_wrote_meanwhile_are_kept(tmp_path, monkeypatc
     assert elsewhere.read(file) == [theirs]
 
 
+def test_failures_that_the_file_of_scores_tells_are_asked_again(tmp_path, monkeypatch):
+    file, names, asked = tmp_path / "scores.jsonl", ["plain/heating/0", "plain/asymmetry/0"], []
+    jobs = designed(1, names)
+    scores = [Score(job.orders[0], ("asymmetry",), "explained", (job.id.split("/")[1],)) for job in jobs]
+    elsewhere.write(file, [Known(s, "old", job.digest) for s, job in zip(scores, jobs, strict=True)])
+    monkeypatch.setattr("rig.prove.run", lambda _, jobs, *__, **___: asked.extend(job.id for job in jobs))
+    words = ["--failures", "--seeds", "1", "--store", str(tmp_path / "s"), "--scores", str(file)]
+    done = CliRunner().invoke(prove_command, [*words, *(word for name in names for word in ("--only", name))])
+    assert done.exit_code == 0, done.output
+    assert asked == ["plain/heating/0"]
+
+
 def test_a_newer_score_from_elsewhere_counts_before_an_older_answer_of_the_store(tmp_path):
     (job,) = design(WORLD, CATALOGUE, 1, ["plain/heating/0"])
     order = job.orders[0]
