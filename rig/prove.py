@@ -137,10 +137,9 @@ def one_case(name: str, draw: str, limit: float, *, verbose: bool) -> str:
 
     store = Store(STORE.with_name("prove-case"))
     number = name.rsplit("/", 1)[-1]
-    jobs = designed(int(number) + 1 if number.isdigit() else 1, [name], draw)
+    jobs = designed(int(number) + 1 if number.isdecimal() else 1, [name], draw)
     for job in jobs:
-        for order in job.orders:
-            (store.answers / job.token / f"{order.tag}.json").unlink(missing_ok=True)
+        store.forget(job)
     run(store, jobs, 1, limit, renew=True, keep=True)
     return "\n\n".join(_told(store, job, verbose=verbose) for job in jobs)
 

@@ -72,6 +72,12 @@ class Store:
         part.write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
         part.replace(folder / f"{order.tag}.json")
 
+    def forget(self, job: Job) -> None:
+        """Truth and answers; they are made anew, by the world and the diagnosis of today."""
+        (self.root / "sealed" / f"{job.token}.json").unlink(missing_ok=True)
+        for order in job.orders:
+            (self.answers / job.token / f"{order.tag}.json").unlink(missing_ok=True)
+
     def pending(self, job: Job, code: str = "", limit: float = 0.0) -> tuple[Order, ...]:
         """Orders not answered yet, or given up after less than `limit` s.
 

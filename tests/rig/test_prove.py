@@ -566,6 +566,21 @@ def test_one_proof_at_a_time_works_in_a_store(tmp_path):
         pass
 
 
+def test_one_case_is_made_anew_whatever_world_made_it_before(tmp_path, monkeypatch):
+    monkeypatch.setattr("rig.prove.STORE", tmp_path / "prove")
+    store, (job,) = Store(tmp_path / "prove-case"), designed(1, ["plain/heating/0"])
+    job = replace(job, orders=job.orders[:1])
+    seal = store.root / "sealed" / f"{job.token}.json"
+    seal.parent.mkdir(parents=True)
+    seal.write_text(json.dumps({"asked": {**job.asked(), "world": "another"}}), encoding="utf-8")
+    store.put(job, job.orders[0], answer("adequate"))
+    pending = []
+    monkeypatch.setattr("rig.prove.run", lambda store, jobs, *_, **__: pending.extend(map(store.pending, jobs)))
+    monkeypatch.setattr("rig.prove._told", lambda *_, **__: "told")
+    done = CliRunner().invoke(prove_command, ["--case", "plain/heating/0"])
+    assert (done.exit_code, done.output, pending) == (0, "told\n", [job.orders])
+
+
 def test_recordings_half_made_are_made_again(tmp_path):
     (job,) = design(WORLD, CATALOGUE, 1, ["plain/heating/0"])
     store = Store(tmp_path)
