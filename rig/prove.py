@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from rig.blind.store import Store
 
 STORE = Path("build/prove")
+LONGEST = 86400.0
+"""s that a diagnosis may be given."""
 EVERY = 25
 """Jobs between two lines of a log file."""
 
@@ -101,6 +103,14 @@ def still_wrong(found: Collected) -> str:
 
     rows = [json.dumps({k: v for k, v in said(s).items() if v}) for s in found.scores if not s.good]
     return "\n".join([*rows, f"{len(found.scores) - len(rows)} of {len(found.scores)} came out right this time"])
+
+
+def require_limit(limit: float) -> None:
+    """Raises ProofError; click lets NaN through every range."""
+    from rig.blind.store import ProofError
+
+    if not 0.0 < limit <= LONGEST:
+        raise ProofError(f"--limit must be above 0 s and at most {LONGEST:g} s, but is {limit:g} s")
 
 
 def read_beside(paths: Sequence[Path], *, shown: bool) -> list[Beside]:
@@ -240,6 +250,7 @@ def prove_command(
     from rig.blind.store import Store, version_of_diagnosis
 
     try:
+        require_limit(limit)
         beside = read_beside(beside_paths, shown=bool(report or json_path))
         if case is not None:
             click.echo(one_case(case, draw, limit, verbose=verbose))

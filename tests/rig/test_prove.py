@@ -377,6 +377,14 @@ def test_the_command_says_what_is_wrong(tmp_path):
     assert "no case is called plain/nothing" in done.output
 
 
+@pytest.mark.parametrize("limit", ["-5", "0", "nan", "inf"])
+def test_a_limit_that_no_diagnosis_can_keep_is_refused(tmp_path, limit):
+    """Below 0 each answer was a timeout; the others ended in a traceback."""
+    done = CliRunner().invoke(prove_command, ["--limit", limit, "--no-run", "--store", str(tmp_path)])
+    assert done.exit_code == 2
+    assert "--limit must be above 0 s" in done.output
+
+
 def test_the_command_tells_an_empty_store(tmp_path):
     out = tmp_path / "figures.json"
     words = ["--no-run", "--seeds", "1", "--store", str(tmp_path), "--json", str(out)]
