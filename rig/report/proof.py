@@ -199,7 +199,7 @@ def _which(draw: str) -> str:
 def _not_drawn(undrawn: Sequence[str]) -> str:
     if not undrawn:
         return "every case could be drawn."
-    cells = Counter(case.split(":")[0].rsplit("/", 1)[0] for case in undrawn)
+    cells = Counter(case.split(": ")[0].rsplit("/", 1)[0] for case in undrawn)
     return (
         f"{len(undrawn)} cases could not be drawn, for no plan, scale and noise of a load cell shows that effect at "
         f"that strength: {counts(dict(cells.most_common()))}."

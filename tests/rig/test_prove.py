@@ -264,6 +264,11 @@ def store_less(scores):
     return Collected(known, 0, ("faint/x/0: no",))
 
 
+def test_the_page_names_the_form_that_could_not_be_drawn():
+    found = Collected((), 0, ("variant/dead_band:smooth/2: no such case", "variant/dead_band:smooth/3: no"))
+    assert "at that strength: variant/dead_band:smooth (2)." in html(proof_page(found, tables([], 1, (), ())))
+
+
 def test_a_page_of_nothing_is_still_a_page():
     figures = tables([], 1, (), ())
     assert "not measured" in html(proof_page(collected(Store(None), []), figures))
