@@ -19,6 +19,8 @@ ORDINATES: Mapping[str, tuple[str, float]] = {
     "gain": ("% of the thrust", 100.0),
     "even": ("% of the size of the thrust", 100.0),
     "step": ("% of the step", 100.0),
+    "reversed": ("% of the thrust", 100.0),
+    "late": ("% of the thrust that comes late", 100.0),
     "drive": ("drive / its unit", 1.0),
 }
 """Label and factor of what a spline multiplies."""

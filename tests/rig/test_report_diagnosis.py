@@ -22,6 +22,8 @@ from identification.mismatch.diagnosis import (
     Where,
 )
 from identification.mismatch.preparing import history_of
+from identification.mismatch.remainder import FlexibleShape, Spline
+from identification.physics.free_form import MULTIPLIERS, WORDS
 from identification.physics.term import Scale
 from identification.recording import Channel, Recording
 from identification.twin import Source, Twin, TwinNoise, TwinTerm
@@ -154,6 +156,16 @@ def test_unexplained_shows_shapes_and_what_it_resembles():
     ]  # what it resembles; no flexible term
     assert "located here" in svg(section.parts[1].plot)
     assert page.lead == "Something is left at time 5 to 20 s."
+
+
+@pytest.mark.parametrize("times", MULTIPLIERS)
+def test_a_flexible_term_of_each_kind_is_drawn(times):
+    """A run that was diagnosed had neither page nor text where the kind had no label."""
+    at = np.linspace(0.0, 3.0, 5)
+    spline = Spline(times, WORDS[times], "1", at, 0.1 * at, 0.01 + 0.0 * at, ((0.5, 0.05, 0.04, 0.01),))
+    found = FlexibleShape("time_since_step", "s", (0.0, 1.0, 3.0), 1, 0.0, 0.0, {}, (spline,), "A flexible term.")
+    page = diagnosis_page(answer(verdict="unexplained", unexplained=replace(ODD, flexible=(found,)), findings=()))
+    assert f"Flexible term over time since step: {times}" in titles(page)["What is not explained"]
 
 
 def test_adequate_page_has_little_to_say():
