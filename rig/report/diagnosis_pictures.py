@@ -196,7 +196,7 @@ def before_after_pictures(d: Diagnosis) -> Iterator[Picture]:
 
 def next_picture(n: NextExperiment) -> Picture:
     """The sweep over time."""
-    plot = steps_plot(
-        [s.duration for s in n.steps], [s.command_voltage for s in n.steps], [s.flow_speed for s in n.steps]
-    )
+    rows = [(s.duration, s.command_voltage, s.flow_speed) for s in n.steps]
+    durations, levels, flow = zip(*rows, strict=True)
+    plot = steps_plot(durations, levels, flow, "voltage" if n.unit == "V" else "rotation rate", n.unit)
     return Picture("The next sweep", plot, "Each level is held; expected power is that of telling the rivals apart.")

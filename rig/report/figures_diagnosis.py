@@ -129,22 +129,23 @@ def spline_over(measured: Group, curve: Curve, x: str, y: str, *, spread_out: bo
     return Plot(draw, alt, (NARROW[0], 3.6))
 
 
-def steps_plot(durations: Sequence[float], voltage: Sequence[float], flow: Sequence[float]) -> Plot:
-    """The steps of a sweep over time; the flow below where it is not at rest."""
+def steps_plot(durations: Sequence[float], level: Sequence[float], flow: Sequence[float], name: str, unit: str) -> Plot:
+    """The steps of a sweep over time, levels called `name`; the flow below where it is not at rest."""
     edges: Floats = np.concatenate([[0.0], np.cumsum(durations)])
     alt = (
-        f"Sweep of {len(voltage)} steps in {edges[-1]:.0f} s: voltage between {min(voltage):.3g} and "
-        f"{max(voltage):.3g} V" + (f", flow up to {max(flow, key=abs):.3g} m/s." if any(flow) else ".")
+        f"Sweep of {len(level)} steps in {edges[-1]:.0f} s: {name} between {min(level):.3g} and "
+        f"{max(level):.3g} {unit}" + (f", flow up to {max(flow, key=abs):.3g} m/s." if any(flow) else ".")
     )
 
     def draw(figure: Figure) -> None:
         two = any(flow)
         axes = figure.subplots(2 if two else 1, 1, sharex=True, squeeze=False, height_ratios=[2, 1] if two else None)
-        rows = [("command / V", voltage, DATA)] + ([("flow / (m/s)", flow, OTHER)] if two else [])
-        for i, (name, values, colour) in enumerate(rows):
+        rows = [(f"{name} / {f'({unit})' if '/' in unit else unit}", level, DATA)]
+        rows += [("flow / (m/s)", flow, OTHER)] if two else []
+        for i, (label, values, colour) in enumerate(rows):
             axes[i, 0].axhline(0.0, color=MUTED, linewidth=0.8)
             axes[i, 0].stairs(values, edges, color=colour, baseline=None, linewidth=2.0)
-            labels(axes[i, 0], "time / s" if i == len(rows) - 1 else "", name)
+            labels(axes[i, 0], "time / s" if i == len(rows) - 1 else "", label)
             axes[i, 0].margins(x=0.01, y=0.1)
 
     return Plot(draw, alt, (NARROW[0], 3.4), (9.0, 3.4))

@@ -220,6 +220,17 @@ def test_effect_is_drawn_by_itself_where_the_recordings_are_at_hand():
     assert "and all findings together; largest" in together.sections[2].parts[0].plot.alt
 
 
+def test_the_next_sweep_is_drawn_in_its_own_unit():
+    turning = replace(NEXT, quantity="rotation_rate")
+    for n, said, label in (
+        (NEXT, "voltage between -9 and 2 V", "voltage / V"),
+        (turning, "rotation rate between -9 and 2 rev/s", "rotation rate / (rev/s)"),
+    ):
+        section = next(s for s in diagnosis_page(answer(next_experiment=n)).sections if s.title.startswith("The next"))
+        assert said in section.parts[1].plot.alt
+        assert label in svg(section.parts[1].plot)
+
+
 def test_finding_without_a_coordinate_is_a_sentence():
     hum = replace(LAGS, effect="periodic_disturbance", statement="A line at 4.2 Hz.", rivals=())
     section = next(s for s in diagnosis_page(answer(findings=(hum,))).sections if s.title == "What was left out")
