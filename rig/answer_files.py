@@ -15,6 +15,7 @@ from rig.config import CampaignConfig
 from rig.errors import ConfigError, RecordingError
 from rig.file_lists import ListOption
 from rig.next_plan import asked, limits_of, require_thruster
+from rig.result_path import RESULT, RESULT_FILE
 
 if TYPE_CHECKING:
     from identification.mismatch.sweeps import Limits
@@ -23,12 +24,11 @@ if TYPE_CHECKING:
 C = TypeVar("C", bound=Callable[..., object])
 
 PATH = click.Path(path_type=Path)
-FILE = click.Path(dir_okay=False, path_type=Path)
 _OPTIONS = (
-    click.option("--json", "json_path", type=PATH, help="Write the diagnosis here; - is standard output."),
-    click.option("--report", type=FILE, help="Write a page with figures here (HTML)."),
-    click.option("--save-twin", type=FILE, help="Write the fitted model here, as a twin (JSON)."),
-    click.option("--plan", type=FILE, help="Write the next experiment here, as a campaign; needs --campaign."),
+    click.option("--json", "json_path", type=RESULT, help="Write the diagnosis here; - is standard output."),
+    click.option("--report", type=RESULT_FILE, help="Write a page with figures here (HTML)."),
+    click.option("--save-twin", type=RESULT_FILE, help="Write the fitted model here, as a twin (JSON)."),
+    click.option("--plan", type=RESULT_FILE, help="Write the next experiment here, as a campaign; needs --campaign."),
     click.option("--campaign", type=PATH, help="Campaign of the recordings: bench and pacing of the next experiment."),
     click.option("--budget", type=float, metavar="S", help="Longest next experiment.  [default: 300]"),
 )

@@ -20,6 +20,7 @@ from rig.errors import ConfigError, PlanError
 from rig.loading import load_campaign
 from rig.plan import FixedDwell, Plan
 from rig.plan_file import Template, write_campaign
+from rig.result_path import RESULT
 from rig.shapes import Levels
 
 
@@ -87,8 +88,8 @@ def _refuse_stray(inertia: bool, options: Mapping[str, Any]) -> None:
 @click.argument("campaign", required=False, type=click.Path(path_type=Path))
 @click.option("--bench", type=click.Path(path_type=Path), help="Bench file, when there is no campaign yet.")
 @click.option("--time", metavar="TIME", help="Of one run: 600, 10min, 1h.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the campaign here.")
-@click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write the design here; - is stdout.")
+@click.option("-o", "--output", type=RESULT, help="Write the campaign here.")
+@click.option("--json", "json_path", type=RESULT, help="Write the design here; - is stdout.")
 @click.option("--noise", metavar="FIT.json|N", help="Fit of an earlier run, or N: error of a mean over one second.")
 @click.option("--model", type=click.Choice(["C", "C+/C-"]), help="One coefficient (default), or one each direction.")
 @click.option("--linear", is_flag=True, default=None, help="A linear term k V in the model.")

@@ -19,6 +19,7 @@ from rig.fit_json import answer_json, fit_json
 from rig.fit_text import alike_text, answer_text, changed_text, set_text
 from rig.one_pass import LONG, fit_one_pass, thrust_rows
 from rig.one_pass_text import one_pass_json, one_pass_text
+from rig.result_path import RESULT, RESULT_FILE
 
 __all__ = ["Answer", "answer_json", "answer_text", "fit_command", "fit_files", "fit_json", "fit_recordings"]
 
@@ -86,10 +87,8 @@ def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:
 
 @click.command("fit")
 @click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--json", "json_path", type=click.Path(path_type=Path), help="Write the fit here; - is standard output.")
-@click.option(
-    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
-)
+@click.option("--json", "json_path", type=RESULT, help="Write the fit here; - is standard output.")
+@click.option("--report", type=RESULT_FILE, help="Write a page with figures here (HTML).")
 @click.option(
     "--model", type=click.Choice(list(NAMES)), help="Model to report; by default C V|V| first, the others beside it."
 )

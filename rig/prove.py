@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from rig.errors import RigError
+from rig.result_path import RESULT_FILE
 
 if TYPE_CHECKING:
     from rig.blind.beside import Beside
@@ -203,7 +204,7 @@ def _told(store: Store, job: Job, *, verbose: bool) -> str:
 @click.option(
     "--scores",
     "scores_path",
-    type=click.Path(dir_okay=False, path_type=Path),
+    type=RESULT_FILE,
     help="File of scores: what it holds by this version of the diagnosis is not asked again; all are written to it.",
 )
 @click.option(
@@ -219,10 +220,8 @@ def _told(store: Store, job: Job, *, verbose: bool) -> str:
 @click.option("--no-run", is_flag=True, help="Only tell what is in the store.")
 @click.option("--case", metavar="CELL/EFFECT/NUMBER", help="Make and answer this one case, print truth and answer.")
 @click.option("--verbose", is_flag=True, help="With --case: everything.")
-@click.option(
-    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
-)
-@click.option("--json", "json_path", type=click.Path(dir_okay=False, path_type=Path), help="Write the figures here.")
+@click.option("--report", type=RESULT_FILE, help="Write a page with figures here (HTML).")
+@click.option("--json", "json_path", type=RESULT_FILE, help="Write the figures here.")
 def prove_command(
     seeds: int,
     only: tuple[str, ...],

@@ -25,6 +25,7 @@ from rig.loading import load_bench, load_campaign
 from rig.next_plan import limits_of, write_next
 from rig.plan import TareConfig
 from rig.plan_file import Level, Template, write_campaign
+from rig.result_path import RESULT, RESULT_FILE
 from rig.run import campaign_folder, progress_bar, require_runnable, run_campaign
 
 if TYPE_CHECKING:
@@ -248,11 +249,9 @@ PATH = click.Path(path_type=Path)
 @click.option("--budget", default="20min", show_default=True, help="Time for everything, such as 600, 10min or 1h.")
 @click.option("--output", type=PATH, help="Folder for what is recorded (default: the campaign's).")
 @click.option(
-    "--json", "json_path", type=PATH, help="Write the last diagnosis and the way to it; - is standard output."
+    "--json", "json_path", type=RESULT, help="Write the last diagnosis and the way to it; - is standard output."
 )
-@click.option(
-    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
-)
+@click.option("--report", type=RESULT_FILE, help="Write a page with figures here (HTML).")
 @click.option("--flow", "flow", metavar="COMMAND", help="Command that sets the water's speed; {speed} is m/s.")
 @click.option("--seed", default=0, show_default=True, help="Of the surrogates that the false-alarm rate is judged by.")
 def settle_command(

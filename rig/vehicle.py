@@ -22,6 +22,7 @@ from identification.vehicle_trials import Trial, ballast_of, trial
 from rig.errors import ConfigError, RecordingError, RigError
 from rig.file_lists import ListCommand, ListOption
 from rig.installation import InstallationFile, Vehicle, load_installation
+from rig.result_path import RESULT, RESULT_FILE
 from rig.vehicle_recordings import Named, check, load_named, matched
 from rig.vehicle_thrusters import Calibration, installed, read_fits, straight_ahead
 
@@ -232,12 +233,8 @@ def _comparators(fit: VehicleFit) -> dict[str, tuple[InertiaFit | Unusable, ...]
     help="What `rig fit --json` wrote of the vehicle's thrusters.",
 )
 @click.option("--installation", type=click.Path(path_type=Path), help="Which thruster sits where (TOML).")
-@click.option(
-    "--json", "json_path", type=click.Path(path_type=Path), help="Write the answer here; - is standard output."
-)
-@click.option(
-    "--report", type=click.Path(dir_okay=False, path_type=Path), help="Write a page with figures here (HTML)."
-)
+@click.option("--json", "json_path", type=RESULT, help="Write the answer here; - is standard output.")
+@click.option("--report", type=RESULT_FILE, help="Write a page with figures here (HTML).")
 @click.option(
     "--holdout",
     cls=ListOption,
