@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -20,6 +21,12 @@ class CanBusConfig:
     bitrate: int = 500_000
     capture: str = ""
     """File that every frame is written to, with its time."""
+
+    def __post_init__(self) -> None:
+        if not self.channel:
+            raise ValueError("channel is missing: the adapter's port, or the network's name (can0)")
+        if self.bitrate <= 0:
+            raise ValueError(f"bitrate must be above 0 bit/s, but is {self.bitrate}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +57,19 @@ class MountConfig:
     """`[mount]`: how the next thruster gets onto the bench. Empty command: the operator is asked."""
 
     command: tuple[str, ...] = ()
-    """argv; `{thruster}` is replaced, `{bench_dir}` is the bench file's folder."""
+    """argv; `{thruster}` is replaced, `{bench_dir}` is the bench file's folder, `{python}` the interpreter."""
     timeout: float = 30.0
+
+    def __post_init__(self) -> None:
+        self.words("", Path())
+
+    def words(self, thruster: str, bench_dir: Path) -> list[str]:
+        """The command with its braces filled. Raises ValueError for braces that mean nothing."""
+        fill = {"thruster": thruster, "bench_dir": str(bench_dir), "python": sys.executable}
+        try:
+            return [word.format(**fill) for word in self.command]
+        except (KeyError, ValueError, IndexError) as error:
+            raise ValueError(f"command has braces that mean nothing ({error}); known are {', '.join(fill)}") from error
 
 
 @dataclass(frozen=True, slots=True)

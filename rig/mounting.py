@@ -6,7 +6,6 @@ import contextlib
 import os
 import signal
 import subprocess
-import sys
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -30,7 +29,7 @@ def mount(session: Session) -> None:
             pass
         session.say("info", f"{status.thruster} is on the bench, says the operator")
         return
-    words = command_words(session)
+    words = command.words(status.thruster, session.campaign.bench.path.parent)
     what = f"the mount command {words} for {status.thruster}"
     with _running(words, session.folder / LOG_NAME) as child:
         session.wait(lambda: child.poll() is not None, command.timeout, what)
@@ -40,18 +39,6 @@ def mount(session: Session) -> None:
             f"{status.thruster} could not be mounted: {words[0]} ended with status {child.returncode}: {said}"
         )
     session.say("info", f"{status.thruster} mounted{': ' + said if said else ''}")
-
-
-def command_words(session: Session) -> list[str]:
-    """The command with its braces filled. Raises DeviceError for braces that mean nothing."""
-    bench = session.campaign.bench
-    fill = {"thruster": session.status.thruster, "bench_dir": str(bench.path.parent), "python": sys.executable}
-    try:
-        return [word.format(**fill) for word in bench.mount.command]
-    except (KeyError, ValueError, IndexError) as error:
-        raise DeviceError(
-            f"{bench.path}: mount.command has braces that mean nothing ({error}); known are {', '.join(fill)}"
-        ) from error
 
 
 @contextlib.contextmanager

@@ -17,7 +17,7 @@ from rig.arming import file_facts
 from rig.config import CampaignConfig
 from rig.errors import ConfigError, LinkError, RecordingError, RigError
 from rig.ledger import Fact, finished_runs, read
-from rig.run import console_screen, follow, progress_bar, start_controller
+from rig.run import console_screen, follow, progress_bar, require_mountable, start_controller
 from rig.runs import live_runs
 
 
@@ -44,7 +44,9 @@ def resume_command(folder: Path, headless: bool) -> int:
 
     facts = read(folder)
     rest = remainder(facts, folder)
-    require_unchanged(facts, check_campaign(rest.campaign).campaign)
+    config = check_campaign(rest.campaign).campaign
+    require_unchanged(facts, config)
+    require_mountable(config, rest.thrusters, headless=headless)
     if not headless and not sys.stdout.isatty():
         raise RigError("rig resume opens the console, which needs a terminal; use --headless where there is none")
     click.echo(f"finished: {', '.join(rest.finished) or 'none'}; to do: {', '.join(rest.thrusters)}")

@@ -60,13 +60,17 @@ def require_runnable(campaign: Path, thrusters: tuple[str, ...], *, headless: bo
         raise RigError(
             f"{campaign}: --thruster {unknown[0]} is not in the campaign; it has {', '.join(config.thrusters)}"
         )
-    chosen = thrusters or config.thrusters
-    if headless and not config.bench.mount.command and len(chosen) > 1 and not sys.stdin.isatty():
+    require_mountable(config, thrusters or config.thrusters, headless=headless)
+    return config
+
+
+def require_mountable(config: CampaignConfig, thrusters: Sequence[str], *, headless: bool) -> None:
+    """Raises RigError where nobody could put the next thruster on the bench."""
+    if headless and not config.bench.mount.command and len(thrusters) > 1 and not sys.stdin.isatty():
         raise RigError(
-            f"{campaign}: {len(chosen)} thrusters, and nobody at this terminal to put the next one on the bench; "
+            f"{config.path}: {len(thrusters)} thrusters, and nobody at this terminal to put the next one on the bench; "
             "give the bench a [mount] command or run one thruster at a time with --thruster"
         )
-    return config
 
 
 def run_campaign(campaign: Path, folder: Path, thrusters: tuple[str, ...], front: FrontEnd) -> int:

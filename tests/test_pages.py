@@ -8,7 +8,6 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import MISSING, fields
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -23,7 +22,6 @@ from rig.console.dialogs import LeaveDialog, NoteDialog
 from rig.console.tables import STATE_STYLES
 from rig.console.wording import STATE_WORDS
 from rig.loading import BENCH_ELSEWHERE, CAMPAIGN_ELSEWHERE, DWELLS, PLAN_ELSEWHERE
-from rig.mounting import command_words
 from rig.plan import Plan, TareConfig
 from rig.shapes import SHAPES
 from sim_devices import __main__ as simulator
@@ -128,9 +126,7 @@ def test_every_plan_kind_and_dwell() -> None:
 
 def test_placeholders_of_the_mount_command() -> None:
     named = tuple(sorted(word for word in words(section("`[mount]`")) if word.startswith("{")))
-    bench = SimpleNamespace(path=Path("/b/bench.toml"), mount=MountConfig(named))
-    session: Any = SimpleNamespace(campaign=SimpleNamespace(bench=bench), status=SimpleNamespace(thruster="T1"))
-    assert {"T1", "/b"} < set(command_words(session))
+    assert {"T1", "/b"} < set(MountConfig(named).words("T1", Path("/b")))
     assert len(named) == 3
 
 

@@ -38,4 +38,5 @@ def _doing(view: View) -> tuple[tuple[str, str], ...]:
         return (("F5", "mounted"), *leave) if snapshot.mounted_by_hand else leave
     if snapshot.state == "paused":
         return (("r", "resume"), *leave)
-    return (("p", "pause"), ("k", "skip"), *leave)
+    skip = (("k", "skip"),) if snapshot.state in ("hold", "sine", "free") else ()
+    return (("p", "pause"), *skip, *leave)

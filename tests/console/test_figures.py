@@ -12,6 +12,7 @@ from rig.console import wording
 from rig.console.axes import reach, thin, ticks
 from rig.console.dialogs import what_leaving_is
 from rig.console.fit import in_words, running_fit, v_abs_v
+from rig.console.keys import key_line
 from rig.console.parting import begin, settled
 from rig.console.session import exit_status
 from rig.console.view import TRACE_KEPT, View, absorb
@@ -156,3 +157,12 @@ def test_exit_status():
 
 def test_the_end_before_any_start_is_no_result():
     assert absorb(View(), snapshot("done", outcome="aborted"), 0.0).points == {}
+
+
+@pytest.mark.parametrize(
+    ("state", "offered"), [("hold", True), ("sine", True), ("free", True), ("tare", False), ("ramp", False)]
+)
+def test_skip_is_offered_where_it_means_something(state, offered):
+    line = key_line(absorb(View(), running(state), 0.0)).plain
+    assert " p pause" in line
+    assert (" k skip" in line) == offered

@@ -366,7 +366,6 @@ def test_mount_command_fails_hangs_or_is_not_there(tmp_path):
             ((sys.executable, "-c", "print('it turns'); raise SystemExit(2)"), "ended with status 2: it turns"),
             ((sys.executable, "-c", "import time; time.sleep(60)"), "waited 2 s for the mount command"),
             (("/no/such/command",), "can't be run: No such file"),
-            (("echo", "{propeller}"), "braces that mean nothing"),
         ]
     ):
         folder = tmp_path / str(number)

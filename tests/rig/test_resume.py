@@ -1,5 +1,6 @@
 """rig resume: what is left to do, and what is refused."""
 
+import io
 import os
 from dataclasses import replace
 
@@ -7,9 +8,11 @@ import pytest
 
 from rig.arming import file_facts
 from rig.cli import main
-from rig.errors import ConfigError, RecordingError
+from rig.config import MountConfig
+from rig.errors import ConfigError, RecordingError, RigError
 from rig.ledger import Ledger
 from rig.resume import remainder, require_unchanged
+from rig.run import require_mountable
 from rig.runs import Run, live_runs, register
 from tests.rig.virtual_bench import bench_config, campaign_config
 
@@ -64,6 +67,16 @@ def test_folder_without_a_campaign_and_a_run_that_is_going_on(tmp_path, capsys):
         assert "still going on" in capsys.readouterr().err
     finally:
         path.unlink()
+
+
+def test_nobody_to_mount_the_next_thruster(tmp_path, monkeypatch):
+    monkeypatch.setattr("sys.stdin", io.StringIO())
+    campaign, _ = begun(tmp_path, "T1", "T2")
+    by_hand = replace(campaign, bench=replace(campaign.bench, mount=MountConfig()))
+    with pytest.raises(RigError, match="2 thrusters, and nobody at this terminal"):
+        require_mountable(by_hand, ["T1", "T2"], headless=True)
+    require_mountable(by_hand, ["T2"], headless=True)
+    require_mountable(by_hand, ["T1", "T2"], headless=False)
 
 
 def test_ledger_of_a_start_can_be_read_back(tmp_path):
