@@ -102,7 +102,8 @@ def stop_command(folder: Path | None) -> int:
     last = Headless(peer).follow(start=False)
     peer.close()
     if last is None or last.stop_confirmed is False:
-        raise LinkError("STOP NOT CONFIRMED by a measurement: look at the propeller, cut the supply")
+        click.echo("rig: STOP NOT CONFIRMED by a measurement: look at the propeller, cut the supply", err=True)
+        return 1
     click.echo(f"stopped; {last.cause or 'the run had already ended'}")
     return 0
 
