@@ -15,7 +15,7 @@ from rig.config import CampaignConfig
 from rig.errors import ConfigError, RecordingError
 from rig.file_lists import ListOption
 from rig.next_plan import asked, limits_of, require_thruster
-from rig.result_path import RESULT, RESULT_FILE
+from rig.result_path import RESULT, RESULT_FILE, require_different
 
 if TYPE_CHECKING:
     from identification.mismatch.sweeps import Limits
@@ -88,7 +88,9 @@ def wanted_of(
     budget: float | None,
 ) -> Wanted:
     """Raises ConfigError or PlanError for what can be seen to fail before anything is read or computed."""
-    for name, path in (("--json", json_path), ("--save-twin", save_twin), ("--plan", plan)):
+    outputs = (("--json", json_path), ("--save-twin", save_twin), ("--plan", plan))
+    require_different(("--campaign", campaign), *outputs, ("--report", report))
+    for name, path in outputs:
         if path is not None and str(path) != "-":
             require_writable(name, path)
     bench = asked(plan, campaign)

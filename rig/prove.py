@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from rig.errors import RigError
-from rig.result_path import RESULT_FILE
+from rig.result_path import RESULT_FILE, require_different
 
 if TYPE_CHECKING:
     from rig.blind.beside import Beside
@@ -250,6 +250,8 @@ def prove_command(
 
     try:
         require_limit(limit)
+        outputs = (("--json", json_path), ("--report", report), ("--scores", scores_path))
+        require_different(*(("--beside", path) for path in beside_paths), *outputs)
         beside = read_beside(beside_paths, shown=bool(report or json_path))
         if case is not None:
             click.echo(one_case(case, draw, limit, verbose=verbose))

@@ -28,6 +28,17 @@ class ResultPath(click.Path):
         return path
 
 
+def require_different(*named: tuple[str, Path | None]) -> None:
+    """Of (option, path). Raises ConfigError where two are one file, for the later would be written over the other."""
+    seen: dict[Path, str] = {}
+    for option, path in named:
+        if path is None or str(path) == "-":
+            continue
+        other = seen.setdefault(path.resolve(), option)
+        if other != option:
+            raise ConfigError(f"{option} {path}: {other} names the same file; choose another name for {option}")
+
+
 def _is_recording(path: Path) -> bool:
     import h5py  # only where there is a file of that name
 

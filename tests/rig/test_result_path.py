@@ -4,8 +4,12 @@ from pathlib import Path
 
 import h5py
 import pytest
+from click.testing import CliRunner
 
+from rig.answer_files import wanted_of
 from rig.cli import main
+from rig.errors import ConfigError
+from rig.prove import prove_command
 from rig.result_path import RESULT
 
 OPTIONS = {
@@ -40,3 +44,22 @@ def test_what_is_no_recording_may_be_written_again(tmp_path):
     path.write_text("an earlier answer")
     for name in (str(path), str(tmp_path), "-"):
         assert RESULT.convert(name, None, None) == Path(name)
+
+
+@pytest.mark.parametrize("words", [("--json", "--report"), ("--scores", "--json"), ("--beside", "--json")])
+def test_one_file_for_two_outputs_of_a_proof_is_refused(words, tmp_path):
+    path = tmp_path / "a.json"
+    path.write_text("hours of work")
+    given = [word for option in words for word in (option, str(path))]
+    done = CliRunner().invoke(prove_command, ["--no-run", "--store", str(tmp_path / "store"), *given])
+    assert done.exit_code == 2
+    assert "names the same file; choose another name" in done.output
+    assert path.read_text() == "hours of work"
+
+
+def test_one_file_for_two_outputs_of_a_diagnosis_is_refused(tmp_path):
+    for outputs in ({"json_path": "a", "save_twin": "a"}, {"report": "a", "campaign": "./a"}):
+        given = {name: tmp_path / value for name, value in outputs.items()}
+        nothing = dict.fromkeys(("json_path", "report", "save_twin", "plan", "campaign", "budget"))
+        with pytest.raises(ConfigError, match="names the same file"):
+            wanted_of(**{**nothing, **given})
