@@ -168,7 +168,8 @@ def _sample(run: Pass, form: Form, thrust: LongChannel, source: LongChannel) -> 
     """A few rows from all over the recording."""
     count = min(ROWS_AT_PLACE, thrust.rows)
     parts = []
-    for start in np.unique(np.linspace(0, thrust.rows - count, PLACES).astype(int)).tolist():
+    places = min(PLACES, thrust.rows // max(count, 1))  # no row twice: a sample is of rows that the blocks have
+    for start in np.linspace(0, thrust.rows - count, places).astype(int).tolist():
         time, found = thrust.times(start, start + count)
         value = np.where(time == found, thrust.values(start, start + count), np.nan)
         known = time[np.isfinite(time)]

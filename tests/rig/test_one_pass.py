@@ -94,6 +94,24 @@ def test_several_files_agree_with_memory(tmp_path, model, names):
     assert C.std_calibration == pytest.approx(0.0005 * C.value)
 
 
+@pytest.mark.parametrize("n", [900, 2000, 8191, 8193])
+def test_short_recordings_agree_with_memory(tmp_path, n):
+    """The sample of a short one may have none of its rows twice."""
+    t = np.arange(n) / 100
+    rng = np.random.default_rng(n)
+    u = 12 * np.sin(t)
+    streams = {
+        "motor": {"time": (None, None, t), "u": ("motor_voltage", "V", u)},
+        "cell": {"time": (None, None, t), "F": ("thrust", "N", 0.4 * u * np.abs(u) + 0.3 * rng.normal(size=n))},
+    }
+    path = write(tmp_path / "a.h5", streams)
+    (found,) = fit_one_pass([path])
+    H, y = in_memory(path, split=False)
+    theta = np.linalg.lstsq(np.column_stack([H, np.ones(len(y))]), y, rcond=None)[0]
+    assert found.rows == len(y)
+    assert found.parameters["C"].value == pytest.approx(theta[0], rel=1e-9)
+
+
 def noise(rng, n, memory):
     from scipy.signal import lfilter
 
