@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from identification.efficiency import AXES, Installation, Thruster
 from identification.points import voltage_channel
@@ -40,6 +41,8 @@ class Calibration:
     thruster: str
     model: str
     coefficients: tuple[Coefficient, ...]
+    statistical: Floats
+    """(p, p): scatter of the fit; C_plus and C_minus have one tare."""
     source: str
 
 
@@ -89,9 +92,22 @@ def _calibration(path: Path, entry: Any) -> Calibration:
             )
         wanted = USABLE[chosen["model"]]
         coefficients = tuple(_coefficient(path, name, key, chosen["parameters"][key]) for key in wanted)
-        return Calibration(name, chosen["model"], coefficients, path.name)
+        return Calibration(name, chosen["model"], coefficients, _statistical(chosen, wanted, coefficients), path.name)
     except (KeyError, TypeError, AttributeError) as error:
         raise ConfigError(f"{path}: an entry of fits is not as `rig fit --json` writes it: {error!r}") from None
+
+
+def _statistical(chosen: Mapping[str, Any], wanted: Sequence[str], coefficients: Sequence[Coefficient]) -> Floats:
+    """(p, p); a file written before fits had a covariance says nothing of what lies beside the diagonal."""
+    told = chosen.get("covariance") or {}
+    if told.get("statistical") is None:
+        return _independent(coefficients)
+    at = [told["names"].index(name) for name in wanted]
+    return np.array(told["statistical"], dtype=np.float64)[np.ix_(at, at)]
+
+
+def _independent(coefficients: Sequence[Coefficient]) -> Floats:
+    return np.diag([c.std_statistical**2 for c in coefficients])
 
 
 def _coefficient(path: Path, thruster: str, name: str, entry: Mapping[str, Any]) -> Coefficient:
@@ -110,22 +126,29 @@ def _coefficient(path: Path, thruster: str, name: str, entry: Mapping[str, Any])
 def installed(file: InstallationFile, fits: Mapping[str, Calibration]) -> Installation:
     """Thrusters as they sit on the vehicle. Raises ConfigError when one has no model."""
     parts = [_placed(file, name, mounting, fits) for name, mounting in file.thrusters.items()]
-    thrusters = tuple(thruster for thruster, _ in parts)
-    coefficients = [c for _, group in parts for c in group]
-    return Installation(thrusters, covariance(coefficients), file.interactions)
+    thrusters = tuple(part.thruster for part in parts)
+    coefficients = [c for part in parts for c in part.coefficients]
+    scatter = block_diag(*(part.statistical for part in parts))
+    return Installation(thrusters, covariance(coefficients, scatter), file.interactions)
 
 
-def covariance(coefficients: Sequence[Coefficient]) -> Floats:
-    """(p, p): scatter of each fit, and the gain of the cell that all of them share."""
-    own = np.diag([c.std_statistical**2 for c in coefficients])
+def covariance(coefficients: Sequence[Coefficient], statistical: Floats) -> Floats:
+    """(p, p): scatter of the fits, and the gain of the cell that all of them share."""
     common = np.array([c.std_calibration * np.sign(c.value) for c in coefficients])
-    out: Floats = own + np.outer(common, common)
+    out: Floats = statistical + np.outer(common, common)
     return out
 
 
-def _placed(
-    file: InstallationFile, name: str, mounting: Mounting, fits: Mapping[str, Calibration]
-) -> tuple[Thruster, tuple[Coefficient, ...]]:
+@dataclass(frozen=True)
+class _Placed:
+    """A thruster on the vehicle, and what is known of its thrust."""
+
+    thruster: Thruster
+    coefficients: tuple[Coefficient, ...]
+    statistical: Floats
+
+
+def _placed(file: InstallationFile, name: str, mounting: Mounting, fits: Mapping[str, Calibration]) -> _Placed:
     if mounting.curve or mounting.table:
         levels, thrust = (
             _curve(file.path.parent / mounting.curve, file.path)
@@ -133,17 +156,18 @@ def _placed(
             else np.array(mounting.table, dtype=np.float64).T
         )
         found = tuple(Coefficient(float(value), 0.0, 0.0) for value in thrust)
-        return Thruster(name, thrust, mounting.arms, levels), found
+        return _Placed(Thruster(name, thrust, mounting.arms, levels), found, _independent(found))
     if mounting.C is not None:
         stated: tuple[Coefficient, ...] = (Coefficient(mounting.C, mounting.C_std, 0.0),)
+        scatter = _independent(stated)
     else:
         wanted = mounting.fit or name
         if wanted not in fits:
             there = ", ".join(fits) or "nothing"
             asked = "the fits hold" if fits else "--thrusters was not given and the file states no C or curve: there is"
             raise ConfigError(f"{file.path}: thruster {name} needs a fit of {wanted!r}; {asked} {there}")
-        stated = fits[wanted].coefficients
-    return Thruster(name, np.array([c.value for c in stated]), mounting.arms), stated
+        stated, scatter = fits[wanted].coefficients, fits[wanted].statistical
+    return _Placed(Thruster(name, np.array([c.value for c in stated]), mounting.arms), stated, scatter)
 
 
 def _curve(path: Path, asked_by: Path) -> tuple[Floats, Floats]:

@@ -1,5 +1,7 @@
 """The installation file: what it says, and the sentence for each thing that is wrong with it."""
 
+import json
+
 import numpy as np
 import pytest
 from vehicle_files import LAY_OUT, fit_of, write
@@ -25,6 +27,19 @@ def test_thrusters_share_the_gain_of_their_cell(tmp_path):
     assert found.cov[0, 0] == pytest.approx(0.0017**2 + 0.001**2)
     assert found.etas == ("eta_hull", "eta_pair")
     assert [(one.direction, one.thrusters) for one in found.interactions][:2] == [(1, ("T3", "T4")), (-1, ("T1", "T2"))]
+
+
+def test_two_coefficients_of_one_fit_keep_their_covariance(tmp_path):
+    path = fit_of(tmp_path / "fit.json", ("T1", "T2"), model="C+/C-")
+    document = json.loads(path.read_text())
+    scatter = [[2e-6, -1e-6, 7e-4], [-1e-6, 3e-6, -7e-4], [7e-4, -7e-4, 1.0]]
+    names = ["C_plus", "C_minus", "tare[a]"]
+    document["fits"][0]["covariance"] = {"names": names, "matrix": scatter, "statistical": scatter}
+    path.write_text(json.dumps(document))
+    found = installed(loaded(tmp_path, BARE), read_fits([path]))
+    assert found.cov - 0.0017**2 == pytest.approx(np.array(
+        [[2e-6, -1e-6, 0, 0], [-1e-6, 3e-6, 0, 0], [0, 0, 1e-6, 0], [0, 0, 0, 1e-6]]
+    ))  # fmt: skip
 
 
 def test_a_thruster_by_another_name_a_stated_one_a_table_and_a_curve(tmp_path):
