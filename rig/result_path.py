@@ -40,9 +40,9 @@ def require_different(*named: tuple[str, Path | None]) -> None:
 
 
 def _is_recording(path: Path) -> bool:
-    import h5py  # only where there is a file of that name
+    from rig.hdf5 import is_hdf5  # only where there is a file of that name
 
-    return bool(h5py.is_hdf5(path))
+    return is_hdf5(path)
 
 
 RESULT = ResultPath()

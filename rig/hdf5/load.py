@@ -41,6 +41,11 @@ def load(path: str | Path, rows: int | None = None) -> Recording:
         return _recording(file, path, opened_as, rows)
 
 
+def is_hdf5(path: Path) -> bool:
+    """Whether a file is HDF5, whatever its name."""
+    return bool(h5py.is_hdf5(path))
+
+
 def open_for_reading(path: Path) -> tuple[h5py.File, str]:
     """The open file and `plain` or `swmr`; its format has been checked. Raises RecordingError."""
     if not path.is_file():
