@@ -44,6 +44,15 @@ holdout_option = click.option(
 )
 
 
+seed_option = click.option(
+    "--seed",
+    type=click.IntRange(min=0),
+    default=0,
+    show_default=True,
+    help="Of the surrogates that the false-alarm rate is judged by.",
+)
+
+
 def answer_options(command: C) -> C:
     """The options of a diagnosis that say what is written, and for which bench."""
     return reduce(lambda made, option: option(made), reversed(_OPTIONS), command)

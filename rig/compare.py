@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rig.answer_files import PATH, Wanted, answer_options, holdout_option, wanted_of
+from rig.answer_files import PATH, Wanted, answer_options, holdout_option, seed_option, wanted_of
 from rig.diagnose import NOTHING, read, recordings_in, refuse_both, tell
 from rig.errors import RecordingError, RigError
 from rig.file_lists import ListCommand
@@ -48,7 +48,7 @@ def compare_files(
 @click.argument("real", type=PATH)
 @holdout_option
 @answer_options
-@click.option("--seed", default=0, show_default=True, help="Of the surrogates that the false-alarm rate is judged by.")
+@seed_option
 def compare_command(sim: Path, real: Path, holdout: tuple[Path, ...], seed: int, **outputs: Any) -> None:
     """Diagnose the recording REAL against the recording SIM that any program simulated with the same command.
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from rig.answer_files import PATH, Wanted, answer_options, holdout_option, wanted_of
+from rig.answer_files import PATH, Wanted, answer_options, holdout_option, seed_option, wanted_of
 from rig.diagnose_vehicle import VehicleFiles, diagnose_vehicle_files, is_vehicle, refuse_for_tunnel
 from rig.errors import RecordingError, RigError
 from rig.file_lists import ListCommand
@@ -172,7 +172,7 @@ def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) 
 )
 @click.option("--mass-std", type=float, default=0.0, metavar="KG", help="Standard deviation of --mass.  [default: 0]")
 @click.option("--axis", type=click.Choice(["surge", "sway", "heave", "yaw"]), help="Vehicle: only trials of this axis.")
-@click.option("--seed", default=0, show_default=True, help="Of the surrogates that the false-alarm rate is judged by.")
+@seed_option
 def diagnose_command(
     files: tuple[Path, ...],
     twin: Path | None,

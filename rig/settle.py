@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.answer_files import Wanted
+from rig.answer_files import Wanted, seed_option
 from rig.config import CampaignConfig
 from rig.design_ask import seconds
 from rig.diagnose import diagnose_files, read, recordings_in, tell
@@ -253,7 +253,7 @@ PATH = click.Path(path_type=Path)
 )
 @click.option("--report", type=RESULT_FILE, help="Write a page with figures here (HTML).")
 @click.option("--flow", "flow", metavar="COMMAND", help="Command that sets the water's speed; {speed} is m/s.")
-@click.option("--seed", default=0, show_default=True, help="Of the surrogates that the false-alarm rate is judged by.")
+@seed_option
 def settle_command(
     files: tuple[Path, ...],
     campaign: Path | None,

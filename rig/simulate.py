@@ -5,12 +5,13 @@ from __future__ import annotations
 import uuid
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from rig.errors import RecordingError, RigError, TwinError
+from rig.errors import ConfigError, RecordingError, RigError, TwinError
 
 if TYPE_CHECKING:
     from identification.mismatch.simulating import Drive, Prediction
@@ -23,6 +24,8 @@ TICK = 0.02
 """s between commands of a ramp or a sine, as `bench.loop_rate` has it by default."""
 TAIL = 1.0
 """s recorded after the last command."""
+MOST = 10_000_000
+"""Samples of one simulation."""
 UNITS = {
     "flow_speed": "m/s",
     "bus_voltage": "V",
@@ -134,7 +137,9 @@ def simulated(twin: Twin, wanted: Asked, rate: float | None, seed: int | None) -
     from identification.mismatch.simulating import simulate
 
     interval = 1 / rate if rate else twin.interval
-    count = int((wanted.end - wanted.start) / interval) + 1
+    count = int(min((wanted.end - wanted.start) / interval, MOST)) + 1
+    if count > MOST:
+        raise TwinError(f"{wanted.name}: more than {MOST:,} samples at {1 / interval:g} samples/s; give a lower --rate")
     times = wanted.start + np.arange(count, dtype=np.float64) * interval
     rng = None if seed is None else np.random.default_rng(seed)
     found = simulate(twin, wanted.drive, times, rng)
@@ -190,6 +195,13 @@ def _columns(twin: Twin, wanted: Asked, found: Prediction) -> Iterator[tuple[Str
             yield one(quantity, quantity, UNITS[quantity]), time, (value,)
 
 
+def _require_numbers(rate: float | None, flow: float | None) -> None:
+    """Raises ConfigError; click lets NaN through every range."""
+    for option, value in (("--rate", rate), ("--flow-speed", flow)):
+        if value is not None and not isfinite(value):
+            raise ConfigError(f"{option} must be a finite number, but is {value:g}")
+
+
 PATH = click.Path(path_type=Path)
 
 
@@ -197,7 +209,7 @@ PATH = click.Path(path_type=Path)
 @click.argument("plan", type=PATH)
 @click.option("--twin", "twin_path", required=True, type=PATH, help="The twin that predicts.")
 @click.option("-o", "--output", required=True, type=PATH, help="The recording to write.")
-@click.option("--noise", "seed", type=int, help="Add the twin's noise, drawn from this seed.")
+@click.option("--noise", "seed", type=click.IntRange(min=0), help="Add the twin's noise, drawn from this seed.")
 @click.option("--rate", type=click.FloatRange(0, min_open=True), help="Samples/s; default: as the twin's recordings.")
 @click.option("--flow-speed", "flow", type=float, help="Tunnel flow in m/s; default: the plan's, else none.")
 def simulate_command(
@@ -212,6 +224,7 @@ def simulate_command(
     from rig.twin import read_twin
 
     try:
+        _require_numbers(rate, flow)
         twin = read_twin(twin_path)
         wanted = asked(plan, twin, flow)
         found = simulated(twin, wanted, rate, seed)

@@ -6,6 +6,7 @@ import importlib.util
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ from rig.cli import rig
 from rig.diagnose_text import diagnosis_text
 from rig.errors import TwinError
 from rig.hdf5 import load
-from rig.simulate import timed
+from rig.simulate import Asked, simulated, timed
 from rig.twin import read_twin, twin_json, write_twin
 
 ROOT = Path(__file__).parents[2]
@@ -162,6 +163,31 @@ def test_a_replayed_command_is_predicted_and_adequate_against_the_twin(dead, fol
     assert again.exit_code == 2
     assert "never overwritten" in again.output
     assert json.loads(run("diagnose", out, "--twin", twin, "--json", "-").output)["verdict"] == "adequate"
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        *((f"{command} --seed -1", "-1 is not in the range x>=0") for command in ("diagnose", "compare", "settle")),
+        ("simulate --noise -1", "-1 is not in the range x>=0"),
+        ("simulate --rate inf", "--rate must be a finite number"),
+        ("simulate --rate nan", "--rate must be a finite number"),
+        ("simulate --flow-speed nan", "--flow-speed must be a finite number"),
+    ],
+)
+def test_a_number_that_cannot_be_used_is_refused(words, says, tmp_path):
+    """Each was a traceback; a flow that is no number made thrust that is none."""
+    command, *option = words.split()
+    files = {"compare": ["a.h5", "b.h5"], "simulate": ["a.h5", "--twin", "t.json", "-o", "c.h5"]}.get(command, ["a.h5"])
+    result = run(command, *files, *option)
+    assert result.exit_code == 2
+    assert says in result.output
+
+
+def test_more_samples_than_a_recording_can_hold_are_refused():
+    wanted = Asked(None, (), 0.0, 3600.0, "an hour")
+    with pytest.raises(TwinError, match="an hour: more than 10,000,000 samples at 1e\\+12 samples/s"):
+        simulated(SimpleNamespace(interval=0.05), wanted, 1e12, None)
 
 
 def test_a_campaign_is_predicted_with_its_steps(dead, folder):
