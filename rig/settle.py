@@ -185,12 +185,20 @@ def by_hand(speed: float) -> None:
 
 
 def by_command(command: str) -> SetFlow:
-    """A command sets it; `{speed}` in it stands for m/s."""
+    """A command sets it; `{speed}` in it stands for m/s. Raises ConfigError for what no shell could split."""
+    try:
+        pattern = shlex.split(command)
+    except ValueError as error:
+        raise ConfigError(f"--flow {command}: {error}; expected a program and its arguments") from error
+    if not pattern:
+        raise ConfigError("--flow is empty; expected a program and its arguments")
 
     def set_flow(speed: float) -> None:
-        words = [word.replace("{speed}", f"{speed:g}") for word in shlex.split(command)]
+        words = [word.replace("{speed}", f"{speed:g}") for word in pattern]
         try:
-            done = subprocess.run(words, capture_output=True, text=True, timeout=FLOW_PATIENCE, check=False)
+            done = subprocess.run(
+                words, capture_output=True, text=True, errors="replace", timeout=FLOW_PATIENCE, check=False
+            )
         except (OSError, subprocess.TimeoutExpired) as error:
             raise RigError(f"--flow: {words} could not set {speed:g} m/s: {error}") from error
         if done.returncode:
@@ -274,8 +282,9 @@ def settle_command(
     from identification.mismatch.settle import course_json
 
     alone = str(json_path) == "-"
+    set_flow = by_command(flow) if flow is not None else by_hand if sys.stdin.isatty() else None
     settling = _settling(files, campaign, bench, output, budget, seed)
-    settling.set_flow = by_command(flow) if flow else by_hand if sys.stdin.isatty() else None
+    settling.set_flow = set_flow
     settling.say = lambda text: click.echo(text, err=alone)
     found, course, end = settling.settle()
     settling.say(f"{end.reason.replace('_', ' ')}: {end.says}")

@@ -53,6 +53,8 @@ def test_refusals_of_the_command_line(recording, tmp_path, capsys):
     assert "--bench needs --output" in refused(capsys, first, "--bench", BENCH)
     assert "--budget must be a time" in refused(capsys, first, "--campaign", RIGHT, "--budget", "soon")
     assert "none.h5" in refused(capsys, tmp_path / "none.h5", "--campaign", RIGHT, "--output", tmp_path)
+    assert "--flow pump '{speed}: No closing quotation" in refused(capsys, first, "--flow", "pump '{speed}")
+    assert "--flow is empty" in refused(capsys, first, "--flow", "")
 
 
 def test_a_thruster_that_the_campaign_does_not_have_is_refused(recording, tmp_path, capsys):
@@ -162,5 +164,7 @@ def test_the_flow_is_set_by_a_command(tmp_path):
     assert out.read_text() == "0.5"
     with pytest.raises(RigError, match="ended with status 3"):
         by_command(f"{sys.executable} -c 'raise SystemExit(3)'")(0.5)
+    with pytest.raises(RigError, match=r"ended with status 1: Fl.gel"):
+        by_command("sh -c 'printf \"Fl\\374gel\" >&2; exit 1'")(0.5)
     with pytest.raises(RigError, match="could not set 1 m/s"):
         by_command(str(tmp_path / "no-such-program"))(1.0)
