@@ -153,8 +153,8 @@ class Settling:
         """Whatever happened; a flow that goes on is said."""
         try:
             self._flow_at(0.0)
-        except (RigError, click.Abort) as error:
-            self.say(f"THE WATER MAY STILL FLOW: it could not be brought to rest: {error or 'broken off'}")
+        except (RigError, click.Abort, KeyboardInterrupt) as error:
+            self.say(f"THE WATER MAY STILL FLOW: it could not be brought to rest: {str(error) or 'broken off'}")
 
 
 def _expected(campaign: CampaignConfig) -> float:

@@ -134,20 +134,24 @@ def test_the_water_is_brought_to_rest_whatever_ends_it(doubtful, trouble, told):
     assert speeds == [0.8, 0.0]
 
 
-def test_a_flow_that_does_not_stop_is_said(doubtful):
+@pytest.mark.parametrize(
+    ("trouble", "told"),
+    [(RigError("the pump does not answer"), "does not answer"), (KeyboardInterrupt(), "broken off")],
+)
+def test_a_flow_that_does_not_stop_is_said(doubtful, trouble, told):
     settling, speeds, said = doubtful
 
     def set_flow(speed):
         speeds.append(speed)
         if speed == 0.0:
-            raise RigError("the pump does not answer")
+            raise trouble
 
     settling.set_flow = set_flow
     Rounds(settling, 0.8, fails=RigError("the guard tripped"))
     assert settling.settle()[2].reason == "aborted"
     assert speeds == [0.8, 0.0]
     assert said[-1].startswith("THE WATER MAY STILL FLOW")
-    assert "the pump does not answer" in said[-1]
+    assert told in said[-1]
 
 
 def test_a_bench_alone_is_a_campaign_with_the_defaults(tmp_path):
