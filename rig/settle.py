@@ -76,7 +76,7 @@ class Settling:
             while True:
                 try:
                     found, course, end = self._round(found, course)
-                except (RigError, OSError, click.Abort) as error:
+                except (RigError, OSError, click.Abort, KeyboardInterrupt) as error:
                     why = str(error) or "broken off by the operator"
                     return found, course, End("aborted", f"{course.now.says}; the run was aborted: {why}")
                 if end is not None:

@@ -123,6 +123,7 @@ def test_the_water_is_still_for_a_sweep_that_says_nothing_of_it_and_at_the_end(d
         (RigError("the guard tripped"), "the guard tripped"),
         (OSError("no room"), "no room"),
         (click.Abort(), "broken off by the operator"),
+        (KeyboardInterrupt(), "broken off by the operator"),
     ],
 )
 def test_the_water_is_brought_to_rest_whatever_ends_it(doubtful, trouble, told):
