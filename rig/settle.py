@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from rig.answer_files import Wanted, seed_option
+from rig.answer_files import Wanted, seed_option, wanted_of
 from rig.config import CampaignConfig
 from rig.design_ask import seconds
 from rig.diagnose import diagnose_files, read, recordings_in, tell
@@ -250,6 +250,25 @@ def _thruster(path: Path) -> str:
 PATH = click.Path(path_type=Path)
 
 
+def _leave(settling: Settling, found: Diagnosis, course: Course, end: End, wanted: Wanted) -> None:
+    """JSON, page and text. Raises RigError where one cannot be written."""
+    from identification.mismatch.diagnosis import diagnosis_json
+    from identification.mismatch.settle import course_json
+
+    answer = json.dumps({**diagnosis_json(found), "settling": course_json(course, end)}, indent=1, allow_nan=False)
+    try:
+        if wanted.alone:
+            click.echo(answer)
+        elif wanted.json_path is not None:
+            wanted.json_path.write_text(answer + "\n", encoding="utf-8")
+        with contextlib.redirect_stdout(sys.stderr) if wanted.alone else contextlib.nullcontext():
+            tell(found, Wanted(report=wanted.report), read(settling.files) if wanted.report is not None else ())
+    except OSError as error:
+        raise RigError(
+            f"the answer can't be written: {error}; rig diagnose makes it again of the recordings"
+        ) from error
+
+
 @click.command("settle")
 @click.argument("files", nargs=-1, required=True, type=PATH)
 @click.option("--campaign", type=PATH, help="Campaign of the recordings: bench, pacing and tare of what is run.")
@@ -278,24 +297,13 @@ def settle_command(
     THE PROPELLER TURNS when a sweep is run, with the guards of `rig run --headless`. Exit status 0 for an honest
     verdict, 1 when a run was aborted, 2 for input that cannot be used.
     """
-    from identification.mismatch.diagnosis import diagnosis_json
-    from identification.mismatch.settle import course_json
-
-    alone = str(json_path) == "-"
+    wanted = wanted_of(json_path, report, None, None, None, None)
     set_flow = by_command(flow) if flow is not None else by_hand if sys.stdin.isatty() else None
     settling = _settling(files, campaign, bench, output, budget, seed)
     settling.set_flow = set_flow
-    settling.say = lambda text: click.echo(text, err=alone)
+    settling.say = lambda text: click.echo(text, err=wanted.alone)
     found, course, end = settling.settle()
     settling.say(f"{end.reason.replace('_', ' ')}: {end.says}")
     settling.say(f"plans and recordings: {settling.folder}")
-    if json_path is not None:
-        answer = {**diagnosis_json(found), "settling": course_json(course, end)}
-        text = json.dumps(answer, indent=1, allow_nan=False)
-        if alone:
-            click.echo(text)
-        else:
-            json_path.write_text(text + "\n", encoding="utf-8")
-    with contextlib.redirect_stdout(sys.stderr) if alone else contextlib.nullcontext():
-        tell(found, Wanted(report=report), read(settling.files) if report is not None else ())
+    _leave(settling, found, course, end, wanted)
     return 1 if end.reason == "aborted" else 0

@@ -7,12 +7,13 @@ import click
 import numpy as np
 import pytest
 
+from rig.answer_files import Wanted
 from rig.cli import main
 from rig.errors import ConfigError, RigError
 from rig.hdf5 import RecordingFile
 from rig.loading import load_campaign
 from rig.recorder_messages import ChannelSpec, Rows, StreamSpec
-from rig.settle import Settling, bench_alone, by_command, fixed_cost
+from rig.settle import Settling, _leave, bench_alone, by_command, fixed_cost
 
 RIGHT = Path(__file__).parent / "wrong" / "right.toml"
 BENCH = Path(__file__).parents[2] / "benches" / "simulated" / "bench.toml"
@@ -55,6 +56,20 @@ def test_refusals_of_the_command_line(recording, tmp_path, capsys):
     assert "none.h5" in refused(capsys, tmp_path / "none.h5", "--campaign", RIGHT, "--output", tmp_path)
     assert "--flow pump '{speed}: No closing quotation" in refused(capsys, first, "--flow", "pump '{speed}")
     assert "--flow is empty" in refused(capsys, first, "--flow", "")
+
+
+def test_an_answer_that_cannot_be_written_is_refused_before_anything_turns(recording, tmp_path, capsys):
+    words = (recording(), "--campaign", RIGHT, "--output", tmp_path / "out")
+    assert "there is no folder" in refused(capsys, *words, "--json", tmp_path / "absent" / "a.json")
+    assert "names the same file" in refused(capsys, *words, "--json", tmp_path / "a", "--report", tmp_path / "a")
+    assert not (tmp_path / "out").exists()
+
+
+def test_an_answer_that_could_not_be_written_is_one_sentence(doubtful, tmp_path):
+    settling, _, _ = doubtful
+    Rounds(settling, 0.0, fails=RigError("the guard tripped"))
+    with pytest.raises(RigError, match="the answer can't be written: .*absent"):
+        _leave(settling, *settling.settle(), Wanted(json_path=tmp_path / "absent" / "a.json"))
 
 
 def test_a_thruster_that_the_campaign_does_not_have_is_refused(recording, tmp_path, capsys):
