@@ -68,7 +68,7 @@ def test_an_answer_that_cannot_be_written_is_refused_before_anything_turns(recor
 def test_an_answer_that_could_not_be_written_is_one_sentence(doubtful, tmp_path):
     settling, _, _ = doubtful
     Rounds(settling, 0.0, fails=RigError("the guard tripped"))
-    with pytest.raises(RigError, match="the answer can't be written: .*absent"):
+    with pytest.raises(RigError, match=r"the answer can't be written: .*absent"):
         _leave(settling, *settling.settle(), Wanted(json_path=tmp_path / "absent" / "a.json"))
 
 
