@@ -146,6 +146,8 @@ def changes(campaigns: int, sigma: float) -> None:
 
 
 def _spread(values: Floats) -> str:
+    if not values.size:
+        return "of none"
     low, middle, high = np.quantile(values, (0.1, 0.5, 0.9), method="nearest")
     return f"median {middle:.0f} s, 10 % {low:.0f} s, 90 % {high:.0f} s (n = {values.size})"
 
