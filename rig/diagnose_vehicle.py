@@ -85,7 +85,7 @@ def setup_of(files: VehicleFiles, recordings: Mapping[Path, Recording]) -> Vehic
     fits = read_fits(files.thrusters)
     mass = {} if files.mass is None else {ANY_AXIS: Stated(files.mass, files.mass_std)}
     file = _file(files, fits, recordings)
-    ids = {path.stem: recording.recording_id for path, recording in recordings.items()}
+    ids = _ids(recordings)
     if file is None:
         return VehicleSetup(mass=mass, axis=files.axis, ballast={one: name for name, one in ids.items()})
     said = matched(ids, file.trials)
@@ -97,6 +97,14 @@ def setup_of(files: VehicleFiles, recordings: Mapping[Path, Recording]) -> Vehic
         axes={ids[name]: one.axis for name, one in said.items() if one.axis},
         current=file.vehicle.current,
     )
+
+
+def _ids(recordings: Mapping[Path, Recording]) -> dict[str, str]:
+    """Recording ids by the names of their files; of a second file of that name, with its folder, as `rig vehicle`."""
+    ids: dict[str, str] = {}
+    for path, recording in recordings.items():
+        ids[path.stem if path.stem not in ids else f"{path.parent.name}/{path.stem}"] = recording.recording_id
+    return ids
 
 
 def _file(

@@ -10,7 +10,9 @@ import pytest
 from click.testing import CliRunner, Result
 from report_reading import open_fonts
 
+from identification.recording import Recording
 from rig.cli import rig
+from rig.diagnose_vehicle import VehicleFiles, setup_of
 from rig.importer import import_plain
 
 INSTALLATION = """
@@ -113,6 +115,15 @@ BAD = {
     "held out too": (("one.h5", "--holdout", "two.h5", "one.h5"), "is both to be diagnosed and held out"),
     "a twin": (("one.h5", "--save-twin", "twin.json"), "--save-twin keeps the model of a thruster"),
 }
+
+
+def test_files_of_one_name_in_two_folders_are_two_trials(tmp_path: Path) -> None:
+    installation = tmp_path / "boat.toml"
+    installation.write_text(f'{INSTALLATION}[trials."*run"]\naxis = "surge"\n')
+    recordings = {Path(f"{day}/run.h5"): Recording(day, "boat", ()) for day in ("may", "june")}
+    found = setup_of(VehicleFiles(installation=installation), recordings)
+    assert found.axes == {"may": "surge", "june": "surge"}
+    assert found.ballast == {"may": "run", "june": "june/run"}
 
 
 @pytest.mark.parametrize("name", BAD)
