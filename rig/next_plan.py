@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from rig.config import CampaignConfig
 from rig.errors import ConfigError, PlanError
-from rig.plan_file import Level, Template, template_of, write_campaign
+from rig.plan_file import Level, Template, files_of, template_of, write_campaign
 
 if TYPE_CHECKING:
     from identification.mismatch.diagnosis import Diagnosis
@@ -99,12 +99,13 @@ def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path, *, attend
             "--plan: the recordings have no command in V, so the levels of the next experiment are in "
             f"{proposed.unit}; a campaign is driven in V; nothing was written"
         )
-    _require_apart(path, campaign.path)
     flows = {step.flow_speed for step in proposed.steps}
     levels = [
         Level(step.command_voltage, step.duration, step.flow_speed if len(flows) > 1 or step.flow_speed else None)
         for step in proposed.steps
     ]
+    for file in files_of(levels, path):
+        _require_apart(file, campaign.path)
     comment = (
         f"Written by `rig {'settle' if attended else 'diagnose'}`.",
         proposed.why,

@@ -100,11 +100,16 @@ def write_campaign(
     wanted = tuple(levels)
     _require_levels(wanted)
     stretches = [(flow, tuple(part)) for flow, part in groupby(wanted, key=lambda level: level.flow_speed)]
-    files = [path] if len(stretches) == 1 else [_numbered(path, k) for k in range(1, len(stretches) + 1)]
     return tuple(
         _write(file, "\n".join([*_said(comment), *_head(template, file, flow), *_levels(part, template), ""]))
-        for file, (flow, part) in zip(files, stretches, strict=True)
+        for file, (flow, part) in zip(files_of(wanted, path), stretches, strict=True)
     )
+
+
+def files_of(levels: Sequence[Held], path: Path) -> list[Path]:
+    """That `write_campaign` writes."""
+    count = sum(1 for _ in groupby(levels, key=lambda level: level.flow_speed))
+    return [path] if count == 1 else [_numbered(path, k) for k in range(1, count + 1)]
 
 
 def write_sine(

@@ -45,6 +45,9 @@ def test_one_file_for_each_flow_speed(campaign, tmp_path):
     moving = NextExperiment("w", (*STEPS, PlanStep(0.0, 3.0, 0.5), PlanStep(10.0, 3.0, 0.5)), 0.9)
     files = write_next(replace(FOUND, next_experiment=moving), campaign, tmp_path / "next.toml")
     assert [load_campaign(file).flow_speed for file in files] == [0.0, 0.5]
+    of_before = replace(campaign, path=tmp_path / "next-1.toml")
+    with pytest.raises(ConfigError, match=r"next-1.toml: this is the campaign that the plan is made from"):
+        write_next(replace(FOUND, next_experiment=moving), of_before, tmp_path / "next.toml")
 
 
 def test_refusals(campaign, tmp_path):
