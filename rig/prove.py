@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -52,8 +53,24 @@ def run(store: Store, jobs: Sequence[Job], lanes: int, limit: float, *, renew: b
     if not pending:
         return
     working = [Lane(store, str(i), limit, code, keep) for i in range(min(lanes, len(pending)))]
-    with store.locked(), shown(len(pending)) as told:
+    with store.locked(), interruptible(), shown(len(pending)) as told:
         carry_out(pending, working, renew, told)
+
+
+@contextmanager
+def interruptible() -> Iterator[None]:
+    """`kill` and a terminal that closes are as Ctrl+C: the diagnoses are ended too. What `nohup` ignores stays so."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    heard = [s for s in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(s) is not signal.SIG_IGN]
+    before = {s: signal.signal(s, interrupt) for s in heard}
+    try:
+        yield
+    finally:
+        for s, handler in before.items():
+            signal.signal(s, handler)
 
 
 @contextmanager

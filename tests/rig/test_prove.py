@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import sys
 from dataclasses import replace
 from gzip import compress
@@ -27,7 +28,7 @@ from rig.blind.places import PLACES
 from rig.blind.rates import Goal, Rate, of_rate
 from rig.blind.scoring import Near, Score, scored
 from rig.blind.store import ProofError, Store, version_of_diagnosis
-from rig.prove import designed, prove_command
+from rig.prove import designed, interruptible, prove_command
 from rig.report.page import html
 from rig.report.proof import proof_page
 from sim_devices.concealed.sealing import conceal
@@ -529,6 +530,19 @@ def test_ctrl_c_in_the_terminal_does_not_reach_a_child(tmp_path):
     child.ask({}, 30.0)
     assert os.getpgid(child.process.pid) == child.process.pid != os.getpgrp()
     child.close()
+
+
+def test_a_proof_that_is_killed_ends_its_diagnoses_as_on_ctrl_c():
+    before = signal.signal(signal.SIGHUP, signal.SIG_IGN)  # as under nohup
+    try:
+        with interruptible():
+            os.kill(os.getpid(), signal.SIGHUP)
+        with pytest.raises(KeyboardInterrupt), interruptible():
+            os.kill(os.getpid(), signal.SIGTERM)
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_IGN
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGHUP, before)
 
 
 def test_a_proof_that_is_broken_off_waits_for_nobody(tmp_path):
