@@ -79,13 +79,15 @@ def _check(files: VehicleFiles) -> None:
 def setup_of(files: VehicleFiles, recordings: Mapping[Path, Recording]) -> VehicleSetup:
     """Raises ConfigError with one sentence."""
     from identification.mismatch.vehicle.setup import ANY_AXIS, Stated, VehicleSetup
-    from rig.vehicle_recordings import matched
+    from rig.vehicle_recordings import matched, name_of
     from rig.vehicle_thrusters import installed, read_fits
 
     fits = read_fits(files.thrusters)
     mass = {} if files.mass is None else {ANY_AXIS: Stated(files.mass, files.mass_std)}
     file = _file(files, fits, recordings)
-    ids = _ids(recordings)
+    ids: dict[str, str] = {}
+    for path, recording in recordings.items():
+        ids[name_of(path, ids)] = recording.recording_id
     if file is None:
         return VehicleSetup(mass=mass, axis=files.axis, ballast={one: name for name, one in ids.items()})
     said = matched(ids, file.trials)
@@ -97,14 +99,6 @@ def setup_of(files: VehicleFiles, recordings: Mapping[Path, Recording]) -> Vehic
         axes={ids[name]: one.axis for name, one in said.items() if one.axis},
         current=file.vehicle.current,
     )
-
-
-def _ids(recordings: Mapping[Path, Recording]) -> dict[str, str]:
-    """Recording ids by the names of their files; of a second file of that name, with its folder, as `rig vehicle`."""
-    ids: dict[str, str] = {}
-    for path, recording in recordings.items():
-        ids[path.stem if path.stem not in ids else f"{path.parent.name}/{path.stem}"] = recording.recording_id
-    return ids
 
 
 def _file(

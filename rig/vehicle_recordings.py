@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Container, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatch
 from pathlib import Path
@@ -44,10 +44,14 @@ def load_named(paths: Iterable[Path], taken: Sequence[Named] = ()) -> tuple[Name
                 f"{path} is a {recording.kind} recording, not one of a vehicle; thrusters come in by --thrusters, as "
                 "`rig fit` writes them"
             )
-        names = {other.name for other in (*taken, *out)}
-        name = path.stem if path.stem not in names else f"{path.parent.name}/{path.stem}"
+        name = name_of(path, {other.name for other in (*taken, *out)})
         out.append(Named(name, path, recording.recording_id, replace(recording, recording_id=name, source=path.name)))
     return tuple(out)
+
+
+def name_of(path: Path, taken: Container[str]) -> str:
+    """By which trials are told apart: the file's, of a second one of that name with its folder."""
+    return path.stem if path.stem not in taken else f"{path.parent.name}/{path.stem}"
 
 
 def _expanded(paths: Iterable[Path]) -> list[Path]:
