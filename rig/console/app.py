@@ -6,9 +6,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import ClassVar, Final
 
+from textual import events
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Container, Horizontal, Vertical, VerticalScroll
+from textual.message import Message
 from textual.widgets import ContentSwitcher
 
 from rig.console.dialogs import LeaveDialog, Leaving, NoteDialog
@@ -27,6 +29,8 @@ REPLOT: Final = 0.2
 """s between looks at the plots: one costs 10-20 ms, and the stop key must not wait for many."""
 LEASE: Final = 0.5
 """s between leases. From the screen's own loop on purpose: when the screen hangs, the lease goes stale."""
+STOP_KEYS: Final = ("ctrl+c", "super+c", "f9")
+"""super+c is Cmd+C where a terminal passes it on."""
 VIEWS: Final = ("main", "fit", "time", "log", "results")
 
 
@@ -38,8 +42,6 @@ class ConsoleApp(App[None], inherit_bindings=False):
     ENABLE_COMMAND_PALETTE = False
     ALLOW_SELECT = False  # nothing to copy: Ctrl+C is the stop key
     BINDINGS: ClassVar[list[BindingType]] = [
-        # priority: before any screen, dialog or text field sees the key; super+c is Cmd+C where a terminal passes it on
-        Binding("ctrl+c,super+c,f9", "stop", "STOP", priority=True),
         Binding("ctrl+q", "leave", "leave", priority=True),
         Binding("f5", "go", "start"),
         Binding("p", "ask('pause')", "pause"),
@@ -139,6 +141,13 @@ class ConsoleApp(App[None], inherit_bindings=False):
             base.query_one(FitPlot).show(self.state)
             base.query_one(ResidualPlot).show(self.state)
             base.query_one(TimePlot).show(self.state)
+
+    def post_message(self, message: Message) -> bool:
+        """Takes the stop key as it arrives: it waits behind no other key, and no dialog or text field sees it."""
+        if isinstance(message, events.Key) and message.key in STOP_KEYS:
+            self.action_stop()
+            return True
+        return super().post_message(message)
 
     def action_stop(self) -> None:
         """The stop key: the request goes out here, before anything is drawn."""

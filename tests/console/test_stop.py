@@ -96,6 +96,16 @@ async def test_the_handler_sends_without_a_turn_of_the_event_loop():
         assert STOP in desk.feed.sent
 
 
+@pytest.mark.parametrize("key", ["ctrl+c", "f9", "super+c"])
+async def test_the_key_waits_behind_no_other_key(key):
+    async with sitting(running()) as desk:
+        desk.app.simulate_key("n")
+        desk.app.simulate_key(key)
+        assert STOP in desk.feed.sent  # no turn of the event loop: the note has not even opened
+        await settle(desk.pilot, lambda: isinstance(desk.app.screen, NoteDialog))
+        assert desk.kinds() == ["stop"]
+
+
 @pytest.mark.alone
 async def test_latency_under_redraw_is_below_100_ms():
     """docs/reliability.md, promise 4: key event to request, with a snapshot and both plots due at every press."""

@@ -8,6 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from tests.reliability.live import NOT_BEGUN
+from tests.reliability.metronome import metronome, stalled
+
 RESULTS = Path(__file__).parents[2] / "build" / "reliability.json"
 
 
@@ -34,3 +37,24 @@ def report(measured: dict[str, dict[str, float | str]]) -> Callable[[str, float,
         measured[name] = {"value": round(value, 4), "unit": unit}
 
     return keep
+
+
+@pytest.fixture(scope="session")
+def late_wakes(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    file = tmp_path_factory.mktemp("metronome") / "late"
+    with metronome(file):
+        yield file
+
+
+@pytest.fixture
+def prompt(late_wakes: Path) -> Callable[[float, float, int], None]:
+    """Fail when a `latency` from `since_ns` on exceeds what is `allowed`, both in s. When it would not have without the
+    time that a process with nothing to do was held up as well, nothing was tried: the test may begin once more."""
+
+    def judge(latency: float, allowed: float, since_ns: int) -> None:
+        held_up = stalled(late_wakes, since_ns, since_ns + round(latency * 1e9))
+        if latency > allowed >= latency - held_up:
+            raise AssertionError(f"{NOT_BEGUN}: the machine stood still for {held_up:.3f} s of {latency:.3f} s")
+        assert latency <= allowed
+
+    return judge
