@@ -9,6 +9,7 @@ sleeps 2 s unless told not to; shutdown of a lost port raises before closing it.
 from __future__ import annotations
 
 import contextlib
+import difflib
 import fcntl
 import os
 import threading
@@ -18,6 +19,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import can
+from can.interfaces import VALID_INTERFACES
 
 from drivers.errors import LinkError
 from drivers.inbox import BadRecords, Inbox
@@ -51,6 +53,10 @@ class CanBus:
     def __init__(self, interface: str, channel: str, bitrate: int, capture: str = "") -> None:
         if not interface or not channel:
             raise ValueError("a CAN bus needs an interface (slcan, socketcan ...) and a channel (port or network name)")
+        if interface not in VALID_INTERFACES:
+            near = difflib.get_close_matches(interface, VALID_INTERFACES, 1)
+            hint = f"did you mean {near[0]}?" if near else f"it has {', '.join(sorted(VALID_INTERFACES))}"
+            raise ValueError(f"python-can has no interface {interface!r}; {hint}")
         if bitrate <= 0:
             raise ValueError(f"CAN bitrate must be positive, not {bitrate}")
         self.error: str | None = None

@@ -10,7 +10,7 @@ from drivers.can_bus import CanBus
 from drivers.errors import DeviceError as DriverDeviceError
 from drivers.errors import LinkError as DriverLinkError
 from drivers.protocols import Instrument, MotorController, Sample, Stream
-from rig.config import BenchConfig
+from rig.config import BenchConfig, CanBusConfig
 from rig.errors import ConfigError, DeviceError, LinkError
 
 COMMAND_STREAM = "command"
@@ -67,8 +67,8 @@ class Bench:
 
 
 def build(config: BenchConfig) -> Bench:
-    """Construct the devices of a bench file; opens nothing."""
-    buses = {name: CanBus(bus.interface, bus.channel, bus.bitrate, bus.capture) for name, bus in config.can.items()}
+    """Construct the devices of a bench file; opens nothing. Raises ConfigError."""
+    buses = {name: _bus(name, bus, config) for name, bus in config.can.items()}
     instruments: dict[str, Instrument] = {}
     for name, device in config.devices.items():
         kind = KINDS[device.kind]
@@ -77,6 +77,13 @@ def build(config: BenchConfig) -> Bench:
         else:
             instruments[name] = kind.build(name, device.options)
     return Bench(config, buses, instruments)
+
+
+def _bus(name: str, bus: CanBusConfig, config: BenchConfig) -> CanBus:
+    try:
+        return CanBus(bus.interface, bus.channel, bus.bitrate, bus.capture)
+    except ValueError as error:
+        raise ConfigError(f"{config.path}: can.{name}: {error}") from None
 
 
 def _about(name: str, error: Exception) -> str:

@@ -5,13 +5,13 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from itertools import groupby
 from math import isfinite
 from pathlib import Path
 from typing import Protocol
 
-from rig.config import CampaignConfig
+from rig.config import CampaignConfig, WatchConfig
 from rig.errors import ConfigError
 from rig.plan import TareConfig
 from rig.shapes import require, require_above_zero
@@ -65,6 +65,7 @@ class Template:
     expected_C: float | None = None
     """N/V^2"""
     prove_watchdog: bool = True
+    watch: WatchConfig = field(default_factory=WatchConfig)
 
 
 def template_of(campaign: CampaignConfig) -> Template:
@@ -85,6 +86,7 @@ def template_of(campaign: CampaignConfig) -> Template:
         campaign.unattended,
         campaign.expected_C,
         campaign.prove_watchdog,
+        campaign.watch,
     )
 
 
@@ -164,7 +166,16 @@ def _head(template: Template, file: Path, flow: float | None) -> list[str]:
     tare = template.tare
     lines += ["", "[tare]", f"duration = {float(tare.duration)!r}   # s"]
     lines += [f"max_std_error = {float(tare.max_std_error)!r}   # N", f"max_drift = {float(tare.max_drift)!r}   # N/s"]
-    return [*lines, f"attempts = {tare.attempts}", ""]
+    return [*lines, f"attempts = {tare.attempts}", "", *_watch(template.watch, file)]
+
+
+def _watch(watch: WatchConfig, file: Path) -> list[str]:
+    """`[watch]` with what is not the default; nothing when all is."""
+    said = {f.name: value for f in fields(watch) if (value := getattr(watch, f.name)) != f.default}
+    if watch.twin:
+        said["twin"] = _relative(Path(watch.twin), file)
+    lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in said.items()]
+    return ["[watch]", *lines, ""] if said else []
 
 
 def _pacing(template: Template) -> list[str]:

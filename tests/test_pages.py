@@ -17,7 +17,7 @@ from drivers import KINDS
 from rig.check import check_campaign
 from rig.cli import main
 from rig.config import BenchConfig, CampaignConfig, CanBusConfig, LimitConfig, MountConfig, WatchConfig
-from rig.console.app import ConsoleApp
+from rig.console.app import STOP_KEYS, ConsoleApp
 from rig.console.dialogs import LeaveDialog, NoteDialog
 from rig.console.tables import STATE_STYLES
 from rig.console.wording import STATE_WORDS
@@ -166,7 +166,7 @@ def test_the_error_of_the_page_is_what_the_tool_prints(
 
 def test_every_key_of_the_console() -> None:
     seen = {word.lower() for word in words(text("console"))}
-    bound = []
+    bound = [*STOP_KEYS]
     for binding in (*ConsoleApp.BINDINGS, *NoteDialog.BINDINGS, *LeaveDialog.BINDINGS):
         bound += (binding.key if isinstance(binding, Binding) else binding[0]).split(",")
     assert len(bound) > 15

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from rig.check import check_campaign
+from rig.config import WatchConfig
 from rig.errors import ConfigError, PlanError
 from rig.loading import load_campaign
 from rig.plan_file import Level, template_of, write_campaign, write_sine
@@ -53,6 +54,17 @@ def test_a_text_with_quotes_survives(template, tmp_path):
     (path,) = write_campaign([Level(1.0, 2.0)], replace(template, notes=odd, unattended=True), tmp_path / "p.toml")
     assert load_campaign(path).notes == odd
     assert load_campaign(path).unattended
+
+
+def test_what_the_campaign_is_watched_with_stays(template, tmp_path):
+    twin = tmp_path / "twins" / 'T1 "new".toml'
+    twin.parent.mkdir()
+    twin.touch()
+    watch = WatchConfig(0.2, str(twin.with_name('{thruster} "new".toml')), stop=True)
+    (path,) = write_campaign([Level(1.0, 2.0)], replace(template, watch=watch), tmp_path / "p.toml")
+    assert load_campaign(path).watch == watch
+    (path,) = write_campaign([Level(1.0, 2.0)], replace(template, watch=WatchConfig(off=True)), tmp_path / "p.toml")
+    assert load_campaign(path).watch == WatchConfig(off=True)
 
 
 def test_a_sine(template, tmp_path):
