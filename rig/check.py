@@ -165,6 +165,7 @@ def print_report(report: CheckReport, console: Console) -> None:
         times = (f"{step.expected:.1f}", f"{step.max_duration:.1f}")
         table.add_row(str(step.index), step.phase, f"{start:.2f}", to, *times)
     console.print(table)
+    console.print(f"bench          {campaign.bench.name}", markup=False)
     console.print(f"thrusters      {', '.join(campaign.thrusters)}", markup=False)
     if campaign.flow_speed is not None:
         console.print(f"flow speed     {campaign.flow_speed:g} m/s, to be set by hand; the preflight compares")
