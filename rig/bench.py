@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
+from math import inf
 
 from drivers import KINDS
 from drivers.can_bus import CanBus
@@ -77,6 +78,22 @@ def build(config: BenchConfig) -> Bench:
         else:
             instruments[name] = kind.build(name, device.options)
     return Bench(config, buses, instruments)
+
+
+def thrust_bounds(config: BenchConfig) -> tuple[float, float]:
+    """N, lowest and highest thrust within the range of the force sensor and the limits of the bench file; infinite
+    where neither says."""
+    bounds = [(-inf, inf)]
+    for stream in build(config).instruments[config.force].streams:
+        for channel in (c for c in stream.channels if c.quantity == "thrust"):
+            bounds.append((_or(channel.range_min, -inf), _or(channel.range_max, inf)))
+            name = f"{stream.name}.{channel.name}"
+            bounds += [(_or(m.min, -inf), _or(m.max, inf)) for m in config.limits if m.channel == name]
+    return max(low for low, _ in bounds), min(high for _, high in bounds)
+
+
+def _or(end: float | None, otherwise: float) -> float:
+    return otherwise if end is None else end
 
 
 def _bus(name: str, bus: CanBusConfig, config: BenchConfig) -> CanBus:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import inf
 from pathlib import Path
@@ -14,7 +13,7 @@ from identification.experiment import Criterion
 from identification.recording import Floats
 from identification.run_order import THERMAL_TIME, Course, Slow
 from identification.thrust_design import Noise, Terms
-from rig.bench import build
+from rig.bench import build, thrust_bounds
 from rig.config import BenchConfig
 from rig.design_levels import DRIFT, Ask
 from rig.design_noise import Known, read_noise
@@ -194,21 +193,6 @@ def _period(bench: BenchConfig) -> float:
     return next(s.period_s for s in force.streams for c in s.channels if c.quantity == "thrust")
 
 
-def _thrust_bounds(bench: BenchConfig, most: float | None) -> Iterator[tuple[float, float]]:
-    """N, lowest and highest: the cell's range, the limits of the bench, and --max-thrust."""
-    for stream in build(bench).instruments[bench.force].streams:
-        for channel in (c for c in stream.channels if c.quantity == "thrust"):
-            yield (
-                channel.range_min if channel.range_min is not None else -inf,
-                (channel.range_max if channel.range_max is not None else inf),
-            )
-            for limit in bench.limits:
-                if limit.channel == f"{stream.name}.{channel.name}":
-                    yield -inf if limit.min is None else limit.min, inf if limit.max is None else limit.max
-    if most is not None:
-        yield -most, most
-
-
 def _candidates(options: Options, bench: BenchConfig, top: float, C: float | None) -> tuple[Floats, tuple[str, ...]]:
     """Voltages that may be held, ascending, and a remark when thrust limits them."""
     if options.levels is not None:
@@ -219,8 +203,9 @@ def _candidates(options: Options, bench: BenchConfig, top: float, C: float | Non
         V = np.linspace(-top, top, 2 * GRID + 1)
     if C is None:
         return V, ()
-    bounds = list(_thrust_bounds(bench, options.max_thrust))
-    low, high = max(b[0] for b in bounds), min(b[1] for b in bounds)
+    low, high = thrust_bounds(bench)
+    if options.max_thrust is not None:
+        low, high = max(low, -options.max_thrust), min(high, options.max_thrust)
     thrust = C * V * np.abs(V)
     fits = (thrust >= low) & (thrust <= high)
     if bool(fits.all()):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -31,7 +32,7 @@ def asked(plan: Path | None, campaign: Path | None) -> CampaignConfig | None:
 def limits_of(
     campaign: CampaignConfig | None, budget: float | None = None, flow_speeds: tuple[float, ...] | None = None
 ) -> Limits:
-    """What the bench allows: its voltage, its slew, and the thrust that its guard stands; `flow_speeds`: see Limits."""
+    """What the bench allows: its voltage, its slew, the thrust that cell and guard stand; `flow_speeds`: see Limits."""
     from identification.mismatch.sweeps import BUDGET, Limits
 
     seconds = BUDGET if budget is None else budget
@@ -39,19 +40,17 @@ def limits_of(
         raise PlanError(f"--budget must be above 0 s, but is {seconds:g} s")
     if campaign is None:
         return Limits(budget=seconds)
+    from rig.bench import thrust_bounds  # every driver: not for a diagnosis without a plan
+
     bench = campaign.bench
-    name = f"{bench.force}.thrust"
-    stands = [
-        min(abs(end) for end in (limit.min, limit.max) if end is not None)
-        for limit in bench.limits
-        if limit.channel == name and (limit.min is not None or limit.max is not None)
-    ]
+    low, high = thrust_bounds(bench)
+    stands = min(abs(low), abs(high))
     return Limits(
         max_voltage=bench.max_voltage,
         budget=seconds,
         flow_speeds=flow_speeds,
         slew=campaign.plan.slew,
-        max_thrust=min(stands, default=None),
+        max_thrust=stands if isfinite(stands) else None,
     )
 
 

@@ -73,6 +73,10 @@ def test_limits_are_the_benchs(campaign):
     assert (found.budget, found.slew, found.max_thrust) == (120.0, 12.0, 300.0)
     open_ended = replace(campaign, bench=replace(campaign.bench, limits=()))
     assert limits_of(open_ended).max_thrust is None
+    cell = campaign.bench.devices["load_cell"]
+    weaker = replace(cell, options=replace(cell.options, range_min=-150.0, range_max=500.0))
+    bench = replace(campaign.bench, devices={**campaign.bench.devices, "load_cell": weaker})
+    assert limits_of(replace(campaign, bench=bench)).max_thrust == 150.0
     assert limits_of(None).budget < inf
 
 
