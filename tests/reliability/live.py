@@ -235,6 +235,8 @@ class Killed:
 
     state: str
     """Of the campaign when it was killed."""
+    t_ns: int
+    """When."""
     release: float
     """s until the motor was no longer driven."""
     rested: bool
@@ -262,7 +264,8 @@ def kill_once(bench: LiveBench, after: float) -> Killed:
     recorded = float(thrust.time[-1]) if thrust is not None else 0.0
     lost = max(seen.time - recorded, 0.0)
     select.select([], [], [], max(t_ns * 1e-9 + 2 * WATCHDOG - time.monotonic(), 0.0))  # a motor at rest is let go too
-    return Killed(seen.state, zero_after(bench.truth(), t_ns), rested, recording.outcome, recording.complete, lost)
+    release = zero_after(bench.truth(), t_ns)
+    return Killed(seen.state, t_ns, release, rested, recording.outcome, recording.complete, lost)
 
 
 def at_rest(bench: LiveBench, timeout: float = 5.0) -> bool:

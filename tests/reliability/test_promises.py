@@ -83,14 +83,14 @@ def test_sensor_that_lies(tmp_path, report, prompt, device, fault, amount, cause
         front.peer.close()
 
 
-def test_kill_9_at_random_instants(tmp_path, report):
+def test_kill_9_at_random_instants(tmp_path, report, prompt):
     """Promise 1; twenty and more of them: benchmarks/kill_minus_9.py."""
     chance, worst = random.Random(15), 0.0
     with live_bench(tmp_path) as bench:
         for _ in range(5):
             killed = kill_once(bench, chance.uniform(0.0, 6.0))
             worst = max(worst, killed.release)
-            assert killed.release <= WATCHDOG + TICK + SLACK
+            prompt(killed.release, WATCHDOG + TICK + SLACK, killed.t_ns)
             assert killed.rested
             assert (killed.outcome, killed.complete) == ("aborted", True)
     report("kill -9 at 5 random instants: worst time to release", worst, "s")
