@@ -65,13 +65,19 @@ def besides(scores: Sequence[Score]) -> list[Goal]:
     ]
     pairs, opened = cell(scores, "pair"), cell(scores, *OPEN_CELLS)
     counted = [s for s in opened if s.counted]
+    plain = cell(scores, "plain")
+    sure = [s for s in plain if not s.counted and s.said == "explained"]
     return [
         *named,
+        of_rate("faint: right alone", rate(s.alone for s in cell(scores, "faint"))),
         of_rate(
             "plain: right alone, where the nearest neighbour leaves an oracle 8 sigma",
-            rate(s.alone for s in cell(scores, "plain") if s.counted),
+            rate(s.alone for s in plain if s.counted),
         ),
+        of_rate("plain: right alone, where it leaves less and no doubt is stated", rate(s.alone for s in sure)),
         of_rate("pairs: both named", rate(set(s.truth) <= set(s.named) for s in pairs)),
+        of_rate("pairs: right alone", rate(s.alone for s in pairs)),
+        of_rate("other textbook forms at plain: right alone", rate(s.alone for s in cell(scores, "variant"))),
         of_rate("textbook forms of the catalogue at plain: right", rate(s.right for s in cell(scores, "form"))),
         of_rate("channels that lie: said", rate(s.right for s in cell(scores, "fault"))),
         of_rate("wrong names, one effect below faint", rate(s.wrong for s in cell(scores, *LADDER))),
