@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rig.blind.beside import Beside
     from rig.blind.collecting import Collected
     from rig.blind.design import Job
+    from rig.blind.scoring import Score
     from rig.blind.store import Store
 
 STORE = Path("build/prove")
@@ -172,6 +173,15 @@ def one_case(name: str, draw: str, limit: float, *, verbose: bool) -> str:
     return "\n\n".join(_told(store, job, verbose=verbose) for job in jobs)
 
 
+def _counted(score: Score) -> str:
+    """How the answer counts in its cell."""
+    from rig.blind.scoring import OPEN_CELLS
+
+    if score.order.cell in OPEN_CELLS:
+        return f"outcome: {score.outcome}" + ("" if score.counted else " (not counted: a neighbour is too near)")
+    return f"right: {score.right}, alone: {score.alone}, wrong: {score.wrong}"
+
+
 def _told(store: Store, job: Job, *, verbose: bool) -> str:
     from rig.blind.collecting import collected
     from rig.blind.figures import said
@@ -184,8 +194,7 @@ def _told(store: Store, job: Job, *, verbose: bool) -> str:
     short = {name: truth[name] for name in ("effects", "fault", "noise_kind", "plan", "rate", "channels")}
     rows.append(f"truth: {json.dumps(truth if verbose else short)}")
     for order, score in zip(job.orders, collected(store, [job]).scores, strict=True):
-        verdict = f"right: {score.right}, alone: {score.alone}, wrong: {score.wrong}, outcome: {score.outcome}"
-        rows += [f"{order.id}: {json.dumps(said(score))}", verdict]
+        rows += [f"{order.id}: {json.dumps(said(score))}", _counted(score)]
         answer = store.answer(job, order)
         if verbose or score.failed:
             rows.append(json.dumps(answer, indent=1))
