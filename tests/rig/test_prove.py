@@ -28,7 +28,7 @@ from rig.blind.places import PLACES
 from rig.blind.rates import Goal, Rate, of_rate
 from rig.blind.scoring import Near, Score, scored
 from rig.blind.store import ProofError, Store, version_of_diagnosis
-from rig.prove import designed, interruptible, prove_command
+from rig.prove import _counted, designed, interruptible, prove_command
 from rig.report.page import html
 from rig.report.proof import proof_page
 from sim_devices.concealed.sealing import conceal
@@ -606,6 +606,16 @@ def test_one_case_is_made_anew_whatever_world_made_it_before(tmp_path, monkeypat
     monkeypatch.setattr("rig.prove._told", lambda *_, **__: "told")
     done = CliRunner().invoke(prove_command, ["--case", "plain/heating/0"])
     assert (done.exit_code, done.output, pending) == (0, "told\n", [job.orders])
+
+
+def test_a_case_is_told_by_what_counts_in_its_cell():
+    plain = scored(order("plain/heating/0"), truth("heating"), answer("explained", finding("heating")))
+    assert _counted(plain) == "right: True, alone: True, wrong: False"
+    located = answer("unexplained", place="time")
+    assert _counted(scored(order("outside/gain_step/0"), truth("gain_step"), located)) == "outcome: located"
+    twin = truth("dead_band") | {"twins": [{"rival": "exponent", "form": "", "left": 1.0}]}
+    missed = scored(order("removed/dead_band/0", "dead_band"), twin, answer("adequate"))
+    assert _counted(missed) == "outcome: missed (not counted: a neighbour is too near)"
 
 
 def test_recordings_half_made_are_made_again(tmp_path):
