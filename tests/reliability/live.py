@@ -27,7 +27,7 @@ WATCHDOG = 0.5
 TICK = 0.02
 """s, loop period of benches/simulated/bench.toml."""
 PATIENCE = 0.6
-"""s, allowed age of a load cell sample; 0.2 s is the default, tried in virtual time in tests/rig."""
+"""s, allowed age of a sample; 0.2 s is the default, tried in virtual time in tests/rig."""
 NOT_BEGUN = "the run did not get where the test begins"
 """Begins the message of a test that could not try its promise: the Makefile begins that test once more."""
 SLACK = 0.03
@@ -126,13 +126,16 @@ def unchanged(text: str) -> str:
 
 
 def patient(text: str) -> str:
-    """A bench file whose load cell may be `PATIENCE` late: the machine that the tests run on is not tried here.
+    """A bench file whose samples may be `PATIENCE` late: the machine that the tests run on is not tried here.
 
     Without the thermometer, for whose five slow rows every preflight would wait.
     """
     slow = text.index("[devices.thermometer]")
     text = text[:slow] + text[text.index("[limits", slow) :]
-    return text.replace("min = -300.0 ", f"max_age = {PATIENCE}\nmin = -300.0 ")
+    for limit in ("min = -300.0 ", "max = 40.0 "):  # of load_cell.thrust, of motor.current
+        assert limit in text
+        text = text.replace(limit, f"max_age = {PATIENCE}\n{limit}")
+    return text
 
 
 @contextmanager
