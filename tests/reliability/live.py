@@ -15,7 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from rig.hdf5 import load
+from rig.hdf5 import RecordingFile, load
 from rig.link import Peer, connect
 from rig.messages import Request, Snapshot
 from rig.run import start_controller
@@ -249,6 +249,15 @@ class Killed:
     """s of thrust samples that were there and are not in the file."""
 
 
+def closed(run: Run, timeout: float = 5.0) -> RecordingFile:
+    """The one recording of a run whose controller is gone, once the recorder has closed it, or as it is by then."""
+    (path,) = Path(run.folder).glob("*.h5")
+    deadline = time.monotonic() + timeout
+    while not (recording := load(path)).complete and time.monotonic() < deadline:
+        select.select([], [], [], 0.1)
+    return recording
+
+
 def kill_once(bench: LiveBench, after: float) -> Killed:
     """Start a run and kill -9 its controller `after` s after its first tare began."""
     run = bench.start(dwell=1.0)
@@ -261,8 +270,7 @@ def kill_once(bench: LiveBench, after: float) -> Killed:
     bench.controllers[-1].wait(15)
     front.peer.close()
     rested = at_rest(bench)
-    (path,) = Path(run.folder).glob("*.h5")
-    recording = load(path)
+    recording = closed(run)
     thrust = recording.first_of("thrust")
     recorded = float(thrust.time[-1]) if thrust is not None else 0.0
     lost = max(seen.time - recorded, 0.0)

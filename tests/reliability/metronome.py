@@ -35,8 +35,18 @@ def metronome(file: Path) -> Iterator[None]:
 
 def stalled(file: Path, since_ns: int, until_ns: int) -> float:
     """s between two instants of the monotonic clock during which the metronome was not woken though it was due."""
+    return sum(_within(file, since_ns, until_ns)) * 1e-9
+
+
+def longest(file: Path, since_ns: int, until_ns: int) -> float:
+    """s of the longest such time on end."""
+    return max(_within(file, since_ns, until_ns), default=0) * 1e-9
+
+
+def _within(file: Path, since_ns: int, until_ns: int) -> list[int]:
+    """ns of each late wake that lie between the two."""
     pairs = [tuple(map(int, line.split())) for line in file.read_text().split("\n")[:-1]]
-    return sum(max(0, min(woken, until_ns) - max(due, since_ns)) for due, woken in pairs) * 1e-9
+    return [max(0, min(woken, until_ns) - max(due, since_ns)) for due, woken in pairs]
 
 
 def main(file: Path) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.reliability.live import NOT_BEGUN
-from tests.reliability.metronome import stalled
+from tests.reliability.metronome import longest, stalled
 
 
 @pytest.fixture
@@ -21,6 +21,7 @@ def late_wakes(tmp_path):
 )
 def test_stalled(late_wakes, since, until, held_up):
     assert stalled(late_wakes, round(since * 1e9), round(until * 1e9)) == pytest.approx(held_up)
+    assert longest(late_wakes, 0, 9_000_000_000) == pytest.approx(0.12)
 
 
 def test_prompt(prompt):
