@@ -174,7 +174,7 @@ def _watch(watch: WatchConfig, file: Path) -> list[str]:
     said = {f.name: value for f in fields(watch) if (value := getattr(watch, f.name)) != f.default}
     if watch.twin:
         said["twin"] = _relative(Path(watch.twin), file)
-    lines = [f"{key} = {json.dumps(value, ensure_ascii=False)}" for key, value in said.items()]
+    lines = [f"{key} = {_text(value) if key == 'twin' else json.dumps(value)}" for key, value in said.items()]
     return ["[watch]", *lines, ""] if said else []
 
 
