@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 
+from identification.experiment_design.run_order import Course, Slow
+from identification.experiment_design.thrust_design import Noise, Terms
 from identification.recording import Channel, Recording
 from identification.recording import Step as Row
-from identification.run_order import Course, Slow
-from identification.thrust import ThrustFit, fit_thrust
-from identification.thrust_design import Noise, Terms
+from identification.thruster.thrust import ThrustFit, fit_thrust
 from rig.design import plan_of
 from rig.design_levels import Ask
 from rig.design_plain import LEVELS, filling, judge

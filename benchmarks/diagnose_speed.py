@@ -116,7 +116,7 @@ def profile(folder: Path) -> None:
     for order in ("tottime", "cumulative"):
         pstats.Stats(run).strip_dirs().sort_stats(order).print_stats(25)
     imports = subprocess.run(
-        [sys.executable, "-X", "importtime", "-c", "import rig.cli, rig.diagnose, identification.mismatch.diagnosing"],
+        [sys.executable, "-X", "importtime", "-c", "import rig.cli, rig.diagnose, identification.mismatch.pipeline"],
         capture_output=True,
         text=True,
         check=True,

@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "identifi
 from thrust_runs import ar1, flicker, level_table, sine, staircase, white
 
 from identification.recording import Recording
-from identification.thrust import ThrustFit, fit_thrust
+from identification.thruster.thrust import ThrustFit, fit_thrust
 
 LEVELS = (0.0, 9.0, -9.0, 18.0, -18.0, 0.0, 13.0, -13.0)
 TRUTH = 0.4

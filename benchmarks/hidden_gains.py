@@ -27,16 +27,16 @@ from statistics import median
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
-from identification.mismatch import search
-from identification.mismatch.baseline import baseline, start
-from identification.mismatch.diagnosing import _histories
-from identification.mismatch.fitting import extended, fit
-from identification.mismatch.model import Data, Model
-from identification.mismatch.preparing import Refusal
-from identification.mismatch.screening import Screening, directions, refined, screen
-from identification.mismatch.shape_error import allowed, corrections
-from identification.mismatch.slow_change import ALARM, slow_changes
-from identification.mismatch.state import State, refresh
+from identification.mismatch.estimate.estimate import State, refresh
+from identification.mismatch.estimate.fitting import extended, fit
+from identification.mismatch.locate.slow_change import ALARM, slow_changes
+from identification.mismatch.model.model import Data, Model
+from identification.mismatch.pipeline import _histories
+from identification.mismatch.prepare.preparing import Refusal
+from identification.mismatch.select import forward_selection as search
+from identification.mismatch.select.baseline import baseline, start
+from identification.mismatch.select.screening import Screening, directions, refined, screen
+from identification.mismatch.select.shape_error import allowed, corrections
 from sim_devices import concealed
 from tests.concealed.recordings import recordings
 

@@ -23,7 +23,7 @@ from time import perf_counter, process_time
 import h5py
 import numpy as np
 
-from identification.streaming import Block, stream_least_squares
+from identification.estimation.streaming import Block, stream_least_squares
 
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 BLOCK = 32_768

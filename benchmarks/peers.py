@@ -40,9 +40,9 @@ from peers.columns import Problem, problem
 from peers.counting import Answer, counted, table
 from peers.methods import GRIDS, TUNED, names
 
-from identification.mismatch.diagnosing import diagnose
+from identification.mismatch.compare.simulation import Drive, Prediction, others_of, simulate
 from identification.mismatch.diagnosis import Diagnosis
-from identification.mismatch.simulating import Drive, Prediction, others_of, simulate
+from identification.mismatch.pipeline import diagnose
 from identification.recording import Recording
 from rig.blind.beside import Peers, write
 from rig.blind.store import version_of_diagnosis

@@ -31,18 +31,18 @@ from time import process_time
 import h5py
 import numpy as np
 
-from identification.mismatch.baseline import start
-from identification.mismatch.fitting import extended
-from identification.mismatch.grid import Held
-from identification.mismatch.model import Data, Model, Theta, predict
-from identification.mismatch.noise import Whitener
-from identification.mismatch.preparing import Refusal, history_of
-from identification.mismatch.screening import directions
-from identification.mismatch.search import available
-from identification.mismatch.state import State, refresh
-from identification.physics.filters import delayed
-from identification.physics.history import History
+from identification.mismatch.estimate.estimate import State, refresh
+from identification.mismatch.estimate.fitting import extended
+from identification.mismatch.model.model import Data, Model, Theta, predict
+from identification.mismatch.noise.covariance import Whitener
+from identification.mismatch.prepare.grid import Held
+from identification.mismatch.prepare.preparing import Refusal, history_of
+from identification.mismatch.select.baseline import start
+from identification.mismatch.select.forward_selection import available
+from identification.mismatch.select.screening import directions
 from identification.recording import Recording
+from identification.run_history.filters import delayed
+from identification.run_history.history import History
 from rig.hdf5 import load
 from sim_devices import concealed
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from time import process_time
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from identification.mismatch.settle import Course, End, round_line
+from identification.mismatch.next_experiment.sequential_experiment import Course, End, round_line
 from rig.diagnose_text import diagnosis_text
 from tests.concealed.ambiguous import Bench, drawn
 

@@ -23,9 +23,9 @@ from time import process_time
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
-from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis
-from identification.mismatch.preparing import Refusal
+from identification.mismatch.pipeline import diagnose
+from identification.mismatch.prepare.preparing import Refusal
 from rig.diagnose_text import diagnosis_text
 from sim_devices import concealed
 from sim_devices.world.effects.uncatalogued import UNCATALOGUED

@@ -20,11 +20,11 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.judgement import judge
+from identification.estimation.judgement import judge
 from identification.recording import Channel, Recording
-from identification.thrust import fit_thrust
-from identification.thrust_data import Unusable
-from identification.velocity import Window, derivative
+from identification.thruster.thrust import fit_thrust
+from identification.thruster.thrust_data import Unusable
+from identification.velocity.velocity import Window, derivative
 
 Floats = NDArray[np.float64]
 RATE = 50.0

@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.estimation import Method
-from identification.points import voltage_channel
+from identification.estimation.least_squares import Method
 from identification.recording import Recording
-from identification.thrust_data import voltage_at
-from identification.thrust_forms import Model
+from identification.steady_state.points import voltage_channel
+from identification.thruster.thrust_data import voltage_at
+from identification.thruster.thrust_forms import Model
 from rig.errors import RecordingError
 from rig.fit import answer_text, fit_recordings
 from rig.hdf5 import load

@@ -17,7 +17,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.vehicle_replay import Replay
+from identification.vehicle.replay import Replay
 from rig.importer import import_file
 from rig.importing.mapping import read_map
 from rig.vehicle import VehicleAnswer, identify_files

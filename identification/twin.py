@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from identification.flexible_terms.flexible import Flexible
 from identification.physics.catalogue import CATALOGUE
-from identification.physics.free_form import Flexible
 from identification.physics.term import Scale, Term
 
 
@@ -69,7 +69,7 @@ class TwinLine:
 
 @dataclass(frozen=True, slots=True)
 class TwinNoise:
-    """Of one thrust sample: variances in N^2, times in s; the law of identification.mismatch.noise."""
+    """Of one thrust sample: variances in N^2, times in s; the law of identification.mismatch.noise.covariance."""
 
     white: float
     proportional: float

@@ -18,7 +18,7 @@ from rig.next_plan import asked, limits_of, require_thruster
 from rig.result_path import RESULT, RESULT_FILE, require_different
 
 if TYPE_CHECKING:
-    from identification.mismatch.sweeps import Limits
+    from identification.mismatch.next_experiment.sweeps import Limits
     from identification.recording import Recording
 
 C = TypeVar("C", bound=Callable[..., object])

@@ -15,7 +15,7 @@ from rig.errors import RecordingError, RigError
 from rig.file_lists import ListCommand
 
 if TYPE_CHECKING:
-    from identification.mismatch.comparing import Compared
+    from identification.mismatch.comparison import Compared
 
 
 def compare_files(
@@ -26,8 +26,8 @@ def compare_files(
     `holdout`: further real runs, which are only predicted. Raises RecordingError or ConfigError for what cannot be
     used.
     """
-    from identification.mismatch.comparing import compare
-    from identification.mismatch.preparing import Refusal
+    from identification.mismatch.comparison import compare
+    from identification.mismatch.prepare.preparing import Refusal
     from rig.twin import stamped
 
     held = recordings_in(holdout, "rig compare") if holdout else []

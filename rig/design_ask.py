@@ -9,10 +9,10 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.experiment import Criterion
+from identification.experiment_design.experiment import Criterion
+from identification.experiment_design.run_order import THERMAL_TIME, Course, Slow
+from identification.experiment_design.thrust_design import Noise, Terms
 from identification.recording import Floats
-from identification.run_order import THERMAL_TIME, Course, Slow
-from identification.thrust_design import Noise, Terms
 from rig.bench import build, thrust_bounds
 from rig.config import BenchConfig
 from rig.design_levels import DRIFT, Ask

@@ -7,8 +7,8 @@ from math import inf, isfinite, pi, sqrt
 from pathlib import Path
 from typing import Any
 
-from identification.experiment import Impossible
-from identification.inertia_sine import Limits, SineTest, Vehicle, best_sine
+from identification.experiment_design.experiment import Impossible
+from identification.experiment_design.inertia_sine import Limits, SineTest, Vehicle, best_sine
 from rig.config import CampaignConfig
 from rig.design_ask import seconds
 from rig.errors import PlanError

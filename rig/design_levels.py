@@ -7,10 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from identification.experiment import Candidates, Criterion, Design, copper_heat, optimal_levels
+from identification.experiment_design.experiment import Candidates, Criterion, Design, copper_heat, optimal_levels
+from identification.experiment_design.run_order import Course, Setting, Slow, schedule
+from identification.experiment_design.thrust_design import Noise, Terms
 from identification.recording import Floats
-from identification.run_order import Course, Setting, Slow, schedule
-from identification.thrust_design import Noise, Terms
 from rig.errors import PlanError
 
 GOOD = 2e-3

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.thrust_design import Noise, noise_of
+from identification.experiment_design.thrust_design import Noise, noise_of
 from rig.errors import RecordingError
 
 RATE_PARTS = ("C_t", "C_t_plus", "C_t_minus")

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.run_order import Exposure, exposure
-from identification.thrust_design import Means, Promise, promise
+from identification.experiment_design.run_order import Exposure, exposure
+from identification.experiment_design.thrust_design import Means, Promise, promise
 from rig.design_levels import Ask, mean_heat
 from rig.design_plan import worth
 from rig.plan import FixedDwell, Plan, Step, TareConfig

@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.experiment import Criterion
+from identification.experiment_design.experiment import Criterion
+from identification.experiment_design.run_order import best_order, schedule, spread_out
+from identification.experiment_design.thrust_design import Promise, promise
 from identification.recording import Floats
-from identification.run_order import best_order, schedule, spread_out
-from identification.thrust_design import Promise, promise
 from rig.design_levels import Ask, Spent, check_levels_of, long_enough, mean_heat, optimum
 from rig.errors import PlanError
 from rig.plan_file import Level

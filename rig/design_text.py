@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.thrust_design import LEVEL, POWER, noticed
+from identification.experiment_design.thrust_design import LEVEL, POWER, noticed
 from rig.design_levels import Ask
 from rig.design_plain import Judged, means_of
 from rig.design_plan import Chosen

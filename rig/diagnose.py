@@ -20,7 +20,7 @@ from rig.next_plan import write_next
 
 if TYPE_CHECKING:  # numpy and scipy come up when a diagnosis is made, not for `rig diagnose --help`
     from identification.mismatch.diagnosis import Diagnosis
-    from identification.mismatch.sweeps import Limits
+    from identification.mismatch.next_experiment.sweeps import Limits
     from identification.recording import Recording
     from identification.twin import Twin
     from rig.config import CampaignConfig
@@ -115,8 +115,8 @@ def diagnosed(
     limits: Limits | None = None,
 ) -> Diagnosis:
     """As identification has it, a refusal raised as RecordingError."""
-    from identification.mismatch.diagnosing import diagnose
-    from identification.mismatch.preparing import Refusal
+    from identification.mismatch.pipeline import diagnose
+    from identification.mismatch.prepare.preparing import Refusal
 
     found = diagnose(recordings, holdout, seed, baseline, limits)
     if isinstance(found, Refusal):

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from math import floor, isfinite, log10
 from textwrap import wrap
 
+from identification.mismatch.answer.remainder import FlexibleShape, FormulaFound
 from identification.mismatch.diagnosis import NOT_WHITE, Diagnosis, Finding, Unexplained, Value, Where
-from identification.mismatch.remainder import FlexibleShape, FormulaFound
 
 WIDTH = 100
 MOST_STEPS = 12

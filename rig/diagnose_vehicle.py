@@ -53,7 +53,7 @@ def diagnose_vehicle_files(
     recordings: Mapping[Path, Recording], holdout: Mapping[Path, Recording], seed: int, files: VehicleFiles
 ) -> Diagnosis:
     """Raises RecordingError for what cannot be diagnosed, ConfigError for an option that cannot be used."""
-    from identification.mismatch.preparing import Refusal
+    from identification.mismatch.prepare.preparing import Refusal
     from identification.mismatch.vehicle.diagnose import diagnose_vehicle
 
     _check(files)
@@ -131,7 +131,7 @@ def _on_axis(
     recordings: Mapping[Path, Recording], setup: VehicleSetup, everything: Mapping[Path, Recording]
 ) -> list[Recording]:
     """With --axis, those that drive it; otherwise all of them."""
-    from identification.mismatch.preparing import Refusal
+    from identification.mismatch.prepare.preparing import Refusal
     from identification.mismatch.vehicle.setup import driven_axis, straight_ahead
 
     if not setup.axis or not recordings:

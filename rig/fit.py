@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import click
 
-from identification.estimation import Method
-from identification.thrust_data import Unusable
-from identification.thrust_forms import Model
+from identification.estimation.least_squares import Method
+from identification.thruster.thrust_data import Unusable
+from identification.thruster.thrust_forms import Model
 from rig.errors import RecordingError, RigError
 from rig.fit_answer import Answer, expand, fit_files, fit_recordings
 from rig.fit_comparison import alike, changed

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 
-from identification.estimation import Method
+from identification.estimation.least_squares import Method
 from identification.recording import Recording
-from identification.thrust import ThrustFit, fit_runs
-from identification.thrust_choice import Candidate, Remainder, side_by_side, without
-from identification.thrust_data import Run, Unusable, prepare
-from identification.thrust_forms import FORMS, MODELS, Model
-from identification.thruster_dynamics import DynamicsFit, fit_dynamics
+from identification.thruster.dynamics import DynamicsFit, fit_dynamics
+from identification.thruster.model_choice import Candidate, Remainder, side_by_side, without
+from identification.thruster.thrust import ThrustFit, fit_runs
+from identification.thruster.thrust_data import Run, Unusable, prepare
+from identification.thruster.thrust_forms import FORMS, MODELS, Model
 from rig.errors import RecordingError
 from rig.hdf5 import load
 

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.comparison import (
+from identification.thruster.comparison import (
     MANY,
     Change,
     Difference,
@@ -23,9 +23,9 @@ from identification.comparison import (
     pairs,
     share_calibration,
 )
-from identification.repeatability import Repeatability, repeatability, with_repeatability
-from identification.thrust import Parameter, ThrustFit, fit_runs
-from identification.thrust_forms import model_of
+from identification.thruster.repeatability import Repeatability, repeatability, with_repeatability
+from identification.thruster.thrust import Parameter, ThrustFit, fit_runs
+from identification.thruster.thrust_forms import model_of
 from rig.errors import RecordingError
 from rig.fit_answer import FIT_FORMAT, FIT_VERSION, Answer
 
@@ -187,7 +187,7 @@ def changed(answers: Sequence[Answer], path: Path) -> Changed:
 
 
 def named(fit: ThrustFit, name: str) -> str:
-    """A coefficient's name among those of other thrusters, as `identification.efficiency` has it: `C+[T1]`."""
+    """A coefficient's name among those of other thrusters, as `identification.vehicle.efficiency` has it: `C+[T1]`."""
     return f"{name.replace('_plus', '+').replace('_minus', '-')}[{fit.thruster}]"
 
 

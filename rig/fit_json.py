@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from identification.comparison import Difference
+from identification.estimation.verdicts import Significance, significance
 from identification.recording import Floats
-from identification.thrust import Parameter, ThrustFit
-from identification.thrust_choice import Candidate, Remainder, statement
-from identification.thrust_data import Unusable
-from identification.thrust_report import verdicts
-from identification.thruster_dynamics import UNITS, DynamicsFit
-from identification.verdicts import Significance, significance
+from identification.thruster.comparison import Difference
+from identification.thruster.dynamics import UNITS, DynamicsFit
+from identification.thruster.model_choice import Candidate, Remainder, statement
+from identification.thruster.thrust import Parameter, ThrustFit
+from identification.thruster.thrust_data import Unusable
+from identification.thruster.thrust_report import verdicts
 from rig.fit_answer import FIT_FORMAT, FIT_VERSION, Answer
 from rig.fit_comparison import Alike, Changed, alike, coefficients
 

@@ -6,12 +6,12 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from identification import dynamics_report
-from identification.comparison import POWER, Change, Difference
-from identification.thrust_choice import Candidate, statement
-from identification.thrust_data import Unusable
-from identification.thrust_report import digits, sentence, table, verdicts
-from identification.thruster_dynamics import UNITS
+from identification.thruster import dynamics_report
+from identification.thruster.comparison import POWER, Change, Difference
+from identification.thruster.dynamics import UNITS
+from identification.thruster.model_choice import Candidate, statement
+from identification.thruster.thrust_data import Unusable
+from identification.thruster.thrust_report import digits, sentence, table, verdicts
 from rig.fit_answer import Answer
 from rig.fit_comparison import Alike, Changed
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, TypeVar
 
-from identification.efficiency import AXES, Interaction
+from identification.vehicle.efficiency import AXES, Interaction
 from rig.errors import ConfigError
 from rig.tables import Table, decode, joined, read_toml, refuse_unknown, table_at
 

@@ -13,7 +13,7 @@ from rig.plan_file import Level, Template, files_of, template_of, write_campaign
 
 if TYPE_CHECKING:
     from identification.mismatch.diagnosis import Diagnosis
-    from identification.mismatch.sweeps import Limits
+    from identification.mismatch.next_experiment.sweeps import Limits
 
 
 def asked(plan: Path | None, campaign: Path | None) -> CampaignConfig | None:
@@ -33,7 +33,7 @@ def limits_of(
     campaign: CampaignConfig | None, budget: float | None = None, flow_speeds: tuple[float, ...] | None = None
 ) -> Limits:
     """What the bench allows: its voltage, its slew, the thrust that cell and guard stand; `flow_speeds`: see Limits."""
-    from identification.mismatch.sweeps import BUDGET, Limits
+    from identification.mismatch.next_experiment.sweeps import BUDGET, Limits
 
     seconds = BUDGET if budget is None else budget
     if not seconds > 0:

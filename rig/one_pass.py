@@ -2,7 +2,7 @@
 
 The rows are samples, not points of holds. Of marked holds the second half is used (`load` and a fit in memory leave
 out at most the first); of a run without them every sample. The standard errors come from the scatter of batches of
-rows (`identification.batches`), so that noise correlated over many samples is paid for.
+rows (`identification.estimation.batches`), so that noise correlated over many samples is paid for.
 """
 
 from __future__ import annotations
@@ -14,16 +14,16 @@ from pathlib import Path
 import numpy as np
 from scipy.stats import t as student
 
-from identification.batches import BatchSums, Sandwich, sandwich
-from identification.holds import Window, from_steps, overlap_free, without_waiting
-from identification.points import FALLBACK
+from identification.estimation.batches import BatchSums, Sandwich, sandwich
+from identification.estimation.regression import LinearFit
+from identification.estimation.streaming import Block, Condensed, condense, join, solve
 from identification.recording import Channel, Floats, Recording
-from identification.regression import LinearFit
-from identification.settling import LONGEST_CUT
-from identification.streaming import Block, Condensed, condense, join, solve
-from identification.thrust import Parameter
-from identification.thrust_data import gain_std, voltage_at
-from identification.thrust_forms import FORMS, Form, Model
+from identification.steady_state.holds import Window, from_steps, overlap_free, without_waiting
+from identification.steady_state.points import FALLBACK
+from identification.steady_state.settling import LONGEST_CUT
+from identification.thruster.thrust import Parameter
+from identification.thruster.thrust_data import gain_std, voltage_at
+from identification.thruster.thrust_forms import FORMS, Form, Model
 from rig.errors import RecordingError
 from rig.hdf5 import load
 from rig.hdf5.blocks import LongChannel, long_channels

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from identification.batches import BATCHES
-from identification.settling import LONGEST_CUT
-from identification.thrust_data import gain_std
-from identification.thrust_report import digits
+from identification.estimation.batches import BATCHES
+from identification.steady_state.settling import LONGEST_CUT
+from identification.thruster.thrust_data import gain_std
+from identification.thruster.thrust_report import digits
 from rig.fit_json import parameter_json
 from rig.one_pass import OnePass
 

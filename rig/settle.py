@@ -30,7 +30,7 @@ from rig.run import campaign_folder, progress_bar, require_runnable, run_campaig
 
 if TYPE_CHECKING:
     from identification.mismatch.diagnosis import Diagnosis
-    from identification.mismatch.settle import Course, End
+    from identification.mismatch.next_experiment.sequential_experiment import Course, End
 
 OPENING = 20.0
 """s of a run beside its plan: ports, preflight, mounting, closing, table; seen on a loaded two-core machine."""
@@ -67,7 +67,7 @@ class Settling:
 
         Raises RigError for input that cannot be used, before anything moves; after that what goes wrong is an end.
         """
-        from identification.mismatch.settle import Course, End, belief, opening_line
+        from identification.mismatch.next_experiment.sequential_experiment import Course, End, belief, opening_line
 
         found = self._diagnosed(0.0)
         course = Course(self.budget, belief(found), self._spent())
@@ -86,7 +86,7 @@ class Settling:
 
     def _round(self, found: Diagnosis, course: Course) -> tuple[Diagnosis, Course, End | None]:
         """One experiment and its diagnosis, or why there is none."""
-        from identification.mismatch.settle import End, next_step, round_line
+        from identification.mismatch.next_experiment.sequential_experiment import End, next_step, round_line
 
         plans = self._written(found, len(course.rounds) + 1)
         step = next_step(course, self._needs(plans))
@@ -104,7 +104,7 @@ class Settling:
         return time.monotonic() - self.begun
 
     def _diagnosed(self, spent: float) -> Diagnosis:
-        from identification.mismatch.settle import allowance
+        from identification.mismatch.next_experiment.sequential_experiment import allowance
 
         began = time.monotonic()
         room = allowance(self.budget - spent, fixed_cost(self.campaign) + self.thinking)
@@ -253,7 +253,7 @@ PATH = click.Path(path_type=Path)
 def _leave(settling: Settling, found: Diagnosis, course: Course, end: End, wanted: Wanted) -> None:
     """JSON, page and text. Raises RigError where one cannot be written."""
     from identification.mismatch.diagnosis import diagnosis_json
-    from identification.mismatch.settle import course_json
+    from identification.mismatch.next_experiment.sequential_experiment import course_json
 
     answer = json.dumps({**diagnosis_json(found), "settling": course_json(course, end)}, indent=1, allow_nan=False)
     try:

@@ -14,7 +14,7 @@ import click
 from rig.errors import ConfigError, RecordingError, RigError, TwinError
 
 if TYPE_CHECKING:
-    from identification.mismatch.simulating import Drive, Prediction
+    from identification.mismatch.compare.simulation import Drive, Prediction
     from identification.recording import Floats, Step
     from identification.twin import Twin
     from rig.plan import Step as PlannedStep
@@ -62,7 +62,7 @@ def asked(plan: Path, twin: Twin, flow: float | None) -> Asked:
 def _of_campaign(path: Path, twin: Twin, flow: float | None) -> Asked:
     import numpy as np
 
-    from identification.mismatch.simulating import Drive
+    from identification.mismatch.compare.simulation import Drive
     from rig.loading import load_campaign
 
     if twin.driver_quantity == "rotation_rate":
@@ -111,7 +111,7 @@ def _commands(step: PlannedStep, tick: float) -> Iterator[tuple[float, float]]:
 def _of_recording(path: Path, twin: Twin, flow: float | None) -> Asked:
     import numpy as np
 
-    from identification.mismatch.simulating import Drive, others_of
+    from identification.mismatch.compare.simulation import Drive, others_of
     from rig.hdf5 import load
 
     recording = load(path)
@@ -133,8 +133,8 @@ def simulated(twin: Twin, wanted: Asked, rate: float | None, seed: int | None) -
     """At `rate` samples/s, by default the twin's own. Raises TwinError where the plan lacks what the twin needs."""
     import numpy as np
 
-    from identification.mismatch.preparing import Refusal
-    from identification.mismatch.simulating import simulate
+    from identification.mismatch.compare.simulation import simulate
+    from identification.mismatch.prepare.preparing import Refusal
 
     interval = 1 / rate if rate else twin.interval
     count = int(min((wanted.end - wanted.start) / interval, MOST)) + 1
@@ -228,7 +228,7 @@ def simulate_command(
         twin = read_twin(twin_path)
         wanted = asked(plan, twin, flow)
         found = simulated(twin, wanted, rate, seed)
-        from identification.mismatch.simulating import wave_notes
+        from identification.mismatch.compare.simulation import wave_notes
 
         noise = "without noise" if seed is None else f"with noise of seed {seed}"
         notes = f"Simulated, not measured: {plan.name} on {twin.origin}, {noise}, without a tare."

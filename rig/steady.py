@@ -10,13 +10,13 @@ import numpy as np
 from identification.recording import Floats
 
 LEAST_SAMPLES = 8
-"""Fewer give no drift (identification.steady)."""
+"""Fewer give no drift (identification.steady_state.steady)."""
 
 
 class SteadyEstimator(Protocol):
     """Mean of a growing series, with an error honest under autocorrelation. All NaN while unknown.
 
-    `identification.steady.SteadyMonitor` is the one that runs; asking it costs about a millisecond.
+    `identification.steady_state.steady.SteadyMonitor` is the one that runs; asking it costs about a millisecond.
     """
 
     def add(self, time: Floats, value: Floats) -> None:

@@ -10,7 +10,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from identification.thrust import ThrustFit
+from identification.thruster.thrust import ThrustFit
 from rig.errors import RecordingError
 from rig.fit import Answer, answer_json, fit_files
 

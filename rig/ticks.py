@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from identification.recording import Step as StepRow
-from identification.steady import SteadyMonitor
+from identification.steady_state.steady import SteadyMonitor
 from rig.config import BenchConfig, CampaignConfig
 from rig.guard import MIN_LATENESS, Trip
 from rig.messages import LogLine, Point, Request, State

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from identification.physics.free_form import MULTIPLIERS, Flexible
+from identification.flexible_terms.flexible import MULTIPLIERS, Flexible
 from identification.physics.term import Scale, Term
 from identification.twin import TERMS, Source, Twin, TwinLine, TwinNoise, TwinTerm, names_of
 from rig.errors import TwinError

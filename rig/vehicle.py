@@ -10,15 +10,15 @@ from pathlib import Path
 import click
 import numpy as np
 
-from identification.efficiency import Installation
-from identification.inertia import InertiaFit
-from identification.maximum_likelihood import NOTHING, Gaussian, independent
+from identification.comparators.rivals import rivals
+from identification.estimation.maximum_likelihood import NOTHING, Gaussian, independent
 from identification.recording import Recording
-from identification.thrust_data import Unusable
-from identification.vehicle_campaign import AxisResult, CampaignFacts, VehicleFit, identify_vehicle, sort_trials
-from identification.vehicle_replay import Replay, replay
-from identification.vehicle_rivals import rivals
-from identification.vehicle_trials import Trial, ballast_of, trial
+from identification.thruster.thrust_data import Unusable
+from identification.vehicle.campaign import AxisResult, CampaignFacts, VehicleFit, identify_vehicle, sort_trials
+from identification.vehicle.efficiency import Installation
+from identification.vehicle.inertia import InertiaFit
+from identification.vehicle.replay import Replay, replay
+from identification.vehicle.trials import Trial, ballast_of, trial
 from rig.errors import ConfigError, RecordingError, RigError
 from rig.file_lists import ListCommand, ListOption
 from rig.installation import InstallationFile, Vehicle, load_installation

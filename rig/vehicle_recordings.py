@@ -10,10 +10,10 @@ from typing import TypeVar
 
 import numpy as np
 
-from identification.constant_velocity import LEAST_SAMPLES
-from identification.efficiency import AXES, Installation
 from identification.recording import Recording
-from identification.vehicle_trials import dominant_axis, response_of
+from identification.vehicle.efficiency import AXES, Installation
+from identification.vehicle.trials import dominant_axis, response_of
+from identification.velocity.constant_velocity import LEAST_SAMPLES
 from rig.errors import RecordingError
 from rig.hdf5 import load
 

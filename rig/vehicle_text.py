@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from identification.inertia import InertiaFit
-from identification.maximum_likelihood import Gaussian
-from identification.thrust_data import Unusable
-from identification.thrust_report import digits
-from identification.vehicle import DragFit
-from identification.vehicle_campaign import AxisResult
-from identification.vehicle_replay import Replay
-from identification.vehicle_report import Row, rows
+from identification.estimation.maximum_likelihood import Gaussian
+from identification.thruster.thrust_data import Unusable
+from identification.thruster.thrust_report import digits
+from identification.vehicle.campaign import AxisResult
+from identification.vehicle.inertia import InertiaFit
+from identification.vehicle.replay import Replay
+from identification.vehicle.report import Row, rows
+from identification.vehicle.steady_drag import DragFit
 from rig.vehicle import VehicleAnswer
 
 RAN_AWAY = "runs away: the drag that was identified is negative there"

@@ -11,9 +11,9 @@ from typing import Any
 import numpy as np
 from scipy.linalg import block_diag
 
-from identification.efficiency import AXES, Installation, Thruster
-from identification.points import voltage_channel
 from identification.recording import Floats, Recording
+from identification.steady_state.points import voltage_channel
+from identification.vehicle.efficiency import AXES, Installation, Thruster
 from rig.errors import ConfigError, RecordingError
 from rig.hdf5 import load
 from rig.installation import InstallationFile, Mounting

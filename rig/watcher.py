@@ -73,7 +73,9 @@ def settings_of(run: Watched) -> Settings:
     """Raises TwinError for a twin that can't be read, is another thruster's or needs what is not fed."""
     if not run.twin:
         return Settings(run.highest, run.false_alarms_per_hour)
-    from identification.mismatch.preparing import Refusal  # with a twin only: the catalogue takes seconds to import
+    from identification.mismatch.prepare.preparing import (
+        Refusal,  # with a twin only: the catalogue takes seconds to import
+    )
     from identification.watching.known import expected_of, gain_std
     from rig.twin import read_twin
 

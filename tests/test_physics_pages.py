@@ -16,7 +16,7 @@ from identification.physics.vehicle.catalogue import CATALOGUE as VEHICLE
 ROOT = Path(__file__).parents[1]
 PAGES = ROOT / "docs" / "physics"
 WITHOUT_CLASS = ("periodic_disturbance", "channel_fault")
-"""Found by identification.mismatch.lines and faults."""
+"""Found by identification.mismatch.periodic.periodic_disturbances and faults."""
 IDS = (*dict.fromkeys(t.id for t in (*CATALOGUE, *VEHICLE)), *WITHOUT_CLASS)
 SECTIONS = (
     "Formula",

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from identification.linear_drag import THESIS_EXAMPLE, linear_drag_response, sine_derivative_bound
-from identification.velocity import Window, derivative
+from identification.velocity.linear_drag import THESIS_EXAMPLE, linear_drag_response, sine_derivative_bound
+from identification.velocity.velocity import Window, derivative
 
 TIME = np.arange(540) / 3.0
 """180 s at 3 Hz, "i.e. 540 data samples"."""

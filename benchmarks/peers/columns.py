@@ -16,13 +16,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.mismatch.baseline import raw_directions, start
-from identification.mismatch.fitting import Fit, fit, raw
-from identification.mismatch.full_rate import series_of
-from identification.mismatch.model import Data, Model, Theta, weights
-from identification.mismatch.noise import Noise
-from identification.mismatch.preparing import Refusal, history_of
-from identification.mismatch.search import available
+from identification.mismatch.estimate.fitting import Fit, fit, raw
+from identification.mismatch.model.model import Data, Model, Theta, weights
+from identification.mismatch.noise.covariance import Noise
+from identification.mismatch.periodic.full_rate import series_of
+from identification.mismatch.prepare.preparing import Refusal, history_of
+from identification.mismatch.select.baseline import raw_directions, start
+from identification.mismatch.select.forward_selection import available
 from identification.physics.term import Term
 from peers.cases import Puzzle
 

@@ -1,6 +1,6 @@
 """The vehicle found by simulated annealing on the error of the simulated position: no derivative, no start needed.
 
-It says in which valley the error is least, not how well that is known: from there `identification.inertia.output_error`
+It says in which valley the error is least, not how well that is known: from there `vehicle.inertia.output_error`
 goes to the bottom, with the starts of the trials and all that was known beforehand free to move, and the covariance is
 that of its estimate. (The annealed values themselves had some 20 times the variance in ten runs: they are found with
 the velocity at the start held at what the first, noisy, measurements show.)
@@ -14,12 +14,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import dual_annealing
 
-from identification.inertia import InertiaFit, output_error, responses, starts_of
-from identification.maximum_likelihood import Gaussian
+from identification.estimation.maximum_likelihood import Gaussian
 from identification.recording import Floats
-from identification.thrust_data import Unusable
-from identification.vehicle_replay import validate
-from identification.vehicle_trials import Trial
+from identification.thruster.thrust_data import Unusable
+from identification.vehicle.inertia import InertiaFit, output_error, responses, starts_of
+from identification.vehicle.replay import validate
+from identification.vehicle.trials import Trial
 
 
 def by_annealing(

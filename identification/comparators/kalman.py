@@ -11,14 +11,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.inertia import InertiaFit, start_inertia, starts_of
-from identification.inertia_by_derivative import sensor_noise
-from identification.maximum_likelihood import NOTHING, Gaussian
+from identification.estimation.maximum_likelihood import NOTHING, Gaussian
 from identification.recording import Floats
-from identification.thrust_data import Unusable
-from identification.vehicle_replay import validate
-from identification.vehicle_simulation import column, current_along, integrate
-from identification.vehicle_trials import Trial
+from identification.thruster.thrust_data import Unusable
+from identification.vehicle.inertia import InertiaFit, start_inertia, starts_of
+from identification.vehicle.inertia_by_derivative import sensor_noise
+from identification.vehicle.replay import validate
+from identification.vehicle.simulation import column, current_along, integrate
+from identification.vehicle.trials import Trial
 
 START_SPREAD = 0.5
 """Relative standard deviation of the inertia before any measurement."""

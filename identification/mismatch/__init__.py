@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from identification.mismatch.diagnosing import diagnose
+    from identification.mismatch.pipeline import diagnose
 
 __all__ = ["diagnose"]
 
@@ -17,7 +17,7 @@ __all__ = ["diagnose"]
 def __getattr__(name: str) -> Any:
     """`diagnose`, loaded when it is asked for: the watch of a running campaign needs a small part of this package."""
     if name == "diagnose":
-        from identification.mismatch.diagnosing import diagnose
+        from identification.mismatch.pipeline import diagnose
 
         return diagnose
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

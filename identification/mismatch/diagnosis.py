@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from math import isfinite
 from typing import Literal
 
-from identification.mismatch.remainder import FlexibleShape, FormulaFound, flexible_json, formula_json
+from identification.mismatch.answer.remainder import FlexibleShape, FormulaFound, flexible_json, formula_json
 from identification.recording import Floats
 from identification.twin import Twin
 

@@ -7,10 +7,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.history import History
 from identification.physics.soft_limit import limited, mean_slope
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+from identification.run_history.history import History
 
 LEAST_MOVE = 1e-6
 """Of the limit: what moves less within an interval stands still."""

@@ -7,10 +7,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.filters import lowpass
-from identification.physics.history import History
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+from identification.run_history.filters import lowpass
+from identification.run_history.history import History
 
 THERMOMETER = "motor_temperature"
 MOST_PER_KELVIN = 1.0

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from identification.physics.filters import play
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+from identification.run_history.filters import play
 
 
 @dataclass(frozen=True, slots=True)

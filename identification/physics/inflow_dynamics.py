@@ -7,9 +7,9 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.filters import lag, lowpass
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+from identification.run_history.filters import lag, lowpass
 
 
 @dataclass(frozen=True, slots=True)

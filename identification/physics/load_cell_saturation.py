@@ -8,10 +8,10 @@ from typing import ClassVar, Literal
 import numpy as np
 from scipy.special import ndtr
 
-from identification.physics.history import TAIL, History
 from identification.physics.soft_limit import limited, slope_at
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+from identification.run_history.history import TAIL, History
 
 FAR = 8.0
 """Standard deviations of the noise: what is farther from the limit clips always, or never."""

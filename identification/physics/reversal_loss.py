@@ -7,10 +7,10 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.filters import since_opposite
-from identification.physics.history import TURNING
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+from identification.run_history.filters import since_opposite
+from identification.run_history.history import TURNING
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.filters import reconstructed
-from identification.physics.history import History
-from identification.physics.rate_gap import running, without_ticks
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+from identification.run_history.filters import reconstructed
+from identification.run_history.history import History
+from identification.run_history.rate_gap import running, without_ticks
 
 
 def slip(history: History, x: Floats, k: float) -> Floats:

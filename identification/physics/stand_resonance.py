@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.filters import resonant
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+from identification.run_history.filters import resonant
 
 TRIED = 18
 """Frequencies to look for it with."""

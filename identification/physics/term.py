@@ -10,8 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
-from identification.physics.history import History
 from identification.recording import Floats
+from identification.run_history.history import History
 
 Stage = Literal["command", "rotor", "hydro", "stand", "cell"]
 STAGES: tuple[Stage, ...] = ("command", "rotor", "hydro", "stand", "cell")

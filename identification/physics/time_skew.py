@@ -7,9 +7,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.filters import delayed
 from identification.physics.term import Moment, Parameter, Scale, Stage
 from identification.recording import Floats
+from identification.run_history.filters import delayed
 
 FINER = tuple(np.geomspace(0.2, 5.0, 17).tolist())
 """Of a trial delay: from one trial to the next."""

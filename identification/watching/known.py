@@ -7,8 +7,8 @@ from math import isfinite, sqrt
 
 import numpy as np
 
-from identification.mismatch.preparing import Refusal
-from identification.mismatch.simulating import Drive, simulate
+from identification.mismatch.compare.simulation import Drive, simulate
+from identification.mismatch.prepare.preparing import Refusal
 from identification.twin import Twin
 from identification.watching.stretches import Expected
 

@@ -9,7 +9,7 @@ from math import isfinite, isnan
 import numpy as np
 
 from identification.recording import Floats
-from identification.settling import settle
+from identification.steady_state.settling import settle
 
 BATCH = 0.1
 """s averaged at once: what is kept of a stretch are such means."""

@@ -18,10 +18,10 @@ from typing import Any
 
 import numpy as np
 
-from identification.mismatch.diagnosing import diagnose
+from identification.mismatch.compare.simulation import Drive, Prediction, held, others_of, simulate
 from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
-from identification.mismatch.preparing import Refusal
-from identification.mismatch.simulating import Drive, Prediction, held, others_of, simulate
+from identification.mismatch.pipeline import diagnose
+from identification.mismatch.prepare.preparing import Refusal
 from identification.recording import Floats, Recording
 from rig.blind.reading import recording, recordings, times
 

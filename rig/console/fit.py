@@ -8,7 +8,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from identification.estimation import Rows, estimate
+from identification.estimation.least_squares import Rows, estimate
 from rig.messages import Point
 
 
@@ -43,7 +43,7 @@ def v_abs_v(point: Point) -> float:
 
 @lru_cache(maxsize=16)
 def running_fit(points: tuple[Point, ...]) -> RunningFit | None:
-    """Weighted least squares of `identification.estimation`; None until two different values of V|V| have a point."""
+    """Weighted least squares of `estimation.least_squares`; None until two different values of V|V| have a point."""
     chosen = [point for point in points if usable(point)]
     x = np.array([v_abs_v(point) for point in chosen])
     if len(np.unique(x)) < 2:

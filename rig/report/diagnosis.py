@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from math import isfinite, sqrt
 from pathlib import Path
 
+from identification.mismatch.compare.reported_runs import Run, runs_of
 from identification.mismatch.diagnosis import NOT_WHITE, Diagnosis, NextExperiment, Value
-from identification.mismatch.reported_runs import Run, runs_of
 from identification.recording import Recording
 from rig.report import page as pages
 from rig.report import provenance

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from identification.mismatch.answer.remainder import FlexibleShape, Spline
 from identification.mismatch.diagnosis import Unexplained, Value
-from identification.mismatch.remainder import FlexibleShape, Spline
 from rig.report.diagnosis_words import axis, effect_name, rarity, value_cells, words
 from rig.report.figures import Curve, Group
 from rig.report.figures_diagnosis import spline_over

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from identification.mismatch.compare.reported_runs import Run
+from identification.mismatch.compare.signature import SPREAD_OUT, Signature, profile, signature
+from identification.mismatch.compare.signature import shape as shape_of
 from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, NextExperiment, Unexplained, Where
-from identification.mismatch.reported_runs import Run
-from identification.mismatch.signature import SPREAD_OUT, Signature, profile, signature
-from identification.mismatch.signature import shape as shape_of
 from rig.report.diagnosis_words import KINDS, axis, driver_quantity, effect_name, evidence, stretch, words
 from rig.report.figures import Curve, Group
 from rig.report.figures_diagnosis import residual_size, shape, signature_over, steps_plot

@@ -6,9 +6,9 @@ import re
 from collections.abc import Mapping
 from math import isfinite
 
+from identification.mismatch.compare.signature import Kind
 from identification.mismatch.diagnosis import Diagnosis, Finding, Value, Where
-from identification.mismatch.signature import Kind
-from identification.thrust_report import digits
+from identification.thruster.thrust_report import digits
 from rig.report.look import prose, unit_text
 from rig.report.rivals import REVEALED_BY
 

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.thrust import ThrustFit
-from identification.thrust_report import digits, sentence, table, verdicts
+from identification.thruster.thrust import ThrustFit
+from identification.thruster.thrust_report import digits, sentence, table, verdicts
 from rig.fit_answer import Answer
 from rig.fit_comparison import Changed
 from rig.report import figures, provenance

@@ -6,11 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identification import dynamics_report
-from identification.thrust_choice import Candidate, statement
-from identification.thrust_data import Unusable
-from identification.thrust_report import digits
-from identification.thruster_dynamics import UNITS, DynamicsFit
+from identification.thruster import dynamics_report
+from identification.thruster.dynamics import UNITS, DynamicsFit
+from identification.thruster.model_choice import Candidate, statement
+from identification.thruster.thrust_data import Unusable
+from identification.thruster.thrust_report import digits
 from rig.fit_answer import Answer
 from rig.fit_comparison import Changed, alike
 from rig.fit_text import alike_text, changed_text

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from identification.recording import Floats
-from identification.thrust import Parameter, ThrustFit
+from identification.thruster.thrust import Parameter, ThrustFit
 from rig.report import figures
 from rig.report.figures import Curve, Group
 from rig.report.normal import normal_order

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.stats import norm
 
-from identification.estimation import Estimate
+from identification.estimation.least_squares import Estimate
 from identification.recording import Floats
 from rig.report.figures import NormalOrder
 

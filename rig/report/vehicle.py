@@ -8,14 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.inertia import InertiaFit, responses
-from identification.inertia_by_derivative import smoothed
 from identification.recording import Floats
-from identification.thrust_data import Unusable
-from identification.vehicle import DragFit
-from identification.vehicle_campaign import AxisResult, VehicleFit
-from identification.vehicle_report import COVER_95, Row, rows
-from identification.vehicle_simulation import current_along
+from identification.thruster.thrust_data import Unusable
+from identification.vehicle.campaign import AxisResult, VehicleFit
+from identification.vehicle.inertia import InertiaFit, responses
+from identification.vehicle.inertia_by_derivative import smoothed
+from identification.vehicle.report import COVER_95, Row, rows
+from identification.vehicle.simulation import current_along
+from identification.vehicle.steady_drag import DragFit
 from rig.report import figures, figures_vehicle, provenance
 from rig.report.figures import Curve, Group, Interval
 from rig.report.figures_mismatch import Panel, before_after

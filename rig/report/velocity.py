@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from identification.linear_drag import THESIS_EXAMPLE, linear_drag_response
 from identification.recording import Floats
-from identification.velocity import Derivative, Window, derivative
+from identification.velocity.linear_drag import THESIS_EXAMPLE, linear_drag_response
+from identification.velocity.velocity import Derivative, Window, derivative
 from rig.report.look import BAND, DATA, INK, MODEL, NARROW, Plot, labels, legend_above, standalone
 from rig.report.page import Page, Picture, Section, Table, columns
 

@@ -8,10 +8,10 @@ from itertools import groupby
 
 import numpy as np
 
-from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, NextExperiment, PlanStep
-from identification.mismatch.settle import Course, End, allowance, belief, next_step
-from identification.mismatch.sweeps import Limits
+from identification.mismatch.next_experiment.sequential_experiment import Course, End, allowance, belief, next_step
+from identification.mismatch.next_experiment.sweeps import Limits
+from identification.mismatch.pipeline import diagnose
 from identification.recording import Recording
 from sim_devices import concealed
 from sim_devices.concealed.definition import Case, Run

@@ -12,9 +12,9 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from identification.efficiency import Installation, Interaction, Thruster
 from identification.mismatch.vehicle.setup import ANY_AXIS, Stated, VehicleSetup
 from identification.recording import Channel, Recording, Step
+from identification.vehicle.efficiency import Installation, Interaction, Thruster
 from sim_devices.vehicle import Hull, Trial, romeo, run_trials
 from sim_devices.vehicle.body import Body
 from sim_devices.vehicle.campaign import ALL, DIVE, FRONT, REAR, scaled, sine

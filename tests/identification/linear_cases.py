@@ -6,13 +6,13 @@ import numpy as np
 from monte_carlo import NOISES, Case, Draw, covariance, drawn, efficient, efficient_blockwise
 from thrust_runs import sine, staircase
 
-from identification.estimation import Rows, estimate
-from identification.linear_drag import THESIS_EXAMPLE, linear_drag_response
-from identification.maximum_likelihood import maximise
-from identification.regression import least_squares
-from identification.streaming import stream_least_squares
-from identification.thrust import fit_thrust
-from identification.velocity import Window, derivative
+from identification.estimation.least_squares import Rows, estimate
+from identification.estimation.maximum_likelihood import maximise
+from identification.estimation.regression import least_squares
+from identification.estimation.streaming import stream_least_squares
+from identification.thruster.thrust import fit_thrust
+from identification.velocity.linear_drag import THESIS_EXAMPLE, linear_drag_response
+from identification.velocity.velocity import Window, derivative
 
 NAMES = ("C", "tare")
 THETA = np.array([0.4, 1.5])

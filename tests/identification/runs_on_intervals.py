@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from identification.physics.history import History
 from identification.physics.term import Moment, Scale
+from identification.run_history.history import History
 
 
 def uneven(rng, n, low=0.004, high=0.25):

@@ -5,7 +5,7 @@ import pytest
 from scipy.signal import lfilter
 from scipy.stats import t as student
 
-from identification.batches import BATCHES, BatchSums, sandwich
+from identification.estimation.batches import BATCHES, BatchSums, sandwich
 
 THETA = np.array([0.4, 1.5])
 

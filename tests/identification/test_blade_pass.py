@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, Finding
+from identification.mismatch.pipeline import diagnose
 from identification.recording import Recording
 from sim_devices import concealed
 from tests.concealed.recordings import recording

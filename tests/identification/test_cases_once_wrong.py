@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, Finding
+from identification.mismatch.pipeline import diagnose
 from sim_devices import concealed
 from sim_devices.concealed import Case
 from tests.concealed.recordings import recording

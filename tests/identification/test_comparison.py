@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.comparison import (
+from identification.thruster.comparison import (
     ALPHA,
     MANY,
     Group,
@@ -19,7 +19,7 @@ from identification.comparison import (
     share_calibration,
     smallest_change,
 )
-from identification.repeatability import repeatability, with_repeatability
+from identification.thruster.repeatability import repeatability, with_repeatability
 
 DOF = 11.0
 CELL = 'load_cell/thrust {"gain_std": 0.01}'

@@ -12,7 +12,7 @@ import pytest
 from linear_cases import cases, linear, regressor
 from monte_carlo import NOISES, covariance, efficient, results, sample
 
-from identification.regression import least_squares
+from identification.estimation.regression import least_squares
 
 RUNS = {
     "C+/C-": 0, "holds of 60": 40, "holds of 200": 0, "sine": 80, "1600": 150, ", 120": 300, "Savitzky": 60,

@@ -3,8 +3,15 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from identification.experiment import GAP_AFTER, Candidates, Design, Impossible, copper_heat, optimal_levels
-from identification.regression import Deficiency
+from identification.estimation.regression import Deficiency
+from identification.experiment_design.experiment import (
+    GAP_AFTER,
+    Candidates,
+    Design,
+    Impossible,
+    copper_heat,
+    optimal_levels,
+)
 
 X = np.linspace(-1, 1, 101)
 V = np.linspace(-20, 20, 41)

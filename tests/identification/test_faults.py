@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.faults import Fault, find_faults, repaired
+from identification.mismatch.faults.channel_faults import Fault, find_faults, repaired
 from identification.recording import Channel, Floats, Recording
 from sim_devices import concealed
 from sim_devices.concealed.shapes import SHAPES

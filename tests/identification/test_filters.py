@@ -5,8 +5,8 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.signal import welch
 
-from identification.mismatch.spectrum import averaged, smoothed
-from identification.physics.filters import delayed, integral, lag, lowpass, play, reconstructed, recursion
+from identification.mismatch.periodic.spectrum import averaged, smoothed
+from identification.run_history.filters import delayed, integral, lag, lowpass, play, reconstructed, recursion
 
 
 def _play(value, width):

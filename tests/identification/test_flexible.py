@@ -8,20 +8,20 @@ import numpy as np
 import pytest
 from diagnosed_runs import C, run
 
-from identification.mismatch.diagnosing import diagnose
+from identification.flexible_terms.flexible import MULTIPLIERS, Flexible, turned
+from identification.flexible_terms.formula import Monomial
+from identification.mismatch.compare.simulation import Drive, Prediction, others_of, simulate
 from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
-from identification.mismatch.formula import monomials_of, term_of
-from identification.mismatch.knots import Moments, choose, heights, nodes_of
-from identification.mismatch.model import Data
-from identification.mismatch.preparing import history_of
-from identification.mismatch.simulating import Drive, Prediction, others_of, simulate
-from identification.mismatch.sizes import scale_of
-from identification.physics.formula_form import Monomial
-from identification.physics.free_form import MULTIPLIERS, Flexible, turned
-from identification.physics.history import History
-from identification.physics.splines import spline
+from identification.mismatch.model.model import Data
+from identification.mismatch.pipeline import diagnose
+from identification.mismatch.prepare.preparing import history_of
+from identification.mismatch.prepare.scales import scale_of
+from identification.mismatch.unnamed.formula import monomials_of, term_of
+from identification.mismatch.unnamed.spline_knot_selection import Moments, choose, heights, nodes_of
 from identification.physics.term import Moment, Scale
 from identification.recording import Channel
+from identification.run_history.history import History
+from identification.run_history.splines import spline
 from rig.diagnose_text import diagnosis_text
 from rig.errors import TwinError
 from rig.report.diagnosis import diagnosis_page

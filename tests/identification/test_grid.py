@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.mismatch.grid import Held, edges_of
+from identification.mismatch.prepare.grid import Held, edges_of
 from identification.recording import Channel
 
 SPACING = 0.041

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis
+from identification.mismatch.pipeline import diagnose
 from sim_devices import concealed
 from tests.concealed.recordings import recording
 

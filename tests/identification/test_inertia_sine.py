@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from identification.experiment import Impossible
-from identification.inertia_sine import Limits, SineTest, Vehicle, best_sine, predict
-from identification.information import model_information
-from identification.linear_drag import LinearDrag, linear_drag_response
+from identification.estimation.information import model_information
+from identification.experiment_design.experiment import Impossible
+from identification.experiment_design.inertia_sine import Limits, SineTest, Vehicle, best_sine, predict
+from identification.velocity.linear_drag import LinearDrag, linear_drag_response
 
 LINEAR = Vehicle(500.0, 170.0, 0.0)
 LIMITS = Limits(90.0, 3.0, 0.07, max_force=60.0, max_travel=8.0, omega=(0.05, 1.0))

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from identification.information import (
+from identification.estimation.information import (
     Efficiency,
     differences,
     efficiency,
@@ -12,8 +12,8 @@ from identification.information import (
     model_information,
     score_information,
 )
-from identification.linear_drag import THESIS_EXAMPLE, LinearDrag, linear_drag_response
-from identification.regression import Deficiency, least_squares
+from identification.estimation.regression import Deficiency, least_squares
+from identification.velocity.linear_drag import THESIS_EXAMPLE, LinearDrag, linear_drag_response
 
 NAMES = ("a", "b", "c")
 

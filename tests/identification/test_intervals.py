@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch import fitting
-from identification.mismatch.baseline import start
-from identification.mismatch.fitting import bounds_of, fit
-from identification.mismatch.intervals import JUMPS, Profile, intervals
-from identification.mismatch.model import Model
-from identification.mismatch.preparing import history_of
-from identification.mismatch.state import refresh
+from identification.mismatch.estimate import fitting
+from identification.mismatch.estimate.confidence_intervals import JUMPS, Profile, intervals
+from identification.mismatch.estimate.estimate import refresh
+from identification.mismatch.estimate.fitting import bounds_of, fit
+from identification.mismatch.model.model import Model
+from identification.mismatch.prepare.preparing import history_of
+from identification.mismatch.select.baseline import start
 from identification.physics.dead_band import DeadBand
 from identification.physics.linear_term import LinearTerm
 from identification.physics.load_cell_creep import LoadCellCreep

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from thrust_runs import ar1, white
 
-from identification.judgement import judge, reduce_model
-from identification.regression import least_squares
+from identification.estimation.judgement import judge, reduce_model
+from identification.estimation.regression import least_squares
 
 N = 400
 X = np.linspace(-1, 1, N)

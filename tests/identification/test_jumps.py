@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from identification.mismatch.baseline import baseline, start
-from identification.mismatch.jumps import APART, TRIED, likeliest_jumps
-from identification.mismatch.model import Model
-from identification.mismatch.omnibus import judge_left
-from identification.mismatch.preparing import history_of
-from identification.mismatch.screening import orthogonal_basis
+from identification.mismatch.locate.residual_structure_test import judge_left
+from identification.mismatch.model.model import Model
+from identification.mismatch.prepare.preparing import history_of
+from identification.mismatch.select.baseline import baseline, start
+from identification.mismatch.select.jumps import APART, TRIED, likeliest_jumps
+from identification.mismatch.select.screening import orthogonal_basis
 from tests.identification.diagnosed_runs import run
 
 

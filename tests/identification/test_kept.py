@@ -6,8 +6,8 @@ from functools import partial
 
 import numpy as np
 
-from identification.physics.kept import Kept
 from identification.recording import Floats
+from identification.run_history.kept import Kept
 
 
 def test_the_longest_unused_is_forgotten() -> None:

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.mismatch.lines import Line, alias_of_mains, find_lines
-from identification.mismatch.resonance_noise import find_bands
-from identification.mismatch.spectrum import Series
-from identification.mismatch.turns import turned, turned_by_rate
+from identification.mismatch.periodic.periodic_disturbances import Line, alias_of_mains, find_lines
+from identification.mismatch.periodic.resonances import find_bands
+from identification.mismatch.periodic.rotor_angle import turned, turned_by_rate
+from identification.mismatch.periodic.spectrum import Series
 from identification.recording import Floats
 from sim_devices.concealed.draw import NOISE_KINDS, noise_law
 from sim_devices.world.noise_law import drawn

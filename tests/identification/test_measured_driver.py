@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from identification.mismatch.baseline import start
-from identification.mismatch.diagnosing import diagnose
-from identification.mismatch.measured import measured, noise_of
-from identification.mismatch.preparing import history_of
-from identification.physics.filters import reconstructed
+from identification.mismatch.pipeline import diagnose
+from identification.mismatch.prepare.measured_driver import measured, noise_of
+from identification.mismatch.prepare.preparing import history_of
+from identification.mismatch.select.baseline import start
 from identification.recording import Channel, Recording
+from identification.run_history.filters import reconstructed
 
 C, TOP, HOLD = 0.28, 19.2, 3.0
 REVERSE = 0.893

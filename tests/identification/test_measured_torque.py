@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from diagnosed_runs import TOP, levels, run
 
-from identification.mismatch.channels import torque
-from identification.mismatch.diagnosing import diagnose
-from identification.mismatch.grid import Held
-from identification.mismatch.model import Data
-from identification.mismatch.preparing import history_of
-from identification.mismatch.search import available
-from identification.mismatch.sizes import scale_of
+from identification.mismatch.model.model import Data
+from identification.mismatch.pipeline import diagnose
+from identification.mismatch.prepare.channels import torque
+from identification.mismatch.prepare.grid import Held
+from identification.mismatch.prepare.preparing import history_of
+from identification.mismatch.prepare.scales import scale_of
+from identification.mismatch.select.forward_selection import available
 from identification.physics.torque_crosstalk import MeasuredTorque, TorqueCrosstalk
 from identification.recording import Channel
 from rig.report.rivals import told_apart

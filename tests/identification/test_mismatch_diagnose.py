@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from diagnosed_runs import NOISE, TOP, C, dead_band, levels, run, table
 
-from identification.mismatch import diagnosing
-from identification.mismatch.baseline import baseline, start
-from identification.mismatch.diagnosing import diagnose
+from identification.mismatch import pipeline as diagnosing
 from identification.mismatch.diagnosis import Diagnosis, Where, diagnosis_json
-from identification.mismatch.fitting import extended, fit
-from identification.mismatch.flatness import noise_goes_on
-from identification.mismatch.flexible import split
-from identification.mismatch.judging import Score
-from identification.mismatch.model import Model
-from identification.mismatch.naming import doubts
-from identification.mismatch.noise import Noise
-from identification.mismatch.predicting import predicting, predicts, unforeseen
-from identification.mismatch.preparing import Refusal, history_of
-from identification.mismatch.search import search
+from identification.mismatch.estimate.fitting import extended, fit
+from identification.mismatch.model.model import Model
+from identification.mismatch.name.naming import doubts
+from identification.mismatch.noise.covariance import Noise
+from identification.mismatch.pipeline import diagnose
+from identification.mismatch.prepare.preparing import Refusal, history_of
+from identification.mismatch.select.baseline import baseline, start
+from identification.mismatch.select.flatness import noise_goes_on
+from identification.mismatch.select.forward_selection import search
+from identification.mismatch.unnamed.flexible import split
+from identification.mismatch.validate.held_out import Score
+from identification.mismatch.validate.prediction import predicting, predicts, unforeseen
 from identification.physics.dead_band import DeadBand
 from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.motor_lag import MotorLag

@@ -6,9 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.noise import Noise, Rows, Whitener, rows_of
-from identification.mismatch.noise_likelihood import fit_noise
-from identification.mismatch.restricted import Response, likelihood
+from identification.mismatch.noise.covariance import Noise, Rows, Whitener, rows_of
+from identification.mismatch.noise.restricted_likelihood import Response, likelihood
+from identification.mismatch.noise.variances import fit_noise
 
 MIXED = Noise(0.04, 0.0009, (0.15, 4.0), (0.05, 0.3), ((3.0, 4.0),), (0.2,))
 SLOW = Noise(0.04, 0.0009, (0.15, 4.0), (0.05, 0.3))

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.preparing import Refusal, history_of
-from identification.physics.history import History
+from identification.mismatch.prepare.preparing import Refusal, history_of
 from identification.recording import Channel, Recording
+from identification.run_history.history import History
 
 UNITS = {
     "thrust": "N",

@@ -6,7 +6,8 @@ from types import SimpleNamespace
 
 import pytest
 
-from identification.mismatch import diagnosing, search
+from identification.mismatch import pipeline as diagnosing
+from identification.mismatch.select import forward_selection as search
 
 
 def state(*terms):

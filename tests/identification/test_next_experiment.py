@@ -5,13 +5,21 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import PlanStep
-from identification.mismatch.foreseeing import AFTER_STEP, Bench, Outlook, ending, intervals, one_zero, stretches
-from identification.mismatch.preparing import history_of
-from identification.mismatch.search import search
-from identification.mismatch.separating import distances, pieces, power
-from identification.mismatch.sweeps import REST, Block, Limits, blocks, put_together, round_level
+from identification.mismatch.next_experiment.discrimination import distances, pieces, power
+from identification.mismatch.next_experiment.predicted_response import (
+    AFTER_STEP,
+    Bench,
+    Outlook,
+    ending,
+    intervals,
+    one_zero,
+    stretches,
+)
+from identification.mismatch.next_experiment.sweeps import REST, Block, Limits, blocks, put_together, round_level
+from identification.mismatch.pipeline import diagnose
+from identification.mismatch.prepare.preparing import history_of
+from identification.mismatch.select.forward_selection import search
 from identification.recording import Channel, Recording
 
 RATE, HOLD, TOP, C, NOISE = 40.0, 3.0, 20.0, 0.4, 1.2

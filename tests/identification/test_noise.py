@@ -5,8 +5,8 @@ import pytest
 from scipy.stats import t as student
 from thrust_runs import ar1, flicker, white
 
-from identification.noise import ar1_mean_variance, fit_noise, leverage
-from identification.shared_noise import fit_noise_jointly
+from identification.estimation.even_noise import ar1_mean_variance, fit_noise, leverage
+from identification.steady_state.shared_noise import fit_noise_jointly
 
 RUNS = 300
 

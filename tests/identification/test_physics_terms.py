@@ -11,11 +11,11 @@ from runs_on_intervals import history, moment, scale, uneven
 from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
-from identification.mismatch.model import Model, Theta, predict
-from identification.physics import filters
+from identification.mismatch.model.model import Model, Theta, predict
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.rotation_coupling import slip
 from identification.physics.term import STAGES
+from identification.run_history import filters
 
 H = history()
 S = scale(H)

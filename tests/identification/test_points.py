@@ -2,9 +2,9 @@ import numpy as np
 import pytest
 from thrust_runs import LEVELS, level_table, sine, staircase
 
-from identification.holds import from_steps, from_voltage, overlap_free
-from identification.points import find_windows, reduce_to_points, resolution, voltage_channel
 from identification.recording import Channel, Recording, Step
+from identification.steady_state.holds import from_steps, from_voltage, overlap_free
+from identification.steady_state.points import find_windows, reduce_to_points, resolution, voltage_channel
 
 
 def points_of(recording):

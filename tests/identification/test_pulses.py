@@ -5,13 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.baseline import baseline, start
-from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
-from identification.mismatch.model import Model
-from identification.mismatch.omnibus import PLAIN_P
-from identification.mismatch.preparing import history_of
-from identification.mismatch.pulses import likeliest_pulses
+from identification.mismatch.locate.pulses import likeliest_pulses
+from identification.mismatch.locate.residual_structure_test import PLAIN_P
+from identification.mismatch.model.model import Model
+from identification.mismatch.pipeline import diagnose
+from identification.mismatch.prepare.preparing import history_of
+from identification.mismatch.select.baseline import baseline, start
 from identification.recording import Channel
 from rig.twin import read_twin, write_twin
 from tests.identification.diagnosed_runs import run

@@ -3,7 +3,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from identification.regression import least_squares, weighted
+from identification.estimation.regression import least_squares, weighted
 
 
 def problem(seed, n=30, p=3):

@@ -15,7 +15,7 @@ from identification.mismatch.diagnosis import (
     Unexplained,
     Where,
 )
-from identification.mismatch.settle import (
+from identification.mismatch.next_experiment.sequential_experiment import (
     LEAST,
     Course,
     End,

@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 from thrust_runs import ar1
 
-from identification.settling import exponential_cut, mser_cut, settle
+from identification.steady_state.settling import exponential_cut, mser_cut, settle
 
 
 def decay(n, amplitude, tau, sigma=1.0, seed=0):

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.mismatch.compare.reported_runs import runs_of
+from identification.mismatch.compare.signature import profile, shape, signature
 from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, HeldOutRmse, Rmse, Value
-from identification.mismatch.reported_runs import runs_of
-from identification.mismatch.signature import profile, shape, signature
 
 LEVELS = np.array([0.0, 8.0, -8.0, 2.0, 16.0, -16.0, -2.0, 0.0, 12.0, 4.0, -12.0, -4.0])
 HOLD, RATE, C = 10.0, 20.0, 0.4

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from identification.singular_values import thin_svd
+from identification.estimation.singular_values import thin_svd
 
 
 def given_up(*_: Any, **__: Any) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis
+from identification.mismatch.pipeline import diagnose
 from sim_devices import concealed
 from tests.concealed.recordings import recording
 from tests.identification.diagnosed_runs import run

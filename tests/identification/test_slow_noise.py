@@ -5,11 +5,11 @@ import pytest
 from scipy.signal import lfilter
 from thrust_runs import white
 
-from identification.asymptote import asymptote
 from identification.recording import Channel, Recording, Step
-from identification.shared_noise import fit_noise_jointly
-from identification.steady import settled_estimate
-from identification.thrust import fit_thrust
+from identification.steady_state.asymptote import asymptote
+from identification.steady_state.shared_noise import fit_noise_jointly
+from identification.steady_state.steady import settled_estimate
+from identification.thruster.thrust import fit_thrust
 
 RATE, SLOW_TIME = 92.0, 0.5
 PLAN = (0.0, 4.0, -4.0, 8.0, -8.0, 12.0, 0.0, -12.0, 16.0, -16.0, 20.0, -20.0, 0.0)

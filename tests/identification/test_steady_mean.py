@@ -3,7 +3,7 @@ import pytest
 from scipy.stats import t as student
 from thrust_runs import ar1, white
 
-from identification.steady import SteadyMonitor, mean_estimate, settled_estimates
+from identification.steady_state.steady import SteadyMonitor, mean_estimate, settled_estimates
 
 
 @pytest.mark.parametrize("draw", [white, ar1(0.9)])

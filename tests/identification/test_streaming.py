@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from identification.regression import least_squares
-from identification.streaming import stream_least_squares
+from identification.estimation.regression import least_squares
+from identification.estimation.streaming import stream_least_squares
 
 NAMES = ("a", "b", "c")
 ROWS = 4096

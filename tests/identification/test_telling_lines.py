@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from diagnosed_runs import NOISE, C, levels, run
 
-from identification.mismatch.diagnosing import diagnose
+from identification.mismatch.compare.simulation import Drive, simulate, wave_notes
 from identification.mismatch.diagnosis import diagnosis_json
-from identification.mismatch.simulating import Drive, simulate, wave_notes
-from identification.mismatch.turns import turned
+from identification.mismatch.periodic.rotor_angle import turned
+from identification.mismatch.pipeline import diagnose
 from identification.recording import Channel, Recording
 from identification.watching.known import expected_of
 from rig.twin import read_twin, twin_json, write_twin

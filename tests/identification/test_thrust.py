@@ -12,12 +12,12 @@ from thrust_runs import (
     white,
 )  # fmt: skip
 
-from identification.estimation import Rows, estimate, excess_std
-from identification.pooling import inverse_trigamma, moderate
+from identification.estimation.least_squares import Rows, estimate, excess_std
 from identification.recording import Channel, Recording
-from identification.thrust import ThrustFit, fit_thrust
-from identification.thrust_data import Unusable, gain_std
-from identification.thrust_report import digits, sentence, table, verdicts
+from identification.steady_state.pooling import inverse_trigamma, moderate
+from identification.thruster.thrust import ThrustFit, fit_thrust
+from identification.thruster.thrust_data import Unusable, gain_std
+from identification.thruster.thrust_report import digits, sentence, table, verdicts
 
 SHORT = (0.0, 9.0, -9.0, 18.0, -18.0, 0.0, 13.0, -13.0)
 

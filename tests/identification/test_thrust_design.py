@@ -3,10 +3,19 @@
 import numpy as np
 import pytest
 
-from identification.experiment import Candidates, Design, optimal_levels
-from identification.regression import Deficiency
-from identification.run_order import Course, Setting, Slow, best_order, exposure, heat_state, schedule, spread_out
-from identification.thrust_design import Means, Noise, Promise, Terms, noise_of, noticed, promise
+from identification.estimation.regression import Deficiency
+from identification.experiment_design.experiment import Candidates, Design, optimal_levels
+from identification.experiment_design.run_order import (
+    Course,
+    Setting,
+    Slow,
+    best_order,
+    exposure,
+    heat_state,
+    schedule,
+    spread_out,
+)
+from identification.experiment_design.thrust_design import Means, Noise, Promise, Terms, noise_of, noticed, promise
 
 COURSE = Course(12.0, 4, 1.0, 3.0, 0.8)
 V = np.array([20.0, -20.0, 10.0, -10.0, 5.0, -5.0, 20.0, -20.0])

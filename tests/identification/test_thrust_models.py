@@ -5,10 +5,10 @@ import pytest
 from thrust_runs import ar1, sine, staircase
 
 from identification.recording import Channel, Recording
-from identification.thrust import ThrustFit, fit_thrust
-from identification.thrust_choice import effective_samples, side_by_side, statement, without
-from identification.thrust_data import Unusable, flow_of
-from identification.thrust_forms import FORMS, columns, model_of
+from identification.thruster.model_choice import effective_samples, side_by_side, statement, without
+from identification.thruster.thrust import ThrustFit, fit_thrust
+from identification.thruster.thrust_data import Unusable, flow_of
+from identification.thruster.thrust_forms import FORMS, columns, model_of
 
 C_T, C_S, K = 0.4, 1.5, 1.1
 

@@ -6,12 +6,12 @@ from scipy.integrate import solve_ivp
 from scipy.stats import chi2
 from thrust_runs import ar1, white
 
-from identification.dynamics_report import levels_table, sentence, verdicts
 from identification.recording import Channel, Recording
-from identification.rotor_data import Drive, drive
-from identification.rotor_simulation import simulate
-from identification.thrust_data import Unusable
-from identification.thruster_dynamics import DynamicsFit, fit_dynamics
+from identification.thruster.dynamics import DynamicsFit, fit_dynamics
+from identification.thruster.dynamics_report import levels_table, sentence, verdicts
+from identification.thruster.rotor_data import Drive, drive
+from identification.thruster.rotor_simulation import simulate
+from identification.thruster.thrust_data import Unusable
 
 ALPHA, K, GAMMA, DELAY = 0.2, 1.1, 4.0, 0.03
 LEVELS = (8.0, -8.0, 16.0, -16.0, 5.0, 12.0)

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from identification.mismatch.preparing import history_of
-from identification.mismatch.sizes import scale_of
-from identification.mismatch.tick_response import told
+from identification.mismatch.model.step_response import told
+from identification.mismatch.prepare.preparing import history_of
+from identification.mismatch.prepare.scales import scale_of
 from identification.physics.motor_lag import MotorLag
 from identification.physics.stand_resonance import StandResonance
 from identification.physics.time_skew import TimeSkew

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from identification.mismatch.baseline import start
-from identification.mismatch.fitting import raw
-from identification.mismatch.model import Model
-from identification.mismatch.preparing import history_of
-from identification.physics.filters import lag
-from identification.physics.history import ticks_before
+from identification.mismatch.estimate.fitting import raw
+from identification.mismatch.model.model import Model
+from identification.mismatch.prepare.preparing import history_of
+from identification.mismatch.select.baseline import start
 from identification.physics.motor_lag import MotorLag
 from identification.physics.stand_resonance import StandResonance
-from identification.physics.ticks_passed import Passed
 from identification.recording import Channel, Recording
+from identification.run_history.filters import lag
+from identification.run_history.history import ticks_before
+from identification.run_history.sub_interval_dynamics import Passed
 
 TICK = 0.05
 TAU = 0.003

@@ -16,13 +16,13 @@ from vehicle_world import (
     truth_of,
 )  # fmt: skip
 
-from identification.inertia import by_derivative, output_error
-from identification.maximum_likelihood import Gaussian
-from identification.thrust_data import Unusable
-from identification.vehicle import fit_runs, identify_drag, passed_on
-from identification.vehicle_campaign import AxisTrials, CampaignFacts, identify_axis, identify_vehicle, sort_trials
-from identification.vehicle_replay import validate
-from identification.vehicle_trials import Trial, steady_runs, trial
+from identification.estimation.maximum_likelihood import Gaussian
+from identification.thruster.thrust_data import Unusable
+from identification.vehicle.campaign import AxisTrials, CampaignFacts, identify_axis, identify_vehicle, sort_trials
+from identification.vehicle.inertia import by_derivative, output_error
+from identification.vehicle.replay import validate
+from identification.vehicle.steady_drag import fit_runs, identify_drag, passed_on
+from identification.vehicle.trials import Trial, steady_runs, trial
 from sim_devices.vehicle import romeo, run_trials
 from sim_devices.vehicle.campaign import (
     ALL,

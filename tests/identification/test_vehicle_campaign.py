@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from vehicle_world import installation, recordings_of
 
-from identification.efficiency import Installation, Interaction, Thruster
-from identification.maximum_likelihood import Gaussian
+from identification.comparators.rivals import rivals
+from identification.estimation.maximum_likelihood import Gaussian
 from identification.recording import Channel, Recording
-from identification.thrust_data import Unusable
-from identification.vehicle_campaign import (
+from identification.thruster.thrust_data import Unusable
+from identification.vehicle.campaign import (
     AxisTrials,
     CampaignFacts,
     at_once,
@@ -19,11 +19,11 @@ from identification.vehicle_campaign import (
     sort_trials,
     step_of,
 )
-from identification.vehicle_replay import replay
-from identification.vehicle_report import is_calibration, rows, verdict
-from identification.vehicle_rivals import rivals
-from identification.vehicle_simulation import simulate_all
-from identification.vehicle_trials import trial
+from identification.vehicle.efficiency import Installation, Interaction, Thruster
+from identification.vehicle.replay import replay
+from identification.vehicle.report import is_calibration, rows, verdict
+from identification.vehicle.simulation import simulate_all
+from identification.vehicle.trials import trial
 from sim_devices.vehicle import romeo
 from sim_devices.vehicle.campaign import BALLAST, DIVE, FRONT, TURN_FRONT, sine, there_and_back
 

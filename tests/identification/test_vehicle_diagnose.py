@@ -9,13 +9,13 @@ from math import isfinite
 import numpy as np
 import pytest
 
-from identification.efficiency import Installation, Thruster
-from identification.mismatch.diagnosing import diagnose
 from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
-from identification.mismatch.preparing import Refusal
+from identification.mismatch.pipeline import diagnose
+from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.vehicle.diagnose import diagnose_vehicle
 from identification.mismatch.vehicle.setup import Stated, VehicleSetup, straight_ahead
 from identification.recording import Channel, Recording
+from identification.vehicle.efficiency import Installation, Thruster
 from rig.diagnose_text import diagnosis_text
 from sim_devices.vehicle import Trial
 from tests.concealed.vehicles import DIVE, Case, case, levels_of, recordings, setup, surge_trials

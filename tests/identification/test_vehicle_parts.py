@@ -8,8 +8,11 @@ from thrust_runs import staircase
 from vehicle_world import installation, recordings_of
 
 from identification.comparators import by_annealing, by_kalman
-from identification.constant_velocity import approaches, straight_line, velocities
-from identification.efficiency import (
+from identification.estimation.maximum_likelihood import Gaussian, independent, maximise
+from identification.recording import Channel, Recording
+from identification.thruster.thrust import fit_thrust
+from identification.thruster.thrust_data import Unusable
+from identification.vehicle.efficiency import (
     Installation,
     Interaction,
     Thruster,
@@ -17,17 +20,14 @@ from identification.efficiency import (
     efficiency_sentence,
     force_on,
 )
-from identification.inertia import by_derivative, output_error
-from identification.inertia_by_derivative import inverse_inertia, smoothed
-from identification.maximum_likelihood import Gaussian, independent, maximise
-from identification.recording import Channel, Recording
-from identification.thrust import fit_thrust
-from identification.thrust_data import Unusable
-from identification.vehicle import identify_drag, steady_velocity, unit_of
-from identification.vehicle_entangled import entanglement
-from identification.vehicle_replay import fit_percent
-from identification.vehicle_simulation import integrate
-from identification.vehicle_trials import Trial, dominant_axis, response_of, steady_runs, trial
+from identification.vehicle.entangled import entanglement
+from identification.vehicle.inertia import by_derivative, output_error
+from identification.vehicle.inertia_by_derivative import inverse_inertia, smoothed
+from identification.vehicle.replay import fit_percent
+from identification.vehicle.simulation import integrate
+from identification.vehicle.steady_drag import identify_drag, steady_velocity, unit_of
+from identification.vehicle.trials import Trial, dominant_axis, response_of, steady_runs, trial
+from identification.velocity.constant_velocity import approaches, straight_line, velocities
 from sim_devices.vehicle import romeo
 from sim_devices.vehicle.campaign import FRONT, sine, there_and_back
 

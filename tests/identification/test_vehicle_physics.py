@@ -8,7 +8,6 @@ from math import exp, sqrt, tanh
 import numpy as np
 import pytest
 
-from identification.efficiency import Installation, Interaction, Thruster
 from identification.mismatch.vehicle.model import VehicleModel, begin, layout_of, predict
 from identification.mismatch.vehicle.motion import changes, left_over, linearised, moved, observed
 from identification.mismatch.vehicle.runs import Prepared, prepare
@@ -16,6 +15,7 @@ from identification.mismatch.vehicle.setup import Stated, VehicleSetup
 from identification.physics.vehicle.catalogue import CATALOGUE
 from identification.physics.vehicle.term import Body, Scale, VehicleTerm
 from identification.recording import Channel, Recording
+from identification.vehicle.efficiency import Installation, Interaction, Thruster
 
 SCALE = Scale("surge", 20.0, 300.0, 1.5, 40.0, 200.0, 0.1, 500.0, True, 0.4)
 LARGE = replace(SCALE, axis="heave", volts=48.0, force=3.0, speed=0.2, ballasts=("a", "b"))

@@ -4,8 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.signal import savgol_filter
 
-from identification.local_polynomial import coefficient_rows, is_even
-from identification.velocity import Adaptive, Derivative, Window, derivative
+from identification.velocity.local_polynomial import coefficient_rows, is_even
+from identification.velocity.velocity import Adaptive, Derivative, Window, derivative
 
 EVEN = np.arange(60) / 4
 

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 from thrust_runs import ar1
 
-from identification.verdicts import residual_variance, significance, underfit, whiteness
+from identification.estimation.verdicts import residual_variance, significance, underfit, whiteness
 
 
 @given(st.floats(0.01, 1e3), st.floats(0.01, 1e3))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.mismatch.preparing import Refusal
+from identification.mismatch.prepare.preparing import Refusal
 from identification.twin import TERMS, Twin, TwinNoise, TwinTerm
 from identification.watching import Settings, Watch
 from identification.watching.evidence import SLOTS, Evidence

@@ -7,13 +7,13 @@ import numpy as np
 from monte_carlo import NOISES, Case, Draw, blockwise, drawn
 
 from identification.comparators import by_annealing, by_kalman
-from identification.efficiency import Force, Installation, Interaction, Thruster
-from identification.inertia import by_derivative, output_error, responses
-from identification.maximum_likelihood import Gaussian
+from identification.estimation.maximum_likelihood import Gaussian
 from identification.recording import Channel, Recording, Step
-from identification.thrust_data import Unusable
-from identification.vehicle import identify_drag, predicted_velocities
-from identification.vehicle_trials import Trial, steady_runs
+from identification.thruster.thrust_data import Unusable
+from identification.vehicle.efficiency import Force, Installation, Interaction, Thruster
+from identification.vehicle.inertia import by_derivative, output_error, responses
+from identification.vehicle.steady_drag import identify_drag, predicted_velocities
+from identification.vehicle.trials import Trial, steady_runs
 from sim_devices.vehicle.campaign import ALL, FRONT, REAR, scaled
 
 FIX_SIGMA = 0.07

@@ -7,12 +7,12 @@ from time import process_time
 import numpy as np
 
 from identification.comparators import by_annealing, by_kalman
-from identification.efficiency import Installation, Interaction, Thruster
-from identification.inertia import by_derivative, output_error
 from identification.recording import Channel, Recording, Step
-from identification.vehicle import identify_drag
-from identification.vehicle_campaign import CampaignFacts, identify_vehicle
-from identification.vehicle_trials import trial
+from identification.vehicle.campaign import CampaignFacts, identify_vehicle
+from identification.vehicle.efficiency import Installation, Interaction, Thruster
+from identification.vehicle.inertia import by_derivative, output_error
+from identification.vehicle.steady_drag import identify_drag
+from identification.vehicle.trials import trial
 from sim_devices.vehicle import romeo, run_trials
 from sim_devices.vehicle.body import Body
 from sim_devices.vehicle.campaign import heave_steady, sines, surge_steady, sway_steady, yaw_steady

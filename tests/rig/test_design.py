@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.run_order import Course, Slow, schedule
-from identification.thrust_design import Noise, Terms
+from identification.experiment_design.run_order import Course, Slow, schedule
+from identification.experiment_design.thrust_design import Noise, Terms
 from rig.check import check_campaign
 from rig.cli import main
 from rig.design import design, plan_of

@@ -256,7 +256,7 @@ def test_compare_writes_and_holds_out_as_diagnose_does(simulation, dead, folder,
 
 
 def test_compare_draws_each_effect_by_itself(simulation, dead):
-    from identification.mismatch.reported_runs import runs_of
+    from identification.mismatch.compare.reported_runs import runs_of
     from rig.compare import compare_files
 
     found = compare_files(simulation, dead[0])

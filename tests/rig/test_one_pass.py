@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from identification.recording import Channel
-from identification.thrust_data import voltage_at
+from identification.thruster.thrust_data import voltage_at
 from rig.errors import RecordingError
 from rig.fit import fit_command
 from rig.hdf5 import blocks, load

@@ -16,7 +16,7 @@ from blind_scores import CATALOGUE, WORLD, answer, finding, order, truth, whole_
 from click.testing import CliRunner
 from report_reading import open_fonts
 
-from identification.mismatch.simulating import Prediction
+from identification.mismatch.compare.simulation import Prediction
 from rig.blind import answering, elsewhere
 from rig.blind.answering import answered
 from rig.blind.collecting import Collected, Known, collected, not_good

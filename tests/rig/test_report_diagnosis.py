@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 from report_reading import open_fonts, read
 
+from identification.flexible_terms.flexible import MULTIPLIERS, WORDS
+from identification.mismatch.answer.remainder import FlexibleShape, Spline
 from identification.mismatch.diagnosis import (
     NOT_WHITE,
     Curves,
@@ -21,9 +23,7 @@ from identification.mismatch.diagnosis import (
     Value,
     Where,
 )
-from identification.mismatch.preparing import history_of
-from identification.mismatch.remainder import FlexibleShape, Spline
-from identification.physics.free_form import MULTIPLIERS, WORDS
+from identification.mismatch.prepare.preparing import history_of
 from identification.physics.term import Scale
 from identification.recording import Channel, Recording
 from identification.twin import Source, Twin, TwinNoise, TwinTerm

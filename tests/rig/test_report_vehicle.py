@@ -5,12 +5,12 @@ import numpy as np
 import pytest
 from report_reading import open_fonts, read
 
-from identification.efficiency import Installation, Thruster
-from identification.maximum_likelihood import Gaussian, independent
+from identification.estimation.maximum_likelihood import Gaussian, independent
 from identification.recording import Channel, Recording, Step
-from identification.thrust_data import Unusable
-from identification.vehicle_campaign import identify_vehicle
-from identification.vehicle_replay import Replay
+from identification.thruster.thrust_data import Unusable
+from identification.vehicle.campaign import identify_vehicle
+from identification.vehicle.efficiency import Installation, Thruster
+from identification.vehicle.replay import Replay
 from rig.report.page import html
 from rig.report.vehicle import vehicle_page
 from rig.vehicle import HeldOut, VehicleAnswer

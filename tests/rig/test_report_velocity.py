@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from report_reading import open_fonts, read
 
-from identification.velocity import Window, derivative
+from identification.velocity.velocity import Window, derivative
 from rig.report.look import svg
 from rig.report.page import html
 from rig.report.velocity import draw_velocity, velocity_example, velocity_page

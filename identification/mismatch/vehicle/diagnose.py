@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.mismatch.diagnosis import Diagnosis, Mismatch, Rmse, Verdict
-from identification.mismatch.preparing import Refusal
+from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.vehicle.answering import (
     baseline_words,
     curves_of,

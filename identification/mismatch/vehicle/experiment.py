@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import norm
 
 from identification.mismatch.diagnosis import NextExperiment, PlanStep
-from identification.mismatch.noise import Noise, Rows, Whitener
+from identification.mismatch.noise.covariance import Noise, Rows, Whitener
 from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.model import on_other_runs, predict
 from identification.mismatch.vehicle.naming import EQUAL, Named

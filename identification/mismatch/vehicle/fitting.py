@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.noise import Noise, Rows, Whitener
-from identification.mismatch.noise_likelihood import fit_noise
+from identification.estimation.singular_values import thin_svd
+from identification.mismatch.noise.covariance import Noise, Rows, Whitener
+from identification.mismatch.noise.variances import fit_noise
 from identification.mismatch.vehicle.model import Known, Layout, known, predict
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared
 from identification.recording import Floats
-from identification.singular_values import thin_svd
 
 STEPS = 30
 ENOUGH = 1e-3

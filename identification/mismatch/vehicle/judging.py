@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.mismatch.diagnosis import HeldOutRmse
-from identification.mismatch.noise import Noise
+from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.vehicle.fitting import Fit, fit, weights
 from identification.mismatch.vehicle.free_force import carried, free_index
 from identification.mismatch.vehicle.model import Layout, on_other_runs, without_term

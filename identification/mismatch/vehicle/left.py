@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
+from identification.estimation.singular_values import thin_svd
 from identification.mismatch.vehicle.fitting import Fit, Weights
 from identification.mismatch.vehicle.model import added_forces, respond
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared, Run
 from identification.mismatch.vehicle.screening import beyond, surrogates
 from identification.recording import Floats
-from identification.singular_values import thin_svd
 
 BUMPS = 6
 ALARM = 0.01

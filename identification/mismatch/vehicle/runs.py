@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.efficiency import Installation
-from identification.mismatch.noise import Rows
-from identification.mismatch.preparing import Refusal
+from identification.mismatch.noise.covariance import Rows
+from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.vehicle.setup import ANY_AXIS, Stated, VehicleSetup, thrust_known
 from identification.physics.vehicle.term import Moment, Scale
 from identification.recording import Channel, Floats, Recording
-from identification.vehicle_trials import response_of, thruster_volts
+from identification.vehicle.efficiency import Installation
+from identification.vehicle.trials import response_of, thruster_volts
 
 LEAST_SAMPLES = 20
 LOOKS = 2

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
+from identification.estimation.singular_values import thin_svd
 from identification.mismatch.vehicle.fitting import Fit, Weights
 from identification.mismatch.vehicle.model import predict, with_term
 from identification.mismatch.vehicle.runs import Prepared
@@ -15,7 +16,6 @@ from identification.physics.vehicle.catalogue import CATALOGUE
 from identification.physics.vehicle.installation_efficiency import InstallationEfficiency
 from identification.physics.vehicle.term import VehicleTerm
 from identification.recording import Floats
-from identification.singular_values import thin_svd
 
 ALARM = 0.01
 """Family-wise false-alarm rate."""

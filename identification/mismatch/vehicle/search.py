@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
-from identification.mismatch.noise import Noise
+from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.vehicle.fitting import Fit, Weights, fit, noise_of, weights
 from identification.mismatch.vehicle.model import Layout, VehicleModel, begin, layout_of, with_term, without_term
 from identification.mismatch.vehicle.runs import Prepared

@@ -7,10 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from identification.efficiency import Installation, Thruster
-from identification.mismatch.preparing import Refusal
+from identification.mismatch.prepare.preparing import Refusal
 from identification.recording import Recording
-from identification.vehicle_trials import dominant_axis
+from identification.vehicle.efficiency import Installation, Thruster
+from identification.vehicle.trials import dominant_axis
 
 KNOWN = 0.5
 """Relative standard deviation of a thruster's model above which it counts as not known."""

@@ -1,0 +1,1 @@
+"""Terms of a model that claim no physics: splines over a covariate, and formulas."""

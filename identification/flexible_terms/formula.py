@@ -1,0 +1,130 @@
+"""A formula of recorded quantities as a term: products and powers, added or times the thrust. No physics is claimed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import ClassVar, Literal
+
+import numpy as np
+
+from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.recording import Floats
+from identification.run_history.filters import lowpass
+from identification.run_history.history import History
+
+Times = Literal["1", "F", "|F|"]
+CHANNELS: Mapping[str, tuple[str, str]] = {
+    "n": ("rotation_rate", "rev/s"),
+    "U": ("flow_speed", "m/s"),
+    "T_w": ("water_temperature", "degC"),
+    "T_m": ("motor_temperature", "degC"),
+    "V_b": ("bus_voltage", "V"),
+    "F_j": ("neighbour_thrust", "N"),
+}
+"""Symbol -> recorded quantity and its unit."""
+MEMORIES = (5.0, 20.0, 60.0)
+"""s, of the low-passes."""
+MOST = 1e6
+"""Bound of a coefficient in full thrusts: none, but the fit wants one."""
+
+
+@dataclass(frozen=True, slots=True, order=True)
+class Monomial:
+    """A product of powers of quantities, each in units of its size, times 1, the thrust or its size."""
+
+    powers: tuple[tuple[str, int], ...]
+    """(symbol, power)"""
+    times: Times
+
+    @property
+    def degree(self) -> int:
+        return sum(p for _, p in self.powers)
+
+
+@dataclass(frozen=True, slots=True)
+class Formula:
+    """A sum of monomials."""
+
+    id: ClassVar[str] = "formula"
+    stage: ClassVar[Stage] = "hydro"
+    physics: ClassVar[str] = "a formula; no physics is claimed for it"
+    needs: ClassVar[tuple[str, ...]] = ()
+    monomials: tuple[Monomial, ...]
+    sizes: tuple[tuple[str, float], ...]
+    """(symbol, size)"""
+    middles: tuple[float, ...] = ()
+    """Of each product of powers in the data; empty: 0. A gain is counted from there, so that C stays what the thruster
+    does and not what it would do at 0 degC: the response to a tick of the command is told from C."""
+
+    @property
+    def form(self) -> str:
+        return " + ".join(_told(m) for m in self.monomials)
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(coordinate_of(q) for m in self.monomials for q, _ in m.powers))
+
+    def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
+        size = max(scale.thrust, scale.reading)
+        return tuple(
+            Parameter(f"c{i}", "N" if m.times == "1" else "1", -MOST * size, MOST * size, 0.0)
+            for i, m in enumerate(self.monomials)
+        )
+
+    def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
+    def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
+        return ()
+
+    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+        sizes, out = dict(self.sizes), value
+        middles = self.middles or (0.0,) * len(self.monomials)
+        for c, m, middle in zip(theta, self.monomials, middles, strict=True):
+            product = product_of(m, {q: quantity(q, now.history) / sizes[q] for q, _ in m.powers})
+            out = out + c * times(m.times, value) * (product - middle if m.times == "F" else product)
+        return out
+
+    def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        return f"A formula, {self.form}; no physics is claimed for it."
+
+
+def product_of(m: Monomial, unit: Mapping[str, Floats]) -> Floats:
+    """(M,) of the powers; `unit`: symbol -> (M,) in units of its size."""
+    return np.asarray(np.prod([unit[q] ** p for q, p in m.powers], axis=0))
+
+
+def _told(m: Monomial) -> str:
+    powers = " ".join(q if p == 1 else f"{q}^{p}" for q, p in m.powers)
+    return powers if m.times == "1" else f"{powers} {m.times}"
+
+
+def times(kind: Times, force: Floats) -> Floats:
+    """What a monomial is multiplied by."""
+    return {"1": np.ones_like(force), "F": force, "|F|": np.abs(force)}[kind]
+
+
+def quantity(symbol: str, history: History) -> Floats:
+    """(M,) of a symbol of the grammar; NaN where it was not recorded."""
+    driver = history.driver
+    if symbol == driver_symbol(history):
+        return driver
+    if symbol == "t":
+        return history.middle
+    if symbol.startswith("lp"):
+        memory, squared = float(symbol[2 : symbol.index("(")]), symbol.endswith("|)")
+        return lowpass(driver * np.abs(driver) if squared else np.abs(driver), history.dt, memory)[1]
+    out: Floats = history.others.get(CHANNELS[symbol][0], np.full(driver.size, np.nan))
+    return out
+
+
+def driver_symbol(history: History) -> str:
+    return "n" if history.driver_quantity == "rotation_rate" else "V"
+
+
+def coordinate_of(symbol: str) -> str:
+    """The coordinate over which what a symbol leaves would be seen."""
+    if symbol in CHANNELS:
+        return CHANNELS[symbol][0]
+    return {"t": "time", "V": "command_voltage"}.get(symbol, "load_history")

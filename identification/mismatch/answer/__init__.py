@@ -1,0 +1,1 @@
+"""From all that was found to the verdict, in words and as JSON."""

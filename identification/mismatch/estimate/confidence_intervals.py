@@ -1,0 +1,174 @@
+"""95 % intervals from the likelihood: chi-square, least over all other parameters, has risen by 3.84 at their ends.
+
+Where chi-square is a parabola that is the value +- 1.96 standard errors, and two looks are enough to know it. It is
+none for the time constant of a faint effect, nor for the instant of a jump and a threshold between two levels: of those
+twice the log of the likelihood ratio is the maximum of two Brownian motions that drift away, P(< c) = (1 - exp(-c/2))^2
+(Hansen, Econometrica 68, 575, 2000, eq. 8).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection
+from dataclasses import dataclass
+from math import log, sqrt
+
+import numpy as np
+
+from identification.mismatch.diagnosis import QUANTILE
+from identification.mismatch.estimate.fitting import LEAST_REACH, Fit, bounds_of, columns_of, residual_of
+from identification.mismatch.model.model import Data, Weights
+from identification.physics.term import Parameter, Term
+from identification.recording import Floats
+
+JUMPS = sqrt(-2 * log(1 - sqrt(0.95)))
+"""The same where the prediction jumps at the parameter: root of the rise of chi-square at the ends."""
+NEAR = 0.15
+"""Of the root of the rise: how closely the root of the rise of chi-square is met at an end, the rest in proportion."""
+NARROW = 0.1
+"""Of the distance to an end: a bracket as narrow as this ends where chi-square has risen."""
+MOST_LOOKS = 16
+"""At chi-square, for one end."""
+GROWTH = 1.5, 8.0
+"""Least and most factor by which the distance grows until chi-square has risen."""
+LEAST_STEP = 0.03
+"""Of the step of a slope: standard errors below it are the slope of a stair."""
+REFITS = 6
+SHORTER = 0.3
+FITTED = 0.2
+"""Fall of chi-square at which the other parameters are as good as fitted."""
+AS_FORETOLD = 0.7
+"""Of the fall foretold: where less comes of a step, the slopes are taken anew."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    low: float
+    high: float
+
+
+def intervals(fitted: Fit, data: Data, weights: Weights, terms: Collection[Term]) -> dict[Term, tuple[Interval, ...]]:
+    """Of all parameters of those of its `terms`."""
+    out, at = {}, 1
+    for term, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
+        if term in terms:
+            known = enumerate(term.parameters(data.scale), at)
+            out[term] = tuple(_interval(fitted, data, weights, j, p) for j, p in known)
+        at += len(values)
+    return out
+
+
+def _interval(fitted: Fit, data: Data, weights: Weights, j: int, known: Parameter) -> Interval:
+    """Of theta's parameter `j`."""
+    _, _, step = bounds_of(fitted.model, data, fitted.theta)
+    value = float(fitted.theta.vector[j])
+    wanted = JUMPS if known.jumps else QUANTILE
+    first = max(wanted * float(np.nan_to_num(fitted.std[j])), LEAST_STEP * float(step[j]))
+    profiles = [Profile(fitted, data, weights, j, jumps=known.jumps) for _ in range(2)]
+    ends = (_end(p, wanted, value, bound, first) for p, bound in zip(profiles, (known.low, known.high), strict=True))
+    # a level so near counts as half beyond a spread threshold, wholly beyond a sharp one
+    far = [abs(end - value) + 0.5 * known.blur for end in ends]
+    return Interval(max(value - far[0], known.low), min(value + far[1], known.high))
+
+
+class Profile:
+    """The rise of chi-square where parameter `j` of theta's vector is held elsewhere and the other free ones follow.
+
+    They follow by Gauss-Newton, each time from where they were last; from the fit where the prediction jumps at `j`.
+    """
+
+    def __init__(self, fitted: Fit, data: Data, weights: Weights, j: int, *, jumps: bool = False) -> None:
+        self.fitted, self.data, self.weights, self.j, self.jumps = fitted, data, weights, j, jumps
+        self.low, self.high, _ = bounds_of(fitted.model, data, fitted.theta)
+        moves = np.linalg.norm(fitted.jacobian, axis=0) * (self.high - self.low)[fitted.free] > LEAST_REACH
+        mine = np.flatnonzero(fitted.free) == j
+        self.follow = np.zeros(fitted.free.size, dtype=bool)
+        self.follow[np.flatnonzero(fitted.free)[moves & ~mine]] = True
+        self.slopes = _Slopes.of(fitted.jacobian[:, moves & ~mine])
+        # others per unit of j
+        self.drawn = -self.slopes.step(fitted.jacobian[:, mine].sum(axis=1))
+
+    def __call__(self, value: float) -> float:
+        best, others = self.fitted.theta.vector, self.follow
+        away = value - best[self.j]
+        vector = best.copy()
+        vector[self.j] = value
+        vector = self._moved(vector, self.drawn * away)
+        residual = self._residual(vector)
+        share, fresh = 1.0, False
+        for _ in range(REFITS):
+            step = share * self.slopes.step(residual)
+            foretold = float(residual @ residual - np.sum((residual - self.slopes.columns @ step) ** 2))
+            if foretold < FITTED:
+                break
+            trial = self._moved(vector, step)
+            left = self._residual(trial)
+            fall = float(residual @ residual - left @ left)
+            if fall > 0:
+                vector, residual = trial, left
+            elif fresh:
+                share *= SHORTER
+            if fall < AS_FORETOLD * foretold and not (fresh and fall <= 0):
+                theta = self.fitted.theta.with_vector(vector)
+                columns = columns_of(self.fitted.model, theta, self.data, self.weights, others)
+                self.slopes, fresh = _Slopes.of(columns), True
+        if not self.jumps:
+            self.drawn = (vector[others] - best[others]) / away
+        return float(residual @ residual) - self.fitted.chi2
+
+    def _moved(self, vector: Floats, step: Floats) -> Floats:
+        out = vector.copy()
+        out[self.follow] += step
+        return np.clip(out, self.low, self.high)
+
+    def _residual(self, vector: Floats) -> Floats:
+        theta = self.fitted.theta.with_vector(vector)
+        return residual_of(self.fitted.model, theta, self.data, self.weights)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Slopes:
+    """Columns (n, p) and the inverse of their Gram matrix."""
+
+    columns: Floats
+    inverse: Floats
+
+    @classmethod
+    def of(cls, columns: Floats) -> _Slopes:
+        size = np.linalg.norm(columns, axis=0)
+        size = np.where(size > 0, size, 1.0)
+        gram = columns.T @ columns / np.outer(size, size)
+        return cls(columns, np.linalg.pinv(gram, hermitian=True, rcond=1e-12) / np.outer(size, size))
+
+    def step(self, residual: Floats) -> Floats:
+        """(p,) that takes most from a residual (n,)."""
+        out: Floats = self.inverse @ (self.columns.T @ residual)
+        return out
+
+
+def _end(rise: Callable[[float], float], wanted: float, value: float, bound: float, first: float) -> float:
+    """Where chi-square has risen by `wanted`^2 on the way from `value` to `bound`, or the bound."""
+    most = abs(bound - value)
+    if most == 0:
+        return value
+    sign = 1.0 if bound > value else -1.0
+    inside, outside = (0.0, 0.0), (np.inf, np.inf)
+    far = min(first, most)
+    for _ in range(MOST_LOOKS):
+        root = float(np.sqrt(max(rise(value + sign * far), 0.0)))
+        if abs(root - wanted) < NEAR * wanted:
+            return value + sign * min(far * wanted / root, most)
+        if root < wanted:
+            if far == most:
+                return bound
+            inside = far, root
+        else:
+            outside = far, root
+        if np.isinf(outside[0]):
+            far = min(far * float(np.clip(wanted / max(root, 1e-3), *GROWTH)), most)
+            continue
+        width = outside[0] - inside[0]
+        if width < NARROW * outside[0]:
+            break
+        share = (wanted - inside[1]) / (outside[1] - inside[1])
+        far = inside[0] + width * float(np.clip(share, 0.25, 0.75))
+    return value + sign * (outside[0] if np.isfinite(outside[0]) else inside[0])

@@ -1,0 +1,139 @@
+"""A fit with the noise it was judged with, and how the noise is estimated anew."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from identification.estimation.singular_values import thin_svd
+from identification.mismatch.estimate.fitting import Fit, bounds_of, columns_of, fit, raw
+from identification.mismatch.model.model import Data, Model, Theta, Weights, weights
+from identification.mismatch.noise.covariance import Noise, Rows
+from identification.mismatch.noise.variances import fit_noise
+from identification.physics.term import Term
+from identification.recording import Floats
+from identification.run_history.splines import spline
+
+MOST_NODES = 17
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A fit with the noise it was judged with."""
+
+    fit: Fit
+    noise: Noise
+    rate_noise: Noise | None
+    weights: Weights
+    rows: tuple[Rows, ...]
+    lesser: dict[Term, Fit] = field(default_factory=dict, init=False, repr=False)
+    """By `fit_without`."""
+
+    @property
+    def bic(self) -> float:
+        return self.fit.deviance + int(self.fit.free.sum()) * float(np.log(max(self.fit.residual.size, 2)))
+
+
+def fit_without(state: State, term: Term, data: Data) -> Fit:
+    """The model without one of its terms, refitted with the same noise; once for all who ask."""
+    if term not in state.lesser:
+        smaller = state.fit.model.without(term)
+        kept = dict(zip(state.fit.model.terms, state.fit.theta.terms, strict=True))
+        theta = replace(state.fit.theta, terms=tuple(kept[t] for t in smaller.terms))
+        state.lesser[term] = fit(smaller, theta, data, state.weights)
+    return state.lesser[term]
+
+
+def forces(fit_model: Model, theta: Theta, data: Data) -> list[Floats]:
+    """Predicted F without tare at the rows."""
+    thrust, _ = raw(fit_model, theta, data, with_rate=False)
+    return [f - tare for f, tare in zip(thrust, theta.tares, strict=True)]
+
+
+def refresh(
+    model: Model, theta: Theta, data: Data, extra: Floats | None, state: State | None, like: Noise | None = None
+) -> State:
+    """Noise by REML on what the model leaves, the columns of the model (and of what was pursued) taken as fitted.
+
+    `like`: a noise whose time scales are kept, so that likelihoods can be compared.
+    """
+    size = forces(model, theta, data)
+    thrust, rate = raw(model, theta, data, with_rate=data.with_rate)
+    left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
+    unit = unweighted(data)
+    may = np.ones(theta.vector.size, dtype=bool)
+    may[-2:] = False
+    low, high, _ = bounds_of(model, data, theta)
+    may[-3] = high[-3] > low[-3]
+    J = columns_of(model, theta, data, unit, may)
+    parts = by_run(J, data)
+    if extra is not None and extra.shape[1]:
+        parts = [np.column_stack([p, e]) for p, e in zip(parts, by_run(extra, data), strict=True)]
+    parts = _independent(parts)
+    rows = state.rows if state is not None else data.thrust_rows
+    in_time = not any(h.static for h in data.histories)  # rows of a table may stand in the order of their levels
+    least = 0.0 if in_time else max(reading_step(h.thrust[h.rows]) for h in data.histories) ** 2 / 12
+    noise = fit_noise(rows, left, parts, size, data.bands, like, in_time=in_time, least=least)
+    rate_noise = None
+    if data.with_rate:
+        left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=True)]
+        at = [f[:, None] for f in rate] if in_time else curves(data)
+        rate_noise = fit_noise(
+            data.rate_rows,
+            left_rate,
+            at,
+            [np.zeros(r.size) for r in left_rate],
+            start=state.rate_noise if state is not None else None,
+            in_time=in_time,
+        )
+    w = weights(data, noise, size, rate_noise, rows)
+    fitted = fit(model, theta, data, w)
+    return State(fitted, noise, rate_noise, w, tuple(rows))
+
+
+def unweighted(data: Data) -> Weights:
+    white = Noise(1.0, 0.0)
+    return weights(
+        data,
+        white,
+        [np.zeros(r.size) for r in data.rows],
+        None,
+        [replace(r, count=np.ones(r.time.size)) for r in data.thrust_rows],
+        unit=True,
+    )
+
+
+def curves(data: Data) -> list[Floats]:
+    """Any smooth curve of the rate over the driver, run by run (m, p): a table's noise is what is left beside it."""
+    driver = [h.driver[h.rate_rows] for h in data.histories]
+    every = np.concatenate(driver)
+    nodes = np.quantile(np.unique(every), np.linspace(0, 1, max(3, min(MOST_NODES, every.size // 4))))
+    return [spline(v, nodes, np.eye(nodes.size), 1) for v in driver]
+
+
+def reading_step(values: Floats) -> float:
+    """The step in which a table was written: its rounding is noise too, also where it says 0.00.
+
+    >>> reading_step(np.array([0.0, 0.1, 0.1, 0.4]))
+    0.1
+    """
+    steps = np.diff(np.unique(values))
+    return float(np.min(steps, initial=np.inf, where=steps > 0)) if steps.size else 0.0
+
+
+def by_run(columns: Floats, data: Data) -> list[Floats]:
+    ends = np.cumsum([r.size for r in data.rows])
+    return list(np.split(columns[: ends[-1]], ends[:-1]))
+
+
+def _independent(parts: Sequence[Floats]) -> list[Floats]:
+    """The same span, orthonormal over all runs together."""
+    stacked = np.concatenate(parts)
+    size = np.linalg.norm(stacked, axis=0)
+    stacked = stacked[:, size > 0] / size[size > 0]
+    u, s, _ = thin_svd(stacked)
+    u = u[:, s > 1e-7 * s[0]] * np.sqrt(stacked.shape[0])
+    ends = np.cumsum([p.shape[0] for p in parts])
+    return list(np.split(u, ends[:-1]))

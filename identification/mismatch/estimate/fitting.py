@@ -1,0 +1,294 @@
+"""Fit of a model to whitened rows: Levenberg-Marquardt within the physical bounds (eq. 4.8 with full Sigma)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.estimation.singular_values import thin_svd
+from identification.mismatch.model.model import Data, Model, Theta, Weights, parameters, predict, ticked
+from identification.mismatch.model.sub_interval import ahead, delay_of, shown, turning
+from identification.physics.term import Parameter, Term
+from identification.recording import Floats
+from identification.run_history.filters import delayed, reconstructed
+
+MOST_STEPS = 25
+MOST_TRIES = 8
+"""Dampings tried for one step."""
+LEAST_REACH = 0.05
+"""sigma: a parameter that changes less within its bounds is left where it is."""
+SLOW_FALLS = 3.0
+"""Further falls of the last size that a fit may be short of what is hoped for."""
+PRESSED = 2.5
+"""Sigmas by which a parameter asks to go beyond its bound."""
+DELAYING = frozenset({"motor_lag", "time_skew", "stand_resonance", "inflow_dynamics"})
+MUCH = 0.2
+"""Of the most that clocks may differ by."""
+CLOSE = 1e-4
+"""Fall of chi-square at which a fit has ended; a difference of 1 is one sigma."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A model at its best values, on whitened rows."""
+
+    model: Model
+    theta: Theta
+    residual: Floats
+    """(n,) whitened."""
+    jacobian: Floats
+    """(n, p) whitened, all parameters that were free."""
+    free: NDArray[np.bool_]
+    """(q,) of the whole vector of theta: what was free, and not at a bound."""
+    log_det: float = 0.0
+
+    @property
+    def chi2(self) -> float:
+        return float(self.residual @ self.residual)
+
+    @property
+    def deviance(self) -> float:
+        """-2 log likelihood, up to a constant; noise included, for fits with different noise."""
+        return self.chi2 + self.log_det
+
+    @property
+    def cov(self) -> Floats:
+        """(q, q) of the whole vector, NaN where not free."""
+        q = self.free.size
+        out = np.full((q, q), np.nan)
+        J = self.jacobian
+        size = np.linalg.norm(J, axis=0)
+        size = np.where(size > 0, size, 1.0)
+        inverse = np.linalg.pinv((J / size).T @ (J / size), hermitian=True, rcond=1e-12) / np.outer(size, size)
+        out[np.ix_(self.free, self.free)] = inverse
+        return out
+
+    @property
+    def std(self) -> Floats:
+        return np.sqrt(np.diag(self.cov))
+
+
+def bounds_of(model: Model, data: Data, theta: Theta) -> tuple[Floats, Floats, Floats]:
+    """(low, high, step) of the whole vector."""
+    scale = data.scale
+    known = [p for group in parameters(model, scale) for p in group]
+    R = len(theta.tares)
+    most = 0.0 if any(term.id == "time_skew" for term in model.terms) else data.most_shift
+    low = np.array([-np.inf, *(p.low for p in known), *([-np.inf] * R), -most, -data.most_shift, -np.inf])
+    high = np.array([np.inf, *(p.high for p in known), *([np.inf] * R), most, data.most_shift, np.inf])
+    C = scale.thrust / scale.driver**2
+    steps = [1e-4 * C]
+    for p, value in zip(known, theta.vector[1 : 1 + len(known)], strict=True):
+        span = p.high - p.low
+        steps.append(min(1e-3 * span, 1e-3 * max(abs(value), 0.02 * span)))
+    steps += [1e-3 * scale.thrust] * R + [1e-4, 1e-4, 1e-4 * (abs(theta.k) or 1.0)]
+    return low, high, np.array(steps)
+
+
+def raw(
+    model: Model, theta: Theta, data: Data, *, with_rate: bool, near: Theta | None = None
+) -> tuple[list[Floats], list[Floats]]:
+    """Predictions at the rows: thrust with tare, and rate; run by run.
+
+    Ticks of the command come with the delay of `near`, else of `theta`: a small step moves none across a sample, and
+    would hide the slope.
+    """
+    thrust, rate = [], []
+    there = near or theta
+    late = delay_of(model, there) + there.shift
+    for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
+        F, x = predict(model, theta, history, data.scale, i)
+        more = theta.C * shown(model, theta, history, F, x, theta.tares[i])
+        more = more * ahead(model, theta, history, x, data.scale.driver, late)
+        if theta.shift:
+            F = delayed(F, history.edges, theta.shift)
+        thrust.append((reconstructed(F, history.middle, history.sampled) + more)[rows] + theta.tares[i])
+        if with_rate:
+            seen = turning(model, theta, history, x, data.scale.driver, there.rate_shift)
+            rate.append(theta.k * seen[history.rate_rows])
+    return thrust, rate
+
+
+def residual_of(model: Model, theta: Theta, data: Data, weights: Weights) -> Floats:
+    thrust, rate = raw(model, theta, data, with_rate=bool(weights.rate))
+    left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
+    left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=False)] if weights.rate else []
+    told = ticks_told(model, theta, data, weights)
+    return weights.whiten(left, left_rate, [rows.target - f for rows, f in zip(data.ticks, told, strict=False)])
+
+
+def change_of(
+    before: tuple[Model, Theta], after: tuple[Model, Theta], data: Data, weights: Weights
+) -> tuple[list[Floats], list[Floats], list[Floats]]:
+    """What `after` predicts less what `before` does: thrust, rate and ticks, as `Weights.whiten` takes them."""
+    old = (*raw(*before, data, with_rate=bool(weights.rate)), ticks_told(*before, data, weights))
+    new = (*raw(*after, data, with_rate=bool(weights.rate)), ticks_told(*after, data, weights))
+    thrust, rate, ticks = ([b - a for a, b in zip(x, y, strict=True)] for x, y in zip(old, new, strict=True))
+    return thrust, rate, ticks
+
+
+def ticks_told(model: Model, theta: Theta, data: Data, weights: Weights) -> list[Floats]:
+    return ticked(model, theta, data) if weights.ticks else []
+
+
+def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: NDArray[np.bool_]) -> Floats:
+    """(n, p) whitened slopes of the prediction over the parameters in `which`."""
+    low, high, step = bounds_of(model, data, theta)
+    del low
+    base_thrust, base_rate = raw(model, theta, data, with_rate=bool(weights.rate))
+    vector = theta.vector
+    R, q = len(theta.tares), vector.size
+    base_ticks = ticks_told(model, theta, data, weights)
+    thrust: list[list[Floats]] = [[] for _ in data.histories]
+    rate: list[list[Floats]] = [[] for _ in data.histories]
+    ticks: list[list[Floats]] = [[] for _ in base_ticks]
+    for j in np.flatnonzero(which):
+        run = j - (q - 3 - R)
+        if 0 <= run < R:  # a tare moves its own run by one
+            for i in range(R):
+                thrust[i].append(np.full(base_thrust[i].size, float(i == run)))
+                if weights.rate:
+                    rate[i].append(np.zeros(base_rate[i].size))
+            for column, base in zip(ticks, base_ticks, strict=True):
+                column.append(np.zeros(base.size))
+            continue
+        h = step[j] if vector[j] + step[j] <= high[j] else -step[j]
+        moved = vector.copy()
+        moved[j] += h
+        moved_theta = theta.with_vector(moved)
+        new_thrust, new_rate = raw(model, moved_theta, data, with_rate=bool(weights.rate), near=theta)
+        for i in range(R):
+            thrust[i].append((new_thrust[i] - base_thrust[i]) / h)
+            if weights.rate:
+                rate[i].append((new_rate[i] - base_rate[i]) / h)
+        for column, base, new in zip(ticks, base_ticks, ticks_told(model, moved_theta, data, weights), strict=True):
+            column.append((new - base) / h)
+    stacked = [np.column_stack(c) if c else np.empty((y.size, 0)) for c, y in zip(thrust, base_thrust, strict=True)]
+    stacked_rate = [np.column_stack(c) for c in rate] if weights.rate and which.any() else []
+    stacked_ticks = [np.column_stack(c) if c else np.empty((y.size, 0)) for c, y in zip(ticks, base_ticks, strict=True)]
+    return weights.whiten(stacked, stacked_rate, stacked_ticks)
+
+
+def fit(
+    model: Model,
+    start: Theta,
+    data: Data,
+    weights: Weights,
+    most_steps: int = MOST_STEPS,
+    hopeless: float = np.inf,
+) -> Fit:
+    """Least squares of the whitened residual within the bounds.
+
+    What comes late and clocks that differ look alike, and small steps of the command at few phases of the samples leave
+    valleys between: where a shift of the clocks was found beside such a term, it is also looked for without one. So it
+    is where none at all is better: chi-square has an edge where a step passes from one sample into the next.
+    Ends early once chi-square is above `hopeless` and falls too slowly to get there.
+    """
+    found = _descended(model, start, data, weights, most_steps, hopeless)
+    shift = max(abs(found.theta.shift), abs(found.theta.rate_shift))
+    if shift == 0:
+        return found
+    alike = replace(found.theta, shift=0.0, rate_shift=0.0)
+    doubtful = shift > MUCH * data.most_shift > 0 and any(term.id in DELAYING for term in model.terms)
+    if not doubtful:
+        left = residual_of(model, alike, data, weights)
+        if not float(left @ left) < found.chi2:
+            return found
+    other = _descended(model, alike, data, weights, most_steps, hopeless)
+    return min(found, other, key=lambda each: each.chi2)
+
+
+def _descended(model: Model, start: Theta, data: Data, weights: Weights, most_steps: int, hopeless: float) -> Fit:
+    """Levenberg-Marquardt from one start."""
+    low, high, _ = bounds_of(model, data, start)
+    theta = start.with_vector(np.clip(start.vector, low, high))
+    may = np.ones(theta.vector.size, dtype=bool)
+    may[-1] = bool(weights.rate)
+    may[-3] = high[-3] > low[-3]
+    may[-2] = bool(weights.rate) and high[-2] > low[-2]
+    residual = residual_of(model, theta, data, weights)
+    damping = 1e-3
+    J = columns_of(model, theta, data, weights, may)
+    for _ in range(most_steps):
+        go = _movable(theta.vector[may], J, residual, low[may], high[may])
+        size = np.linalg.norm(J[:, go], axis=0)
+        A = J[:, go] / size
+        gram, right = A.T @ A, A.T @ residual
+        chi2 = float(residual @ residual)
+        for _ in range(MOST_TRIES):
+            moved = theta.vector
+            moved[np.flatnonzero(may)[go]] += np.linalg.solve(gram + damping * np.eye(gram.shape[0]), right) / size
+            trial = theta.with_vector(np.clip(moved, low, high))
+            new = residual_of(model, trial, data, weights)
+            fall = chi2 - float(new @ new)
+            if np.isfinite(fall) and fall > 0:
+                break
+            damping = max(damping, 1e-6) * 8
+        else:
+            break
+        theta, residual = trial, new
+        if chi2 - (1 + SLOW_FALLS) * fall > hopeless:
+            break
+        damping = max(damping / 10, 1e-9)
+        J = columns_of(model, theta, data, weights, may)
+        if fall < CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1)):
+            break
+    ended = (theta.vector <= low) | (theta.vector >= high)
+    free = may & ~ended
+    return Fit(model, theta, residual, J[:, free[may]], free, weights.log_det)
+
+
+def _movable(vector: Floats, J: Floats, residual: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
+    """(p,) parameters that are not pressed against a bound and change something within their bounds."""
+    slope = J.T @ residual
+    stuck = ((vector <= low) & (slope < 0)) | ((vector >= high) & (slope > 0))
+    size = np.linalg.norm(J, axis=0)
+    span = np.where(np.isfinite(high - low), high - low, np.inf)
+    out: NDArray[np.bool_] = ~stuck & (size > 0) & (size * span > LEAST_REACH)
+    return out
+
+
+def extended(theta: Theta, model: Model, term: object, values: tuple[float, ...], bigger: Model) -> Theta:
+    """Theta of `bigger` = model + term, started at `values` for the new one."""
+    known = dict(zip(model.terms, theta.terms, strict=True))
+    return replace(theta, terms=tuple(values if t == term else known[t] for t in bigger.terms))
+
+
+def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:
+    """Whether a parameter is pressed against the end of what is physically possible.
+
+    One that merely lies there, because the data say little of it, is not: beyond the end the fit would be no better.
+    """
+    at = 1
+    for other, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
+        if other == term:
+            break
+        at += len(values)
+    known = term.parameters(data.scale)
+    ended = [_ends(p, value) for p, value in zip(known, values, strict=True)]
+    inner = [end for p, end in zip(known, ended, strict=True) if p.neutral is None]
+    if (inner and all(inner)) or any(e and p.neutral is not None for p, e in zip(known, ended, strict=True)):
+        return True
+    return any(e and abs(_push(at + j, fitted, data, weights)) > PRESSED for j, e in enumerate(ended))
+
+
+def _ends(p: Parameter, value: float) -> bool:
+    """Whether a value sits at a bound that does not mean that the term is absent."""
+    edge = 1e-3 * (p.high - p.low)
+    return (value <= p.low + edge and p.neutral != p.low) or (
+        value >= p.high - edge and p.neutral != p.high and not p.whole
+    )
+
+
+def _push(j: int, fitted: Fit, data: Data, weights: Weights) -> float:
+    """Sigmas by which the residual asks for more of parameter j, beside all that was free."""
+    which = np.zeros(fitted.free.size, dtype=bool)
+    which[j] = True
+    column = columns_of(fitted.model, fitted.theta, data, weights, which)[:, 0]
+    u, s, _ = thin_svd(fitted.jacobian)
+    u = u[:, s > 1e-9 * s[0]] if s.size else u
+    rest = column - u @ (u.T @ column)
+    size = float(np.linalg.norm(rest))
+    return float(rest @ fitted.residual) / size if size > 1e-6 * float(np.linalg.norm(column)) else 0.0

@@ -1,0 +1,160 @@
+"""Channels that lie: swapped, rescaled, reversed, frozen, unsigned, or silent. To be looked for before any physics.
+
+Each channel is judged against the driver and the others over cells of time (fault_cells); what is said must be far
+beyond what any physics of a thruster does, and hold in many stretches of the run. Nothing is repaired silently:
+`repaired` gives the recording as it must have been meant, for who wants it.
+
+What cannot be known and is never claimed: a constant factor or a swap of channels that follow the same law (thrust and
+current), for C or the torque constant absorbs it. That a drive gives the size of its current only is told, but `grave`
+is false: no model of the thrust stands on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+import numpy as np
+
+from identification.mismatch.diagnosis import Value
+from identification.mismatch.faults.bad_values import Stuck, missing, stuck
+from identification.mismatch.faults.cells import Cells, cells_of, own
+from identification.mismatch.faults.driver_laws import (
+    between_runs,
+    impossible,
+    midway,
+    reversed_channels,
+    unsigned,
+)
+from identification.mismatch.faults.swaps import swapped_voltages, swaps
+from identification.recording import Channel, Recording
+
+Kind = Literal["swapped", "rescaled", "reversed", "frozen", "unsigned", "nan"]
+ALARM = 1e-3
+"""Of one test of one channel; see fault_tests for what must hold besides."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fault:
+    """One lie of one channel."""
+
+    recording_id: str
+    channel: str
+    """Quantity."""
+    kind: Kind
+    statement: str
+    p_value: float
+    parameters: Mapping[str, Value] = field(default_factory=dict)
+    other: str = ""
+    """The quantity it was swapped with."""
+    grave: bool = True
+    """Whether a model of the thrust would be wrong with it."""
+
+    @property
+    def repairable(self) -> bool:
+        return self.kind != "nan"
+
+
+def find_faults(recordings: Sequence[Recording], *, alarm: float = ALARM) -> tuple[Fault, ...]:
+    """Every fault of every recording of one thruster, in order of recording; empty for vehicles."""
+    out: list[Fault] = []
+    gains: list[tuple[Cells, set[str]]] = []
+    for recording in recordings:
+        if recording.kind == "vehicle":
+            continue
+        found, cells = _of_one(recording, alarm)
+        out += found
+        if cells is not None:
+            gains.append((cells, {f.channel for f in found} | {f.other for f in found}))
+    if len(gains) > 1:
+        for cells, q, says, values in between_runs(gains):
+            out.append(Fault(cells.recording.recording_id, q, "rescaled", says, alarm, values))
+    return tuple(out)
+
+
+def _of_one(recording: Recording, alarm: float) -> tuple[list[Fault], Cells | None]:
+    name = recording.recording_id
+    out = [Fault(name, q, "nan", says, 0.0, values) for q, says, values in missing(recording)]
+    first = cells_of(recording)
+    if first is None:
+        return out, None
+    held: dict[str, Stuck] = {q: s for q, s in stuck(recording, first) if s.p_value < alarm}
+    out += [
+        Fault(name, q, "frozen", s.statement, s.p_value, {"start": s.start_value, "end": s.end_value, "value": s.at})
+        for q, s in held.items()
+    ]
+    cells = cells_of(recording, {q: (s.start, s.end) for q, s in held.items()})
+    if cells is None:
+        return out, None
+    exchanged = [*swapped_voltages(recording), *swaps(cells)]
+    exchanged = [s for s in exchanged if s[3] < alarm][:1]
+    out += [Fault(name, a, "swapped", says, p, other=b) for a, b, says, p in exchanged]
+    done = {q for s in exchanged for q in s[:2]}
+    if "command_voltage" in done:
+        return out, None
+    scaled = [r for r in midway(cells) if r[2] < alarm and r[0] not in done]
+    out += [Fault(name, q, "rescaled", says, p, values) for q, says, p, values in scaled]
+    done |= {r[0] for r in scaled}
+    absurd = [i for i in impossible(cells) if i[0] not in done]
+    out += [Fault(name, q, "rescaled", says, p, values) for q, says, p, values in absurd]
+    signless = [u for u in unsigned(cells) if u[2] < alarm and u[0] not in done]
+    out += [Fault(name, q, "unsigned", says, p, grave=q != "current") for q, says, p in signless]
+    done |= {u[0] for u in signless}
+    backwards = [r for r in reversed_channels(cells, done) if r[2] < alarm]
+    out += [Fault(name, q, "reversed", says, p, values) for q, says, p, values in backwards]
+    return out, cells
+
+
+def repaired(recording: Recording, fault: Fault) -> Recording:
+    """The recording as it must have been meant, were the fault true. Other recordings are returned as they are.
+
+    swapped: exchanged back. rescaled: divided by the factor from `start` on. reversed: sign changed. unsigned: sign of
+    the driver at each sample. frozen: NaN while it stood still. nan: nothing can be done, returned as it is.
+    """
+    if recording.recording_id != fault.recording_id or not fault.repairable:
+        return recording
+    channel = own(recording, fault.channel)
+    if channel is None:
+        return recording
+    if fault.kind == "swapped":
+        other = own(recording, fault.other)
+        if other is None:
+            return recording
+        swap = {
+            id(channel): replace(channel, time=other.time, value=other.value),
+            id(other): replace(other, time=channel.time, value=channel.value),
+        }
+        return replace(recording, channels=tuple(swap.get(id(c), c) for c in recording.channels))
+    new = _REPAIRS[fault.kind](recording, channel, fault)
+    return replace(recording, channels=tuple(new if c is channel else c for c in recording.channels))
+
+
+def _rescaled(_recording: Recording, channel: Channel, fault: Fault) -> Channel:
+    start = fault.parameters["start"].value if "start" in fault.parameters else -np.inf
+    factor = fault.parameters["factor"].value
+    return replace(channel, value=np.where(channel.time >= start, channel.value / factor, channel.value))
+
+
+def _reversed(_recording: Recording, channel: Channel, _fault: Fault) -> Channel:
+    return replace(channel, value=-channel.value)
+
+
+def _unsigned(recording: Recording, channel: Channel, _fault: Fault) -> Channel:
+    driver = next(c for q in ("command_voltage", "motor_voltage", "rotation_rate") if (c := own(recording, q)))
+    sign = np.sign(np.nan_to_num(driver.held_at(channel.time)))
+    last = np.maximum.accumulate(np.where(sign != 0, np.arange(sign.size), 0))
+    return replace(channel, value=np.where(sign[last] < 0, -channel.value, channel.value))
+
+
+def _frozen(_recording: Recording, channel: Channel, fault: Fault) -> Channel:
+    start, end = fault.parameters["start"].value, fault.parameters["end"].value
+    return replace(channel, value=np.where((channel.time >= start) & (channel.time <= end), np.nan, channel.value))
+
+
+_REPAIRS: Mapping[str, Callable[[Recording, Channel, Fault], Channel]] = {
+    "rescaled": _rescaled,
+    "reversed": _reversed,
+    "unsigned": _unsigned,
+    "frozen": _frozen,
+}

@@ -1,0 +1,233 @@
+"""Faults that one channel shows against the driver and the others: rescaled, reversed, unsigned.
+
+Static laws of a thruster: rate and motor voltage follow the driver's sign and nearly its size, thrust, torque and
+current nearly its size squared; supply, flow and temperatures do not follow its sign. Each test asks for two
+things: that the channel's own law fails, and that the law of the fault holds, over the run's blocks and by far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from identification.estimation.tails import student_sf
+from identification.mismatch.diagnosis import Value
+from identification.mismatch.faults.cells import (
+    BLOCKS,
+    Cells,
+    explained,
+    fitted,
+    gain,
+    shapes,
+)
+from identification.recording import Floats
+
+LINEAR = ("rotation_rate", "motor_voltage")
+SQUARE = ("thrust", "current", "torque")
+FOLLOWS = 0.9
+"""R^2 of a channel that follows a law."""
+FACTORS: Mapping[float, str] = {
+    60.0: "per minute for per second",
+    2 * np.pi: "rad for turns",
+    9.80665: "kilogram-force for newton",
+    4.4482216: "pound-force for newton",
+    2.2046226: "pound for kilogram",
+    1000.0: "a prefix (milli, kilo)",
+    100.0: "per cent",
+    10.0: "a digit",
+    2.0: "a factor of two",
+}
+NAMED = 0.03
+"""Relative nearness to a named factor."""
+UNNAMED = 3.0
+"""A factor beyond this, or below its inverse, is no physics of a thruster even without a name."""
+LEAST_NAMED = 1.7
+STEADY = 0.1
+"""Spread of the factor over the blocks after the change, relative to its logarithm."""
+BLURRED = 3
+"""Cells on either side of a change that are not used: they may hold rows of both sides."""
+FASTEST_TURN = 1000.0
+"""rev/s: more than any propeller does; rev/min are likely."""
+UNSIGNED_SHARE = 0.3
+"""Least ratio of the slopes on both sides."""
+LEAST = 8
+"""Cells with a value."""
+
+Scaled = tuple[str, str, float, dict[str, Value]]
+
+
+def impossible(cells: Cells) -> Iterator[Scaled]:
+    """Units that the size of a channel gives away."""
+    rate = cells.values.get("rotation_rate")
+    if rate is not None and np.nanmax(np.abs(rate)) > FASTEST_TURN:
+        says = f"rotation_rate reaches {np.nanmax(np.abs(rate)):.4g} rev/s; these are turns per minute (60)."
+        yield "rotation_rate", says, 0.0, {"factor": Value(60.0, 0.0, "1")}
+    if cells.driver_quantity != "command_voltage":
+        return
+    for q in ("motor_voltage", "bus_voltage"):
+        y = cells.values.get(q)
+        if y is None or not np.isfinite(y).any():
+            continue
+        if q == "motor_voltage":
+            ratio = abs(float(fitted(shapes(cells.driver)["linear"], y)[0][1])) / cells.size
+        else:
+            ratio = float(np.nanmedian(np.abs(y))) / cells.size
+        factor = 1000.0 if ratio > 300 else 0.001 if 0 < ratio < 0.01 else 0.0
+        if factor:
+            says = f"{q} is {ratio:.3g} times the command: {'milli' if factor > 1 else 'kilo'}volts, not volts."
+            yield q, says, 0.0, {"factor": Value(factor, 0.0, "1")}
+
+
+def named_factor(factor: float) -> tuple[float, str]:
+    """The factor of a unit near it and what that is; the factor itself and "" without one."""
+    for known, what in FACTORS.items():
+        for exact in (known, 1 / known):
+            if abs(factor / exact - 1) < NAMED:
+                return exact, what
+    return factor, ""
+
+
+def _telling(factor: float) -> bool:
+    if not factor > 0:
+        return False
+    size = max(factor, 1 / factor)
+    return size > UNNAMED or (size > LEAST_NAMED and bool(named_factor(factor)[1]))
+
+
+def midway(cells: Cells) -> Iterator[Scaled]:
+    """Channels whose scale changes at once within the run, alone of all."""
+    found = {q: _change(cells, cells.values[q]) for q in (*LINEAR, *SQUARE) if q in cells.values}
+    for q, change in found.items():
+        if change is None:
+            continue
+        start, factor, std, p = change
+        if any(o is not None and o[0] == start and k != q for k, o in found.items()):
+            continue  # several at once: the rotor did it
+        _, what = named_factor(factor)
+        says = f"{q} changes its scale {factor:.4g}-fold at {start:.4g} s, alone of all"
+        says += f" ({what})." if what else "."
+        yield q, says, p, {"factor": Value(factor, std, "1"), "start": Value(start, 0.0, "s")}
+
+
+def _change(cells: Cells, y: Floats) -> tuple[float, float, float, float] | None:
+    """(time, factor, its standard error, p) of the likeliest change of scale; None without a telling one."""
+    good = np.flatnonzero(np.isfinite(y))
+    if good.size < 4 * BLOCKS:
+        return None
+    columns = shapes(cells.driver)["odd"]
+    X, v = columns[good], y[good]
+    at = _split(X, v)
+    if at is None:
+        return None
+    before, after = slice(0, at - BLURRED), slice(at + BLURRED, good.size)
+    if min(explained(X[before], v[before]), explained(X[after], v[after])) < FOLLOWS:
+        return None
+    inner = np.abs(cells.driver[good]) <= np.max(np.abs(cells.driver[good][before])) + 0.02
+    law = X @ np.linalg.lstsq(X[before], v[before], rcond=None)[0]
+    late = np.flatnonzero(inner & (np.arange(good.size) >= at + BLURRED))
+    if late.size < BLOCKS or not np.any(law[late]):
+        return None
+    blocks = [b for b in np.array_split(late, 8) if np.ptp(law[b]) > 0.05 * np.ptp(law)]
+    factors = np.array([np.polyfit(law[b], v[b], 1)[0] for b in blocks])
+    if factors.size < 4 or np.any(factors <= 0):
+        return None
+    logs = np.log(factors)
+    middle, spread = float(np.median(logs)), float(np.std(logs, ddof=1))
+    if not _telling(float(np.exp(middle))) or spread > STEADY * abs(middle):
+        return None
+    error = spread / np.sqrt(logs.size)
+    p = float(2 * student_sf(abs(middle) / max(error, 1e-12), logs.size - 1))
+    return float(cells.time[good[at]]), float(np.exp(middle)), float(np.exp(middle) * error), p
+
+
+def _split(X: Floats, v: Floats) -> int | None:
+    """Row at which two separate fits leave least."""
+    grams = np.cumsum(X[:, :, None] * X[:, None, :], axis=0)
+    moments = np.cumsum(X * v[:, None], axis=0)
+    n = v.size
+    edge = max(n // 12, 3 * X.shape[1])
+    tried = np.unique(np.linspace(edge, n - edge, 400).astype(int))
+    best, place = -np.inf, None
+    tiny = 1e-9 * np.eye(X.shape[1]) * np.trace(grams[-1])
+    for i in tried.tolist():
+        A, b = grams[i - 1], moments[i - 1]
+        A2, b2 = grams[-1] - A, moments[-1] - b
+        score = float(b @ np.linalg.solve(A + tiny, b) + b2 @ np.linalg.solve(A2 + tiny, b2))
+        if score > best:
+            best, place = score, i
+    if place is None:
+        return None
+    step = int(np.max(np.diff(tried), initial=1))
+    near = range(max(place - step, edge), min(place + step, n - edge) + 1)
+    scores = [_score(grams, moments, i, tiny) for i in near]
+    return near[int(np.argmax(scores))]
+
+
+def _score(grams: Floats, moments: Floats, i: int, tiny: Floats) -> float:
+    A, b = grams[i - 1], moments[i - 1]
+    A2, b2 = grams[-1] - A, moments[-1] - b
+    return float(b @ np.linalg.solve(A + tiny, b) + b2 @ np.linalg.solve(A2 + tiny, b2))
+
+
+def unsigned(cells: Cells) -> Iterator[tuple[str, str, float]]:
+    """Channels that lost their sign: on both sides of the driver they go the same way."""
+    if not cells.both_ways:
+        return
+    for q in ("thrust", "rotation_rate", "current", "torque"):
+        y = cells.values.get(q)
+        if y is None or np.count_nonzero(np.isfinite(y)) < BLOCKS:
+            continue
+        columns = shapes(cells.driver)["linear_sides" if q in LINEAR else "sides"]
+        right, _, p_right = gain(cells, columns, y, 1)
+        left, _, p_left = gain(cells, columns, y, 2)
+        if right * left >= 0 or min(abs(right), abs(left)) < UNSIGNED_SHARE * max(abs(right), abs(left)):
+            continue
+        if explained(shapes(cells.driver)["even"], y) < 0.7 or q == "torque":
+            continue
+        says = (
+            f"{q} has no sign: it goes {'up' if right > 0 else 'down'} whichever way the {cells.driver_quantity} goes."
+        )
+        yield q, says, max(p_right, p_left)
+
+
+def reversed_channels(cells: Cells, done: set[str]) -> Iterator[Scaled]:
+    """Channels of the wrong sign against the driver; all of them: the driver itself."""
+    x = shapes(cells.driver)
+    slopes: dict[str, tuple[float, float, float]] = {}
+    for q in ("thrust", "rotation_rate", "motor_voltage", "current"):
+        y = cells.values.get(q)
+        if y is None or q in done or np.count_nonzero(np.isfinite(y)) < LEAST or explained(x["odd"], y) < 0.5:
+            continue
+        slopes[q] = gain(cells, x["linear" if q in LINEAR else "quadratic"], y, 1)
+    wrong = {q: s for q, s in slopes.items() if s[0] < 0}
+    if len(wrong) > 1 and len(wrong) == len(slopes):
+        says = f"{', '.join(wrong)} all go against the {cells.driver_quantity}: its sign is reversed."
+        yield cells.driver_quantity, says, max(s[2] for s in wrong.values()), {}
+        return
+    for q, (slope, error, p) in wrong.items():
+        says = f"{q} goes against the {cells.driver_quantity}: its sign is reversed"
+        says += "." if len(slopes) > 1 else ", or that of the driver: no other channel tells which."
+        yield q, says, p, {"slope": Value(slope, error, "1")}
+
+
+def between_runs(runs: Sequence[tuple[Cells, set[str]]]) -> Iterator[tuple[Cells, str, str, dict[str, Value]]]:
+    """Channels whose scale differs from the other runs' by a factor of units."""
+    for q in (*LINEAR, *SQUARE):
+        found = []
+        for cells, lying in runs:
+            y = cells.values.get(q)
+            columns = shapes(cells.driver)["linear" if q in LINEAR else "quadratic"]
+            if y is not None and q not in lying and explained(columns, y) > FOLLOWS:
+                slope, error, _ = gain(cells, columns, y, 1)
+                found.append((cells, slope / cells.size ** (1 if q in LINEAR else 2), error / abs(slope)))
+        logs = np.log(np.abs([f[1] for f in found])) if len(found) > 1 else np.empty(0)
+        for i in range(logs.size):
+            others = np.delete(logs, i)
+            factor = float(np.exp(logs[i] - np.median(others)))
+            alone = logs.size > 2 or i == 1  # of two runs nobody knows which: the later one is named
+            if alone and np.ptp(others) < 0.3 and _telling(factor):
+                _, what = named_factor(factor)
+                says = f"{q} is {factor:.4g} times that of the other {'runs' if logs.size > 2 else 'run'}"
+                says += f" ({what})." if what else "."
+                yield found[i][0], q, says, {"factor": Value(factor, factor * found[i][2], "1")}

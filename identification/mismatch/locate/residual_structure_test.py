@@ -1,0 +1,266 @@
+"""What no term carries: structure of any shape in what is left, over each thing that was recorded.
+
+Each coordinate (coordinates.py) has a group of columns. The size of the whitened residual in the span of a group is
+chi-square distributed when nothing is left. The smallest p-value of all groups is judged against its own distribution
+under drawn signs of blocks, as the screening is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
+from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.locate.pulses import Pulses, likeliest_pulses
+from identification.mismatch.model.model import Data, Weights, predict
+from identification.mismatch.select.covariates import Coordinate, coordinates
+from identification.mismatch.select.jumps import APART, TRIED, jumps
+from identification.mismatch.select.screening import lengths, normal_scores, orthogonal_basis, quiet, surrogate_scores
+from identification.mismatch.select.shape_error import allowed_in, corrections
+from identification.recording import Floats
+
+ALARM = 0.004
+"""False-alarm rate of what is left, family-wise: with the search for effects and for lines some 1 % of a diagnosis."""
+FAR = 4.0
+"""Sigmas beyond which a row counts no more: one outlier is no structure."""
+ROUNDING = 1e-9
+"""Of a coordinate's reach: such an edge is 0."""
+PLAIN_P = 1e-7
+"""Of one group: what is plainly no noise, whatever its kind."""
+
+
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """One coordinate's group of columns against the residual."""
+
+    coordinate: Coordinate
+    statistic: float
+    dof: int
+    p_value: float
+    """Of this group alone, shape error of the model's terms allowed for."""
+    share: float
+    """Of the residual's (whitened) sum of squares beyond what noise has."""
+
+
+@dataclass(frozen=True, eq=False)
+class Omnibus:
+    groups: tuple[Judged, ...]
+    """Smallest p-value first."""
+    p_value: float
+    """Family-wise, of the smallest."""
+    pulses: Pulses | None = None
+    """Of the gain, that come back: a part of what is left over time."""
+
+
+def judge_left(
+    fit: Fit,
+    data: Data,
+    weights: Weights,
+    rng: np.random.Generator,
+    looked_at: Sequence[Coordinate] | None = None,
+    *,
+    pulsing: bool = True,
+) -> Omnibus:
+    """Judge the residual of the thrust over every coordinate. `pulsing`: pulses that come back are looked for too."""
+    found = tuple(looked_at) if looked_at is not None else coordinates(fit, data)
+    n = data.size
+    basis = orthogonal_basis(fit.jacobian[:n])
+    residual = np.clip(fit.residual[:n], -FAR, FAR)
+    changes = corrections(fit, data, Weights(weights.thrust))
+    groups, spans = [], []
+    for c in found:
+        columns = Weights(weights.thrust).whiten(list(c.columns), [])
+        columns = columns - basis @ (basis.T @ columns)
+        Q = orthogonal_basis(columns)
+        if Q.shape[1] == 0:
+            continue
+        score = Q.T @ residual
+        stat, dof = float(score @ score), Q.shape[1]
+        if weights.ticks and c.quantity == "time_since_step":
+            ticks = fit.residual[fit.residual.size - sum(rows.target.size for rows in data.ticks) :]
+            stat, dof = stat + float(ticks @ ticks), dof + ticks.size
+        extra = allowed_in(changes, Q)
+        p = _tail(stat, dof, extra)
+        groups.append(Judged(c, stat, dof, p, max(stat - dof, 0.0) / max(float(residual @ residual), 1e-300)))
+        spans.append(Q)
+        if c.quantity == "time":
+            groups[-1] = min(groups[-1], _jump(c, fit, residual, data, weights, basis), key=lambda g: g.p_value)
+    pulses = None
+    at = next((i for i, g in enumerate(groups) if g.coordinate.quantity == "time"), None)
+    if at is not None and pulsing:
+        others = [(Q, g) for Q, g in zip(spans, groups, strict=True) if g is not groups[at] and g.p_value < PLAIN_P]
+        pulses = _pulses(fit, residual, data, weights, others)
+        if pulses is not None:
+            groups[at] = min(groups[at], _of_pulses(groups[at].coordinate, pulses, residual), key=lambda g: g.p_value)
+    order = sorted(range(len(groups)), key=lambda i: (groups[i].p_value, groups[i].dof - groups[i].statistic))
+    if not groups:
+        return Omnibus((), 1.0)
+    p_family = _family(groups, spans, residual, rng)
+    return Omnibus(tuple(groups[i] for i in order), p_family, pulses)
+
+
+def _family(groups: Sequence[Judged], spans: Sequence[Floats], residual: Floats, rng: np.random.Generator) -> float:
+    """P-value of the smallest p-value of all groups, by draws of the residual over their spans (n, q)."""
+    every = np.column_stack(spans)
+    clean = quiet(residual, every)
+    plain = [Q for Q, g in zip(spans, groups, strict=True) if g.p_value < PLAIN_P]
+    if plain:  # a structure of many small parts would be in the draws, and hide itself
+        known = orthogonal_basis(np.column_stack(plain))
+        clean = clean - known @ (known.T @ clean)
+    least = min(g.p_value for g in groups)
+    # of blocks' signs: heavy tails and colour within a block are in them; of white normal noise: few blocks are not
+    draws = (surrogate_scores(every, clean, rng), normal_scores(every, rng))
+    p = max(_of_family(least, scores, [Q.shape[1] for Q in spans]) for scores in draws)
+    return float(max(min(p, 1.0), min(1.0, least)))
+
+
+def _of_family(least: float, scores: Floats, sizes: Sequence[int]) -> float:
+    """How often the smallest p-value of all groups is as small as `least`, by draws of their scores (s, q).
+
+    Beyond the draws scaled so that the family behaves as they do.
+    """
+    parts = np.split(scores**2, np.cumsum(sizes)[:-1], axis=1)
+    smallest = np.min([chi2_sf(s.sum(axis=1), s.shape[1]) for s in parts], axis=0)
+    p = (1 + np.count_nonzero(smallest <= least)) / (1 + smallest.size)
+    if p < 20 / smallest.size:
+        at = float(np.quantile(smallest, 0.05))
+        p = min(p, max(0.05 / max(at, 1e-300), float(len(sizes))) * least)
+    return float(p)
+
+
+def _jump(time: Coordinate, fit: Fit, residual: Floats, data: Data, weights: Weights, basis: Floats) -> Judged:
+    """The likeliest jump of the zero: under slow noise it shows for seconds only, and no smooth shape follows it.
+
+    Taken for one only where it is plainly no noise.
+    """
+    when, score = jumps(residual, data, weights, basis)
+    known = [v[1] for t, v in zip(fit.model.terms, fit.theta.terms, strict=True) if t.id == "zero_offset"]
+    new = np.all([np.abs(when - at) > APART * data.scale.duration for at in known], axis=0)
+    when, score = (when[new], score[new]) if known else (when, score)
+    if not score.size:
+        return Judged(time, 0.0, 1, 1.0, 0.0)
+    stat = float(score[0] ** 2)
+    p = TRIED * _tail(stat, 1, 0.0)
+    told = replace(time, what=f"{time.what}; the reading jumps at {when[0]:.4g} s")
+    share = max(stat - 1, 0.0) / max(float(residual @ residual), 1e-300)
+    return Judged(told, stat, 1, p if p < PLAIN_P else 1.0, share)
+
+
+def _pulses(
+    fit: Fit, residual: Floats, data: Data, weights: Weights, others: Sequence[tuple[Floats, Judged]]
+) -> Pulses | None:
+    """The likeliest pulses of the gain that come back: slow noise takes them up, and no smooth shape follows them.
+
+    Taken for such only where they are plainly no noise, and account for what is plainly left over `others` (spans), but
+    not these for them: a plan that repeats itself makes pulses of anything.
+    """
+    found = likeliest_pulses(fit, data, weights, residual)
+    if found is None or found.p_value > PLAIN_P:
+        return None
+    rest = residual - found.column * (found.column @ residual)
+    if any(_tail(float(np.sum((Q.T @ rest) ** 2)), g.dof, 0.0) < PLAIN_P for Q, g in others):
+        return None
+    if others:
+        known = orthogonal_basis(np.column_stack([Q for Q, _ in others]))
+        beyond = likeliest_pulses(fit, data, weights, residual - known @ (known.T @ residual))
+        if beyond is None or beyond.p_value > PLAIN_P:
+            return None
+    return found
+
+
+def _of_pulses(time: Coordinate, found: Pulses, residual: Floats) -> Judged:
+    stat = found.sigmas**2
+    share = max(stat - 1, 0.0) / max(float(residual @ residual), 1e-300)
+    return Judged(replace(time, what=f"{time.what}; {found.statement}"), stat, 1, found.p_value, share)
+
+
+def _tail(stat: float, dof: int, extra: float) -> float:
+    p = float(noncentral_chi2_sf(stat, dof, extra)) if extra > 1e-9 else float(chi2_sf(stat, dof))
+    return p if np.isfinite(p) else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where over a coordinate the residual is, and its shape."""
+
+    quantity: str
+    unit: str
+    low: float
+    high: float
+    share: float
+    p_value: float
+    table: tuple[tuple[float, float, float], ...]
+    """(covariate, mean residual in N, its standard error) bin by bin."""
+    what: str
+
+
+def locate(judged: Judged, fit: Fit, data: Data, weights: Weights) -> Place:
+    """The stretch of the coordinate that holds most of what its columns make of the residual: noise is everywhere."""
+    c = judged.coordinate
+    covariate = np.concatenate(c.covariate)
+    residual = np.concatenate(
+        [
+            h.thrust[r] - predict(fit.model, fit.theta, h, data.scale, i)[0][r] - fit.theta.tares[i]
+            for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True))
+        ]
+    )
+    count = np.concatenate([h.count[r] for h, r in zip(data.histories, data.rows, strict=True)]).astype(np.float64)
+    edges = _bins(covariate)
+    index = np.clip(np.searchsorted(edges, covariate, side="right") - 1, 0, edges.size - 2)
+    k = edges.size - 1
+    weight = np.bincount(index, weights=count, minlength=k)
+    mean = np.bincount(index, weights=count * residual, minlength=k) / np.maximum(weight, 1e-300)
+    rows = np.bincount(index, minlength=k)
+    spread = np.bincount(index, weights=count * (residual - mean[index]) ** 2, minlength=k) / np.maximum(weight, 1e-300)
+    error = np.sqrt(spread / np.maximum(rows, 1))
+    power = np.bincount(index, weights=count * _structure(c, residual, data, weights) ** 2, minlength=k)
+    full = rows > 0
+    low, high, share = _stretch(edges, np.asarray(power, dtype=np.float64))
+    low, high = (0.0 if abs(edge) < ROUNDING * (edges[-1] - edges[0]) else edge for edge in (low, high))
+    center = 0.5 * (edges[1:] + edges[:-1])
+    table = tuple((float(center[i]), float(mean[i]), float(error[i])) for i in np.flatnonzero(full))
+    return Place(c.quantity, c.unit, low, high, share, judged.p_value, table, c.what)
+
+
+def _structure(c: Coordinate, residual: Floats, data: Data, weights: Weights) -> Floats:
+    """(n,) N, of the residual what any shape over the coordinate is: least squares with the coloured noise."""
+    thrust = Weights(weights.thrust)
+    ends = np.cumsum([r.size for r in data.rows])[:-1]
+    columns = thrust.whiten(list(c.columns), [])
+    size = lengths(columns)
+    unit = columns / np.where(size > 0, size, 1.0)
+    left = thrust.whiten(list(np.split(residual, ends)), [])
+    inverse = np.linalg.pinv(unit.T @ unit, hermitian=True, rcond=1e-9)
+    out: Floats = np.concatenate(c.columns) @ (inverse @ (unit.T @ left) / np.where(size > 0, size, 1.0))
+    return out
+
+
+def _bins(covariate: Floats) -> Floats:
+    """About 16 bins: levels where there are few, otherwise of equal numbers."""
+    levels = np.unique(np.round(covariate, 9))
+    if levels.size <= 24:
+        if levels.size == 1:
+            return np.array([levels[0] - 0.5, levels[0] + 0.5])
+        middle = 0.5 * (levels[1:] + levels[:-1])
+        return np.concatenate([[levels[0] - (middle[0] - levels[0])], middle, [levels[-1] + (levels[-1] - middle[-1])]])
+    found = np.unique(np.quantile(covariate, np.linspace(0, 1, 17)))
+    found[-1] = np.nextafter(found[-1], np.inf)
+    return found
+
+
+def _stretch(edges: Floats, power: Floats) -> tuple[float, float, float]:
+    """The shortest run of bins that holds 70 % of the power, or the whole."""
+    total = float(power.sum())
+    if total <= 0:
+        return float(edges[0]), float(edges[-1]), 0.0
+    best = (0, power.size)
+    cumulative = np.concatenate([[0.0], np.cumsum(power)])
+    for i in range(power.size):
+        j = int(np.searchsorted(cumulative, cumulative[i] + 0.7 * total))
+        if j <= power.size and edges[j] - edges[i] < edges[best[1]] - edges[best[0]]:
+            best = (i, j)
+    share = float((cumulative[best[1]] - cumulative[best[0]]) / total)
+    return float(edges[best[0]]), float(edges[best[1]]), share

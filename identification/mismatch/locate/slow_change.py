@@ -1,0 +1,75 @@
+"""A slow change of zero or gain that the noise had taken for its own: told from noise by estimating both together.
+
+A residual that wanders once over the run is what slow noise leaves, so a noise estimated on it is as slow as that, and
+no test against that noise sees it. The restricted likelihood of noise and change together tells them apart: noise that
+wanders so far in one run must be there in every part of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.estimation.tails import chi2_sf
+from identification.mismatch.estimate.estimate import State, forces, refresh
+from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.select.screening import orthogonal_basis
+from identification.recording import Floats
+
+SLOW, QUICK = 2, 16
+"""Degrees of the polynomials over time. Those of the zero are slow: what wanders quicker is noise by any other name."""
+ALARM = 1e-5
+"""Of one kind of change: the likelihood ratio of noise models is no exact chi-square (benchmarks/hidden_gains.py)."""
+
+
+def beside_slow_change(state: State, data: Data) -> State | None:
+    """The same model with its noise estimated beside such a change; None where noise explains the residual as well."""
+    if any(h.static for h in data.histories):
+        return None
+    found = [(p, beside) for p, beside in slow_changes(state, data) if p < ALARM]
+    return min(found, key=lambda each: each[0])[1] if found else None
+
+
+def slow_changes(state: State, data: Data) -> list[tuple[float, State]]:
+    """The p-value of each kind of change, and the model with its noise estimated beside it."""
+    now = refresh(state.fit.model, state.fit.theta, data, None, None)
+    found = []
+    for columns in slow_columns(now, data):
+        beside = refresh(now.fit.model, now.fit.theta, data, columns, now, now.noise)
+        gain = now.fit.deviance - beside.fit.deviance + _taken(beside, data, columns)
+        found.append((float(chi2_sf(gain, columns.shape[1])), beside))
+    return found
+
+
+def slow_columns(state: State, data: Data) -> tuple[Floats, ...]:
+    """(n, degree x runs) Legendre polynomials of time at the rows, run by run: of the zero, and times the force."""
+    force = forces(state.fit.model, state.fit.theta, data)
+    shapes, gains = [], []
+    for history, rows, size in zip(data.histories, data.rows, force, strict=True):
+        time = history.middle[rows]
+        across = 2 * (time - time[0]) / max(float(time[-1] - time[0]), 1e-9) - 1
+        shapes.append(np.polynomial.legendre.legvander(across, QUICK)[:, 1:])
+        gains.append(shapes[-1] * (size / data.scale.thrust)[:, None])
+    slow = [_each_its_own([part[:, :SLOW] for part in parts]) for parts in (shapes, gains)]
+    return (*slow, _each_its_own(gains))
+
+
+def _each_its_own(parts: Sequence[Floats]) -> Floats:
+    """Columns of every run beside each other, zero in the other runs' rows."""
+    ends = np.cumsum([0, *(p.shape[0] for p in parts)])
+    degree = parts[0].shape[1]
+    out = np.zeros((int(ends[-1]), degree * len(parts)))
+    for i, part in enumerate(parts):
+        out[ends[i] : ends[i + 1], degree * i : degree * (i + 1)] = part
+    return out
+
+
+def _taken(state: State, data: Data, columns: Floats) -> float:
+    """Of the whitened residual's square by the columns beside the model's own."""
+    n = data.size
+    parts = np.split(columns, np.cumsum([rows.size for rows in data.rows])[:-1])
+    whitened = Weights(state.weights.thrust).whiten(list(parts), [])
+    basis = orthogonal_basis(state.fit.jacobian[:n])
+    score = orthogonal_basis(whitened - basis @ (basis.T @ whitened)).T @ state.fit.residual[:n]
+    return float(score @ score)

@@ -1,0 +1,71 @@
+"""What a model says of the rows that the ticks of the command make (physics/tick_rows.py)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from identification.physics.motor_lag import MotorLag, rate_at
+from identification.physics.term import Scale, Term
+from identification.recording import Floats
+from identification.run_history.filters import lowpass, resonant
+from identification.run_history.step_response_rows import TickRows
+
+DYNAMIC = ("motor_lag", "stand_resonance", "time_skew")
+"""What shows within a few ticks."""
+Acting = tuple[Term, tuple[float, ...], Scale]
+
+
+def told(rows: TickRows, acting: list[Acting], C: float, shift: float) -> Floats:
+    """The rows as a model foretells them."""
+    terms = _dynamic(acting)
+    late = shift + sum(values[0] for term, values, _ in terms if term.id == "time_skew")
+    return rows.kept((C, *_key(terms, shift)), lambda: rows.predicted(C, held_back(rows, terms, shift), late))
+
+
+def held_back(rows: TickRows, acting: list[Acting], shift: float) -> Floats:
+    """(B,) 1 - s at the nodes: s the response of the acting terms to a unit step, its mean over the levels.
+
+    Less what the means over intervals have of it: a smooth rise to the last value.
+    """
+    terms = _dynamic(acting)
+    if not terms and shift == 0:
+        return np.zeros(rows.nodes.size - 1)
+    return rows.kept(_key(terms, shift), lambda: _held_back(rows, terms, shift))
+
+
+def _dynamic(acting: list[Acting]) -> list[Acting]:
+    return [each for each in acting if each[0].id in DYNAMIC]
+
+
+def _key(terms: list[Acting], shift: float) -> tuple[object, ...]:
+    return (tuple((term, values, sizes.driver) for term, values, sizes in terms), shift)
+
+
+def _held_back(rows: TickRows, terms: list[Acting], shift: float) -> Floats:
+    levels = rows.levels if any(term.id == "motor_lag" for term, _, _ in terms) else rows.levels[:1]
+    after = rows.after
+    dt = np.full(after.size, 2 * after[0])
+    back = 1 - np.mean([_later(_response(terms, level, dt, after), after, shift) for level in levels], axis=0)
+    # what is not over yet goes on smoothly, and the means have it: without this it would seem to end in a jump
+    u = after / rows.nodes[-1]
+    out: Floats = rows.hats @ (back - back[-1] * u**2 * (3 - 2 * u))
+    return out
+
+
+def _response(terms: list[Acting], level: Floats, dt: Floats, after: Floats) -> Floats:
+    s = np.ones(dt.size)
+    for term, values, sizes in terms:
+        if isinstance(term, MotorLag) and values[0] > 1e-6:
+            s = lowpass(s, dt, float(1 / rate_at(term.form, values, level, sizes.driver)))[1]
+        elif term.id == "stand_resonance":
+            s = s + values[0] * (resonant(s, dt, values[1], values[2]) - s)
+        elif term.id == "time_skew":
+            s = _later(s, after, values[0])
+    return s
+
+
+def _later(s: Floats, after: Floats, delay: float) -> Floats:
+    if delay == 0:
+        return s
+    out: Floats = np.interp(after - delay, after, s, left=0.0 if delay > 0 else s[0])
+    return out

@@ -1,0 +1,219 @@
+"""A name is earned: no rival does as well, the parameter is the same everywhere, and its value is possible."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
+from identification.mismatch.estimate.estimate import State, fit_without
+from identification.mismatch.estimate.fitting import Fit, at_bound
+from identification.mismatch.locate.residual_structure_test import Omnibus
+from identification.mismatch.model.model import Data, Weights, predict
+from identification.mismatch.prepare.preparing import DRIVERS
+from identification.mismatch.select.flatness import noise_goes_on
+from identification.mismatch.select.forward_selection import STATIC, static_curve
+from identification.mismatch.select.rivals import NEAR, Rival, Standing, swaps
+from identification.mismatch.select.screening import orthogonal_basis
+from identification.physics.term import Term
+from identification.recording import Floats
+
+SAME = 0.1
+"""Parts of a run whose parameters differ by less count as the same."""
+ONE_SIDED = 0.1
+"""Of the size of what a term does: with less of it on one side there is nothing to compare."""
+OWN_SHARE = 0.01
+"""Of what a term explains: less than this left over its own coordinate is the textbook's fault, not the name's."""
+INCONSTANT = 1e-3
+"""p-value, after all tests of a term, below which its parameter is not the same everywhere."""
+OWN_COORDINATE = 1e-4
+"""p-value of what is left over a term's own coordinate below which its name is not earned."""
+CANCELLED = 0.15
+"""Of what each of two terms does alone: less together, and neither is seen."""
+MANY_SHAPES = 3
+REPAIR = 0.1
+"""Of what two shapes on one static curve explain together: what adds less than this to the other repairs it."""
+ALIKE = 0.7
+"""Of the same: where each explains more than this alone, either could be the one that is repaired."""
+
+
+@dataclass(frozen=True, eq=False)
+class Named:
+    """One term of the final model and what speaks for its name."""
+
+    term: Term
+    theta: tuple[float, ...]
+    std: tuple[float, ...]
+    chi2_gain: float
+    bic_gain: float
+    p_value: float
+    probability: float
+    rivals: tuple[Rival, ...]
+    """Other effects within NEAR, best first."""
+    doubts: tuple[str, ...]
+    """Why the name is not earned; empty when it is."""
+
+
+def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
+    """Where the parameter of a term is not the same: halves of the run, directions, levels, runs."""
+    out = []
+    if at_bound(term, state.fit, data, state.weights):
+        out.append("its parameters end at what is physically possible")
+    if _unseen(state.fit, term, data):
+        out.append("it is faster than the samples can show")
+    if noise_goes_on(state.fit, term, state.noise, data):
+        out.append("the noise goes on where the readings should be flat")
+    change = _raw_effect(state.fit, (term,), data)
+    out += [f"it and {other.id} nearly cancel" for other in _cancelled(state.fit, term, change, data)]
+    n = data.size
+    basis = orthogonal_basis(state.fit.jacobian[:n])
+    driver = [h.driver[r] for h, r in zip(data.histories, data.rows, strict=True)]
+    middle = [h.middle[r] for h, r in zip(data.histories, data.rows, strict=True)]
+    half = np.median(np.abs(np.concatenate(driver)))
+    splits = {
+        "in both halves of the run": [t > np.median(t) for t in middle],
+        "in both directions": [v < 0 for v in driver],
+        "at all levels": [np.abs(v) > half for v in driver],
+    }
+    if len(driver) > 1:
+        splits["in all runs"] = [np.full(v.size, i >= len(driver) / 2) for i, v in enumerate(driver)]
+    if any(h.static for h in data.histories):
+        del splits["in both halves of the run"]  # a table may stand in the order of its levels
+    weights = Weights(state.weights.thrust)
+    whole = float(np.linalg.norm(weights.whiten(change, [])))
+    for what, masks in splits.items():
+        column = weights.whiten([c * m for c, m in zip(change, masks, strict=True)], [])
+        if not ONE_SIDED < float(np.linalg.norm(column)) / max(whole, 1e-300) < 1 - ONE_SIDED**2:
+            continue
+        rest = column - basis @ (basis.T @ column)
+        size = float(np.linalg.norm(rest))
+        if size < 1e-3 * float(np.linalg.norm(column)) or size < 0.3:
+            continue
+        score = float(rest @ state.fit.residual[:n]) / size
+        p = float(noncentral_chi2_sf(score**2, 1, (SAME * size) ** 2))
+        if p * len(splits) * many < INCONSTANT:
+            out.append(f"its parameter is not the same {what} ({abs(score) / size * 100:.0f} % apart)")
+    return tuple(out)
+
+
+def _unseen(now: Fit, term: Term, data: Data) -> bool:
+    """Ringing beyond half the sampling rate: between the samples it may be any other delay."""
+    values = dict(zip(now.model.terms, now.theta.terms, strict=True))[term]
+    named = dict(zip((p.name for p in term.parameters(data.scale)), values, strict=True))
+    return term.id == "stand_resonance" and named["frequency"] > 0.5 / min(h.spacing for h in data.histories)
+
+
+def _cancelled(now: Fit, term: Term, change: list[Floats], data: Data) -> list[Term]:
+    """Terms that follow a step too and undo nearly all of what this one does: a large lag with a large lead."""
+    if "time_since_step" not in term.coordinates:
+        return []
+    found = []
+    for other in now.model.terms:
+        if other != term and "time_since_step" in other.coordinates:
+            both = np.concatenate(_raw_effect(now, (term, other), data))
+            alone = np.concatenate(_raw_effect(now, (other,), data))
+            least = min(float(np.linalg.norm(np.concatenate(change))), float(np.linalg.norm(alone)))
+            if float(np.linalg.norm(both)) < CANCELLED * least:
+                found.append(other)
+    return found
+
+
+def _raw_effect(now: Fit, terms: tuple[Term, ...], data: Data) -> list[Floats]:
+    smaller = replace(now.model, terms=tuple(t for t in now.model.terms if t not in terms))
+    known = dict(zip(now.model.terms, now.theta.terms, strict=True))
+    theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
+    out = []
+    for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
+        full, _ = predict(now.model, now.theta, h, data.scale, i)
+        less, _ = predict(smaller, theta, h, data.scale, i)
+        out.append((full - less)[r])
+    return out
+
+
+def _standing(state: State, term: Term, data: Data, terms: Sequence[Term]) -> Standing:
+    less = fit_without(state, term, data)
+    return less, swaps(state, term, less, data, terms)
+
+
+def _repaired(state: State, data: Data, less: Mapping[Term, Fit]) -> dict[Term, tuple[str, ...]]:
+    """Two shapes on one static curve that explain nearly the same, but for a little that one repairs of the other: the
+    curve has neither shape, and one that is not in the catalogue would do as well.
+
+    `less`: the fit without each term.
+    """
+    out: dict[Term, tuple[str, ...]] = {}
+    for one, other in combinations(state.fit.model.terms, 2):
+        curve = static_curve(one, measured=data.with_rate)
+        if not curve or curve != static_curve(other, measured=data.with_rate):
+            continue
+        neither = fit_without(replace(state, fit=less[one]), other, data).chi2
+        together = neither - state.fit.chi2
+        adds = [less[term].chi2 - state.fit.chi2 for term in (one, other)]
+        if min(adds) < REPAIR * together and max(adds) < (1 - ALIKE) * together:
+            share = 100 * (1 - max(adds) / together)
+            for term, beside in ((one, other), (other, one)):
+                told = f"{beside.id} alone explains nearly the same ({share:.0f} % of what both do), and neither all"
+                out[term] = (*out.get(term, ()), told)
+    return out
+
+
+def name(
+    state: State, data: Data, terms: Sequence[Term], standing: dict[Term, Standing] | None = None
+) -> tuple[Named, ...]:
+    """Every term of the model with its rivals and doubts, the largest gain first."""
+    out = []
+    logn = float(np.log(max(state.fit.residual.size, 2)))
+    at = 1
+    std = state.fit.std
+    many = max(len(state.fit.model.terms), 1)
+    stands = {term: (standing or {}).get(term) or _standing(state, term, data, terms) for term in state.fit.model.terms}
+    repaired = _repaired(state, data, {term: less for term, (less, _) in stands.items()})
+    for term, values in zip(state.fit.model.terms, state.fit.theta.terms, strict=True):
+        less, others = stands[term]
+        gain = less.chi2 - state.fit.chi2
+        close = [r for r in others if min(r.bic_loss, r.aic_loss) < NEAR and r.term.id != term.id]
+        unique: dict[str, Rival] = {}
+        for r in close:
+            unique.setdefault(r.term.id, r)
+        probability = 1.0 / (1.0 + sum(np.exp(-0.5 * max(r.bic_loss, 0.0)) for r in unique.values()))
+        out.append(
+            Named(
+                term,
+                values,
+                tuple(float(s) for s in std[at : at + len(values)]),
+                gain,
+                gain - len(values) * logn,
+                max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
+                float(probability),
+                tuple(unique.values()),
+                (*doubts(state, term, data, many), *repaired.get(term, ())),
+            )
+        )
+        at += len(values)
+    return tuple(sorted(out, key=lambda n: -n.chi2_gain))
+
+
+def with_doubts(named: Sequence[Named], left: Omnibus | None, *, measured: bool) -> tuple[Named, ...]:
+    """Doubts that only show when all terms and what is left are seen together.
+
+    Something left over a term's own coordinate: its shape is not the textbook's. Many static shapes on one curve: any
+    curve can be made of enough of them. `measured`: the rate, as a response.
+    """
+    shapes = Counter(static_curve(n.term, measured=measured) for n in named)
+    clear = {g.coordinate.quantity: g for g in left.groups if g.p_value < OWN_COORDINATE} if left is not None else {}
+    out = []
+    for n in named:
+        more: list[str] = []
+        names = {d for c in n.term.coordinates for d in (DRIVERS if c in STATIC else (c,))}
+        own = [q for q, g in clear.items() if q in names and g.statistic - g.dof > OWN_SHARE * n.chi2_gain]
+        if own:
+            more.append(f"more is left over its own coordinate, {own[0]}")
+        curve = static_curve(n.term, measured=measured)
+        if curve and shapes[curve] >= MANY_SHAPES:
+            more.append(f"{shapes[curve]} shapes on one static curve make any curve")
+        out.append(replace(n, doubts=(*n.doubts, *more)))
+    return tuple(out)

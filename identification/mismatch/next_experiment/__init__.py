@@ -1,0 +1,1 @@
+"""From rivals to the sweep that tells them apart, within the limits of the bench."""

@@ -1,0 +1,248 @@
+"""Lines locked to the rotor: a sin(2 pi z theta + p), theta the angle turned.
+
+Found by `rotor_search`; fitted here by least squares with one phase for as long as the data bear it: a whole run, a
+minute, or a stretch of steady turning. Each stretch counts by the noise that it has at the line.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.estimation.tails import chi2_sf
+from identification.mismatch.periodic.order_search import LASTING, Candidate, most_significant
+from identification.mismatch.periodic.spectrum import Series
+from identification.mismatch.periodic.steady_segments import Stretch, speed_of, stretches
+from identification.recording import Floats
+
+ODD = 0.02
+"""Of the false-alarm rate: what is left to waves that do not come a whole number of times a turn."""
+WHOLE = 0.003
+"""Relative: how well the scale of a measured rate is known."""
+LEAST_GAIN = 25.0
+"""In chi-square."""
+TRIED = np.linspace(-1.0, 1.0, 41)
+"""Ratios near a candidate, in its reach."""
+BESIDE = (-7, -6, -5, -4, 4, 5, 6, 7)
+"""Independent ratios of a stretch beside a line."""
+COHERENT = 0.01
+"""Probability below which what fewer phases lose of the power is no noise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """a cos(phi) + b sin(phi) from `start` to `end` (s) of one run."""
+
+    run: int
+    start: float
+    end: float
+    a: float
+    b: float
+
+
+def wave_of(parts: Sequence[Part], run: int, time: Floats, angle: Floats) -> Floats:
+    """(n,) N at these times of a run, from phi = angle (n,) rad; 0 where no part is."""
+    out = np.zeros_like(time)
+    for part in parts:
+        if part.run == run:
+            inside = (time >= part.start) & (time < part.end)
+            out[inside] += part.a * np.cos(angle[inside]) + part.b * np.sin(angle[inside])
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Locked:
+    ratio: float
+    ratio_std: float
+    amplitude: float
+    amplitude_std: float
+    phase: float | None
+    phase_std: float | None
+    p_value: float
+    gain: float
+    speed: float
+    """Mean speed of the turning rotor, turns per s."""
+    parts: tuple[Part, ...]
+    """One for each stretch."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Noise:
+    """Of the stretches, at one ratio."""
+
+    own: Floats
+    """(k,) variance of white noise as loud as that of the run at the line: what the waves were whitened with."""
+    beside: float
+    """How much louder it is beside the line."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Waves:
+    """Waves of one ratio, with a phase for each piece of the data."""
+
+    ratio: float
+    piece: NDArray[np.intp]
+    """(k,) of each stretch."""
+    sums: NDArray[np.complex128]
+    """(pieces,) of value exp(-2 pi i ratio turns) over the variance of the noise."""
+    weights: Floats
+    """(pieces,) samples over that variance."""
+
+    @property
+    def gain(self) -> float:
+        """Chi-square."""
+        return float(2 * np.sum(np.abs(self.sums) ** 2 / self.weights))
+
+    @property
+    def earned(self) -> float:
+        """The same without what noise would give, one phase being free."""
+        return self.gain - 2.0 * (self.weights.size - 1)
+
+
+def find_locked(runs: Sequence[tuple[int, Series]], alarm: float, *, in_turns: bool = True) -> Locked | None:
+    """The most significant rotor-locked line; None without one.
+
+    `in_turns`: angles are those of the propeller, whose waves come a whole number of times a turn.
+    """
+    top = max(float(np.quantile(speed_of(r), 0.99)) for _, r in runs)
+    if not top > 0:
+        return None
+    parts = list(stretches(runs, top))
+    if len(parts) < 2:
+        return None
+    candidate = most_significant(parts, top)
+    if not candidate.p_value < (alarm if not in_turns or _is_whole(candidate) else ODD * alarm):
+        return None
+    found = _fitted(parts, candidate)
+    if not found.gain > LEAST_GAIN:
+        return None
+    # a loud line was part of its own noise
+    loud = [wave_of(found.parts, i, r.time, 2 * np.pi * found.ratio * r.turns) for i, r in runs if r.turns is not None]
+    return _fitted(list(stretches(runs, top, loud)), candidate)
+
+
+def _is_whole(candidate: Candidate) -> bool:
+    return abs(candidate.ratio - max(round(candidate.ratio), 1)) < max(candidate.reach, WHOLE * candidate.ratio)
+
+
+def _fitted(parts: Sequence[Stretch], candidate: Candidate) -> Locked:
+    """With the fewest phases that keep the power."""
+    noise = _noise_at(parts, candidate.ratio)
+    finest = waves = _apart(parts, noise, candidate)
+    for seconds in LASTING:
+        fewer = _joined(parts, noise, finest.ratio, candidate.reach, _pieces_of(parts, seconds))
+        # an angle that slips takes amplitude from waves of one phase
+        lost, phases = max(finest.gain - fewer.gain, 0.0), finest.weights.size - fewer.weights.size
+        if fewer.earned > LEAST_GAIN and (phases == 0 or chi2_sf(lost, 2 * phases) > COHERENT):
+            waves = fewer
+            break
+    return _told(parts, waves, candidate.p_value)
+
+
+def _noise_at(parts: Sequence[Stretch], ratio: float) -> _Noise:
+    return _Noise(np.array([p.colour.variance(ratio, p.speeds) for p in parts]), _beside(parts, ratio))
+
+
+def _beside(parts: Sequence[Stretch], ratio: float) -> float:
+    """How much louder than its noise the residual is on either side of a line: of repeated shapes there are many."""
+    powers, n = 0.0, 0
+    for p in parts:
+        own = float(np.ptp(p.turns))
+        powers += float(np.mean([abs(p.wave(ratio + j / own)) ** 2 for j in BESIDE]))
+        n += p.time.size
+    return max(powers / n, 1.0)
+
+
+def _pieces_of(parts: Sequence[Stretch], seconds: float) -> NDArray[np.intp]:
+    """(k,) piece of so many seconds in which each stretch lies."""
+    keys = [(p.run, int(p.time[0] // seconds)) for p in parts]
+    known = {key: i for i, key in enumerate(dict.fromkeys(keys))}
+    return np.array([known[key] for key in keys], dtype=np.intp)
+
+
+def _sums(parts: Sequence[Stretch], noise: _Noise, ratio: float) -> NDArray[np.complex128]:
+    """(k,) of value exp(-2 pi i ratio turns) over the variance of the noise."""
+    waves = np.array([p.wave(ratio) for p in parts], dtype=np.complex128)
+    out: NDArray[np.complex128] = waves / (np.sqrt(noise.own) * noise.beside)
+    return out
+
+
+def _weights(parts: Sequence[Stretch], noise: _Noise, piece: NDArray[np.intp]) -> Floats:
+    n = np.array([p.time.size for p in parts]) / (noise.own * noise.beside)
+    return np.asarray(np.bincount(piece, n), dtype=np.float64)
+
+
+def _added(sums: NDArray[np.complex128], piece: NDArray[np.intp]) -> NDArray[np.complex128]:
+    """Sums over the stretches of each piece."""
+    out = np.zeros(int(piece.max()) + 1, dtype=np.complex128)
+    np.add.at(out, piece, sums)
+    return out
+
+
+def _apart(parts: Sequence[Stretch], noise: _Noise, candidate: Candidate) -> _Waves:
+    """A phase for each stretch; the ratio of most power near the candidate's."""
+    piece = np.arange(len(parts))
+    weights = _weights(parts, noise, piece)
+    tried = [
+        _Waves(z, piece, _sums(parts, noise, z), weights) for z in (candidate.ratio + TRIED * candidate.reach).tolist()
+    ]
+    return max(tried, key=lambda waves: waves.gain)
+
+
+def _joined(parts: Sequence[Stretch], noise: _Noise, ratio: float, reach: float, piece: NDArray[np.intp]) -> _Waves:
+    """A phase for each piece; the ratio within `reach` of the one given at which that has most power."""
+    weights = _weights(parts, noise, piece)
+    centre = np.array([p.turns.mean() for p in parts])
+    span = float(np.ptp(centre)) or 1.0
+    for _ in range(2):
+        sums = _sums(parts, noise, ratio)
+        offsets = np.linspace(-reach, reach, int(np.clip(8 * reach * span, 40, 20000)) | 1)
+        gains = [
+            float(np.sum(np.abs(_added(sums * np.exp(-2j * np.pi * d * centre), piece)) ** 2 / weights))
+            for d in offsets
+        ]
+        ratio += float(offsets[int(np.argmax(gains))])
+        reach = 2 * reach / offsets.size
+    return _Waves(ratio, piece, _added(_sums(parts, noise, ratio), piece), weights)
+
+
+def _told(parts: Sequence[Stretch], waves: _Waves, p_value: float) -> Locked:
+    """Amplitude, ratio and phase with what is not known of them."""
+    each, total = 2 * waves.sums / waves.weights, float(waves.weights.sum())
+    coherent = each.size == 1
+    std = size_std = float(np.sqrt(2 / total))
+    amplitude = float(np.sqrt(np.sum(waves.weights * np.abs(each) ** 2) / total))
+    if not coherent:
+        bias = 2 * std**2 * each.size
+        amplitude = float(np.sqrt(max(amplitude**2 - bias, 0.0)))
+        size_std = float(np.sqrt(std**2 + 0.5 * std**2 * bias / max(amplitude, std) ** 2))
+    size = max(amplitude, std)
+    n = np.array([p.time.size for p in parts], dtype=np.float64)
+    ratio_std = std / (2 * np.pi * size * _spread(parts, n, waves.piece))
+    mean_turns = float(np.average([p.turns.mean() for p in parts], weights=n))
+    return Locked(
+        ratio=waves.ratio,
+        ratio_std=ratio_std,
+        amplitude=amplitude,
+        amplitude_std=size_std,
+        phase=float(np.angle(each[0] * 1j)) if coherent else None,
+        phase_std=float(np.hypot(std / size, 2 * np.pi * ratio_std * mean_turns)) if coherent else None,
+        p_value=p_value,
+        gain=waves.gain if coherent else waves.gain - 2.0 * each.size,
+        speed=float(np.average([p.speed for p in parts], weights=n)),
+        parts=tuple(
+            Part(p.run, float(p.time[0]), float(np.nextafter(p.time[-1], np.inf)), float(c.real), float(-c.imag))
+            for p, c in zip(parts, each[waves.piece], strict=True)
+        ),
+    )
+
+
+def _spread(parts: Sequence[Stretch], n: Floats, piece: NDArray[np.intp]) -> float:
+    """Standard deviation of the angle within the pieces, turns."""
+    centre = np.array([p.turns.mean() for p in parts])
+    middle = np.bincount(piece, n * centre) / np.bincount(piece, n)
+    within = np.array([np.var(p.turns) for p in parts]) + (centre - middle[piece]) ** 2
+    return float(np.sqrt(np.average(within, weights=n)))

@@ -1,0 +1,276 @@
+"""Periodic disturbances in the residual at full rate: mains, pick-up, blade pass.
+
+A line of fixed frequency a sin(2 pi f t + p), or one locked to the rotor, a sin(2 pi z theta + p) with theta the angle
+turned. The most significant of either kind is found, fitted by least squares and taken out, until none passes.
+
+A line must stand above the noise of its neighbours at a family-wise false-alarm rate over all that is searched
+(spectrum), and a Lorentz peak of noise must not explain it as well (Whittle likelihood, see `peak_p_value`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from identification.mismatch.periodic.line_or_order import as_turning
+from identification.mismatch.periodic.line_width import peak_p_value
+from identification.mismatch.periodic.order_tracking import Locked, Part, find_locked, wave_of
+from identification.mismatch.periodic.spectrum import (
+    FAR,
+    Series,
+    Spectrum,
+    clipped,
+    family_wise,
+    finite,
+    spacing_of,
+    spectrum_of,
+    tail,
+)
+from identification.mismatch.periodic.steady_segments import speed_of
+from identification.recording import Floats
+
+ALARM = 0.005
+"""Family-wise false-alarm rate: half of what a diagnosis is allowed, the search for effects has its own."""
+LOCKED = 0.2
+"""Of that for lines locked to the rotor, whose noise differs from stretch to stretch: those that matter are far beyond
+it, and of 300 clean recordings four had one at 0.0002 to 0.003."""
+MOST_LINES = 4
+LOWEST = 1.0
+"""Hz: below this a residual is full of steps that are repeated, not of lines."""
+PERIODS = 10
+"""Least number of periods in a run."""
+LEAST_SAMPLES = 100
+TRIED = 6
+"""Peaks that are looked at before a spectrum holds no line."""
+MAINS = (50.0, 60.0)
+"""Hz; IEC 60038 systems."""
+HARMONICS = (1, 2, 3, 4, 5)
+EQUAL = 10.0
+"""Gain in chi-square by which fixed and rotor-locked lines are told apart."""
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """One periodic disturbance. Standard errors are of the noise beside the line."""
+
+    kind: Literal["fixed", "rotation"]
+    frequency: float
+    """Hz; of a rotor-locked line at the mean speed of the turning rotor."""
+    frequency_std: float
+    ratio: float | None
+    """Periods per `unit`, of a rotor-locked line."""
+    ratio_std: float | None
+    amplitude: float
+    """N."""
+    amplitude_std: float
+    phase: float | None
+    """rad of a sin(2 pi f t + phase) in the first run; None where it differs from stretch to stretch."""
+    phase_std: float | None
+    p_value: float
+    """Family-wise."""
+    gain: float
+    """In chi-square."""
+    statement: str
+    rival: Line | None = None
+    """Of the other kind, where it explains it about as well."""
+    parts: tuple[Part, ...] = ()
+    unit: Literal["rev", "V s"] = "rev"
+    """Of the turns: V s where no rate was recorded."""
+    band: tuple[float, float] = (0.0, 0.0)
+    """Hz, in which it shows: the frequency -+ 1/T of the longest run; of a rotor-locked line over nine tenths of the
+    time in which it turns."""
+    power: float = 0.0
+    """N^2, mean square over all samples."""
+
+    def at(self, time: Floats, turns: Floats | None = None, run: int = 0) -> Floats:
+        """(n,) N, the line at these times (and turns) of that run."""
+        if self.kind == "rotation" and turns is None:
+            raise ValueError("a line locked to the rotor needs the turns at these times")
+        angle = 2 * np.pi * (self.frequency * time if self.ratio is None or turns is None else self.ratio * turns)
+        return wave_of(self.parts, run, time, angle)
+
+
+def find_lines(
+    runs: Sequence[Series],
+    *,
+    alarm: float = ALARM,
+    lowest: float = LOWEST,
+    turns_unit: Literal["rev", "V s"] = "rev",
+    most: int = MOST_LINES,
+) -> tuple[Line, ...]:
+    """Every line in the residuals of one thruster's runs, the most significant first.
+
+    `Series.turns`: see `turned`. Rotor-locked lines are searched where all runs have them; where the rotor stands
+    still they are silent. Runs of fewer than LEAST_SAMPLES samples are left out.
+    """
+    left = [finite(r) for r in runs]
+    found: list[Line] = []
+    while len(found) < most:
+        best = _best(left, alarm, lowest, turns_unit)
+        if best is None:
+            break
+        found.append(_placed(best, left))
+        left = [
+            replace(r, residual=r.residual - best.at(r.time, r.turns, i)) if r.time.size else r
+            for i, r in enumerate(left)
+        ]
+    return tuple(found)
+
+
+def _placed(line: Line, runs: Sequence[Series]) -> Line:
+    """With its band and power."""
+    waves = [line.at(r.time, r.turns, i) for i, r in enumerate(runs)]
+    power = sum(float(w @ w) for w in waves) / sum(w.size for w in waves)
+    low = high = line.frequency
+    if line.ratio is not None:
+        turning = [speed_of(r)[w != 0] for r, w in zip(runs, waves, strict=True) if np.count_nonzero(w) > 1]
+        low, high = line.ratio * np.quantile(np.concatenate(turning), (0.05, 0.95))
+    resolution = 1 / max(float(np.ptp(r.time)) for r in runs if r.time.size)
+    return replace(line, band=(max(float(low) - resolution, 0.0), float(high) + resolution), power=power)
+
+
+def _best(runs: Sequence[Series], alarm: float, lowest: float, unit: Literal["rev", "V s"]) -> Line | None:
+    long = [(i, r) for i, r in enumerate(runs) if r.time.size >= LEAST_SAMPLES]
+    if not long:
+        return None
+    fixed = _fixed(long, alarm, lowest)
+    locked = None
+    if all(r.turns is not None for _, r in long):
+        found = find_locked(long, LOCKED * alarm, in_turns=unit == "rev")
+        locked = None if found is None else _locked(found, unit)
+    if fixed is not None and locked is None and all(r.turns is not None for _, r in long):
+        turning = as_turning(long, fixed.frequency, fixed.amplitude_std, fixed.p_value)
+        locked = None if turning is None or fixed.gain - turning.gain > EQUAL else _locked(turning, unit)
+    if fixed is None or locked is None:
+        return fixed or locked
+    better, other = (fixed, locked) if fixed.gain >= locked.gain else (locked, fixed)
+    return replace(better, rival=other) if better.gain - other.gain < EQUAL else better
+
+
+def _fixed(runs: Sequence[tuple[int, Series]], alarm: float, lowest: float) -> Line | None:
+    """The most significant line of one frequency."""
+    spacings = [spacing_of(r.time) for _, r in runs]
+    spacing, even = min(s for s, _ in spacings), all(e for _, e in spacings) and len({s for s, _ in spacings}) == 1
+    spans = [float(r.time[-1] - r.time[0]) for _, r in runs]
+    spectra = [spectrum_of(r, max(spans), spacing, even=even) for _, r in runs]
+    step = spectra[0].step
+    ratio = np.mean([s.power / s.noise for s in spectra], axis=0)
+    first = int(np.ceil(max(lowest, PERIODS / max(spans)) / step))
+    ratio[:first] = 0.0
+    trials = float(np.sum([np.sqrt(4 * np.pi * np.var(r.time)) for _, r in runs])) * (0.5 / spacing)
+    for _ in range(TRIED):
+        at = int(np.argmax(ratio))
+        if at < first or _p_value(float(ratio[at]), len(runs), trials) > alarm * 10:
+            return None
+        line = _fitted(runs, spectra, at, trials, spacing)
+        if line is not None and line.p_value < alarm:
+            return line
+        ratio[max(at - int(FAR / 2), 0) : at + int(FAR / 2)] = 0.0
+    return None
+
+
+def _p_value(mean_ratio: float, runs: int, trials: float) -> float:
+    return family_wise(tail(mean_ratio, runs, FAR), runs * mean_ratio, trials)
+
+
+def _fitted(
+    runs: Sequence[tuple[int, Series]], spectra: Sequence[Spectrum], at: int, trials: float, spacing: float
+) -> Line | None:
+    """Frequency by least squares round a grid point, coefficients run by run; None beyond the searched band."""
+    from scipy.optimize import minimize_scalar  # a quarter of a second, and few recordings come here
+
+    step = spectra[0].step
+    noise = [float(s.noise[at]) for s in spectra]
+    values = [clipped(r.residual) for _, r in runs]
+
+    def power(f: float) -> float:
+        return sum(_power(r.time, v, f) / s for (_, r), v, s in zip(runs, values, noise, strict=True))
+
+    found = minimize_scalar(
+        lambda f: -power(f), bounds=((at - 1) * step, (at + 1) * step), method="bounded", options={"xatol": 1e-3 * step}
+    )
+    f = float(found.x)
+    p = _p_value(power(f) / len(runs), len(runs), trials)
+    loudest = int(np.argmax([_power(r.time, v, f) / s for (_, r), v, s in zip(runs, values, noise, strict=True)]))
+    p = max(p, peak_p_value(runs[loudest][1].time, values[loudest], f))
+    parts, precision = [], []
+    for (i, r), s in zip(runs, noise, strict=True):
+        a, b = _coefficients(r.time, clipped(r.residual), f)
+        parts.append(Part(i, -np.inf, np.inf, a, b))
+        precision.append(r.time.size / (2 * s))
+    sizes = np.hypot([q.a for q in parts], [q.b for q in parts])
+    amplitude = float(np.average(sizes, weights=precision))
+    std = float(1 / np.sqrt(np.sum(precision)))
+    spread = np.array([np.var(r.time) for _, r in runs])
+    f_std = float(1 / (2 * np.pi * amplitude * np.sqrt(np.sum(precision * spread))))
+    first_std = float(1 / (sizes[0] * np.sqrt(precision[0])))
+    phase_std = float(np.hypot(first_std, 2 * np.pi * f_std * float(np.mean(runs[0][1].time))))
+    phase = float(np.arctan2(parts[0].a, parts[0].b))
+    says = _fixed_says(f, amplitude, spacing)
+    return Line(
+        "fixed", f, f_std, None, None, amplitude, std, phase, phase_std, p, 2 * power(f), says, parts=tuple(parts)
+    )
+
+
+def _power(time: Floats, value: Floats, f: float) -> float:
+    """|sum value exp(-2 pi i f t)|^2 / n."""
+    angle = 2 * np.pi * f * time
+    return float((value @ np.cos(angle)) ** 2 + (value @ np.sin(angle)) ** 2) / time.size
+
+
+def _coefficients(time: Floats, value: Floats, f: float) -> tuple[float, float]:
+    angle = 2 * np.pi * f * time
+    X = np.column_stack([np.cos(angle), np.sin(angle), np.ones_like(angle)])
+    a, b, _ = np.linalg.lstsq(X, value, rcond=None)[0]
+    return float(a), float(b)
+
+
+def alias_of_mains(f: float, spacing: float, within: float) -> float | None:
+    """Harmonic of the mains (Hz) that samples `spacing` s apart show at `f`, to `within` Hz; None without one."""
+    rate = 1.0 / spacing
+    for mains in MAINS:
+        for harmonic in HARMONICS:
+            true = mains * harmonic
+            seen = abs(true - rate * round(true / rate))
+            if abs(seen - f) < within + 0.002 * true:  # grid frequency is kept within 0.2 % nearly always (ENTSO-E)
+                return true
+    return None
+
+
+def _fixed_says(f: float, amplitude: float, spacing: float) -> str:
+    says = f"Periodic disturbance of {amplitude:.3g} N at {f:.4g} Hz"
+    true = alias_of_mains(f, spacing, 0.02)
+    if true is not None and true < 0.5 / spacing:
+        says += f", which is mains ({true:g} Hz)"
+    elif true is not None:
+        says += f"; sampled at {1 / spacing:.4g} Hz, mains of {true:g} Hz would show there"
+    return says + "."
+
+
+def _locked(found: Locked, unit: Literal["rev", "V s"]) -> Line:
+    per = "turn" if unit == "rev" else "V s of the driver"
+    near = round(found.ratio)
+    blades = unit == "rev" and near >= 1 and abs(found.ratio - near) < max(0.02, 4 * found.ratio_std)
+    says = f"Periodic disturbance of {found.amplitude:.3g} N locked to the rotor, {found.ratio:.4g} periods per {per}"
+    says += f" (blade pass of {near} blades, or the {near}. order of the shaft)" if blades and near > 1 else ""
+    says += ": silent at rest."
+    speed = found.speed
+    return Line(
+        "rotation",
+        found.ratio * speed,
+        found.ratio_std * speed,
+        found.ratio,
+        found.ratio_std,
+        found.amplitude,
+        found.amplitude_std,
+        found.phase,
+        found.phase_std,
+        found.p_value,
+        found.gain,
+        says,
+        parts=found.parts,
+        unit=unit,
+    )

@@ -1,0 +1,248 @@
+"""Intervals of one run: short where the command changes, growing with the time since then, cut at its steps."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.mismatch.prepare.measured_driver import NOISES, measured
+from identification.recording import Channel, Floats
+
+FINEST = 0.01
+"""s, the shortest interval."""
+COARSEST = 0.25
+"""s, the longest one while levels are held."""
+FINEST_AFTER_STEP = 0.0025
+"""s: motor lags of some milliseconds are as steep as this."""
+GROWTH_AFTER_STEP = 0.12
+WINDOW = 0.0015
+"""s before and after a sample that stands for its time."""
+WINDOW_ZONE = 0.1
+"""s after a change of the command in which samples have windows."""
+LEAST_WINDOWED = 0.008
+"""s between samples: where they are denser, only those after a step have windows..."""
+DENSE_ZONE = 10.0
+"""...for so many samples."""
+WINDOW_SHARE = 0.3
+"""Of the spacing, at most, before and after a sample."""
+GROWTH = 0.06
+"""Length of an interval per time since the last change."""
+MOVES = 0.01
+"""Share of the largest driver that counts as a change."""
+GAP = 5.0
+"""Spacings without a sample that are a gap."""
+TICKING = 5
+"""More steps than this part of the intervals are the ticks of ramps, unless they are..."""
+LARGEST_TICK = 0.08
+"""...larger than this share of the largest driver."""
+REST = 3.0
+"""Spacings of the samples: a command that stood for longer was held."""
+STEP = 0.02
+"""Share of the largest driver: a change of a command that is a step."""
+
+
+def distinct(time: Floats, value: Floats) -> tuple[Floats, Floats]:
+    """Samples that share one time become their mean."""
+    if time.size < 2 or np.all(np.diff(time) > 0):
+        return time, value
+    unique, index = np.unique(time, return_inverse=True)
+    mean: Floats = np.bincount(index, weights=value) / np.bincount(index)
+    return unique, mean
+
+
+def _gaps(time: Floats, good: NDArray[np.bool_]) -> Floats:
+    """(g, 2) first and one past last time of each stretch that is not good, between two that are."""
+    change = np.diff(good.astype(np.int8))
+    begun, ended = np.flatnonzero(change == -1) + 1, np.flatnonzero(change == 1) + 1
+    ended = ended[ended > begun[0]] if begun.size else ended[:0]
+    return np.column_stack([time[begun[: ended.size]], time[ended]]).astype(np.float64)
+
+
+class Held:
+    """The driver as a function of time: constant between rows of a command, a straight line between measurements.
+
+    A measurement that jumped from one sample to the next did so half way between them.
+    """
+
+    def __init__(self, channel: Channel, end: float) -> None:
+        good = np.isfinite(channel.value)
+        self.quantity = str(channel.quantity)
+        self.stepwise = channel.quantity == "command_voltage"
+        self.unknown = _gaps(channel.time, good) if self.stepwise else np.empty((0, 2))
+        """(g, 2) s: from a command that is no number to the next that is one; taken as that one."""
+        known = channel.time.astype(np.float64)
+        for begun, ended in self.unknown:
+            known[channel.time == ended] = begun
+        self.time, self.value = distinct(known[good], channel.value[good])
+        self.measured = None if self.stepwise else measured(self.time, self.value)
+        if self.measured is not None:
+            self.time, self.value = self.measured.with_jumps()
+        last = max(end, float(self.time[-1]))
+        knots = np.append(self.time, last + 1.0)
+        if self.stepwise:
+            area = self.value * np.diff(knots)
+        else:
+            padded = np.append(self.value, self.value[-1])
+            area = 0.5 * (padded[1:] + padded[:-1]) * np.diff(knots)
+        self._knots, self._area = knots, np.concatenate([[0.0], np.cumsum(area)])
+
+    def mean(self, edges: Floats) -> Floats:
+        """(M,) mean over each interval. A command before its first row is 0."""
+        total = np.interp(edges, self._knots, self._area)
+        if not self.stepwise:
+            index = np.clip(np.searchsorted(self._knots, edges, side="right") - 1, 0, self.time.size - 1)
+            padded = np.append(self.value, self.value[-1])
+            span = self._knots[index + 1] - self._knots[index]
+            part = np.clip(edges - self._knots[index], 0.0, span)
+            slope = (padded[index + 1] - padded[index]) / span
+            total = self._area[index] + padded[index] * part + 0.5 * slope * part**2
+        out: Floats = np.diff(total) / np.diff(edges)
+        return out
+
+    def excess(self, edges: Floats) -> Floats:
+        """(M,) mean of V|V| over each interval less that of the mean V: what a moving driver gives beside its mean."""
+        at = np.union1d(edges, self._knots[(self._knots > edges[0]) & (self._knots < edges[-1])])
+        middle, left, right = 0.5 * (at[1:] + at[:-1]), at[:-1], at[1:]
+        if self.stepwise:
+            index = np.searchsorted(self._knots, middle, side="right") - 1
+            v = np.where(index < 0, 0.0, self.value[np.clip(index, 0, self.time.size - 1)])
+            square = v * np.abs(v)
+        else:
+            a, m, b = (np.interp(t, self.time, self.value) for t in (left, middle, right))
+            square = (a * np.abs(a) + 4 * m * np.abs(m) + b * np.abs(b)) / 6
+        which = np.searchsorted(edges, middle, side="right") - 1
+        total = np.bincount(which, weights=square * (right - left), minlength=edges.size - 1)
+        mean = self.mean(edges)
+        out: Floats = total / np.diff(edges) - mean * np.abs(mean)
+        return out
+
+    @property
+    def noise(self) -> float:
+        """Standard deviation of a sample of a measured driver, in its unit; 0 of a command."""
+        return 0.0 if self.measured is None else self.measured.noise
+
+    @property
+    def finest(self) -> float:
+        """s: between samples of a measured driver whose noise is seen; 0 of all others."""
+        loud = self.measured is not None and self.measured.loud
+        return float(np.median(np.diff(self.measured.time))) if self.measured and loud else 0.0
+
+    def starts(self, rest: float) -> Floats:
+        """Times at which it begins to move, and not by a step, after it stood for more than `rest` s."""
+        change = np.diff(self.value)
+        moves, far = self.time[1:][change != 0], np.abs(change[change != 0])
+        begins = (np.diff(moves, prepend=-np.inf) > rest) & (far <= STEP * float(np.max(np.abs(self.value))))
+        out: Floats = moves[begins]
+        return out
+
+    def changes(self) -> Floats:
+        """Times at which it has moved by MOVES of its size since the last such time."""
+        step = max(MOVES * float(np.max(np.abs(self.value))), NOISES * self.noise)
+        index, last = [0], self.value[0]
+        if self.value.size < 200_000:
+            for i, v in enumerate(self.value.tolist()):
+                if abs(v - last) > step:
+                    index.append(i)
+                    last = v
+        out: Floats = self.time[np.array(index, dtype=np.intp)]
+        return out
+
+
+def edges_of(time: Floats, held: Held, most: int) -> Floats:
+    """Edges between samples, dense after changes; big steps of the command are edges too."""
+    spacing = float(np.median(np.diff(time)))
+    between = 0.5 * (time[1:] + time[:-1])
+    candidates = np.concatenate([[time[0] - 0.5 * spacing], between, [time[-1] + 0.5 * spacing]])
+    changes = held.changes()
+    index = np.searchsorted(changes, candidates, side="right") - 1
+    since = np.where(index >= 0, candidates - changes[np.maximum(index, 0)], COARSEST / GROWTH)
+    finest = max(FINEST, spacing, held.finest)
+    width = np.clip(GROWTH * since, finest, max(COARSEST, finest))
+    wanted = np.concatenate([[0.0], np.cumsum(np.diff(candidates) / width[1:])])
+    shrink = min(1.0, most / max(float(wanted[-1]), 1.0))
+    number = np.floor(wanted * shrink + 1e-6)
+    edges = candidates[np.concatenate([[True], np.diff(number) > 0])]
+    edges[-1] = candidates[-1]
+    gap = np.flatnonzero(np.diff(time) > GAP * spacing)
+    if 0 < gap.size < most // 4:  # samples at the end of a long interval would stand for its middle
+        edges = np.union1d(edges, np.concatenate([time[gap] + 0.5 * spacing, time[gap + 1] - 0.5 * spacing]))
+    edges = _with_starts(_with_jumps(edges, held, most), candidates, held, spacing, most)
+    return _with_windows(_with_steps(edges, held, spacing, most), time, held, spacing, most)
+
+
+def _with_jumps(edges: Floats, held: Held, most: int) -> Floats:
+    """Two levels of a measured driver share no interval."""
+    jumps = held.measured.jumps if held.measured is not None else np.empty(0)
+    inside = jumps[(jumps > edges[0]) & (jumps < edges[-1])]
+    if not 0 < inside.size < most // 4:
+        return edges
+    out = np.union1d(edges, inside)
+    result: Floats = out[np.concatenate([[True], np.diff(out) > 1e-6])]
+    return result
+
+
+def _with_starts(edges: Floats, candidates: Floats, held: Held, spacing: float, most: int) -> Floats:
+    """What is held and what moves after it share no interval: an edge before the first sample on the way."""
+    starts = held.starts(REST * spacing) if held.stepwise else np.empty(0)
+    if not 0 < starts.size < most // 4:
+        return edges
+    before = np.searchsorted(candidates, starts, side="right") - 1
+    return np.union1d(edges, candidates[np.clip(before, 0, candidates.size - 1)])
+
+
+def _with_steps(edges: Floats, held: Held, spacing: float, most: int) -> Floats:
+    """Each step of a command is an edge, followed by intervals that begin at FINEST_AFTER_STEP and grow."""
+    size = float(np.max(np.abs(held.value)))
+    steps = held.time[1:][np.abs(np.diff(held.value)) > STEP * size]
+    steps = steps[(steps > edges[0]) & (steps < edges[-1])]
+    if steps.size > most // TICKING:  # a fast ramp, of which each tick would be a step
+        steps = held.time[1:][np.abs(np.diff(held.value)) > LARGEST_TICK * size]
+        steps = steps[(steps > edges[0]) & (steps < edges[-1])]
+    if not (held.stepwise and steps.size):
+        return edges
+    after = [0.0]
+    while (width := max(FINEST_AFTER_STEP, GROWTH_AFTER_STEP * after[-1])) < spacing:
+        after.append(after[-1] + width)
+    if steps.size * len(after) > most:
+        after = [0.0]
+    gap = np.diff(np.append(steps, edges[-1]))
+    added = (steps[:, None] + np.array(after)[None, :])[np.array(after)[None, :] < gap[:, None] - 1e-4]
+    last = np.searchsorted(steps, edges, side="right") - 1
+    since = np.where(last >= 0, edges - steps[np.maximum(last, 0)], np.inf)
+    until = np.where(last + 1 < steps.size, steps[np.minimum(last + 1, steps.size - 1)] - edges, np.inf)
+    free = (since > after[-1] + 0.3 * spacing) & (until > min(0.3 * spacing, FINEST_AFTER_STEP))
+    free[[0, -1]] = True
+    out = np.union1d(edges[free], added)
+    result: Floats = out[np.concatenate([[True], np.diff(out) > 1e-6])]
+    return result
+
+
+def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most: int) -> Floats:
+    """Shortly after every change of a command, each sample gets a short interval of its own."""
+    if not held.stepwise:
+        return edges
+    dense = spacing < LEAST_WINDOWED
+    least = STEP * float(np.max(np.abs(held.value))) if dense else 0.0
+    changes = held.time[1:][np.abs(np.diff(held.value)) > least]
+    changes = changes[(changes > edges[0]) & (changes < edges[-1])]
+    if not changes.size or changes.size > most:
+        return edges
+    zone = DENSE_ZONE * spacing if dense else max(WINDOW_ZONE, 5 * spacing)
+    half = min(WINDOW, WINDOW_SHARE * spacing)
+    last = np.searchsorted(changes, time, side="right") - 1
+    own = time[(last >= 0) & (time - changes[np.maximum(last, 0)] < zone)]
+    if own.size > most:
+        return edges
+    nearest = np.searchsorted(changes, own)
+    before = changes[np.maximum(nearest - 1, 0)]
+    after = changes[np.minimum(nearest, changes.size - 1)]
+    low = np.where((before <= own) & (own - before < half), before, own - half)
+    high = np.where((after > own) & (after - own < half), after, own + half)
+    windows = np.column_stack([low, high])
+    inside = np.searchsorted(windows[:, 0], edges, side="right") - 1
+    covered = (inside >= 0) & (edges > windows[np.maximum(inside, 0), 0]) & (edges < windows[np.maximum(inside, 0), 1])
+    covered[[0, -1]] = False
+    out = np.union1d(np.union1d(edges[~covered], windows.ravel()), changes)
+    out = out[(out >= edges[0]) & (out <= edges[-1])]
+    result: Floats = out[np.concatenate([[True], np.diff(out) > 1e-5])]
+    return result

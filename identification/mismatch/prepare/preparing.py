@@ -1,0 +1,277 @@
+"""From a recording to its history: which channel drives, and what was measured in each interval (grid.py)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.mismatch.prepare.channels import followed, jumps, neighbour_at, supply, torque
+from identification.mismatch.prepare.grid import STEP, Held, distinct, edges_of
+from identification.recording import Channel, Floats, Recording
+from identification.run_history.history import CHANGED, History
+from identification.run_history.sub_interval_leads import with_leads
+
+DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
+"""What may explain the thrust, best first."""
+JITTER_BEFORE, JITTER_AFTER = 0.002, 0.003
+"""s round a step within which a sample may belong to either level: time stamps are not better."""
+JITTER_SHARE = 0.1
+"""Of the time between samples: where they are dense and even, so good are their stamps."""
+JITTERS = 3.0
+"""Standard deviations of the time between samples that a stamp may be off."""
+MOST_INTERVALS = 6000
+MOST_MOVING = 10000
+"""The same where the driver hardly ever stands still: within an interval a kink of the curve is not seen."""
+MANY_CHANGES = 1500
+MOST_LEVELS = 300
+"""Of a measured driver, whose errors are told from noise."""
+AFTER_UNKNOWN = 1.0
+"""s after a stretch of unknown command before thrust counts again."""
+LEAST_DWELL = 0.5
+"""s of a level in a static table."""
+FEW_SAMPLES = 3
+"""Samples of a level, at most, that make a static table."""
+LEAST_HELD = 0.5
+"""s of a level of which the second half counts as steady."""
+LEAST_SAMPLES = 5
+FOLLOWED = ("bus_voltage", "flow_speed", "current", "torque", "motor_temperature", "water_temperature", "rotation_rate")
+"""Quantities that terms and tests may look at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why a recording cannot be diagnosed, in one sentence."""
+
+    reason: str
+
+
+def history_of(recording: Recording, most_intervals: int = MOST_INTERVALS) -> History | Refusal:
+    """The run on at most about `most_intervals` intervals."""
+    name = recording.source or recording.recording_id
+    recording = _own_first(recording)
+    thrust = recording.first_of("thrust")
+    if thrust is None:
+        return Refusal(f"{name} has no thrust channel (quantity thrust): there is no response to explain")
+    good = np.isfinite(thrust.value) & np.isfinite(thrust.time)
+    time, force = distinct(thrust.time[good], thrust.value[good])
+    if time.size < LEAST_SAMPLES:
+        return Refusal(f"{name} has {time.size} finite thrust samples; at least {LEAST_SAMPLES} are needed")
+    driver = _driver(recording)
+    if isinstance(driver, str):
+        return Refusal(f"{name} {driver}")
+    held = Held(driver, float(time[-1]))
+    time, force = _driven(time, force, held)
+    if time.size < LEAST_SAMPLES:
+        return Refusal(f"{name}: thrust and {driver.quantity} share no stretch of time; are both on one clock?")
+    time, force = _clear_of_steps(time, force, held)
+    if time.size < LEAST_SAMPLES:
+        return Refusal(f"{name}: almost every thrust sample coincides with a change of the driver")
+    edges = edges_of(time, held, MOST_MOVING if held.changes().size > MANY_CHANGES else most_intervals)
+    return _filled(recording, driver, held, edges, time, force)
+
+
+def _own_first(recording: Recording) -> Recording:
+    """A neighbour's channels behind those of the thruster itself, whichever were written first."""
+    own = sorted(recording.channels, key=lambda c: c.thruster not in (None, "", recording.thruster))
+    return replace(recording, channels=tuple(own))
+
+
+def _driver(recording: Recording) -> Channel | str:
+    """The best channel that moves; otherwise what is wrong, as the end of a sentence."""
+    seen: list[str] = []
+    for quantity in DRIVERS:
+        channel = recording.first_of(quantity)
+        if channel is None:
+            continue
+        value = channel.value[np.isfinite(channel.value)]
+        if value.size and float(np.ptp(value)) > 1e-9 * max(float(np.max(np.abs(value))), 1e-300):
+            return channel
+        seen.append(f"{quantity} is {value[0]:g} throughout" if value.size else f"{quantity} holds no number")
+    if not seen:
+        return f"has none of {', '.join(DRIVERS)}: nothing tells what drove the thruster"
+    return f"cannot be diagnosed: {', '.join(seen)}; at least two levels are needed"
+
+
+def _driven(time: Floats, force: Floats, held: Held) -> tuple[Floats, Floats]:
+    """Without what was measured before the first row of the driver, while it was unknown (and a little longer, the
+    rotor coasts), and, for a measured driver, after its last row."""
+    slack = 0.5 * float(np.median(np.diff(time)))
+    end = np.inf if held.stepwise else held.time[-1] + slack
+    inside = (time >= held.time[0] - slack) & (time <= end)
+    for begun, ended in held.unknown:
+        inside &= (time < begun) | (time > ended + AFTER_UNKNOWN)
+    return time[inside], force[inside]
+
+
+def _clear_of_steps(time: Floats, force: Floats, held: Held) -> tuple[Floats, Floats]:
+    """Without samples so near to a step of the command that the clocks cannot say which level they belong to, or of
+    which a measured driver does not say what drove them."""
+    if held.measured is not None:
+        known = held.measured.known(time, force)
+        return time[known], force[known]
+    size = float(np.max(np.abs(held.value)))
+    big = np.abs(np.diff(held.value, prepend=0.0)) > STEP * size  # the first row is a step from nothing
+    steps = held.time[big]
+    if not steps.size or time.size < 4 * steps.size:
+        return time, force
+    least = jitter_of(time)
+    after = np.searchsorted(steps, time + min(JITTER_BEFORE, least), side="right") - 1
+    late = time - steps[np.maximum(after, 0)]
+    clear = (after < 0) | (late > min(JITTER_AFTER, least))
+    return time[clear], force[clear]
+
+
+def jitter_of(time: Floats) -> float:
+    """Time in s by which stamps may be off, as their own spacing tells: a share of it, or its scatter."""
+    step = np.diff(time)
+    spacing = float(np.median(step))
+    return max(JITTER_SHARE * spacing, JITTERS * float(np.median(np.abs(step - spacing))) / 0.6745)
+
+
+def _clear_of_jumps(recording: Recording, time: Floats, force: Floats) -> tuple[Floats, Floats]:
+    """Without samples between two samples of the flow of which nobody knows when it changed."""
+    flow = recording.first_of("flow_speed")
+    if flow is None or np.count_nonzero(np.isfinite(flow.value)) < 3:
+        return time, force
+    good = np.isfinite(flow.value)
+    at, value = flow.time[good], flow.value[good]
+    found = np.flatnonzero(jumps(value) & (np.abs(np.diff(value)) > 0.03 * np.ptp(value)))
+    gap = np.searchsorted(at, time, side="right") - 1
+    clear = ~np.isin(gap, found)
+    return (time[clear], force[clear]) if np.count_nonzero(clear) > 0.7 * time.size else (time, force)
+
+
+def _binned(time: Floats, value: Floats, edges: Floats) -> tuple[Floats, NDArray[np.int64], Floats]:
+    """Mean value (NaN where none), number of samples and mean time in each interval."""
+    M = edges.size - 1
+    index = np.searchsorted(edges, time, side="right") - 1
+    inside = (index >= 0) & (index < M)
+    index = index[inside]
+    count = np.bincount(index, minlength=M)
+    some = np.maximum(count, 1)
+    mean = np.where(count > 0, np.bincount(index, weights=value[inside], minlength=M) / some, np.nan)
+    when = np.bincount(index, weights=time[inside], minlength=M) / some
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    return mean, count, np.where(count > 0, when, middle)
+
+
+def _within(time: Floats, value: Floats, edges: Floats, mean: Floats) -> Floats:
+    """Sum of squares about the mean of each interval."""
+    index = np.searchsorted(edges, time, side="right") - 1
+    inside = (index >= 0) & (index < mean.size)
+    index = index[inside]
+    squares = (value[inside] - mean[index]) ** 2
+    return np.asarray(np.bincount(index, weights=squares, minlength=mean.size), dtype=np.float64)
+
+
+def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, time: Floats, force: Floats) -> History:
+    _, whole, _ = _binned(time, force, edges)
+    time, force = _clear_of_jumps(recording, time, force)
+    mean, count, sampled = _binned(time, force, edges)
+    torn = count < 0.5 * whole  # what is left at one end of an interval does not stand for all of it
+    mean[torn], count[torn] = np.nan, 0
+    within = _within(time, force, edges, mean)
+    driven = held.mean(edges)
+    others = _explaining(recording, driver, held, edges, driven)
+    inside = (time >= edges[0]) & (time < edges[-1])
+    rate = rate_count = rate_sampled = None
+    turning_time = np.empty(0)
+    per_driver = 1.0
+    turning = recording.first_of("rotation_rate")
+    if "rotation_rate" in others and turning is not None:
+        good = np.isfinite(turning.value)
+        turning_time = turning.time[good]
+        rate, rate_count, rate_sampled = _binned(turning.time[good], turning.value[good], edges)
+        per_driver = _rate_per_driver(driven, others["rotation_rate"], edges)
+    history = History(
+        recording_id=recording.recording_id,
+        driver_quantity=held.quantity,
+        edges=edges,
+        driver=driven,
+        excess=held.excess(edges),
+        thrust=mean,
+        count=count,
+        sampled=sampled,
+        within=within,
+        tick=max(float(np.median(np.diff(held.time))), 1e-6) if held.time.size > 1 else 1.0,
+        driver_noise=held.noise,
+        level_errors=_level_errors(held, edges),
+        ticks=(held.time, held.value) if held.stepwise else None,
+        sample_time=time[inside],
+        sample_thrust=force[inside],
+        rate_time=turning_time,
+        rate=rate,
+        rate_count=rate_count,
+        rate_sampled=rate_sampled,
+        others=others,
+        rate_per_driver=per_driver,
+        spacing=float(np.median(np.diff(time))),
+        jitter=jitter_of(time),
+        rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
+        static=_is_table(held, time.size),
+    )
+    return with_leads(history, None if held.measured is None else held.measured.at(history.thrust_samples.time))
+
+
+def _level_errors(held: Held, edges: Floats) -> Floats:
+    """(M, k) of each level at which a measured driver stood still: the error of its mean, which all of it shares."""
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    levels = () if held.measured is None else held.measured.levels
+    if not 0 < len(levels) <= MOST_LEVELS:
+        return np.empty((middle.size, 0))
+    columns = [np.where((middle >= v.begun) & (middle <= v.ended), v.error, 0.0) for v in levels]
+    return np.column_stack(columns)
+
+
+def _rate_per_driver(driven: Floats, rate: Floats, edges: Floats) -> float:
+    """Weighted median of rate over driver in the second half of each level that was held, or of everything."""
+    dt = np.diff(edges)
+    size = float(np.max(np.abs(driven), initial=0.0))
+    new = np.abs(np.diff(driven, prepend=np.nan)) > CHANGED * size
+    new[0] = True
+    starts = np.flatnonzero(new)
+    which = np.searchsorted(starts, np.arange(dt.size), side="right") - 1
+    begun, ended = edges[starts][which], np.append(edges[starts[1:]], edges[-1])[which]
+    held = (edges[:-1] > 0.5 * (begun + ended)) & (ended - begun > LEAST_HELD)
+    weight = driven**2 * dt * held
+    if not weight.any():
+        weight = driven**2 * dt
+    at = np.flatnonzero(weight)
+    if at.size == 0:
+        return 1.0
+    ratio = rate[at] / driven[at]
+    order = np.argsort(ratio)
+    total = np.cumsum(weight[at][order])
+    return float(ratio[order[np.searchsorted(total, 0.5 * total[-1])]]) or 1.0
+
+
+def _explaining(recording: Recording, driver: Channel, held: Held, edges: Floats, driven: Floats) -> dict[str, Floats]:
+    """Quantity -> (M,) of what terms and tests may look at beside the driver."""
+    middle = 0.5 * (edges[1:] + edges[:-1])
+    out: dict[str, Floats] = {}
+    for quantity in FOLLOWED:
+        channel = recording.first_of(quantity)
+        if channel is None or channel is driver:
+            continue
+        if quantity == "bus_voltage":
+            values = supply(channel, held, middle, driven, np.diff(edges))
+        elif quantity == "torque":
+            values = torque(channel, held, edges, driven)
+        else:
+            values = followed(channel, middle)
+        if values is not None:
+            out[quantity] = values
+    neighbour = neighbour_at(recording, middle)
+    if neighbour is not None:
+        out["neighbour_thrust"] = neighbour
+    return out
+
+
+def _is_table(held: Held, samples: int) -> bool:
+    """Levels held for long with hardly a sample each: a table of levels, not a course of time."""
+    changes = held.time[np.concatenate([[True], np.diff(held.value) != 0])]
+    if not held.stepwise or changes.size < 2 or samples > FEW_SAMPLES * changes.size:
+        return False
+    return float(np.median(np.diff(changes))) >= LEAST_DWELL

@@ -1,0 +1,57 @@
+"""How large things are in some runs: what terms scale their trials and bounds by."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.physics.term import Scale
+from identification.run_history.history import History
+
+MANY_SAMPLES = 100
+
+
+def scale_of(histories: Sequence[History], C: float) -> Scale:
+    """Sizes of these runs; C from a first fit."""
+    driver = max(h.size for h in histories)
+    unit = "rev/s" if histories[0].driver_quantity == "rotation_rate" else "V"
+    flows = [float(np.max(np.abs(h.others["flow_speed"]))) for h in histories if "flow_speed" in h.others]
+    return Scale(
+        driver=driver,
+        driver_unit=unit,
+        thrust=abs(C) * driver**2,
+        duration=max(float(h.edges[-1] - h.edges[0]) for h in histories),
+        interval=min(_resolution(h) for h in histories),
+        flow=max(flows, default=0.0),
+        reading=max(float(np.nanmax(np.abs(h.thrust))) for h in histories),
+        noise=float(np.median([_scatter(h) for h in histories])),
+        torque=_full_torque(histories) * driver**2,
+    )
+
+
+def _full_torque(histories: Sequence[History]) -> float:
+    """N m per unit of the driver squared; 0 where not every run has a torque. A peak while it starts counts little."""
+    if not all("torque" in h.others for h in histories):
+        return 0.0
+    power = sum(float(np.sum(np.abs(h.others["torque"]) * h.driver**2 * h.dt)) for h in histories)
+    size = sum(float(np.sum(h.driver**4 * h.dt)) for h in histories)
+    return power / size if size > 0 else 0.0
+
+
+def _resolution(history: History) -> float:
+    """s: the shorter intervals, or what the ticks of the command resolve."""
+    shortest = float(np.median(np.sort(history.dt)[: max(history.dt.size // 4, 1)]))
+    return shortest if history.tick_rows is None else min(shortest, history.tick_rows.resolution)
+
+
+def _scatter(history: History) -> float:
+    """N: standard deviation of one sample, robust: from second differences, or of a table from neighbouring rows."""
+    if not history.static and history.sample_thrust.size > MANY_SAMPLES:
+        bent = np.abs(np.diff(history.sample_thrust, 2))
+        return float(np.median(bent[np.isfinite(bent)]) / 0.6745 / np.sqrt(6.0))
+    rows = history.rows
+    same = np.diff(history.level_start[rows]) == 0
+    weight = np.sqrt(1 / history.count[rows][1:] + 1 / history.count[rows][:-1])
+    steps = (np.abs(np.diff(history.thrust[rows])) / weight)[same]
+    return float(np.median(steps) / 0.6745) if steps.size > 10 else 0.0

@@ -1,0 +1,28 @@
+"""Ringing faster than half the sampling rate looks like slower ringing, and a fit may end on either side of it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from identification.mismatch.estimate.estimate import State, refresh
+from identification.mismatch.estimate.fitting import Fit, fit
+from identification.mismatch.model.model import Data
+
+ALIKE = 4.0
+"""Of chi-square: a model that loses less by ringing that the samples can show is as good."""
+
+
+def within_samples(state: State, data: Data) -> State:
+    """Of ringing beyond half the sampling rate the alias below it, where that does nearly as well."""
+    limit = 0.5 / min(h.spacing for h in data.histories)
+    for i, (term, values) in enumerate(zip(state.fit.model.terms, state.fit.theta.terms, strict=True)):
+        if term.id == "stand_resonance" and limit < values[1] < 2 * limit:
+            found = _slower(state.fit, i, (values[0], 2 * limit - values[1], values[2]), data, state)
+            if found.theta.terms[i][1] < limit and found.chi2 < state.fit.chi2 + ALIKE:
+                return refresh(found.model, found.theta, data, None, state)
+    return state
+
+
+def _slower(now: Fit, at: int, values: tuple[float, ...], data: Data, state: State) -> Fit:
+    terms = (*now.theta.terms[:at], values, *now.theta.terms[at + 1 :])
+    return fit(now.model, replace(now.theta, terms=terms), data, state.weights)

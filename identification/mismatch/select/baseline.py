@@ -1,0 +1,138 @@
+"""Where a search begins: C V|V| and tares, with the noise that is left when what is plainly no noise is taken out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.mismatch.estimate.estimate import State, by_run, refresh, unweighted
+from identification.mismatch.estimate.fitting import Fit, extended, fit, raw
+from identification.mismatch.model.model import Data, Model, Spread, Theta, Weights
+from identification.mismatch.prepare.scales import scale_of
+from identification.mismatch.select.covariates import coordinates
+from identification.mismatch.select.jumps import jumps
+from identification.mismatch.select.screening import (
+    MOST_PLAIN,
+    PLAIN,
+    lengths,
+    matching_pursuit,
+    orthogonal_basis,
+)
+from identification.physics.term import Term
+from identification.recording import Floats
+from identification.run_history.history import History
+
+CLOCKS = 0.001
+"""s: clocks of two devices are not trusted to agree better, unless stamps are dense and even."""
+NOISE_ROUNDS = 5
+PLAIN_JUMP = 5.0
+"""Sigmas of a jump that is plainly no noise: hundreds of instants were looked at."""
+
+
+def start(histories: Sequence[History]) -> tuple[Data, Theta]:
+    """Ordinary least squares of C and the tares, without any weights."""
+    gram, right = 0.0, 0.0
+    means = []
+    for h in histories:
+        r = h.rows
+        f = h.driver[r] * np.abs(h.driver[r])
+        y = h.thrust[r]
+        fm, ym = f.mean(), y.mean()
+        gram += float(np.sum((f - fm) ** 2))
+        right += float(np.sum((f - fm) * (y - ym)))
+        means.append((fm, ym))
+    C = right / gram if gram > 0 else 0.0
+    with_rate = all(h.rate is not None and h.rate_rows.size > 20 for h in histories)
+    moving = histories[0].driver_quantity == "command_voltage" and not any(h.static for h in histories)
+    most = min(CLOCKS, max(h.jitter for h in histories)) if moving else 0.0
+    data = Data(tuple(histories), scale_of(histories, C or 1e-12), with_rate=with_rate, most_shift=most)
+    data = replace(data, spread=level_spread(data, C))
+    return data, Theta(C, (), tuple(float(ym - C * fm) for fm, ym in means), k=_k(histories))
+
+
+def level_spread(data: Data, C: float) -> Spread | None:
+    """What the thrust C n|n| is off by where a noisy driver stood still: at all of a level alike, so that levels
+    scatter more than their samples say."""
+    parts: list[list[Floats]] = [[] for _ in data.histories]
+    for i, h in enumerate(data.histories):
+        for error in h.level_errors.T:
+            for k, other in enumerate(data.histories):
+                column = np.zeros(other.rows.size)
+                parts[k].append((2 * C * np.abs(h.driver) * error)[h.rows] if k == i else column)
+    if not parts[0]:
+        return None
+    still = tuple(np.zeros((h.rates.size, len(parts[0]))) for h in data.histories)
+    return Spread(tuple(np.column_stack(p) for p in parts), still)
+
+
+def _k(histories: Sequence[History]) -> float:
+    return float(np.mean([h.rate_per_driver for h in histories]))
+
+
+def every_shape(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
+    """(n, k) raw columns: all trials of the catalogue's terms, and any shape over each coordinate."""
+    shapes = [np.concatenate(c.columns) for c in coordinates(fit_now, data)]
+    columns = np.column_stack([raw_directions(fit_now, data, terms), *shapes])
+    some = lengths(columns) > 0
+    return columns if some.all() else columns[:, some]
+
+
+def pursue(fit_now: Fit, data: Data, judged: Weights, raw_columns: Floats) -> Floats:
+    """(n, k) those of `every_shape` that together take what is plainly no noise.
+
+    Orthogonal matching pursuit. Noise is estimated beside these columns, or a mismatch would be mistaken for it.
+    """
+    thrust_only = Weights(judged.thrust)
+    n = data.size
+    columns = thrust_only.whiten(by_run(raw_columns, data), [])
+    basis = orthogonal_basis(fit_now.jacobian[:n])
+    columns -= basis @ (basis.T @ columns)
+    first = lengths(columns)
+    columns *= np.where(first > 1e-6 * np.median(first), 1 / np.maximum(first, 1e-300), 0.0)
+    chosen, _ = matching_pursuit(columns, fit_now.residual[:n], PLAIN, MOST_PLAIN)
+    out: Floats = raw_columns[:, chosen]
+    return out
+
+
+def raw_directions(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
+    """(n, q) change of the thrust by each trial of each term."""
+    base, _ = raw(fit_now.model, fit_now.theta, data, with_rate=False)
+    columns = []
+    for term in terms:
+        bigger = fit_now.model.plus(term)
+        for trial in term.trials(data.scale):
+            theta = extended(fit_now.theta, fit_now.model, term, trial, bigger)
+            new, _ = raw(bigger, theta, data, with_rate=False)
+            columns.append(np.concatenate(new) - np.concatenate(base))
+    return np.column_stack(columns) if columns else np.empty((data.size, 0))
+
+
+def plain_jumps(state: State, data: Data) -> list[Floats]:
+    """(n, 1) each: steps of the reading that are plainly no noise; slow noise would follow them."""
+    if any(h.static for h in data.histories):
+        return []
+    when = np.concatenate([h.sampled[r] for h, r in zip(data.histories, data.rows, strict=True)])
+    at, score = jumps(state.fit.residual, data, state.weights, orthogonal_basis(state.fit.jacobian[: data.size]))
+    return [(when[:, None] >= t).astype(np.float64) for t in at[score > PLAIN_JUMP][:1]]
+
+
+def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> State:
+    """C V|V|, what is given and tares, with the noise that remains when what is plainly no noise is taken out.
+
+    The noise is first all that is left; what stands out of even that is taken out, and so on: slow noise has many
+    shapes by chance, and taken out at once they would make it look smaller than it is.
+    """
+    unit = unweighted(data)
+    first = fit(model, theta, data, unit)
+    state = refresh(model, first.theta, data, None, None)
+    taken = 0
+    shapes = every_shape(state.fit, data, terms)
+    for _ in range(NOISE_ROUNDS):
+        plain = pursue(state.fit, data, state.weights, np.column_stack([shapes, *plain_jumps(state, data)]))
+        if plain.shape[1] <= taken:
+            break
+        taken = plain.shape[1]
+        state = refresh(model, state.fit.theta, data, plain, state)
+    return state

@@ -1,0 +1,61 @@
+"""Where a cell or its amplifier clips, it clips the noise too: readings are flatter there, as no drive makes them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.model.model import Data, predict
+from identification.mismatch.noise.covariance import Noise
+from identification.physics.load_cell_saturation import LoadCellSaturation
+from identification.physics.term import Term
+from identification.recording import Floats
+
+DEEP = 1.0
+"""Standard deviations of the noise beyond the limit: what clips leaves 8 % of the variance there, or less."""
+BENT = 0.8
+"""Slope of a knee below which readings are looked at."""
+ROUGH = 0.5
+"""Share of the variance that is said to be missing above which the readings there are not flat."""
+CERTAIN = 3.0
+"""Standard errors of what variance is left, which the difference must be."""
+LEAST = 10
+"""Samples there, below which nothing is said."""
+
+
+def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
+    """Whether the readings scatter as ever where a load-cell saturation of the model says that they clip."""
+    if not isinstance(term, LoadCellSaturation):
+        return False
+    values = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))[term]
+    left = scatter = told = samples = 0.0
+    for i, (h, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
+        whole = _force(fitted, term, data, i)
+        shown = predict(fitted.model, fitted.theta, h, data.scale, i)[0][rows]
+        edges = np.concatenate([whole[:1], 0.5 * (whole[1:] + whole[:-1]), whole[-1:]])
+        force, first, last = whole[rows], edges[:-1][rows], edges[1:][rows]
+        variance = noise.white + noise.proportional * force**2 + sum(noise.slow) + sum(noise.band)
+        for side in (1.0, -1.0):
+            reached = np.minimum(side * first, side * last) + side * fitted.theta.tares[i]  # not on the way there
+            slope = term.slope(reached, values)
+            deep = (reached > term.start(values)) & (slope < BENT)
+            if term.form == "hard":
+                deep &= reached > values[0] + DEEP * np.sqrt(variance)
+            count, beside = h.count[rows][deep].astype(np.float64), h.thrust[rows][deep] - shown[deep]
+            if count.sum() > 1:
+                left += float(count @ (beside - np.average(beside, weights=count)) ** 2 + h.within[rows][deep].sum())
+                scatter += float(count @ variance[deep])
+                told += float(count @ (slope[deep] ** 2 * variance[deep]))
+                samples += float(count.sum())
+    missing = ROUGH * (scatter - told)
+    return samples >= LEAST and missing > CERTAIN * told * np.sqrt(2 / samples) and left > told + missing
+
+
+def _force(fitted: Fit, term: Term, data: Data, run: int) -> Floats:
+    """(M,) N, of a run without the term."""
+    known = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))
+    bare = fitted.model.without(term)
+    theta = replace(fitted.theta, terms=tuple(known[t] for t in bare.terms))
+    return predict(bare, theta, data.histories[run], data.scale, run)[0]

@@ -1,0 +1,323 @@
+"""From the baseline to a model: noise first, then the best few candidates fitted jointly, one more term at a time."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Collection, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.estimation.tails import chi2_isf
+from identification.mismatch.estimate.estimate import State, fit_without, refresh
+from identification.mismatch.estimate.fitting import DELAYING, Fit, at_bound, extended, fit
+from identification.mismatch.model.model import Data, Model, Theta, price
+from identification.mismatch.select.baseline import baseline, every_shape, pursue, start
+from identification.mismatch.select.screening import (
+    Screening,
+    directions,
+    refined,
+    screen,
+)
+from identification.mismatch.select.shape_error import allowed, corrections
+from identification.physics.catalogue import CATALOGUE
+from identification.physics.term import Term
+from identification.run_history.history import History
+
+ALARM = 0.01
+"""Family-wise false-alarm rate of the search."""
+CANDIDATES = 5
+MOST_MORE = 3
+"""Candidates beside these whose trials say little."""
+NEARLY = 0.93
+"""Of the best gain: a candidate with fewer parameters that reaches it goes first; swaps come later (rivals.py)."""
+MOST_TERMS = 6
+HIDDEN = 2.0
+"""Sigmas from which a candidate is tried with noise of its own, where none passes."""
+CLEARER = 3.0
+"""The same of a first term that takes its time only where the plan does: a staircase of minutes."""
+SLOW_COORDINATES = frozenset({"time", "flow_speed"})
+"""Coordinates along which nothing changes quickly: slow noise takes for its own what an effect does over them."""
+MOST_HIDDEN = 3
+MOST_INSTANTS = 5
+INSTANTS_APART = 0.05
+"""Of the run: trials of a jump that is hidden."""
+HIDDEN_PRICE = 0.5
+"""Of the price of a term's parameters asked for what is hidden, beside the family-wise threshold."""
+OFFSET_PRICE = 0.35
+"""The same of a jump of the zero: of 336 clean recordings one gained more and was named."""
+STEADY = frozenset({"zero_drift"})
+"""Terms of one shape, that no instant or place is looked for: they pay for themselves alone. On 336 clean recordings of
+six kinds of noise their largest gain was 11.3; of a drift that an oracle sees at 8 sigma half gain more than 15."""
+SOUGHT = frozenset({"stand_resonance"})
+"""Terms whose trials the data point to: they pay in full."""
+STATIC = ("command_voltage", "thrust")
+"""Coordinates of the static curve."""
+MOST_STATIC = 2
+"""Shapes on one static curve: any curve can be made of more."""
+TWINS = {"asymmetry", "torque_crosstalk"}
+"""The same curve in other words: never both, unless a torque was recorded."""
+MOVING = {
+    "motor_lag",
+    "inflow_dynamics",
+    "recirculation",
+    "heating",
+    "reversal_loss",
+    "stand_resonance",
+    "hysteresis",
+    "time_skew",
+    "load_cell_creep",
+    "zero_drift",
+    "zero_offset",
+    "rotation_coupling",
+}
+"""Not to be seen in a static table."""
+
+
+PROXIES = {"supply_sag": "bus_voltage", "heating": "motor_temperature", "torque_crosstalk": "torque"}
+"""Effects with forms that do without the channel that shows them; where it was recorded they must use it."""
+
+
+def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
+    """Terms of the catalogue whose channels were recorded in every run, but for the effects `without`."""
+    have = set.intersection(*(set(h.others) for h in data.histories))
+    if data.scale.torque <= 0:
+        have.discard("torque")  # a channel of zeros
+    static = any(h.static for h in data.histories)
+    out = []
+    for term in CATALOGUE:
+        if term.id in without or not set(term.needs) <= have or (static and term.id in MOVING):
+            continue
+        if data.histories[0].driver_quantity == "rotation_rate" and term.stage in ("command", "rotor"):
+            continue
+        if term.id == "speed_of_advance" and data.scale.flow <= 0:
+            continue
+        if PROXIES.get(term.id, "") in have - set(term.needs):
+            continue
+        if term.id == "supply_sag" and static and not term.needs:
+            continue  # a table is of one supply voltage
+        out.append(term)
+    return tuple(out)
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """What the search ends with."""
+
+    data: Data
+    terms: tuple[Term, ...]
+    before: State
+    after: State
+    screenings: tuple[Screening, ...]
+    last: Screening
+
+
+def static_curve(term: Term, *, measured: bool) -> str:
+    """On which static curve a term is a shape; none: "". A measured rate makes two of one, V to n and n to thrust."""
+    if not set(term.coordinates) <= set(STATIC):
+        return ""
+    return "rate" if measured and term.stage in ("command", "rotor") else "thrust"
+
+
+def accept_threshold(extra: int) -> float:
+    return chi2_isf(ALARM / 50, extra)
+
+
+def search(
+    histories: Sequence[History],
+    rng: np.random.Generator,
+    trace: list[str] | None = None,
+    given: Callable[[Data, Theta], tuple[Data, Theta, Model]] | None = None,
+    bands: tuple[tuple[float, float], ...] = (),
+    without: Collection[str] = (),
+) -> Found:
+    """Forward: screen, fit the best few, keep the best, refresh the noise; until nothing passes. Then prune.
+
+    `given` puts the baseline of a twin in the place of C V|V|; effects `without` are taken out of the catalogue.
+    """
+    data, theta = start(histories)
+    data, theta, first = given(data, theta) if given is not None else (data, theta, Model())
+    data = replace(data, bands=bands)
+    terms = available(data, without)
+    before = baseline(data, theta, terms, first)
+    return _forward(data, terms, before, before, rng, trace)
+
+
+def resumed(found: Found, state: State, rng: np.random.Generator) -> Found:
+    """The search gone on with from `state`, a model of the same recordings that is not the one that was `found`."""
+    return _forward(found.data, found.terms, found.before, state, rng, None, frozenset(found.after.fit.model.terms))
+
+
+def _forward(
+    data: Data,
+    terms: Sequence[Term],
+    before: State,
+    state: State,
+    rng: np.random.Generator,
+    trace: list[str] | None,
+    *known: frozenset[Term],
+) -> Found:
+    """Larger models from `state` on while something passes, none of those that are `known`."""
+    screenings = []
+    seen = {frozenset(state.fit.model.terms), *known}
+    while True:
+        ids = {t.id for t in state.fit.model.terms}
+        judged = _screened(state, data, terms, rng)
+        screenings.append(judged)
+        if trace is not None:
+            trace.append(
+                f"{[t.id for t in state.fit.model.terms]} largest {judged.largest:.1f} of {judged.threshold:.2f} "
+                + str([(t.id, t.form, round(z, 1)) for t, _, z in judged.best(6)])
+            )
+        if len(ids) >= MOST_TERMS:
+            break
+        larger = _lasting(state, judged, data, terms, seen)
+        if larger is None:
+            break
+        state = larger
+        seen.add(frozenset(state.fit.model.terms))
+    return Found(data, tuple(terms), before, state, tuple(screenings), judged)
+
+
+def _screened(state: State, data: Data, terms: Sequence[Term], rng: np.random.Generator) -> Screening:
+    """What may still be added to the model, judged."""
+    inside = state.fit.model.terms
+    ids = {t.id for t in inside}
+    shapes = Counter(static_curve(t, measured=data.with_rate) for t in inside)
+    left = [t for t in terms if t.id not in ids]
+    left = [t for t in left if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < MOST_STATIC]
+    if ids & TWINS and data.scale.torque <= 0:
+        left = [t for t in left if t.id not in TWINS]
+    found = directions(state.fit, data, state.weights, left)
+    spared = allowed(corrections(state.fit, data, state.weights), found.columns)
+    return screen(state.fit, found, rng, ALARM, spared)
+
+
+def _lasting(
+    state: State, judged: Screening, data: Data, terms: Sequence[Term], seen: Collection[frozenset[Term]]
+) -> State | None:
+    """The larger model, pruned; of additions that are dropped again the next best. None where none lasts."""
+    refused: set[Term] = set()
+    found = judged.largest > judged.threshold
+    while larger := _larger(state, judged, data, terms, refused) if found else None:
+        pruned = prune(larger, data)
+        if frozenset(pruned.fit.model.terms) not in seen:
+            return pruned
+        refused |= set(larger.fit.model.terms) - set(state.fit.model.terms)
+    hidden = _hidden(state, judged, data)
+    if hidden is None:
+        return None
+    pruned = prune(hidden, data)
+    return None if frozenset(pruned.fit.model.terms) in seen else pruned
+
+
+def _larger(
+    state: State, judged: Screening, data: Data, terms: Sequence[Term], refused: Collection[Term]
+) -> State | None:
+    """The model with one more term, none of those `refused`, its noise estimated anew."""
+    best = _best_addition(state, judged, data, refused)
+    if best is None:
+        return None
+    remaining = [t for t in terms if t.id not in {u.id for u in best.model.terms}]
+    plain = pursue(best, data, state.weights, every_shape(best, data, remaining))
+    return refresh(best.model, best.theta, data, plain, state)
+
+
+def _hidden(state: State, judged: Screening, data: Data) -> State | None:
+    """The model with a term that the noise had taken for its own: they are told apart when estimated together."""
+    least = CLEARER if not state.fit.model.terms else np.inf  # shape error would be taken for what is hidden
+    likely = [
+        (t, v)
+        for rank, (t, v, z) in enumerate(judged.best(2 * MOST_HIDDEN))
+        if (rank < MOST_HIDDEN or t.id in STEADY) and z > (HIDDEN if SLOW_COORDINATES & set(t.coordinates) else least)
+    ]
+    likely = [each for t, v in likely for each in ((t, at) for at in _instants(judged, t, data) or (v,))]
+    if not likely:
+        return None
+    now = refresh(state.fit.model, state.fit.theta, data, None, None)
+    found = []
+    for term, values in likely:
+        bigger = state.fit.model.plus(term)
+        begin = refined(state.fit, data, state.weights, term, values)
+        theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
+        first = fit(bigger, theta, data, state.weights)
+        new = refresh(bigger, first.theta, data, None, now, now.noise)
+        gain = now.fit.deviance - new.fit.deviance
+        if gain > _asked_of_hidden(term, judged, data):
+            found.append((gain, new))
+    if not found:
+        return None
+    best = max(found, key=lambda each: each[0])[1].fit
+    return refresh(best.model, best.theta, data, None, None)
+
+
+def _instants(judged: Screening, term: Term, data: Data) -> list[tuple[float, ...]]:
+    """Of a jump in time the likeliest trials: which is the best depends on the noise, and that takes it for its own."""
+    if term.id != "zero_offset":
+        return []
+    out: list[tuple[float, ...]] = []
+    for j in np.argsort(-judged.plain):
+        at = judged.directions.values[j]
+        if judged.directions.terms[j] == term and all(
+            abs(at[1] - v[1]) > INSTANTS_APART * data.scale.duration for v in out
+        ):
+            out.append(at)
+        if len(out) == MOST_INSTANTS:
+            break
+    return out
+
+
+def _asked_of_hidden(term: Term, judged: Screening, data: Data) -> float:
+    """Gain in deviance from which a term that is told from noise by estimating both is believed."""
+    if term.id in STEADY:
+        return chi2_isf(ALARM / 20, price(term, data))
+    share = 1.0 if term.id in SOUGHT else OFFSET_PRICE if term.id == "zero_offset" else HIDDEN_PRICE
+    return float(judged.threshold**2 + share * price(term, data) * np.log(data.size))
+
+
+def _candidates(judged: Screening, data: Data) -> list[tuple[Term, tuple[float, ...]]]:
+    """The likeliest terms, and a few of those whose trials say little of what a fit would find: jumps between levels,
+    of which no trial is near unless it is the right one, and what comes late where clocks that differ may hide it."""
+    likely = {term: values for term, values, _ in judged.best(CANDIDATES)}
+    late = any(term.id in DELAYING for term in likely)
+    most = len(likely) + MOST_MORE
+    for term, values, z in judged.best(len(judged.directions.terms), share=0.0):
+        told = (late and term.id in DELAYING) or any(p.jumps for p in term.parameters(data.scale))
+        if told and z > judged.threshold and len(likely) < most:
+            likely.setdefault(term, values)
+    return list(likely.items())
+
+
+def _best_addition(state: State, judged: Screening, data: Data, refused: Collection[Term]) -> Fit | None:
+    fits = []
+    for term, values in _candidates(judged, data):
+        if term in refused:
+            continue
+        bigger = state.fit.model.plus(term)
+        begin = refined(state.fit, data, state.weights, term, values)
+        theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
+        new = fit(bigger, theta, data, state.weights)
+        gain = state.fit.chi2 - new.chi2
+        cost = price(term, data) * np.log(new.residual.size)
+        if gain > max(cost, np.log(new.residual.size)):
+            fits.append((at_bound(term, new, data, state.weights), gain - cost, len(values), new))
+    if not fits:
+        return None
+    possible = [each for each in fits if not each[0]] or fits
+    most = max(each[1] for each in possible)
+    near = [each for each in possible if each[1] >= NEARLY * most]
+    return min(near, key=lambda each: (each[2], -each[1]))[3]
+
+
+def prune(state: State, data: Data) -> State:
+    """Drop terms that no longer earn their place."""
+    while state.fit.model.terms:
+        costs = []
+        for term, values in zip(state.fit.model.terms, state.fit.theta.terms, strict=True):
+            less = fit_without(state, term, data)
+            costs.append((less.chi2 - state.fit.chi2 - accept_threshold(len(values)), less))
+        worst, less = min(costs, key=lambda pair: pair[0])
+        if worst > 0:
+            break
+        state = refresh(less.model, less.theta, data, None, state)
+    return state

@@ -1,0 +1,84 @@
+"""When zero or gain may have jumped: every instant is looked at, as no grid of trials can.
+
+Under slow noise a step is seen by what changes within seconds of it: a trial half a minute off sees nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.model.model import Data, Weights
+from identification.recording import Floats
+
+TRIED = 600
+"""Instants, evenly over the rows."""
+SIZED = 60
+"""Of these the sigmas are worked out, and of as many that look likeliest; between them the size is interpolated."""
+APART = 0.02
+"""Share of the longest run between two that are told."""
+
+
+def likeliest_jumps(
+    fitted: Fit, data: Data, weights: Weights, basis: Floats, most: int, of: Sequence[Floats] | None = None
+) -> tuple[float, ...]:
+    """Up to `most` times in s at which a step of the reading explains most of the residual, the best first.
+
+    `basis` (n, p): orthonormal, what the present model can follow. `of`: per run (n,), what jumps; None: the zero.
+    """
+    when, _ = jumps(fitted.residual, data, weights, basis, of)
+    found: list[float] = []
+    for at in when:
+        if all(abs(at - other) > APART * data.scale.duration for other in found):
+            found.append(float(at))
+        if len(found) == most:
+            break
+    return tuple(found)
+
+
+def jumps(
+    residual: Floats, data: Data, weights: Weights, basis: Floats, of: Sequence[Floats] | None = None
+) -> tuple[Floats, Floats]:
+    """(k,) s and sigmas of steps of the reading, the largest first; `residual` and `basis` whitened."""
+    runs = [h.sampled[r] for h, r in zip(data.histories, data.rows, strict=True)]
+    of = [np.ones(at.size) for at in runs] if of is None else of
+    when = np.unique(np.quantile(np.concatenate(runs), np.linspace(0.01, 0.99, TRIED)))
+    thrust = Weights(weights.thrust)
+    residual, basis = residual[: data.size], basis[: data.size]
+    residual = residual - basis @ (basis.T @ residual)  # no trifle where a step is nearly what the model follows
+    some = np.unique(np.linspace(0, when.size - 1, SIZED).astype(int))
+    size = np.interp(np.arange(when.size), some, np.sqrt(np.maximum(_sizes(runs, of, when[some], thrust, basis), 0.0)))
+    rough = np.abs(_products(runs, of, when, thrust, residual)) / np.where(size > 0, size, np.inf)
+    likely = np.sort(np.argsort(-_peaks(rough))[:SIZED])
+    exact = np.sqrt(np.maximum(_sizes(runs, of, when[likely], thrust, basis), 0.0))
+    score = rough[likely] * size[likely] / np.where(exact > 0, exact, np.inf)
+    order = np.argsort(-score)
+    return when[likely[order]], score[order]
+
+
+def _products(runs: Sequence[Floats], of: Sequence[Floats], when: Floats, thrust: Weights, residual: Floats) -> Floats:
+    """Of the whitened residual with the whitened step at each instant, whose columns are never made."""
+    total = np.zeros(when.size)
+    begin = 0
+    for at, size, whitener in zip(runs, of, thrust.thrust, strict=True):
+        weighed = size * whitener.weighed(residual[begin : begin + at.size])
+        after = np.concatenate([np.cumsum(weighed[::-1])[::-1], [0.0]])
+        total += after[np.searchsorted(at, when, side="left")]
+        begin += at.size
+    return total
+
+
+def _sizes(runs: Sequence[Floats], of: Sequence[Floats], when: Floats, thrust: Weights, basis: Floats) -> Floats:
+    """Squared length of the whitened step at each instant beside what the model can follow."""
+    columns = thrust.whiten([size[:, None] * (at[:, None] >= when) for at, size in zip(runs, of, strict=True)], [])
+    columns -= basis @ (basis.T @ columns)
+    out: Floats = np.einsum("ij,ij->j", columns, columns)
+    return out
+
+
+def _peaks(score: Floats) -> Floats:
+    """The score where no neighbour's is larger, elsewhere next to nothing."""
+    beside = np.maximum(np.append(score[1:], 0.0), np.append(0.0, score[:-1]))
+    return np.where(score >= beside, score, 1e-3 * score)

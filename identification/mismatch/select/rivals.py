@@ -1,0 +1,168 @@
+"""Rivals: every other term that could do what one of the model does, refitted in its place."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from identification.mismatch.estimate.estimate import State, fit_without, refresh
+from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, extended, fit
+from identification.mismatch.model.model import Data, price
+from identification.mismatch.select.flatness import noise_goes_on
+from identification.mismatch.select.forward_selection import accept_threshold
+from identification.mismatch.select.screening import directions, orthogonal_basis, refined
+from identification.physics.term import Term
+from identification.recording import Floats
+
+NEAR = 9.0
+"""BIC units: a rival this near is stated."""
+EQUAL = 4.0
+"""BIC units: nearer than this two answers are equally good."""
+LIKELY = 40.0
+"""Chi-square that a rival may lose by the tangent alone and is still refitted: its inner parameters may move."""
+PRESSED_SHARE = 0.3
+"""Of its gain: a rival may be worse by this than a term whose parameters end at what is possible."""
+MOST_MERGERS = 3
+"""Terms tried in the place of each pair."""
+MERGING = 0.5
+"""Of what a term must gain in their place: one that promises less by its tangent is not refitted."""
+RIVAL_STEPS = 15
+MOST_REFITS = 7
+BETTER = 0.5
+"""BIC units by which a rival must be better to take the place."""
+ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Rival:
+    """Another term in the place of one, refitted."""
+
+    term: Term
+    fit: Fit
+    bic_loss: float
+    """By how much its BIC is worse."""
+    aic_loss: float
+    """By how much its AIC is worse: BIC alone would hide a rival with more parameters than the data can tell apart."""
+
+
+Standing = tuple[Fit, list[Rival]]
+"""The fit without a term, and the rivals in its place."""
+
+
+def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> tuple[State, dict[Term, Standing] | None]:
+    """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end."""
+    for _ in range(ROUNDS):
+        best: tuple[float, Fit] | None = None
+        standing: dict[Term, Standing] = {}
+        for term in state.fit.model.terms:
+            less = fit_without(state, term, data)
+            standing[term] = (less, swaps(state, term, less, data, terms))
+            # a value that is not possible explains nothing: whatever does nearly as well goes before it
+            price = 0.0
+            if at_bound(term, state.fit, data, state.weights) or noise_goes_on(state.fit, term, state.noise, data):
+                price = PRESSED_SHARE * (less.chi2 - state.fit.chi2)
+            for rival in standing[term][1]:
+                loss = rival.bic_loss - price
+                lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.term.parameters(data.scale)))
+                if lasts and loss < -BETTER and (best is None or loss < best[0]):
+                    best = (loss, rival.fit)
+        best = _one_for_two(state, data, terms, best)
+        if best is None:
+            return state, standing
+        state = refresh(best[1].model, best[1].theta, data, None, state)
+    return state, None
+
+
+def _one_for_two(
+    state: State, data: Data, terms: Sequence[Term], best: tuple[float, Fit] | None
+) -> tuple[float, Fit] | None:
+    """The better of `best` and one term in the place of two: a search that goes step by step may miss it."""
+    now = state.fit
+    logn = float(np.log(max(now.residual.size, 2)))
+    for pair in combinations(now.model.terms, 2):
+        less = fit_without(replace(state, fit=fit_without(state, pair[0], data)), pair[1], data)
+        others = [t for t in terms if t.id not in {u.id for u in less.model.terms} and t not in pair]
+        found = directions(less, data, state.weights, others)
+        score = found.columns.T @ less.residual
+        tried: set[Term] = set()
+        for j in np.argsort(-np.where(found.one_sided, score, np.abs(score))):
+            other = found.terms[j]
+            if other in tried:
+                continue
+            more = (price(other, data) - sum(price(t, data) for t in pair)) * logn
+            wanted = now.chi2 - more + (-BETTER if best is None else min(best[0], -BETTER))
+            if len(tried) == MOST_MERGERS or score[j] ** 2 < MERGING * (less.chi2 - wanted):
+                break
+            tried.add(other)
+            values = mirrored(other, found.values[j], data) if score[j] < 0 else found.values[j]
+            bigger = less.model.plus(other)
+            begin = refined(less, data, state.weights, other, values)
+            theta = extended(less.theta, less.model, other, begin, bigger)
+            new = fit(bigger, theta, data, state.weights, RIVAL_STEPS, wanted)
+            loss = new.chi2 - now.chi2 + more
+            if loss < -BETTER and (best is None or loss < best[0]) and not at_bound(other, new, data, state.weights):
+                best = (float(loss), new)
+    return best
+
+
+def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> list[Rival]:
+    """Every other term (and form) that could do what this one does, refitted in its place; best first."""
+    now = state.fit
+    gain = less.chi2 - now.chi2
+    inside = {t.id for t in now.model.terms} - {term.id}
+    others = [t for t in terms if t.id not in inside and t != term]
+    found = directions(less, data, state.weights, others)
+    if not found.terms:
+        return []
+    change = _effect(now, term, data, state)
+    basis = orthogonal_basis(less.jacobian)
+    change = change - basis @ (basis.T @ change)
+    size = float(np.linalg.norm(change))
+    if size == 0:
+        return []
+    rho = found.columns.T @ (change / size)
+    against = (rho < 0) & ~np.array(found.one_sided)
+    rho = np.where(found.one_sided, np.maximum(rho, 0.0), np.abs(rho))
+    best: dict[Term, tuple[float, tuple[float, ...]]] = {}
+    for j, other in enumerate(found.terms):
+        if other not in best or rho[j] > best[other][0]:
+            best[other] = (float(rho[j]), mirrored(other, found.values[j], data) if against[j] else found.values[j])
+    ranked = sorted(best.items(), key=lambda item: -item[1][0])
+    out = []
+    extra_now = price(term, data)
+    logn = float(np.log(max(now.residual.size, 2)))
+    for other, (r, values) in ranked[:MOST_REFITS]:
+        if (1 - r**2) * gain > LIKELY and r < 0.9:
+            break
+        bigger = less.model.plus(other)
+        begin = refined(less, data, state.weights, other, values)
+        more = price(other, data) - extra_now
+        extra = more * logn
+        begun = extended(less.theta, less.model, other, begin, bigger)
+        if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
+            new = fit(bigger, begun, data, state.weights)
+        else:
+            new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - min(extra, 2.0 * more))
+        if at_bound(other, new, data, state.weights) or noise_goes_on(new, other, state.noise, data):
+            continue
+        loss = new.chi2 - now.chi2 + extra
+        out.append(Rival(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))
+    return sorted(out, key=lambda rival: rival.bic_loss)
+
+
+def mirrored(term: Term, values: tuple[float, ...], data: Data) -> tuple[float, ...]:
+    """The amount on the other side of neutral."""
+    first = term.parameters(data.scale)[0]
+    assert first.neutral is not None
+    return (min(max(2 * first.neutral - values[0], first.low), first.high), *values[1:])
+
+
+def _effect(now: Fit, term: Term, data: Data, state: State) -> Floats:
+    """(n,) whitened change that the term makes at its fitted values; the rate's rows with it."""
+    smaller = now.model.without(term)
+    known = dict(zip(now.model.terms, now.theta.terms, strict=True))
+    theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
+    return state.weights.whiten(*change_of((smaller, theta), (now.model, now.theta), data, state.weights))

@@ -1,0 +1,58 @@
+"""The budget for shape error: a textbook shape is trusted to a few per cent of its own correction, no further.
+
+What is left where a found term changes much may be the rest of its true shape; it is no new physics and no structure
+until it is more than this share of the change. Else every real recording would end unexplained.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.mismatch.estimate.fitting import Fit, change_of
+from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.select.screening import orthogonal_basis
+from identification.recording import Floats
+
+SHAPE_ERROR = 0.03
+"""Share of its own correction to which a shape is trusted before something unknown is said to be left."""
+NEXT_TERM = 0.006
+"""The same before another term of the catalogue is added: its shape is known."""
+
+
+def corrections(fitted: Fit, data: Data, weights: Weights) -> list[Floats]:
+    """Whitened (n,) change that each term makes beside what C and the tares can follow; the rate too if it counts."""
+    n = fitted.residual.size if weights.rate or weights.ticks else data.size
+    basis = orthogonal_basis(fitted.jacobian[:n, ~_of_terms(fitted)])
+    out = []
+    known = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))
+    for term in fitted.model.terms:
+        smaller = fitted.model.without(term)
+        theta = replace(fitted.theta, terms=tuple(known[t] for t in smaller.terms))
+        change = weights.whiten(*change_of((smaller, theta), (fitted.model, fitted.theta), data, weights))
+        out.append(change - basis @ (basis.T @ change))
+    return out
+
+
+def _of_terms(fitted: Fit) -> NDArray[np.bool_]:
+    """(p,) which columns of the Jacobian are parameters of terms."""
+    many = sum(len(values) for values in fitted.theta.terms)
+    index = np.arange(fitted.free.size)
+    return ((index > 0) & (index <= many))[fitted.free]
+
+
+def allowed(changes: list[Floats], columns: Floats, share: float = NEXT_TERM) -> Floats:
+    """(q,) sigmas that shape error may put into unit columns (n, q): no more than it has where they are."""
+    out = np.zeros(columns.shape[1])
+    size = np.abs(columns)
+    for change in changes:
+        out += share * np.minimum(np.abs(change) @ size, float(np.linalg.norm(change)))
+    return out
+
+
+def allowed_in(changes: list[Floats], span: Floats) -> float:
+    """Chi-square that shape error may put into an orthonormal span (n, q) of all."""
+    most = SHAPE_ERROR**2 * float(sum(change @ change for change in changes))
+    return min(float(np.sum(allowed(changes, span, SHAPE_ERROR) ** 2)), most)

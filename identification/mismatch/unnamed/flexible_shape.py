@@ -1,0 +1,199 @@
+"""The shape of a flexible term with its error, beside what was measured in bins of its coordinate."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.flexible_terms.flexible import WORDS, Flexible, Multiplier
+from identification.mismatch.answer.remainder import FlexibleShape, Spline
+from identification.mismatch.diagnosis import HeldOutRmse, Unexplained, Value
+from identification.mismatch.estimate.estimate import State
+from identification.mismatch.estimate.fitting import Fit, raw
+from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.name.naming import Named
+from identification.mismatch.unnamed.flexible import Extended
+from identification.mismatch.unnamed.flexible_knots import seen_at
+from identification.mismatch.unnamed.formula import find_formula
+from identification.mismatch.validate.held_out import HeldOut
+from identification.physics.term import Term
+from identification.recording import Floats
+from identification.run_history.history import History
+from identification.run_history.splines import spline
+
+POINTS = 81
+MOST_LEVELS = 24
+BINS = 14
+
+
+def shapes_of(extended: Extended, data: Data) -> tuple[FlexibleShape, ...]:
+    """In the order in which they were found."""
+    weights = Weights(extended.state.weights.thrust)
+    return tuple(shape_of(term, extended.state.fit, data, weights) for term in extended.terms)
+
+
+def shape_of(term: Flexible, fitted: Fit, data: Data, weights: Weights) -> FlexibleShape:
+    """Coefficients, curves and binned measurements of one flexible term of a fit."""
+    at = 1
+    for other, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
+        if other == term:
+            break
+        at += len(values)
+    theta = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))[term]
+    inside = slice(at, at + len(theta))
+    covariance = np.nan_to_num(fitted.cov[inside, inside])
+    std = np.sqrt(np.diag(covariance))
+    known = term.parameters(data.scale)
+    return FlexibleShape(
+        term.quantity,
+        term.unit,
+        term.knots,
+        term.degree,
+        term.memory,
+        term.period,
+        {p.name: Value(v, float(s), p.unit) for p, v, s in zip(known, theta, std, strict=True)},
+        tuple(_splines(term, theta, covariance, fitted, data, weights)),
+        term.statement(theta, data.scale),
+    )
+
+
+def _splines(
+    term: Flexible, theta: Sequence[float], covariance: Floats, fitted: Fit, data: Data, weights: Weights
+) -> list[Spline]:
+    knots = np.array(term.knots)
+    low, high = float(knots[0]), float(knots[-1])
+    spread_out = term.quantity == "time_since_step"
+    fine = np.geomspace(low, high, POINTS) if spread_out else np.linspace(low, high, POINTS)
+    middle, measured, error = _measured(term, fitted, data, weights)
+    out = []
+    for i, m in enumerate(term.times):
+        curve, band = _values(term, m, theta, covariance, fine)
+        there, _ = _values(term, m, theta, covariance, middle)
+        table = tuple(
+            (float(a), float(v), float(w), float(s))
+            for a, v, w, s in zip(middle, there, measured[i], error[i], strict=True)
+        )
+        out.append(Spline(m, WORDS[m], term.unit_of(m, data.scale), fine, curve, band, table))
+    return out
+
+
+def _values(
+    term: Flexible, multiplier: Multiplier, theta: Sequence[float], covariance: Floats, over: Floats
+) -> tuple[Floats, Floats]:
+    """The spline of one multiplier and its standard error, at `over` (n,)."""
+    at = 0
+    for m in term.times:
+        if m == multiplier:
+            break
+        at += len(term.free(m))
+    free = list(term.free(multiplier))
+    inside = slice(at, at + len(free))
+    basis = spline(term.axis(over), term.axis(np.array(term.knots)), np.eye(len(term.knots)), term.degree)[:, free]
+    variance = np.einsum("ni,ij,nj->n", basis, covariance[inside, inside], basis)
+    return basis @ np.array(theta[inside]), np.sqrt(np.maximum(variance, 0.0))
+
+
+def _measured(term: Flexible, fitted: Fit, data: Data, weights: Weights) -> tuple[Floats, Floats, Floats]:
+    """Middles of the bins (b,), and generalised least squares of the residual without the term there: values and
+    standard errors (multipliers, b)."""
+    smaller = fitted.model.without(term)
+    kept = tuple(v for t, v in zip(fitted.model.terms, fitted.theta.terms, strict=True) if t != term)
+    theta = replace(fitted.theta, terms=kept)
+    less = replace(fitted, model=smaller, theta=theta)
+    over, columns = seen_at(term, less, data)
+    thrust, _ = raw(smaller, theta, data, with_rate=False)
+    left = weights.whiten([y - f for y, f in zip(data.thrust, thrust, strict=True)], [])
+    edges = _edges(np.concatenate(over))
+    bins, p = edges.size - 1, len(term.times)
+    made = []
+    for values, times in zip(over, columns, strict=True):
+        index = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, bins - 1)
+        inside = (index[:, None] == np.arange(bins)).astype(np.float64)
+        made.append(np.column_stack([inside * times[:, [j]] for j in range(p)]))
+    white = weights.whiten(made, [])
+    size = np.linalg.norm(white, axis=0)
+    seen = size > 1e-6 * float(size.max(initial=0.0))
+    unit = white / np.where(seen, size, np.inf)
+    inverse = np.linalg.pinv(unit.T @ unit, hermitian=True, rcond=1e-9)
+    value = (inverse @ (unit.T @ left) / np.where(seen, size, np.inf)).reshape(p, bins)
+    error = (np.sqrt(np.maximum(np.diag(inverse), 0.0)) / np.where(seen, size, np.inf)).reshape(p, bins)
+    every = np.concatenate(over)
+    index = np.clip(np.searchsorted(edges, every, side="right") - 1, 0, bins - 1)
+    rows = np.bincount(index, minlength=bins)
+    middle = np.bincount(index, weights=every, minlength=bins) / np.maximum(rows, 1)
+    full = (rows > 0) & seen.reshape(p, bins).all(axis=0)
+    return middle[full], value[:, full], error[:, full]
+
+
+def _edges(values: Floats) -> Floats:
+    """Levels where there are few, otherwise shares of the rows."""
+    size = float(np.max(np.abs(values), initial=0.0)) or 1.0
+    levels = np.unique(np.round(values / size, 4)) * size
+    if levels.size <= MOST_LEVELS:
+        middle = 0.5 * (levels[1:] + levels[:-1])
+        return np.concatenate([[levels[0] - 1e-3 * size], middle, [levels[-1] + 1e-3 * size]])
+    out: Floats = np.unique(np.quantile(values, np.linspace(0, 1, BINS + 1)))
+    return out
+
+
+CURVE = frozenset({"command_voltage", "motor_voltage", "rotation_rate", "thrust", "direction"})
+
+
+def with_flexible(found: Unexplained, extended: Extended | None, data: Data, others: Sequence[History]) -> Unexplained:
+    """What is unexplained, with the flexible terms that model it, and a formula where one agrees everywhere."""
+    if extended is None:
+        return found
+    shapes = shapes_of(extended, data)
+    over = " and ".join(dict.fromkeys(s.covariate for s in shapes))
+    if extended.held < extended.without:
+        how = f"takes the error on data that were not fitted from {extended.without:.4g} to {extended.held:.4g} N"
+    else:
+        names = " and ".join(t.id for t in extended.dropped)
+        how = f"predicts data that were not fitted about as well as {names} ({extended.held:.4g} N)"
+    says = f"A flexible term over {over} {how}."
+    if extended.equals:
+        says += f" Over {' or '.join(extended.equals)} it does about as well: this plan cannot tell them apart."
+    return replace(
+        found,
+        statement=f"{found.statement} {says}",
+        flexible=shapes,
+        equals=extended.equals,
+        replaces=tuple(t.id for t in extended.dropped),
+        heldout_without=extended.without,
+        formula=find_formula(extended, data, others),
+    )
+
+
+def with_held(held: HeldOut, extended: Extended | None) -> HeldOutRmse:
+    """The error on what was not fitted; flexible terms were chosen without the data that judge them."""
+    if extended is None:
+        return HeldOutRmse(held.before, held.after, held.noise, held.what)
+    what = f"{held.what}; the flexible terms were chosen and fitted without the data that judge them"
+    return HeldOutRmse(held.before, extended.held, held.noise, what)
+
+
+def refitted_names(named: Sequence[Named], final: State) -> list[Named]:
+    """Terms whose names were earned with their values in the final model."""
+    places, at = {}, 1
+    for term, values in zip(final.fit.model.terms, final.fit.theta.terms, strict=True):
+        places[term] = (values, slice(at, at + len(values)))
+        at += len(values)
+    std = final.fit.std
+    return [
+        replace(n, theta=places[n.term][0], std=tuple(map(float, std[places[n.term][1]]))) if n.term in places else n
+        for n in named
+    ]
+
+
+def shared(terms: Sequence[Term], extended: Extended) -> list[Term]:
+    """Of these terms those that change what a flexible one changes, over the same coordinate: beside a shape that may
+    be anything their values mean nothing."""
+    over = {q for term in extended.terms for q in _also(term.quantity)}
+    return [term for term in terms if over & {q for c in term.coordinates for q in _also(c)}]
+
+
+def _also(quantity: str) -> frozenset[str]:
+    """Coordinates of the same kind: the static curve is one over all that drives."""
+    return CURVE if quantity in CURVE else frozenset({quantity})

@@ -1,0 +1,69 @@
+"""Held-out judgement on whole runs where several were given: each is predicted by what the others tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from identification.mismatch.estimate.estimate import State, forces
+from identification.mismatch.estimate.fitting import Fit, fit
+from identification.mismatch.model.model import Data, weights
+from identification.mismatch.noise.covariance import Noise
+from identification.mismatch.validate.held_out import HeldOut, by_blocks, least_noise, rmse, with_tares
+
+FOLDS = 4
+"""Runs are left out one by one, or in as many groups."""
+ALIKE = 0.5
+"""Of the largest driver of all runs, and of their median number of samples: a run with less tells too little."""
+
+
+def by_folds(before: State, after: State, data: Data, measured: Data, quiet: Noise) -> HeldOut:
+    """Both models fitted without a run and judged on it, every run in turn; of the run itself only its tare is fitted.
+
+    By blocks of time where there is one run, or one that is no match for the others. Arguments as of `by_blocks`.
+    """
+    R = len(data.histories)
+    if R < 2 or not _alike(data):
+        return by_blocks(before, after, data, measured, quiet)
+    folds = [fold.tolist() for fold in np.array_split(np.arange(R), min(R, FOLDS))]
+    old = [_judged(before, measured, fold) for fold in folds]
+    new = [_judged(after, data, fold) for fold in folds]
+    keep = [np.ones(r.size, dtype=bool) for r in data.rows]
+    noise = least_noise(after.fit, (after.noise, quiet), data, keep)
+    each = "each run" if len(folds) == R else f"each of {len(folds)} groups of runs"
+    what = f"{each} by a model fitted to the others, its own tare fitted; terms were chosen on all of them"
+    return HeldOut(_together(old), _together(new), noise, what)
+
+
+def _alike(data: Data) -> bool:
+    driver = np.array([float(np.max(np.abs(h.driver[r]))) for h, r in zip(data.histories, data.rows, strict=True)])
+    samples = np.array([float(h.count[r].sum()) for h, r in zip(data.histories, data.rows, strict=True)])
+    return bool(driver.min() > ALIKE * driver.max() and samples.min() > ALIKE * float(np.median(samples)))
+
+
+def _judged(state: State, data: Data, fold: Sequence[int]) -> tuple[float, float]:
+    """RMSE in N and samples of the runs of a fold, by the model fitted to the others."""
+    others = [i for i in range(len(data.histories)) if i not in fold]
+    model = _fitted(state, _of(data, others), others)
+    unseen = replace(_of(data, fold), with_rate=False)
+    theta = with_tares(model.model, model.theta, unseen)
+    every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
+    samples = sum(float(h.count[r].sum()) for h, r in zip(unseen.histories, unseen.rows, strict=True))
+    return rmse(model.model, theta, unseen, every), samples
+
+
+def _of(data: Data, runs: Sequence[int]) -> Data:
+    return replace(data, histories=tuple(data.histories[i] for i in runs), keep=None, spread=None)
+
+
+def _fitted(state: State, part: Data, runs: Sequence[int]) -> Fit:
+    theta = replace(state.fit.theta, tares=tuple(state.fit.theta.tares[i] for i in runs))
+    w = weights(part, state.noise, forces(state.fit.model, theta, part), state.rate_noise)
+    return fit(state.fit.model, theta, part, w)
+
+
+def _together(parts: Sequence[tuple[float, float]]) -> float:
+    """RMSE over all samples."""
+    return float(np.sqrt(sum(n * e**2 for e, n in parts) / sum(n for _, n in parts)))

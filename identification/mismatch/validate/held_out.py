@@ -1,0 +1,186 @@
+"""How much better, on data that was not fitted: blocks of time kept back, or whole runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.estimation.tails import chi2_sf
+from identification.mismatch.estimate.estimate import State, forces
+from identification.mismatch.estimate.fitting import Fit, fit, raw
+from identification.mismatch.model.model import Data, Model, Theta, weights
+from identification.mismatch.noise.covariance import Noise
+from identification.run_history.history import History
+
+KEPT_BACK = 4
+"""One block of so many is not fitted."""
+BLOCKS_PER_RUN = 24
+LEAST_BLOCK = 8.0
+"""s."""
+LAGS = 20
+
+
+@dataclass(frozen=True, slots=True)
+class Error:
+    """Root mean square per sample, N, before (C V|V| and tare) and after."""
+
+    before: float
+    after: float
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    before: float
+    after: float
+    noise: float
+    what: str
+
+
+def blocks(history: History) -> NDArray[np.bool_]:
+    """(n,) of bool at the thrust rows: which are fitted. Every fourth block of time (or level) is kept back."""
+    t = history.sampled[history.rows]
+    if history.static:
+        return np.asarray(np.arange(t.size) % KEPT_BACK != KEPT_BACK - 2)
+    span = float(t[-1] - t[0])
+    length = max(span / BLOCKS_PER_RUN, min(LEAST_BLOCK, span / 8))
+    index = np.floor((t - t[0]) / length).astype(int)
+    return np.asarray(index % KEPT_BACK != KEPT_BACK - 2)
+
+
+def rmse(model: Model, theta: Theta, data: Data, which: Sequence[NDArray[np.bool_]]) -> float:
+    """Per sample, N, over the rows in `which`: scatter within a row is in it."""
+    thrust, _ = raw(model, theta, data, with_rate=False)
+    total = samples = 0.0
+    for h, rows, f, w in zip(data.histories, data.rows, thrust, which, strict=True):
+        r = rows[w]
+        total += float(h.count[r] @ (h.thrust[r] - f[w]) ** 2) + float(np.sum(h.within[r]))
+        samples += float(h.count[r].sum())
+    return float(np.sqrt(total / samples)) if samples else float("nan")
+
+
+def least_noise(fitted: Fit, noises: Sequence[Noise], data: Data, which: Sequence[NDArray[np.bool_]]) -> float:
+    """N per sample, rms: the lowest of these noises, and no louder than what the model leaves where it was fitted.
+
+    What a model leaves out makes its noise seem louder, and slow noise is uncertain by more than its size.
+    """
+    n, p = fitted.residual.size, int(fitted.free.sum())
+    left = rmse(fitted.model, fitted.theta, data, which) * np.sqrt(n / max(n - p, 1))
+    every = [np.ones(r.size, dtype=bool) for r in data.rows]
+    return min(float(left), *(noise_rms(each, fitted.model, fitted.theta, data, every) for each in noises))
+
+
+def noise_rms(noise: Noise, model: Model, theta: Theta, data: Data, which: Sequence[NDArray[np.bool_]]) -> float:
+    """What the estimated noise alone gives per sample, N."""
+    size = forces(model, theta, data)
+    total = samples = 0.0
+    for h, rows, f, w in zip(data.histories, data.rows, size, which, strict=True):
+        count = h.count[rows[w]].astype(np.float64)
+        each = noise.white + noise.proportional * f[w] ** 2 + sum(noise.slow) + sum(noise.band)
+        total += float(count @ each)
+        samples += float(count.sum())
+    return float(np.sqrt(total / samples)) if samples else float("nan")
+
+
+def refitted(state: State, data: Data, keep: Sequence[NDArray[np.bool_]]) -> Fit:
+    """Parameters of the same model from a part of the rows, with the same noise."""
+    part = replace(data, keep=tuple(keep))
+    w = weights(part, state.noise, forces(state.fit.model, state.fit.theta, part), state.rate_noise)
+    return fit(state.fit.model, state.fit.theta, part, w)
+
+
+def by_blocks(before: State, after: State, data: Data, measured: Data, quiet: Noise) -> HeldOut:
+    """Parameters of both models without every fourth block, judged on those blocks.
+
+    `measured`: the same runs with the periodic disturbances still in them, for the model before. `quiet`: noise of
+    another model of these runs.
+    """
+    keep = [blocks(h) for h in data.histories]
+    back = [~k for k in keep]
+    old, new = refitted(before, measured, keep), refitted(after, data, keep)
+    noise = least_noise(new, (after.noise, quiet), data, keep)
+    held = "levels" if data.histories[0].static else "blocks of time"
+    what = f"every fourth of the {held}, {sum(int(b.sum()) for b in back)} rows; terms were chosen on all of them"
+    return HeldOut(rmse(old.model, old.theta, measured, back), rmse(new.model, new.theta, data, back), noise, what)
+
+
+def by_runs(before: State, after: State, data: Data, others: Sequence[History], quiet: Noise) -> HeldOut:
+    """Both models on whole runs that were not fitted; of these only the tare is. `quiet` as in `by_blocks`."""
+    unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
+    every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
+    errors = []
+    for state in (before, after):
+        theta = with_tares(state.fit.model, state.fit.theta, unseen)
+        errors.append(rmse(state.fit.model, theta, unseen, every))
+    noise = least_noise(after.fit, (after.noise, quiet), data, [np.ones(r.size, dtype=bool) for r in data.rows])
+    names = ", ".join(h.recording_id for h in others)
+    return HeldOut(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """Of a fit on what it was not fitted to."""
+
+    rmse: float
+    """Per sample, N."""
+    chi2: float
+    """Of the residual, whitened with one and the same noise."""
+
+
+def judge_blocks(state: State, data: Data, keep: Sequence[NDArray[np.bool_]]) -> Callable[[Fit], Score]:
+    """Judges fits of the rows in `keep` on all others, with the noise of `state`."""
+    back = [~k for k in keep]
+    part = replace(data, keep=tuple(back))
+    w = weights(part, state.noise, forces(state.fit.model, state.fit.theta, part), None)
+
+    def score(found: Fit) -> Score:
+        thrust, _ = raw(found.model, found.theta, part, with_rate=False)
+        left = w.whiten([y - f for y, f in zip(part.thrust, thrust, strict=True)], [])
+        return Score(rmse(found.model, found.theta, data, back), float(left @ left))
+
+    return score
+
+
+def judge_runs(state: State, data: Data, others: Sequence[History]) -> Callable[[Fit], Score]:
+    """Judges fits on whole runs, their tares fitted; a fit that needs what one of these lacks is infinitely bad."""
+    unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
+    every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
+    first = with_tares(state.fit.model, state.fit.theta, unseen)
+    w = weights(unseen, state.noise, forces(state.fit.model, first, unseen), None)
+
+    def score(found: Fit) -> Score:
+        if any(not set(term.needs) <= set(h.others) for term in found.model.terms for h in others):
+            return Score(float("inf"), float("inf"))
+        theta = with_tares(found.model, found.theta, unseen)
+        thrust, _ = raw(found.model, theta, unseen, with_rate=False)
+        left = w.whiten([y - f for y, f in zip(unseen.thrust, thrust, strict=True)], [])
+        return Score(rmse(found.model, theta, unseen, every), float(left @ left))
+
+    return score
+
+
+def with_tares(model: Model, theta: Theta, data: Data) -> Theta:
+    """The same with the tares that the runs of `data` want, one each."""
+    zero = replace(theta, tares=tuple(0.0 for _ in data.histories))
+    thrust, _ = raw(model, zero, data, with_rate=False)
+    tares = [
+        float(np.average(y - f, weights=h.count[r]))
+        for y, f, h, r in zip(data.thrust, thrust, data.histories, data.rows, strict=True)
+    ]
+    return replace(theta, tares=tuple(tares))
+
+
+def whiteness(fitted: Fit, data: Data) -> float:
+    """p-value of Ljung and Box over LAGS lags of the whitened thrust residual, run by run."""
+    ends = np.cumsum([r.size for r in data.rows])
+    statistic, dof = 0.0, 0
+    for part in np.split(fitted.residual[: ends[-1]], ends[:-1]):
+        n, lags = part.size, min(LAGS, part.size // 5)
+        e = np.clip(part - part.mean(), -4, 4)
+        power = float(e @ e)
+        for k in range(1, lags + 1):
+            statistic += n * (n + 2) * (float(e[k:] @ e[:-k]) / power) ** 2 / (n - k) if power > 0 else 0.0
+        dof += lags
+    return float(chi2_sf(statistic, dof)) if dof else 1.0

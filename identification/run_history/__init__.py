@@ -1,0 +1,1 @@
+"""One run as the engine sees it: means over intervals, and what memory, ticks and splines make of them."""

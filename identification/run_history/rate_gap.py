@@ -1,0 +1,114 @@
+"""How far the measured rate is from what a model says of it, without the noise of the rate.
+
+The noise would hide a coupling of the thrust to the rate. What is left of the gap is any curve of the driver, and
+beside it what wanders: a share of the driver, or an amount, whichever foretells the rate better. A gap that changes
+from row to row, as that of a rotor that lags, is no wandering: it is taken as it was measured, or over few rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from identification.recording import Floats
+from identification.run_history.filters import reconstructed
+from identification.run_history.splines import spline
+from identification.run_history.wandering import Smoother
+
+if TYPE_CHECKING:
+    from identification.run_history.history import History
+
+NODES, ROWS_A_NODE = 17, 50
+"""Of the curve of the driver, at quantiles of it, at most; and the rows that one takes."""
+LEAST_ROWS = 8
+SLOW = 4
+"""Rows on either side that foretell a row best, where what is seen wanders."""
+REACHES = (1, 2, 4, 8, 16, 32, 64, 128)
+"""Rows on either side."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RateGap:
+    """What takes the noise out of the gap of one run."""
+
+    smoother: Smoother
+    nodes: Floats
+    by_share: bool
+
+    def calmed(self, gap: Floats, history: History) -> Floats:
+        """(M,) of a gap (m,) at the rows of the rate."""
+        c, wandering = self.smoother(gap, history.middle)
+        out = spline(history.driver, self.nodes, c, 1)
+        return out + (history.driver * wandering if self.by_share else wandering)
+
+
+def rate_gap(history: History) -> RateGap | None:
+    """None of a static table, where the gap changes from row to row, and where too few rows tell what wanders."""
+    rows = history.rate_rows
+    if history.static or history.rate is None or history.rate_sampled is None or rows.size < LEAST_ROWS:
+        return None
+    driver = driver_at_rate(history)
+    nodes = np.unique(np.quantile(driver, np.linspace(0.0, 1.0, min(NODES, max(rows.size // ROWS_A_NODE, 2)))))
+    if nodes.size < 2:
+        return None
+    columns = spline(driver, nodes, np.eye(nodes.size), 1)
+    gap = without_ticks(history.rate[rows] / history.rate_per_driver - driver, history)
+    left = gap - columns @ np.linalg.lstsq(columns, gap, rcond=1e-10)[0]
+    one = np.ones_like(gap)
+    by_share = running(left, driver).error < running(left, one).error
+    if running(left, driver if by_share else one).reach < SLOW:
+        return None
+    count = one if history.rate_count is None else history.rate_count[rows].astype(np.float64)
+    smoother = Smoother(history.rate_sampled[rows], columns, driver if by_share else one, count, gap)
+    return None if smoother.law is None else RateGap(smoother, nodes, by_share)
+
+
+def driver_at_rate(history: History) -> Floats:
+    """(m,) the driver at the rows of the rate."""
+    assert history.rate_sampled is not None
+    return reconstructed(history.driver, history.middle, history.rate_sampled)[history.rate_rows]
+
+
+def without_ticks(gap: Floats, history: History) -> Floats:
+    """The gap (m,) less what the ticks of the command do within an interval, as far as the rotor follows them."""
+    lead = np.broadcast_to(history.rate_lead, history.driver.shape)[history.rate_rows]
+    power = float(lead @ lead)
+    followed = min(max(float(gap @ lead) / power, 0.0), 1.0) if power > 0 else 0.0
+    return gap - followed * lead
+
+
+class Running(NamedTuple):
+    """A coefficient (n,) over so many neighbours on either side, and its leave-one-out error."""
+
+    coefficient: Floats
+    error: float
+    reach: int
+
+
+def running(value: Floats, basis: Floats) -> Running:
+    """Running coefficient of value on a basis (n,): over as many neighbours as err least.
+
+    One alone, as measured, errs by what a straight line through both neighbours would.
+    """
+    if value.size < LEAST_ROWS:
+        alone = np.divide(value, basis, out=np.zeros_like(value), where=basis != 0)
+        return Running(alone, float(np.mean(value**2)), 0)
+    power = np.concatenate([[0.0], np.cumsum(basis**2)])
+    product = np.concatenate([[0.0], np.cumsum(basis * value)])
+    index = np.arange(value.size)
+    tiny = max(1e-9 * float(power[-1]) / value.size, 1e-300)
+    alone = value[1:-1] - 0.5 * (value[2:] + value[:-2])
+    best = np.divide(value, basis, out=np.zeros_like(value), where=basis**2 > tiny)
+    error, width = float(np.mean(alone**2)) if basis.std() == 0 else np.inf, 0
+    for reach in REACHES:
+        if 2 * reach + 1 > value.size // 4:
+            break
+        low, high = np.maximum(index - reach, 0), np.minimum(index + reach + 1, value.size)
+        b2, by = power[high] - power[low], product[high] - product[low]
+        others = np.maximum(b2 - basis**2, tiny)
+        missed = float(np.mean((value - basis * (by - basis * value) / others) ** 2))
+        if missed < error:
+            best, error, width = by / np.maximum(b2, tiny), missed, reach
+    return Running(best, error, width)

@@ -1,0 +1,100 @@
+"""What ticks of a command do at the samples beside the line through means, as a lag, ringing and a delay pass them on.
+
+Between two ticks the driver stands still: the rotor follows it by its own equation, and ringing is a decaying
+exponential that each tick adds to. So the response is known at any time, not only at the ends of intervals. The force
+rings, not the driver: a tick that rings on adds to it by what the force changed then, however slow the rotor is now.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.recording import Floats
+from identification.run_history.filters import complex_recursion, delayed, lag_ends, lagged, recursion, resonant
+from identification.run_history.history import History
+
+SETTLED = 25.0
+"""Time constants after which a rotor has followed and ringing has died away."""
+SLOWEST = 1e-3
+"""Rate of following, beside that at the largest driver, of a rotor that hardly turns."""
+
+
+@dataclass(frozen=True, slots=True)
+class Passed:
+    """Dynamics between the driver and a channel: first a rotor that follows, then a stand that rings, then a delay."""
+
+    rotor: tuple[float, float] | None = None
+    """Coefficients of n' = quadratic (w|w| - n|n|) + linear (w - n); None at once."""
+    ring: tuple[float, float, float] | None = None
+    """Compliance c, frequency w / 2 pi in Hz, damping z: transfer function 1 - c + c w^2/(p^2 + 2 z w p + w^2)."""
+    delay: float = 0.0
+    """s."""
+
+    def means(self, history: History) -> Floats:
+        """(M,) of the rotor's rate, means over intervals, of a driver that stands still in each."""
+        out = history.driver if self.rotor is None else history.followed(history.driver, self.rotor)
+        return delayed(out, history.edges, self.delay) if self.delay else out
+
+    def rung_means(self, history: History) -> Floats:
+        """(M,) of rate |rate| as the stand shows it, means over intervals, of a driver that stands still in each."""
+        assert self.ring is not None
+        x = history.driver if self.rotor is None else history.followed(history.driver, self.rotor)
+        force = x * np.abs(x)
+        moved = force - history.driver[0] * np.abs(history.driver[0])
+        out = force + self.ring[0] * (resonant(moved, history.dt, *self.ring[1:]) - moved)
+        return delayed(out, history.edges, self.delay) if self.delay else out
+
+    def at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
+        """(N,) the rate `since` s + delay after the tick `last`, of a driver that takes `value` (T,) at the ticks
+        `when` (T,) s. It was settled before the first.
+        """
+        return self.followed(last, since, value, self.rates(when, value))
+
+    def rung_at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
+        """(N,) rate |rate| as the stand shows it then."""
+        rate = self.at(last, since, when, value)
+        return rate * np.abs(rate) + self.ringing(last, since, when, value)
+
+    def rates(self, when: Floats, value: Floats, near: Floats | None = None) -> Floats:
+        """(T,) of the rotor at each tick. `near`: those of a rotor that is not far off."""
+        if self.rotor is None:
+            return value
+        begin = float(value[0])
+        end = lag_ends(value[:-1], np.diff(when), *self.rotor, begin, None if near is None else near[1:])
+        return np.concatenate([value[:1], end])
+
+    def followed(self, last: NDArray[np.intp], since: Floats, value: Floats, rates: Floats) -> Floats:
+        """(N,) as `at`; `rates` (T,) at the ticks."""
+        out: Floats = value[last]
+        if self.rotor is not None:
+            quadratic, linear = self.rotor
+            follows = np.flatnonzero(since * (quadratic * np.abs(value) + linear)[last] < SETTLED)
+            out[follows] = lagged(out[follows], rates[last[follows]], since[follows], quadratic, linear)
+        return out
+
+    def ringing(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
+        """What the stand adds to rate |rate|, (N,): modes of the linear response, the rotor taken as linear about each
+        tick."""
+        assert self.ring is not None
+        c, f, z = self.ring
+        w = 2 * np.pi * f
+        pole = complex(-z * w, w * np.sqrt(max(1 - z**2, 1e-9)))
+        force = value * np.abs(value)
+        change, gap = np.diff(force, prepend=force[0]), np.diff(when, prepend=when[0])
+        share: NDArray[np.complex128] = np.full(value.size, c * w**2 / (2j * pole.imag * pole))
+        out = np.zeros(since.size)
+        if self.rotor is not None:
+            quadratic, linear = self.rotor
+            follow = 2 * quadratic * np.abs(value) + linear
+            follow = np.maximum(follow, SLOWEST * float(np.max(follow)))
+            share *= follow / (pole + follow)
+            lagging = recursion(np.exp(-follow * gap), change, 0.0)
+            lagging *= c * (1 - w**2 / (follow**2 - 2 * z * w * follow + w**2))
+            out += lagging[last] * np.exp(-follow[last] * since)
+        rings = np.flatnonzero(z * w * since < SETTLED)
+        left = share * complex_recursion(np.exp(pole * gap), change.astype(np.complex128))
+        out[rings] += 2 * np.real(left[last[rings]] * np.exp(pole * since[rings]))
+        return out

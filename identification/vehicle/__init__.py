@@ -1,0 +1,1 @@
+"""From the trials of a whole vehicle to its drag, efficiency, current, buoyancy and inertia."""
