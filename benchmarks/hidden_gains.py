@@ -27,7 +27,7 @@ from statistics import median
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
-from identification.mismatch.estimate.estimate import State, refresh
+from identification.mismatch.estimate.estimate import Estimate, refresh
 from identification.mismatch.estimate.fitting import extended, fit
 from identification.mismatch.locate.slow_change import ALARM, slow_changes
 from identification.mismatch.model.model import Data, Model
@@ -75,24 +75,24 @@ def seen(case: concealed.Case, *without: str) -> Seen:
         return Seen()
     data, theta = start(histories)
     terms = search.available(data, without)
-    state = baseline(data, theta, terms, Model())
-    found = directions(state.fit, data, state.weights, terms)
-    spared = allowed(corrections(state.fit, data, state.weights), found.columns)
-    judged = screen(state.fit, found, np.random.default_rng(0), search.ALARM, spared)
+    estimate = baseline(data, theta, terms, Model())
+    found = directions(estimate.fit, data, estimate.weights, terms)
+    spared = allowed(corrections(estimate.fit, data, estimate.weights), found.columns)
+    judged = screen(estimate.fit, found, np.random.default_rng(0), search.ALARM, spared)
     if judged.largest > judged.threshold:
         return Seen()
-    return Seen(tuple(_tried(state, judged, data)), tuple(p for p, _ in slow_changes(state, data)))
+    return Seen(tuple(_tried(estimate, judged, data)), tuple(p for p, _ in slow_changes(estimate, data)))
 
 
-def _tried(state: State, judged: Screening, data: Data) -> Iterator[Gain]:
-    now = refresh(state.fit.model, state.fit.theta, data, None, None)
+def _tried(estimate: Estimate, judged: Screening, data: Data) -> Iterator[Gain]:
+    now = refresh(estimate.fit.model, estimate.fit.theta, data, None, None)
     for term, values, screened in judged.best(2 * search.MOST_HIDDEN):
         if screened < LEAST:
             continue
-        bigger = state.fit.model.plus(term)
-        begin = refined(state.fit, data, state.weights, term, values)
-        theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
-        first = fit(bigger, theta, data, state.weights)
+        bigger = estimate.fit.model.plus(term)
+        begin = refined(estimate.fit, data, estimate.weights, term, values)
+        theta = extended(estimate.fit.theta, estimate.fit.model, term, begin, bigger)
+        first = fit(bigger, theta, data, estimate.weights)
         new = refresh(bigger, first.theta, data, None, now, now.noise)
         asked = search._asked_of_hidden(term, judged, data)
         yield Gain(term.id, screened, now.fit.deviance - new.fit.deviance, asked)

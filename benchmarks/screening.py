@@ -31,7 +31,7 @@ from time import process_time
 import h5py
 import numpy as np
 
-from identification.mismatch.estimate.estimate import State, refresh
+from identification.mismatch.estimate.estimate import Estimate, refresh
 from identification.mismatch.estimate.fitting import extended
 from identification.mismatch.model.model import Data, Model, Theta, predict
 from identification.mismatch.noise.covariance import Whitener
@@ -69,7 +69,7 @@ def write_case(path: Path, seconds: float) -> None:
             group[c.name].attrs.update(quantity=c.quantity, unit=c.unit)
 
 
-def prepared(recording: Recording) -> tuple[History, Data, State]:
+def prepared(recording: Recording) -> tuple[History, Data, Estimate]:
     """C V|V| and tare with the noise that they leave; the thrust is the only response."""
     history = history_of(recording)
     assert not isinstance(history, Refusal)
@@ -80,14 +80,14 @@ def prepared(recording: Recording) -> tuple[History, Data, State]:
 
 def ours(recording: Recording) -> tuple[list[str], list[float], float, int]:
     """Names, sigmas, CPU s, bytes at the peak."""
-    _, data, state = prepared(recording)
+    _, data, estimate = prepared(recording)
     at_rest = peak()
     began = process_time()
     history = history_of(recording)
     assert not isinstance(history, Refusal)
     data = Data((history,), data.scale)
-    found = directions(state.fit, data, state.weights, available(data))
-    sigmas = found.columns.T @ state.fit.residual
+    found = directions(estimate.fit, data, estimate.weights, available(data))
+    sigmas = found.columns.T @ estimate.fit.residual
     took = process_time() - began
     names = [f"{t.id} {t.form} {v}" for t, v in zip(found.terms, found.values, strict=True)]
     return names, sigmas.tolist(), took, peak() - at_rest
@@ -95,12 +95,12 @@ def ours(recording: Recording) -> tuple[list[str], list[float], float, int]:
 
 def by_samples(recording: Recording, *, refit: bool) -> tuple[list[str], list[float], float, int]:
     """Everything at every sample: the terms are evaluated on one interval per sample."""
-    _, data, state = prepared(recording)
+    _, data, estimate = prepared(recording)
     sampled = replace(data, histories=(_each_sample(recording, data.histories[0]),))
-    whitener, base, left = _at_samples(sampled, state)
+    whitener, base, left = _at_samples(sampled, estimate)
     Q, _ = np.linalg.qr(base)
     names, sigmas, took, at_rest = [], [], 0.0, peak()
-    for name, change in _candidates(sampled, state.fit.theta):
+    for name, change in _candidates(sampled, estimate.fit.theta):
         began = process_time()
         column = whitener.whiten(change)
         rest = column - Q @ (Q.T @ column)
@@ -143,14 +143,14 @@ def _each_sample(recording: Recording, coarse: History) -> History:
     )
 
 
-def _at_samples(data: Data, state: State) -> tuple[Whitener, np.ndarray, np.ndarray]:
+def _at_samples(data: Data, estimate: Estimate) -> tuple[Whitener, np.ndarray, np.ndarray]:
     """Whitener, whitened columns of the baseline (C, tare and, where it is free, the shift of the clocks), residual."""
-    (history,), theta = data.histories, state.fit.theta
+    (history,), theta = data.histories, estimate.fit.theta
     F, _ = predict(Model(), theta, history, data.scale)
     later = [delayed(F, history.edges, theta.shift + more)[history.rows] for more in (0.0, SLIGHT)]
-    whitener = Whitener(state.noise, data.thrust_rows[0], np.abs(later[0]))
+    whitener = Whitener(estimate.noise, data.thrust_rows[0], np.abs(later[0]))
     base = [later[0], np.ones(later[0].size)]
-    if state.fit.free[-3]:
+    if estimate.fit.free[-3]:
         base.append((later[1] - later[0]) / SLIGHT)
     left = history.thrust[history.rows] - later[0] - theta.tares[0]
     return whitener, whitener.whiten(np.column_stack(base)), whitener.whiten(left)

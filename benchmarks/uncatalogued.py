@@ -4,7 +4,7 @@
 
 Each effect is concealed in a recording drawn at random (sim_devices.concealed: thruster, plan, sampling, noise and
 channels), as strong as an oracle sees it at so many sigma that knows its shape. For each: the truth, the verdict, names
-given, where, what the model doubts, held-out error of C V|V|, of the model of named terms and of the model with
+given, where, what the model failed_checks, held-out error of C V|V|, of the model of named terms and of the model with
 flexible terms, beside the noise's own; the shape of the flexible terms; the formula if there is one. Last, a table.
 """
 

@@ -1,4 +1,4 @@
-"""A shape that no physics is claimed for: a spline over one coordinate, times what it multiplies.
+"""A shape that no physics is claimed for: a spline over one covariate, times what it multiplies.
 
 It is a term like any other, so that a model with it is fitted, judged, saved and simulated as models are; but it is in
 no catalogue, and no search ever proposes it. Beyond the knots it is constant: nothing is known there.
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.physics.rotation_coupling import slip
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import lowpass, since_opposite
 from identification.run_history.history import TURNING, History
@@ -43,7 +43,7 @@ MOST = 5.0
 
 @dataclass(frozen=True, slots=True)
 class Flexible:
-    """A cubic or broken line through values at knots over a coordinate."""
+    """A cubic or broken line through values at knots over a covariate."""
 
     physics: ClassVar[str] = "a free shape; no physics is claimed for it"
     quantity: str
@@ -82,7 +82,7 @@ class Flexible:
         return self.quantity == "rotation_rate" and "drive" not in self.times
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
+    def covariates(self) -> tuple[str, ...]:
         return (self.quantity,)
 
     def zeros(self, multiplier: Multiplier) -> tuple[int, ...]:
@@ -111,8 +111,8 @@ class Flexible:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
-        over = self.axis(self.covariate(now.history, now.x, now.scale))
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
+        over = self.axis(self.over(now.history, now.x, now.scale))
         out, at = value, 0
         for m in self.times:
             free = self.free(m)
@@ -124,7 +124,7 @@ class Flexible:
             )
         return out
 
-    def covariate(self, history: History, x: Floats, scale: Scale) -> Floats:
+    def over(self, history: History, x: Floats, scale: Scale) -> Floats:
         """(M,) in `unit`."""
         match self.quantity:
             case "time":
@@ -163,7 +163,7 @@ class Flexible:
         return f"{over} {what}{anew}; no physics is claimed for it.{of_run}"
 
 
-def multiplied(multiplier: Multiplier, value: Floats, now: Moment, memory: float) -> Floats:
+def multiplied(multiplier: Multiplier, value: Floats, now: TermContext, memory: float) -> Floats:
     """(M,) what the spline is multiplied by."""
     match multiplier:
         case "force" | "drive":

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 from identification.run_history.history import History
@@ -62,8 +62,8 @@ class Formula:
         return " + ".join(_told(m) for m in self.monomials)
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(coordinate_of(q) for m in self.monomials for q, _ in m.powers))
+    def covariates(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(covariate_of(q) for m in self.monomials for q, _ in m.powers))
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         size = max(scale.thrust, scale.reading)
@@ -78,7 +78,7 @@ class Formula:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         sizes, out = dict(self.sizes), value
         middles = self.middles or (0.0,) * len(self.monomials)
         for c, m, middle in zip(theta, self.monomials, middles, strict=True):
@@ -123,8 +123,8 @@ def driver_symbol(history: History) -> str:
     return "n" if history.driver_quantity == "rotation_rate" else "V"
 
 
-def coordinate_of(symbol: str) -> str:
-    """The coordinate over which what a symbol leaves would be seen."""
+def covariate_of(symbol: str) -> str:
+    """The covariate over which what a symbol leaves would be seen."""
     if symbol in CHANNELS:
         return CHANNELS[symbol][0]
     return {"t": "time", "V": "command_voltage"}.get(symbol, "load_history")

@@ -26,13 +26,13 @@ from identification.mismatch.diagnosis import (
     Verdict,
 )
 from identification.mismatch.estimate.confidence_intervals import Interval, intervals
-from identification.mismatch.estimate.estimate import State, refresh
+from identification.mismatch.estimate.estimate import Estimate, refresh
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.faults.channel_faults import Fault, find_faults, repaired
-from identification.mismatch.locate.residual_structure_test import ALARM, Omnibus, judge_left
+from identification.mismatch.locate.residual_structure_test import ALARM, ResidualStructure, residual_structure
 from identification.mismatch.locate.slow_change import beside_slow_change
 from identification.mismatch.model.model import Data, Weights
-from identification.mismatch.name.naming import Named, name, with_doubts
+from identification.mismatch.name.naming import Named, name, with_joint_checks
 from identification.mismatch.next_experiment.proposal import propose
 from identification.mismatch.next_experiment.sweeps import Limits
 from identification.mismatch.noise.covariance import Noise
@@ -41,14 +41,15 @@ from identification.mismatch.periodic.periodic_disturbances import Line
 from identification.mismatch.prepare.channel_availability import held_by_all, predictable
 from identification.mismatch.prepare.preparing import Refusal, history_of
 from identification.mismatch.select.aliases import within_samples
-from identification.mismatch.select.forward_selection import STATIC, Found, prune, resumed, search
-from identification.mismatch.select.rivals import EQUAL, Standing, settle_forms
+from identification.mismatch.select.forward_selection import STATIC, Selected, prune, resumed, search
+from identification.mismatch.select.rivals import EQUAL, SwapTest, swap_tests
 from identification.mismatch.select.shape_error import SHAPE_ERROR, corrections
-from identification.mismatch.unnamed.flexible import Extended, Parted, extend, foremost, split
+from identification.mismatch.unnamed.flexible import Extended, extend, foremost
 from identification.mismatch.unnamed.flexible_shape import refitted_names, shared, with_flexible, with_held
 from identification.mismatch.validate.cross_validation import by_folds
 from identification.mismatch.validate.held_out import HeldOut, by_blocks, by_runs, rmse, whiteness
-from identification.mismatch.validate.prediction import predicting, predicts, unforeseen, without_terms
+from identification.mismatch.validate.prediction import predicting, predicts, without_terms, worse_predicted
+from identification.mismatch.validate.train_test_split import TrainTestSplit, train_test_split
 from identification.physics.term import Term
 from identification.recording import Recording
 from identification.run_history.history import History
@@ -117,7 +118,7 @@ def diagnose(
     return replace(answer, notes=(*answer.notes, *told))
 
 
-def _gone_on(found: Found, rng: np.random.Generator) -> tuple[Found, State, dict[Term, Standing] | None]:
+def _gone_on(found: Selected, rng: np.random.Generator) -> tuple[Selected, Estimate, dict[Term, SwapTest] | None]:
     """With rivals exchanged; and once more what lies beyond, where the exchange made another model of it."""
     if not found.after.fit.model.terms:
         return found, found.after, None
@@ -130,29 +131,29 @@ def _gone_on(found: Found, rng: np.random.Generator) -> tuple[Found, State, dict
     return again, *_settled(again)
 
 
-def _left(found: Found, after: State, rng: np.random.Generator) -> tuple[State, Omnibus]:
+def _left(found: Selected, after: Estimate, rng: np.random.Generator) -> tuple[Estimate, ResidualStructure]:
     """What no term carries, with the noise that shows it."""
     data = found.data
-    left = _with_colour(judge_left(after.fit, data, after.weights, rng), after, data)
+    left = _with_colour(residual_structure(after.fit, data, after.weights, rng), after, data)
     if left.p_value < ALARM or not left.groups:
         return after, left
     if after is found.after and found.last.largest > max(found.last.threshold, UNCARRIED):
         best = found.last.directions.terms[int(np.argmax(found.last.z))]
-        return after, _foremost_over(replace(left, p_value=min(found.last.p_value, left.p_value)), best.coordinates)
+        return after, _foremost_over(replace(left, p_value=min(found.last.p_value, left.p_value)), best.covariates)
     beside = beside_slow_change(after, data)
     if beside is None:
         return after, left
-    return beside, _foremost_over(judge_left(beside.fit, data, beside.weights, rng), ("time",))
+    return beside, _foremost_over(residual_structure(beside.fit, data, beside.weights, rng), ("time",))
 
 
-def _foremost_over(left: Omnibus, quantities: Collection[str]) -> Omnibus:
-    """The same with these coordinates first."""
-    return replace(left, groups=tuple(sorted(left.groups, key=lambda g: g.coordinate.quantity not in quantities)))
+def _foremost_over(left: ResidualStructure, quantities: Collection[str]) -> ResidualStructure:
+    """The same with these covariates first."""
+    return replace(left, groups=tuple(sorted(left.groups, key=lambda g: g.covariate.quantity not in quantities)))
 
 
-def _settled(found: Found) -> tuple[State, dict[Term, Standing] | None]:
+def _settled(found: Selected) -> tuple[Estimate, dict[Term, SwapTest] | None]:
     """With rivals exchanged, pruned as a search ends; as found where what was exchanged for a term is dropped again."""
-    after, standing = settle_forms(found.after, found.data, found.terms)
+    after, standing = swap_tests(found.after, found.data, found.terms)
     slower = within_samples(after, found.data)
     if slower is not after:
         return slower, None
@@ -200,31 +201,31 @@ class _Evidence:
 
 def _answer(
     evidence: _Evidence,
-    found: Found,
-    left: Omnibus,
+    found: Selected,
+    left: ResidualStructure,
     rng: np.random.Generator,
     limits: Limits | None,
-    standing: dict[Term, Standing] | None,
-) -> tuple[Diagnosis, State]:
+    standing: dict[Term, SwapTest] | None,
+) -> tuple[Diagnosis, Estimate]:
     """The answer, and the final model: with flexible terms where no physics carries what is left."""
     data, before, others = found.data, found.before, evidence.others
     structure = left.p_value < ALARM
     every_name = name(found.after, data, found.terms, standing)
-    named = with_doubts(every_name, left if structure else None, measured=data.with_rate)
-    parted = split(found.after, data, others)
-    named = _foreseen(named, parted, same_run=not others)
-    earned = [n for n in named if not n.doubts]
-    doubted = [n for n in named if n.doubts]
-    open_ended = (structure or bool(doubted)) and bool(left.groups)
-    bare, place = _located(found.after, data, left, doubted, rng) if open_ended else (found.after, left)
-    located = _foremost(place, doubted, data) if open_ended else ""
-    free = extend(found.after, before, data, located, doubted, parted, rng) if open_ended else None
-    unnamed = [n.term for n in doubted]
-    after = predicting(found.after, parted, data, found.terms, unnamed, others) if free is None else free.state
-    if earned and doubted and free is None and not predicts(after, before, data, others):
-        after, doubted, earned = before, [*doubted, *(replace(n, doubts=(ALONE,)) for n in earned)], []
-        bare, place = _located(found.after, data, left, doubted, rng)
-    unexplained = _unexplained(place, bare, data, doubted, free, others) if open_ended else None
+    named = with_joint_checks(every_name, left if structure else None, measured=data.with_rate)
+    split = train_test_split(found.after, data, others)
+    named = _checked_on_held_out(named, split, same_run=not others)
+    earned = [n for n in named if not n.failed_checks]
+    unearned = [n for n in named if n.failed_checks]
+    open_ended = (structure or bool(unearned)) and bool(left.groups)
+    bare, place = _located(found.after, data, left, unearned, rng) if open_ended else (found.after, left)
+    located = _foremost(place, unearned, data) if open_ended else ""
+    free = extend(found.after, before, data, located, unearned, split, rng) if open_ended else None
+    unnamed = [n.term for n in unearned]
+    after = predicting(found.after, split, data, found.terms, unnamed, others) if free is None else free.estimate
+    if earned and unearned and free is None and not predicts(after, before, data, others):
+        after, unearned, earned = before, [*unearned, *(replace(n, failed_checks=(ALONE,)) for n in earned)], []
+        bare, place = _located(found.after, data, left, unearned, rng)
+    unexplained = _unexplained(place, bare, data, unearned, free, others) if open_ended else None
     earned, known = _with_values(earned, found.after, after, data, free)
     every = [np.ones(r.size, dtype=bool) for r in data.rows]
     held = _held_out(before, after, evidence, found.after.noise, free)
@@ -253,14 +254,14 @@ def _answer(
     return answer, after
 
 
-def _foreseen(named: Sequence[Named], parted: Parted, *, same_run: bool) -> tuple[Named, ...]:
+def _checked_on_held_out(named: Sequence[Named], split: TrainTestSplit, *, same_run: bool) -> tuple[Named, ...]:
     """With a doubt where a model without the term predicts what was not fitted better."""
-    worse = unforeseen(parted, [n.term for n in named if not n.doubts], same_run=same_run)
+    worse = worse_predicted(split, [n.term for n in named if not n.failed_checks], same_run=same_run)
     doubt = "what was not fitted is predicted better without it"
-    return tuple(replace(n, doubts=(*n.doubts, doubt)) if n.term in worse else n for n in named)
+    return tuple(replace(n, failed_checks=(*n.failed_checks, doubt)) if n.term in worse else n for n in named)
 
 
-def _held_out(before: State, after: State, evidence: _Evidence, quiet: Noise, free: Extended | None) -> HeldOut:
+def _held_out(before: Estimate, after: Estimate, evidence: _Evidence, quiet: Noise, free: Extended | None) -> HeldOut:
     """On the runs held out; where none are on each run in turn; on blocks of time where one run is all there is, and
     where flexible terms were chosen on the rest of these."""
     if evidence.others:
@@ -270,9 +271,9 @@ def _held_out(before: State, after: State, evidence: _Evidence, quiet: Noise, fr
 
 
 def _with_values(
-    earned: Sequence[Named], before: State, after: State, data: Data, free: Extended | None
+    earned: Sequence[Named], before: Estimate, after: Estimate, data: Data, free: Extended | None
 ) -> tuple[list[Named], dict[Term, tuple[Interval, ...]]]:
-    """Names with their values and intervals in the final model, `after`; of those that share a coordinate with a
+    """Names with their values and intervals in the final model, `after`; of those that share a covariate with a
     flexible term in the model without any."""
     alone = shared([n.term for n in earned], free) if free is not None else []
     named = refitted_names([n for n in earned if n.term not in alone], after)
@@ -326,7 +327,7 @@ def _with_channels(answer: Diagnosis, faults: Sequence[Fault]) -> Diagnosis:
     return replace(answer, verdict=verdict, findings=found, notes=(*answer.notes, *notes))
 
 
-def _with_colour(left: Omnibus, after: State, data: Data) -> Omnibus:
+def _with_colour(left: ResidualStructure, after: Estimate, data: Data) -> ResidualStructure:
     """What is left counts as structure too when it is far from white, and more than the terms' shapes may leave."""
     colour = whiteness(after.fit, data)
     if not after.fit.model.terms or colour > COLOURED or left.p_value < ALARM:
@@ -338,41 +339,41 @@ def _with_colour(left: Omnibus, after: State, data: Data) -> Omnibus:
 
 
 def _located(
-    after: State, data: Data, left: Omnibus, doubted: Sequence[Named], rng: np.random.Generator
-) -> tuple[State, Omnibus]:
+    after: Estimate, data: Data, left: ResidualStructure, unearned: Sequence[Named], rng: np.random.Generator
+) -> tuple[Estimate, ResidualStructure]:
     """What is left without the terms whose names were not earned: they are no physics, and would hide its place."""
-    if not doubted:
+    if not unearned:
         return after, left
-    bare = replace(after, fit=fit(*without_terms(after, [n.term for n in doubted]), data, after.weights))
-    seen = judge_left(bare.fit, data, after.weights, rng)
+    bare = replace(after, fit=fit(*without_terms(after, [n.term for n in unearned]), data, after.weights))
+    seen = residual_structure(bare.fit, data, after.weights, rng)
     return (bare, seen) if seen.p_value < ALARM else (after, left)
 
 
-def _foremost(left: Omnibus, doubted: Sequence[Named], data: Data) -> str:
-    """The coordinate over which it is left most clearly; a static curve is one over what drives."""
+def _foremost(left: ResidualStructure, unearned: Sequence[Named], data: Data) -> str:
+    """The covariate over which it is left most clearly; a static curve is one over what drives."""
     if left.p_value >= ALARM:  # nothing beyond noise is left: the doubt itself is the place
         driver = data.histories[0].driver_quantity
-        own = {driver if c in STATIC else c for n in doubted for c in n.term.coordinates}
-        return next((g for g in left.groups if g.coordinate.quantity in own), left.groups[0]).coordinate.quantity
-    return left.groups[0].coordinate.quantity
+        own = {driver if c in STATIC else c for n in unearned for c in n.term.covariates}
+        return next((g for g in left.groups if g.covariate.quantity in own), left.groups[0]).covariate.quantity
+    return left.groups[0].covariate.quantity
 
 
 def _unexplained(
-    left: Omnibus,
-    after: State,
+    left: ResidualStructure,
+    after: Estimate,
     data: Data,
-    doubted: Sequence[Named],
+    unearned: Sequence[Named],
     free: Extended | None,
     others: Sequence[History],
 ) -> Unexplained:
-    quantity = free.terms[0].quantity if free is not None else _foremost(left, doubted, data)
+    quantity = free.terms[0].quantity if free is not None else _foremost(left, unearned, data)
     if free is None and left.p_value < ALARM:
-        clear = [g.coordinate.quantity for g in left.groups if g.p_value < ALARM]
+        clear = [g.covariate.quantity for g in left.groups if g.p_value < ALARM]
         quantity = foremost(after, data, clear or [quantity], left.pulses)
-    judged = next((g for g in left.groups if g.coordinate.quantity == quantity), left.groups[0])
+    judged = next((g for g in left.groups if g.covariate.quantity == quantity), left.groups[0])
     where, share, table = where_of(judged, after.fit, data, after.weights)
-    resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in doubted)
-    text = f"Something is left that no term of the catalogue carries: {says(where, share, judged.coordinate.what)}"
-    if doubted:
-        text += f" It resembles {', '.join(n.term.id for n in doubted)}, but {doubted[0].doubts[0]}."
+    resembles = tuple(f"{n.term.id}: {'; '.join(n.failed_checks)}" for n in unearned)
+    text = f"Something is left that no term of the catalogue carries: {says(where, share, judged.covariate.what)}"
+    if unearned:
+        text += f" It resembles {', '.join(n.term.id for n in unearned)}, but {unearned[0].failed_checks[0]}."
     return with_flexible(Unexplained(where, judged.share, left.p_value, table, text, resembles), free, data, others)

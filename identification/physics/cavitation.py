@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 
@@ -19,7 +19,7 @@ class Cavitation:
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "thrust breaks down above a rate"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     form: Literal["linear", "square"] = "linear"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -35,7 +35,7 @@ class Cavitation:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         lost = theta[0] * np.maximum(np.abs(now.x) - theta[1], 0.0)
         out: Floats = value * np.maximum(1 - (lost if self.form == "linear" else lost**2), 0.0)
         return out

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.soft_limit import limited, mean_slope
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.history import History
 
@@ -24,7 +24,7 @@ class CommandSaturation:
     stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "the drive gives no more than a limit"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     form: Literal["hard", "knee"] = "hard"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -43,7 +43,7 @@ class CommandSaturation:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         size = np.abs(value)
         if self._start(theta) >= np.max(size):
             return value

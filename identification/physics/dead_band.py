@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 EDGE = 2e-3
@@ -24,7 +24,7 @@ class DeadBand:
     stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "below a voltage the rotor does not turn"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     form: Literal["shrink", "jump"] = "shrink"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -43,7 +43,7 @@ class DeadBand:
         most = self.parameters(scale)[0].high
         return tuple((min(float(share) * values[0], most),) for share in np.geomspace(0.3, 3.0, 48))
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         # a command that moves within an interval passes the threshold in a part of it; its variance tells how far
         moved = np.sqrt(12 * np.abs(now.history.excess))
         if self.form == "jump":

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 from identification.run_history.history import History
@@ -30,7 +30,7 @@ class Heating:
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "winding and magnets warm up under load"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time",)
+    covariates: ClassVar[tuple[str, ...]] = ("time",)
     form: Literal["winding", "magnet"] = "winding"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -47,7 +47,7 @@ class Heating:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         history = now.history
         current = history.others.get("current")
         load = (now.x / now.scale.driver) ** 4 if current is None else (current / np.nanmax(np.abs(current))) ** 2
@@ -72,7 +72,7 @@ class MeasuredHeating:
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "winding and magnets warm up under load"
     needs: ClassVar[tuple[str, ...]] = (THERMOMETER,)
-    coordinates: ClassVar[tuple[str, ...]] = (THERMOMETER, "time")
+    covariates: ClassVar[tuple[str, ...]] = (THERMOMETER, "time")
     form: Literal["measured_winding", "measured_magnet"] = "measured_winding"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -89,7 +89,7 @@ class MeasuredHeating:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         warm = _rise(now.history)
         if self.form == "measured_magnet":
             warm = lowpass(warm, now.history.dt, theta[1])[1]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import play
 
@@ -18,7 +18,7 @@ class Hysteresis:
     stage: ClassVar[Stage] = "stand"
     physics: ClassVar[str] = "friction or play in the load path"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("previous_voltage", "direction_of_change")
+    covariates: ClassVar[tuple[str, ...]] = ("previous_voltage", "direction_of_change")
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -30,7 +30,7 @@ class Hysteresis:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         return play(value, theta[0])
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

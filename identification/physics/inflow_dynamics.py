@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import lag, lowpass
 
@@ -23,7 +23,7 @@ class InflowDynamics:
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "the water in the duct must be accelerated first, so thrust overshoots"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
     form: Literal["", "momentum"] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -35,7 +35,7 @@ class InflowDynamics:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         if not self.form:
             u = lowpass(now.x, now.history.dt, theta[1])[1]
         else:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 
@@ -17,7 +17,7 @@ class LinearTerm:
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "thrust has a part in proportion to the voltage"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -33,7 +33,7 @@ class LinearTerm:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * now.x
         return out
 

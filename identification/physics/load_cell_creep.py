@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 
@@ -18,7 +18,7 @@ class LoadCellCreep:
     stage: ClassVar[Stage] = "cell"
     physics: ClassVar[str] = "the load cell creeps under load"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step", "time")
+    covariates: ClassVar[tuple[str, ...]] = ("time_since_step", "time")
     form: Literal["one_constant", "two_constants"] = "one_constant"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -35,7 +35,7 @@ class LoadCellCreep:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * lowpass(value, now.history.dt, theta[1])[1]
         if self.form == "two_constants":
             out += theta[2] * lowpass(value, now.history.dt, theta[3])[1]

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 
@@ -19,7 +19,7 @@ class LoadCellNonlinearity:
     stage: ClassVar[Stage] = "cell"
     physics: ClassVar[str] = "the load cell is not straight"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("thrust",)
+    covariates: ClassVar[tuple[str, ...]] = ("thrust",)
     form: Literal["quadratic", "cubic"] = "quadratic"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -41,7 +41,7 @@ class LoadCellNonlinearity:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         bend = value**2 if self.form == "cubic" else np.abs(value)
         out: Floats = value * (1 + theta[0] * bend)
         return out

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.special import ndtr
 
 from identification.physics.soft_limit import limited, slope_at
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.history import TAIL, History
 
@@ -48,7 +48,7 @@ class LoadCellSaturation:
     stage: ClassVar[Stage] = "cell"
     physics: ClassVar[str] = "the load cell or its amplifier clips"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("thrust",)
+    covariates: ClassVar[tuple[str, ...]] = ("thrust",)
     form: Literal["hard", "knee"] = "hard"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -66,7 +66,7 @@ class LoadCellSaturation:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         # the mean of noisy samples that clip one by one while the force moves within the interval
         noise, tails = now.history.scatter or (now.scale.noise, 0.0)
         half = np.maximum(

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 NEARLY_LINEAR = 0.9
@@ -37,7 +37,7 @@ class MotorLag:
     stage: ClassVar[Stage] = "rotor"
     physics: ClassVar[str] = "the rotor needs time to follow"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
     form: Literal["first_order", "quadratic", "mixed"] = "first_order"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -51,7 +51,7 @@ class MotorLag:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         tau = theta[0]
         if tau <= 1e-6:
             return value

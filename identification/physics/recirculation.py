@@ -10,7 +10,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 
@@ -23,7 +23,7 @@ class Recirculation:
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "the jet of the thruster comes round the tunnel"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step", "time")
+    covariates: ClassVar[tuple[str, ...]] = ("time_since_step", "time")
     form: Literal["rate", "thrust", "circuit"] = "rate"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -40,7 +40,7 @@ class Recirculation:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         jet = np.sign(value) * np.sqrt(np.abs(value / now.C)) if self.form == "thrust" else now.x
         u = lowpass(jet, now.history.dt, theta[1])[1]
         if self.form == "circuit":

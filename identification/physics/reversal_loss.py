@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import since_opposite
 from identification.run_history.history import TURNING
@@ -21,7 +21,7 @@ class ReversalLoss:
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "after a reversal the propeller works in its own wake"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time_since_reversal", "time_since_step")
+    covariates: ClassVar[tuple[str, ...]] = ("time_since_reversal", "time_since_step")
     form: Literal["wake", "step"] = "wake"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -33,7 +33,7 @@ class ReversalLoss:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         since_other, since_began, known = since_opposite(now.x, now.history.dt, TURNING * now.scale.driver)
         age = since_other if self.form == "wake" else since_began
         wake = np.where(known, np.exp(-np.maximum(age, 0.0) / theta[1]), 0.0)

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed
 from identification.run_history.history import History
@@ -38,7 +38,7 @@ class RotationCoupling:
     stage: ClassVar[Stage] = "rotor"
     physics: ClassVar[str] = "thrust follows the measured rotation rate, and the rate does not follow the command"
     needs: ClassVar[tuple[str, ...]] = ("rotation_rate",)
-    coordinates: ClassVar[tuple[str, ...]] = ("rotation_rate",)
+    covariates: ClassVar[tuple[str, ...]] = ("rotation_rate",)
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -50,7 +50,7 @@ class RotationCoupling:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * slip(now.history, value, now.history.rate_per_driver)
         return out
 

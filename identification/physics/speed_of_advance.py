@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 
@@ -19,7 +19,7 @@ class SpeedOfAdvance:
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "the flow through the disc takes thrust"
     needs: ClassVar[tuple[str, ...]] = ("flow_speed",)
-    coordinates: ClassVar[tuple[str, ...]] = ("flow_speed",)
+    covariates: ClassVar[tuple[str, ...]] = ("flow_speed",)
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -34,7 +34,7 @@ class SpeedOfAdvance:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value - theta[0] * np.abs(now.x) * now.history.others["flow_speed"]
         return out
 

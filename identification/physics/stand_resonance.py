@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import resonant
 
@@ -25,7 +25,7 @@ class StandResonance:
     stage: ClassVar[Stage] = "stand"
     physics: ClassVar[str] = "the stand rings after a step"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -45,7 +45,7 @@ class StandResonance:
         near = values[1] * np.geomspace(0.6, 1.6, 31)
         return tuple((values[0], float(min(f, most)), damping) for f in near for damping in (0.03, 0.1))
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         rung = resonant(value, now.history.dt, theta[1], theta[2])
         out: Floats = value + theta[0] * (rung - value)
         return out

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 
@@ -20,7 +20,7 @@ class SupplySag:
     stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "the command is a fraction of a supply voltage that moves"
     needs: ClassVar[tuple[str, ...]] = ("bus_voltage",)
-    coordinates: ClassVar[tuple[str, ...]] = ("bus_voltage",)
+    covariates: ClassVar[tuple[str, ...]] = ("bus_voltage",)
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -32,7 +32,7 @@ class SupplySag:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         bus = now.history.others["bus_voltage"]
         ratio = np.maximum(bus / np.nanmax(bus), 1e-3)
         out: Floats = value * ratio ** theta[0]
@@ -53,7 +53,7 @@ class Buffered:
     stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "the command is a fraction of a buffered supply voltage that moves"
     needs: ClassVar[tuple[str, ...]] = ("bus_voltage",)
-    coordinates: ClassVar[tuple[str, ...]] = ("bus_voltage",)
+    covariates: ClassVar[tuple[str, ...]] = ("bus_voltage",)
     form: ClassVar[str] = "buffered"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -65,7 +65,7 @@ class Buffered:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         bus = now.history.others["bus_voltage"]
         felt = lowpass(bus, now.history.dt, theta[1], float(bus[0]))[1]
         out: Floats = value * np.maximum(felt / np.nanmax(bus), 1e-3) ** theta[0]
@@ -86,7 +86,7 @@ class Discharge:
     stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "the supply falls as it is drawn on"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time",)
+    covariates: ClassVar[tuple[str, ...]] = ("time",)
     form: ClassVar[str] = "discharge"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -98,7 +98,7 @@ class Discharge:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         drawn = np.cumsum(np.abs(now.history.driver / now.scale.driver) ** 3 * now.history.dt) / now.scale.duration
         out: Floats = value * np.maximum(1 - theta[0] * drawn, 1e-3)
         return out
@@ -119,7 +119,7 @@ class Loaded:
     stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "the supply gives way to the load"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     form: ClassVar[str] = "loaded"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -131,7 +131,7 @@ class Loaded:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value * (1 - theta[0] * np.minimum(np.abs(value / now.scale.driver), 1.0) ** 3)
         return out
 

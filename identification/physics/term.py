@@ -58,7 +58,7 @@ class Parameter:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Moment:
+class TermContext:
     """What a term may look at beside the value that it changes. Arrays (M,) on the intervals of the history."""
 
     history: History
@@ -93,7 +93,7 @@ class Term(Protocol):
         """Quantities that must be recorded."""
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
+    def covariates(self) -> tuple[str, ...]:
         """Covariates over which its shape can be tested against a free form."""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -105,7 +105,7 @@ class Term(Protocol):
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         """Trials closely round the best one, where a fit could not find its way between them; empty for most terms."""
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         """The value of its stage (M,) with this effect in it."""
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

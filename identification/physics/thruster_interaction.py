@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 
@@ -19,7 +19,7 @@ class ThrusterInteraction:
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "a neighbouring thruster takes thrust when it runs"
     needs: ClassVar[tuple[str, ...]] = ("neighbour_thrust",)
-    coordinates: ClassVar[tuple[str, ...]] = ("neighbour_thrust",)
+    covariates: ClassVar[tuple[str, ...]] = ("neighbour_thrust",)
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -31,7 +31,7 @@ class ThrusterInteraction:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         neighbour = np.abs(now.history.others["neighbour_thrust"])
         out: Floats = value * (1 - theta[0] * neighbour / max(float(np.max(neighbour)), 1e-12))
         return out

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import delayed
 
@@ -23,7 +23,7 @@ class TimeSkew:
     stage: ClassVar[Stage] = "stand"
     physics: ClassVar[str] = "force and command are not on one clock"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -36,7 +36,7 @@ class TimeSkew:
         """Steps of the command between two samples make a staircase of the delay: a slope finds no way along it."""
         return tuple((sign * values[0] * factor,) for sign in (1.0, -1.0) for factor in FINER)
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         return delayed(value, now.history.edges, theta[0])
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 TORQUE = "torque"
@@ -23,7 +23,7 @@ class TorqueCrosstalk:
     stage: ClassVar[Stage] = "stand"
     physics: ClassVar[str] = "the cell feels the torque of the propeller"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage", "direction")
+    covariates: ClassVar[tuple[str, ...]] = ("command_voltage", "direction")
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -43,7 +43,7 @@ class TorqueCrosstalk:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * now.x**2
         return out
 
@@ -62,7 +62,7 @@ class MeasuredTorque:
     stage: ClassVar[Stage] = "stand"
     physics: ClassVar[str] = "the cell feels the torque of the propeller"
     needs: ClassVar[tuple[str, ...]] = (TORQUE,)
-    coordinates: ClassVar[tuple[str, ...]] = (TORQUE,)
+    covariates: ClassVar[tuple[str, ...]] = (TORQUE,)
     form: ClassVar[str] = "measured"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -75,7 +75,7 @@ class MeasuredTorque:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * now.history.others[TORQUE]
         return out
 

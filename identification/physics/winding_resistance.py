@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 
@@ -19,7 +19,7 @@ class WindingResistance:
     stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "voltage is lost in the winding as the current grows"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -31,7 +31,7 @@ class WindingResistance:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         loss = theta[0]
         if loss <= 0:
             return value

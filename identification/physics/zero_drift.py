@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 
@@ -19,7 +19,7 @@ class ZeroDrift:
     stage: ClassVar[Stage] = "cell"
     physics: ClassVar[str] = "the zero of the cell drifts"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time",)
+    covariates: ClassVar[tuple[str, ...]] = ("time",)
     form: Literal["linear", "exponential"] = "linear"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -39,7 +39,7 @@ class ZeroDrift:
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         t = now.history.middle
         if self.form == "linear":
             return value + theta[0] * t

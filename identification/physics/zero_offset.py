@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Moment, Parameter, Scale, Stage
+from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 
 
@@ -19,7 +19,7 @@ class ZeroOffset:
     stage: ClassVar[Stage] = "cell"
     physics: ClassVar[str] = "the zero of the cell jumped between two tares"
     needs: ClassVar[tuple[str, ...]] = ()
-    coordinates: ClassVar[tuple[str, ...]] = ("time",)
+    covariates: ClassVar[tuple[str, ...]] = ("time",)
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -33,7 +33,7 @@ class ZeroOffset:
         step = 0.96 * scale.duration / 79
         return tuple((values[0], values[1] + share * step) for share in np.linspace(-1.0, 1.0, 25))
 
-    def apply(self, value: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         ramp = 2e-3 * now.scale.duration
         edges = (now.history.edges - theta[1]) / ramp
         area = np.where(np.abs(edges) < 0.5, 0.5 * (edges + 0.5) ** 2, np.maximum(edges, 0.0))

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from identification.recording import Floats
 from identification.run_history.filters import lag
-from identification.run_history.kept import Kept
+from identification.run_history.kept import LeastRecentlyUsed
 from identification.run_history.rate_gap import RateGap, rate_gap
 from identification.run_history.step_response_rows import TickRows, tick_rows
 
@@ -146,9 +146,9 @@ class History:
     """(n,) s, every sample of the rotation rate."""
     memo: OrderedDict[object, Floats] = field(default_factory=OrderedDict, repr=False)
     """Values behind the first terms of models predicted lately: a fit moves one parameter at a time."""
-    leads: Kept = field(default_factory=lambda: Kept(MOST_LEADS), repr=False)
+    leads: LeastRecentlyUsed = field(default_factory=lambda: LeastRecentlyUsed(MOST_LEADS), repr=False)
     """What dynamics make of the ticks: each screening tries the same ones."""
-    lately: Kept = field(default_factory=lambda: Kept(MOST_LATELY), repr=False)
+    lately: LeastRecentlyUsed = field(default_factory=lambda: LeastRecentlyUsed(MOST_LATELY), repr=False)
     """What the rates of the last few models make at the samples: most terms change none."""
     static: bool = False
     """Levels without a course of time: nothing that moves can be seen."""

@@ -8,11 +8,11 @@ from collections.abc import Callable, Hashable
 from identification.recording import Floats
 
 
-class Kept:
+class LeastRecentlyUsed:
     """Arrays by what they were made of; when there are more than `most`, the longest unused is forgotten.
 
     >>> import numpy as np
-    >>> kept, a = Kept(most=8), np.arange(3.0)
+    >>> kept, a = LeastRecentlyUsed(most=8), np.arange(3.0)
     >>> kept("twice", lambda: 2 * a, a) is kept("twice", lambda: 2 * a, a)
     True
     >>> kept("twice", lambda: 2 * a, a.copy()) is kept("twice", lambda: 2 * a, a)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
-from identification.run_history.kept import Kept
+from identification.run_history.kept import LeastRecentlyUsed
 
 if TYPE_CHECKING:
     from identification.run_history.history import History
@@ -74,7 +74,7 @@ class TickRows:
     """(B + 1,) s after a tick; at the last nothing is held back."""
     levels: Floats
     """(5,) |V| of the ticks."""
-    kept: Kept = field(default_factory=lambda: Kept(MOST_KEPT), repr=False)
+    kept: LeastRecentlyUsed = field(default_factory=lambda: LeastRecentlyUsed(MOST_KEPT), repr=False)
     """Responses and rows worked out lately: most parameters of a model move none."""
 
     def predicted(self, C: float, held_back: Floats, jump: float = 0.0) -> Floats:

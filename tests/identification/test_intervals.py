@@ -22,13 +22,13 @@ CREEP = LoadCellCreep()
 
 
 def fitted(term, values, **how):
-    """(data, state) of C V|V| with one term, from `values`."""
+    """(data, estimate) of C V|V| with one term, from `values`."""
     data, theta = start([history_of(run(**how))])
     return data, refresh(Model((term,)), replace(theta, terms=(values,)), data, None, None)
 
 
-def interval(term, data, state, which=0):
-    return intervals(state.fit, data, state.weights, (term,))[term][which]
+def interval(term, data, estimate, which=0):
+    return intervals(estimate.fit, data, estimate.weights, (term,))[term][which]
 
 
 def creeping(share, tau):
@@ -49,13 +49,13 @@ def faint():
 
 
 def test_of_a_linear_parameter_it_is_the_value_and_its_standard_errors():
-    data, state = fitted(LinearTerm(), (0.1,), change=lambda t, V, F: F + 0.2 * V)
-    found = interval(LinearTerm(), data, state)
-    value, std = state.fit.theta.terms[0][0], state.fit.std[1]
+    data, estimate = fitted(LinearTerm(), (0.1,), change=lambda t, V, F: F + 0.2 * V)
+    found = interval(LinearTerm(), data, estimate)
+    value, std = estimate.fit.theta.terms[0][0], estimate.fit.std[1]
     assert (found.low, found.high) == pytest.approx((value - 1.96 * std, value + 1.96 * std), rel=0.01)
 
 
-def refitted(data, state, j, value, monkeypatch):
+def refitted(data, estimate, j, value, monkeypatch):
     """Chi-square above the best, parameter j held and all others refitted."""
 
     def held(model, data, theta):
@@ -63,38 +63,38 @@ def refitted(data, state, j, value, monkeypatch):
         low[j], high[j] = value - 1e-12, value + 1e-12
         return low, high, step
 
-    vector = state.fit.theta.vector
+    vector = estimate.fit.theta.vector
     vector[j] = value
     with monkeypatch.context() as patch:
         patch.setattr(fitting, "bounds_of", held)
-        best = fit(state.fit.model, state.fit.theta.with_vector(vector), data, state.weights)
-    return best.chi2 - state.fit.chi2
+        best = fit(estimate.fit.model, estimate.fit.theta.with_vector(vector), data, estimate.weights)
+    return best.chi2 - estimate.fit.chi2
 
 
 def test_the_profile_is_that_of_refits(faint, monkeypatch):
-    data, state = faint
+    data, estimate = faint
     for tau in (4.0, 8.0, 20.0, 40.0):
-        rise = Profile(state.fit, data, state.weights, 2)(tau)
-        assert rise == pytest.approx(refitted(data, state, 2, tau, monkeypatch), abs=0.25)
+        rise = Profile(estimate.fit, data, estimate.weights, 2)(tau)
+        assert rise == pytest.approx(refitted(data, estimate, 2, tau, monkeypatch), abs=0.25)
 
 
 def test_of_a_faint_time_constant_it_is_lopsided(faint, monkeypatch):
-    data, state = faint
-    found = interval(CREEP, data, state, 1)
-    value = state.fit.theta.terms[0][1]
+    data, estimate = faint
+    found = interval(CREEP, data, estimate, 1)
+    value = estimate.fit.theta.terms[0][1]
     assert found.high - value > 1.3 * (value - found.low)
     for end in (found.low, found.high):
-        assert refitted(data, state, 2, end, monkeypatch) == pytest.approx(3.84, abs=0.8)
+        assert refitted(data, estimate, 2, end, monkeypatch) == pytest.approx(3.84, abs=0.8)
 
 
 def test_faint_time_constants_are_within_their_intervals():
     """Of 20; 1.96 standard errors hold only some two thirds."""
     within = narrow = 0
     for seed in range(20):
-        data, state = fitted(CREEP, (0.01, 10.0), change=creeping(0.006, 12.0), seconds=240.0, seed=seed)
-        found = interval(CREEP, data, state, 1)
+        data, estimate = fitted(CREEP, (0.01, 10.0), change=creeping(0.006, 12.0), seconds=240.0, seed=seed)
+        found = interval(CREEP, data, estimate, 1)
         within += found.low <= 12.0 <= found.high
-        narrow += abs(state.fit.theta.terms[0][1] - 12.0) <= 1.96 * state.fit.std[2]
+        narrow += abs(estimate.fit.theta.terms[0][1] - 12.0) <= 1.96 * estimate.fit.std[2]
     assert within >= 18
     assert narrow < 16
 
@@ -102,25 +102,25 @@ def test_faint_time_constants_are_within_their_intervals():
 def test_a_threshold_lies_anywhere_between_two_levels():
     """The levels are 2, 4, 6 V: nothing tells 3.3 V from 3 V."""
     term = DeadBand("jump")
-    data, state = fitted(term, (2.6,), volts=lambda V: np.where(np.abs(V) > 3.3, V, 0.0))
-    found = interval(term, data, state)
+    data, estimate = fitted(term, (2.6,), volts=lambda V: np.where(np.abs(V) > 3.3, V, 0.0))
+    found = interval(term, data, estimate)
     assert 1.9 < found.low < 2.003, "a sharp threshold just beside a level"
     assert 3.997 < found.high < 4.1
-    assert state.fit.std[1] < 0.2 or not np.isfinite(state.fit.std[1]), "the slope knows nothing of it"
+    assert estimate.fit.std[1] < 0.2 or not np.isfinite(estimate.fit.std[1]), "the slope knows nothing of it"
 
 
 def test_what_lies_at_its_bound_has_an_interval_too():
-    data, state = fitted(CREEP, (0.01, 10.0), change=creeping(0.05, 0.2), seconds=120.0)
-    assert state.fit.theta.terms[0][1] == 1.0
-    found = interval(CREEP, data, state, 1)
+    data, estimate = fitted(CREEP, (0.01, 10.0), change=creeping(0.05, 0.2), seconds=120.0)
+    assert estimate.fit.theta.terms[0][1] == 1.0
+    found = interval(CREEP, data, estimate, 1)
     assert found.low == 1.0
     assert 1.0 <= found.high < 10.0
 
 
 def test_of_an_instant_it_reaches_to_where_jumps_end():
-    data, state = fitted(ZeroOffset(), (0.1, 30.0), change=lambda t, V, F: F + 0.1 * (t > 30.0), seconds=60.0)
-    found = interval(ZeroOffset(), data, state, 1)
-    profile = Profile(state.fit, data, state.weights, 2)
+    data, estimate = fitted(ZeroOffset(), (0.1, 30.0), change=lambda t, V, F: F + 0.1 * (t > 30.0), seconds=60.0)
+    found = interval(ZeroOffset(), data, estimate, 1)
+    profile = Profile(estimate.fit, data, estimate.weights, 2)
     for end in (found.low, found.high):
         assert 1.2 * 1.96**2 < profile(end) < 1.4 * JUMPS**2
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.mismatch.locate.residual_structure_test import judge_left
+from identification.mismatch.locate.residual_structure_test import residual_structure
 from identification.mismatch.model.model import Model
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.select.baseline import baseline, start
@@ -51,7 +51,7 @@ def test_the_likeliest_are_those_of_all_steps_one_by_one(jumped):
 @pytest.mark.parametrize("jumped", [(101.9, 1.5, "wanders")], indirect=True)
 def test_a_jump_that_slow_noise_hides_is_located_in_time(jumped):
     truth, data, state, _ = jumped
-    left = judge_left(state.fit, data, state.weights, np.random.default_rng(0))
+    left = residual_structure(state.fit, data, state.weights, np.random.default_rng(0))
     first = left.groups[0]
-    assert (first.coordinate.quantity, left.p_value < 1e-6) == ("time", True)
-    assert float(first.coordinate.what.split("jumps at ")[1].split()[0]) == pytest.approx(truth, abs=0.3)
+    assert (first.covariate.quantity, left.p_value < 1e-6) == ("time", True)
+    assert float(first.covariate.what.split("jumps at ")[1].split()[0]) == pytest.approx(truth, abs=0.3)

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from identification.recording import Floats
-from identification.run_history.kept import Kept
+from identification.run_history.kept import LeastRecentlyUsed
 
 
 def test_the_longest_unused_is_forgotten() -> None:
@@ -17,14 +17,14 @@ def test_the_longest_unused_is_forgotten() -> None:
         made.append(name)
         return np.zeros(1)
 
-    kept = Kept(most=2)
+    kept = LeastRecentlyUsed(most=2)
     for name in ("a", "b", "a", "c", "a", "b"):
         kept(name, partial(make, name))
     assert made == ["a", "b", "c", "b"]
 
 
 def test_arrays_count_by_identity_even_when_an_address_is_used_again() -> None:
-    kept = Kept(most=4)
+    kept = LeastRecentlyUsed(most=4)
     for i in range(200):
         value = np.full(3, float(i))
         assert kept("twice", partial(np.multiply, 2.0, value), value)[0] == 2 * i

@@ -92,16 +92,16 @@ def test_the_noise_of_a_driver_is_told_beside_steps_and_ramps():
 def test_the_noise_of_a_driver_is_averaged_and_its_course_kept(course, most):
     t = np.arange(0, 120, 0.05)
     told = course(t) + 0.1 * np.random.default_rng(3).standard_normal(t.size)
-    calm = measured(t, told)
-    assert np.std(calm.value - course(t)) < 0.1 * most
-    assert np.max(np.abs(calm.value - course(t))) < 0.4
+    smooth = measured(t, told)
+    assert np.std(smooth.value - course(t)) < 0.1 * most
+    assert np.max(np.abs(smooth.value - course(t))) < 0.4
 
 
 def test_levels_share_the_error_of_their_mean():
     t = np.arange(0, 60, 0.05)
     told = staircase(t) + 0.1 * np.random.default_rng(4).standard_normal(t.size)
-    calm = measured(t, told)
-    errors = [(np.mean(staircase(t)[v.first : v.last]) - v.value) / v.error for v in calm.levels]
+    smooth = measured(t, told)
+    errors = [(np.mean(staircase(t)[v.first : v.last]) - v.value) / v.error for v in smooth.levels]
     assert len(errors) >= 14
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.5
     history = history_of(run(noise=0.1, seconds=60.0))

@@ -11,16 +11,16 @@ from identification.mismatch import pipeline as diagnosing
 from identification.mismatch.diagnosis import Diagnosis, Where, diagnosis_json
 from identification.mismatch.estimate.fitting import extended, fit
 from identification.mismatch.model.model import Model
-from identification.mismatch.name.naming import doubts
+from identification.mismatch.name.naming import failed_checks
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import Refusal, history_of
 from identification.mismatch.select.baseline import baseline, start
 from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import search
-from identification.mismatch.unnamed.flexible import split
 from identification.mismatch.validate.held_out import Score
-from identification.mismatch.validate.prediction import predicting, predicts, unforeseen
+from identification.mismatch.validate.prediction import predicting, predicts, worse_predicted
+from identification.mismatch.validate.train_test_split import train_test_split
 from identification.physics.dead_band import DeadBand
 from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.motor_lag import MotorLag
@@ -382,7 +382,7 @@ def test_a_cell_that_is_said_to_clip_is_doubted_where_the_noise_goes_on(made, fo
     found = replace(state, fit=fit(model, replace(state.fit.theta, terms=(values,)), data, state.weights))
     white = replace(found, noise=Noise(NOISE**2, 0.0))
     assert noise_goes_on(white.fit, clips, white.noise, data) != cell
-    assert ("the noise goes on" in " ".join(doubts(white, clips, data, 1))) != cell
+    assert ("the noise goes on" in " ".join(failed_checks(white, clips, data, 1))) != cell
 
 
 def test_a_lag_and_a_lead_that_undo_each_other_are_doubted():
@@ -402,7 +402,7 @@ def test_a_lag_and_a_lead_that_undo_each_other_are_doubted():
         values = {lag: (0.3,), skew: (delay,)}
         at = replace(state.fit.theta, terms=tuple(values[t] for t in model.terms))
         known = replace(state, fit=replace(fit(model, at, data, state.weights, most_steps=0), theta=at))
-        return " ".join(doubts(known, lag, data, 2))
+        return " ".join(failed_checks(known, lag, data, 2))
 
     assert "time_skew nearly cancel" in said(-0.3)
     assert "cancel" not in said(0.3)
@@ -635,7 +635,7 @@ def unnamed(recording, term, values):
     bigger = first.model.plus(term)
     fitted = fit(bigger, extended(first.theta, first.model, term, values, bigger), found.data, found.before.weights)
     after = replace(found.before, fit=fitted)
-    return predicting(after, split(after, found.data, ()), found.data, found.terms, [term], ())
+    return predicting(after, train_test_split(after, found.data, ()), found.data, found.terms, [term], ())
 
 
 def test_a_term_without_a_name_stays_where_it_predicts():
@@ -652,34 +652,34 @@ def test_a_term_without_a_name_goes_where_it_only_describes():
 
 @pytest.fixture(scope="module")
 def late():
-    """Found in a run with a dead band whose force comes late."""
+    """Selected in a run with a dead band whose force comes late."""
     return search(
         (history_of(run(lambda t, _V, F: np.interp(t - 0.2, t, F), volts=dead_band(0.8))),), np.random.default_rng(0)
     )
 
 
-def judged(parted, chi2, rmse):
+def judged(split, chi2, rmse):
     """The same, whose models have these scores where they lack a term."""
-    every = len(parted.state.fit.model.terms)
+    every = len(split.estimate.fit.model.terms)
     return replace(
-        parted,
+        split,
         judge=lambda fitted: Score(1.0, 100.0) if len(fitted.model.terms) == every else Score(rmse, chi2),
     )
 
 
 def test_a_clock_of_one_run_is_not_that_of_another(late):
     assert {t.id for t in late.after.fit.model.terms} == {"dead_band", "time_skew"}
-    better = judged(split(late.after, late.data, ()), 50.0, 0.9)
+    better = judged(train_test_split(late.after, late.data, ()), 50.0, 0.9)
     terms = late.after.fit.model.terms
-    assert {t.id for t in unforeseen(better, terms, same_run=True)} == {"dead_band", "time_skew"}
-    assert {t.id for t in unforeseen(better, terms, same_run=False)} == {"dead_band"}
+    assert {t.id for t in worse_predicted(better, terms, same_run=True)} == {"dead_band", "time_skew"}
+    assert {t.id for t in worse_predicted(better, terms, same_run=False)} == {"dead_band"}
 
 
 def test_of_other_runs_the_error_must_fall_as_well(late):
-    quieter = judged(split(late.after, late.data, ()), 50.0, 1.1)
+    quieter = judged(train_test_split(late.after, late.data, ()), 50.0, 1.1)
     terms = late.after.fit.model.terms
-    assert unforeseen(quieter, terms, same_run=False) == ()
-    assert len(unforeseen(quieter, terms, same_run=True)) == 2
+    assert worse_predicted(quieter, terms, same_run=False) == ()
+    assert len(worse_predicted(quieter, terms, same_run=True)) == 2
 
 
 def test_what_predicts_is_better_than_the_baseline(late):

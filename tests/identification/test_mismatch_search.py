@@ -51,7 +51,7 @@ def test_what_noise_hides_is_tried_once(monkeypatch):
     ],
 )
 def test_an_exchange_that_is_dropped_again_is_none(monkeypatch, exchanged, pruned, kept):
-    monkeypatch.setattr(diagnosing, "settle_forms", lambda *_: (exchanged, {"c": None}))
+    monkeypatch.setattr(diagnosing, "swap_tests", lambda *_: (exchanged, {"c": None}))
     monkeypatch.setattr(diagnosing, "prune", lambda *_: pruned)
     monkeypatch.setattr(diagnosing, "within_samples", lambda found, _data: found)
     after, standing = diagnosing._settled(SimpleNamespace(after=state("a", "b"), data=None, terms=()))

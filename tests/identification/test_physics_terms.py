@@ -133,7 +133,7 @@ def test_it_says_what_it_is_and_what_it_needs(term):
     assert term.stage in STAGES
     assert term.physics
     assert term.physics[0].islower()
-    assert term.coordinates
+    assert term.covariates
     assert set(term.needs) <= set(H.others)
     bare = replace(H, others={}, rate=None, rate_count=None, rate_sampled=None)
     if not term.needs:

@@ -160,11 +160,11 @@ def test_current_seen_in_runs_both_ways_only_spoils_nothing():
 
 def test_scatter_between_runs_widens_what_is_stated():
     vehicle = installation(EXACT)
-    calm = identify_drag(steady(romeo(), surge_steady()), vehicle, "surge")
+    smooth = identify_drag(steady(romeo(), surge_steady()), vehicle, "surge")
     rough = identify_drag(steady(romeo(wander=4.0), surge_steady()), vehicle, "surge")
-    assert calm.excess_std == 0
+    assert smooth.excess_std == 0
     assert rough.excess_std > 0
-    assert rough.estimate.std_of("eta_hull") > 3 * calm.estimate.std_of("eta_hull")
+    assert rough.estimate.std_of("eta_hull") > 3 * smooth.estimate.std_of("eta_hull")
     assert abs(rough.estimate["eta_hull"] - 0.7) < 4 * rough.estimate.std_of("eta_hull")
 
 
@@ -190,8 +190,8 @@ def test_runs_still_gathering_way_are_cut_or_named():
     fit = fit_runs(runs, vehicle, "surge", current=False)
     assert fit.estimate["k2"] == pytest.approx(420.0, rel=0.05)
     short = [SimTrial("s", "surge", [Hold(scaled(FRONT, v), 5.0) for v in (10.0, -10.0, 20.0, -20.0)])]
-    calm = replace(hull, noise={"position": 1e-5, "depth": 1e-5, "heading": 1e-5})
-    bent = fit_runs(steady_runs(steady(calm, short), vehicle, "surge"), vehicle, "surge", current=False)
+    smooth = replace(hull, noise={"position": 1e-5, "depth": 1e-5, "heading": 1e-5})
+    bent = fit_runs(steady_runs(steady(smooth, short), vehicle, "surge"), vehicle, "surge", current=False)
     assert any("had not reached a constant velocity" in s for s in bent.statements)
 
 

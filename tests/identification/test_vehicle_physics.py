@@ -78,7 +78,7 @@ def test_a_term_speaks_in_sentences_and_bounds_have_no_bench_in_them(term: Vehic
         assert told.endswith(".")
         assert ":" in told
     assert term.physics
-    assert term.coordinates
+    assert term.covariates
 
 
 @pytest.mark.parametrize("term", CATALOGUE, ids=lambda t: f"{t.id}-{t.form}")

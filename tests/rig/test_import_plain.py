@@ -35,7 +35,7 @@ DOCUMENT = {
 def test_what_is_written_is_read(tmp_path):
     source, out = tmp_path / "a.json", tmp_path / "a.h5"
     source.write_text(json.dumps(DOCUMENT))
-    done = CliRunner().invoke(import_command, [str(source), "--notes", "calm"], catch_exceptions=False)
+    done = CliRunner().invoke(import_command, [str(source), "--notes", "smooth"], catch_exceptions=False)
     assert "3 rows" in done.output
     found = load(out)
     assert (found.thruster, found.kind, found.water_density, found.complete) == ("ROMEO", "vehicle", 1025.0, True)

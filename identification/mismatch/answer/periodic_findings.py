@@ -18,7 +18,7 @@ from identification.mismatch.diagnosis import (
     Value,
     Where,
 )
-from identification.mismatch.estimate.estimate import State
+from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.model.model import Data
 from identification.mismatch.next_experiment.proposal import largest_level
 from identification.mismatch.next_experiment.sweeps import REST, Limits
@@ -95,7 +95,7 @@ def line_place(line: Line, residual: float) -> Mismatch:
 
 
 def with_lines(
-    answer: Diagnosis, lines: Sequence[Line], state: State, data: Data, before: Twin | None, limits: Limits | None
+    answer: Diagnosis, lines: Sequence[Line], estimate: Estimate, data: Data, before: Twin | None, limits: Limits | None
 ) -> Diagnosis:
     """The answer with periodic disturbances: a place, a finding, parameters of the model, a part of the twin.
 
@@ -121,7 +121,7 @@ def with_lines(
         ),
         twin=None if answer.twin is None else replace(answer.twin, lines=(*found.values(), *gone.values())),
     )
-    return _decided(answer, told, state, data, limits) if told else answer
+    return _decided(answer, told, estimate, data, limits) if told else answer
 
 
 def _named(lines: Mapping[int, TwinLine]) -> dict[str, Value]:
@@ -161,7 +161,9 @@ def _beside_known(line: Line, known: Sequence[TwinLine], origin: str) -> Finding
     return replace(found, statement=f"{found.statement[:-1]}, where {origin} has {known[j].amplitude:.3g} N.")
 
 
-def _decided(answer: Diagnosis, told: Sequence[Line], state: State, data: Data, limits: Limits | None) -> Diagnosis:
+def _decided(
+    answer: Diagnosis, told: Sequence[Line], estimate: Estimate, data: Data, limits: Limits | None
+) -> Diagnosis:
     """With the verdict that the lines make, and the levels that tell one of a fixed frequency from one that turns."""
     open_ = [f for f in answer.findings if f.effect == EFFECT and any(r.bic_loss < EQUAL for r in f.rivals)]
     if not open_:
@@ -170,11 +172,11 @@ def _decided(answer: Diagnosis, told: Sequence[Line], state: State, data: Data, 
     return replace(
         answer,
         verdict="ambiguous" if answer.verdict in ("adequate", "explained") else answer.verdict,
-        next_experiment=answer.next_experiment or two_levels(line, state, data, limits or Limits()),
+        next_experiment=answer.next_experiment or two_levels(line, estimate, data, limits or Limits()),
     )
 
 
-def two_levels(line: Line, state: State, data: Data, limits: Limits) -> NextExperiment:
+def two_levels(line: Line, estimate: Estimate, data: Data, limits: Limits) -> NextExperiment:
     """Two levels of one direction: a line of a fixed frequency stays, one that goes with the rotor moves.
 
     At the second level only the true kind gains, in proportion to the time; chi-square apart is normal, its standard
@@ -182,7 +184,7 @@ def two_levels(line: Line, state: State, data: Data, limits: Limits) -> NextExpe
     """
     volts = data.scale.driver_unit == "V"
     limits = limits if volts else replace(limits, max_voltage=None)  # of a bench, in V
-    top = largest_level(data, state, limits)
+    top = largest_level(data, estimate, limits)
     gain = line.gain / sum(float(h.edges[-1] - h.edges[0]) for h in data.histories)
     longest = max(0.5 * (limits.budget - 2 * REST), SHORTEST)
     seconds = float(np.clip(np.ceil(ENOUGH / max(gain, 1e-9)), SHORTEST, min(LONGEST, longest)))

@@ -15,7 +15,7 @@ if TYPE_CHECKING:  # the diagnosis holds what is here
 
 @dataclass(frozen=True, eq=False)
 class Spline:
-    """What a flexible term multiplies by, over its coordinate."""
+    """What a flexible term multiplies by, over its covariate."""
 
     times: str
     """`force` (1), `gain` (thrust), `even` (|thrust|), `step` (change of thrust), `rate` (|drive|) or `drive`."""
@@ -32,7 +32,7 @@ class Spline:
 
 @dataclass(frozen=True, eq=False)
 class FlexibleShape:
-    """A flexible term of the final model: a spline over a coordinate, no physics."""
+    """A flexible term of the final model: a spline over a covariate, no physics."""
 
     covariate: str
     unit: str

@@ -17,14 +17,14 @@ from identification.mismatch.diagnosis import (
     Where,
 )
 from identification.mismatch.estimate.confidence_intervals import Interval
-from identification.mismatch.estimate.estimate import State
+from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.faults.channel_faults import Fault
-from identification.mismatch.locate.residual_structure_test import ALARM, Judged, judge_left, locate
+from identification.mismatch.locate.residual_structure_test import ALARM, CovariateTest, locate, residual_structure
 from identification.mismatch.model.model import Data, Weights
 from identification.mismatch.name.naming import Named
 from identification.mismatch.prepare.preparing import DRIVERS
-from identification.mismatch.select.forward_selection import STATIC, Found
+from identification.mismatch.select.forward_selection import STATIC, Selected
 from identification.mismatch.select.rivals import Rival
 from identification.physics.term import Term
 
@@ -103,7 +103,7 @@ def _rival(rival: Rival, data: Data) -> RivalFinding:
 
 
 def where_of(
-    judged: Judged, fitted: Fit, data: Data, weights: Weights
+    judged: CovariateTest, fitted: Fit, data: Data, weights: Weights
 ) -> tuple[Where, float, tuple[tuple[float, float, float], ...]]:
     place = locate(judged, fitted, data, weights)
     return Where(place.quantity, place.low, place.high, place.unit), place.share, place.table
@@ -115,35 +115,35 @@ def says(where: Where, share: float, what: str) -> str:
     return f"{100 * share:.0f} % of the residual lies at {place}: {what}."
 
 
-def places_of(found: Found, after: State, rng: np.random.Generator, *, pulsing: bool) -> tuple[Mismatch, ...]:
-    """Where the baseline fails: coordinates of what was found first, the clearest first among them.
+def places_of(found: Selected, after: Estimate, rng: np.random.Generator, *, pulsing: bool) -> tuple[Mismatch, ...]:
+    """Where the baseline fails: covariates of what was found first, the clearest first among them.
 
     Its C and tares are those of the model `after`: with its own it shares out the mismatch over all there is.
     `pulsing`: pulses that come back were found.
     """
     before, data = found.before.fit, found.data
-    seen = judge_left(before, data, found.before.weights, rng, pulsing=pulsing)
+    seen = residual_structure(before, data, found.before.weights, rng, pulsing=pulsing)
     if seen.p_value >= ALARM and not after.fit.model.terms:
         return ()
     same = replace(before.theta, C=after.fit.theta.C, tares=after.fit.theta.tares, shift=after.fit.theta.shift)
     bare = replace(before, theta=same)
     clear = [g for i, g in enumerate(seen.groups) if i == 0 or g.p_value <= CLEAR]
-    own = {q for term in after.fit.model.terms for c in term.coordinates for q in (DRIVERS if c in STATIC else (c,))}
+    own = {q for term in after.fit.model.terms for c in term.covariates for q in (DRIVERS if c in STATIC else (c,))}
     places = [
-        _mismatch(g, bare, data, after.weights) for g in sorted(clear, key=lambda g: g.coordinate.quantity not in own)
+        _mismatch(g, bare, data, after.weights) for g in sorted(clear, key=lambda g: g.covariate.quantity not in own)
     ]
     told = [place for place, whole in places if not whole] or [place for place, _ in places]
     return tuple(told[:MOST_PLACES])
 
 
-def _mismatch(judged: Judged, bare: Fit, data: Data, weights: Weights) -> tuple[Mismatch, bool]:
-    """Of one coordinate, and whether it is all of that coordinate, which says nothing."""
+def _mismatch(judged: CovariateTest, bare: Fit, data: Data, weights: Weights) -> tuple[Mismatch, bool]:
+    """Of one covariate, and whether it is all of that covariate, which says nothing."""
     where, share, table = where_of(judged, bare, data, weights)
-    told = Mismatch("thrust", where, share, judged.p_value, says(where, share, judged.coordinate.what))
+    told = Mismatch("thrust", where, share, judged.p_value, says(where, share, judged.covariate.what))
     return told, where.low <= table[0][0] and where.high >= table[-1][0]
 
 
-def curves_of(before: State, after: State, data: Data) -> tuple[Curves, ...]:
+def curves_of(before: Estimate, after: Estimate, data: Data) -> tuple[Curves, ...]:
     old, _ = raw(before.fit.model, before.fit.theta, data, with_rate=False)
     new, _ = raw(after.fit.model, after.fit.theta, data, with_rate=False)
     return tuple(

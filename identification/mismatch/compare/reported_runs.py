@@ -1,4 +1,4 @@
-"""The runs of a diagnosis as a report looks at them: residuals, what each effect changes, and coordinates."""
+"""The runs of a diagnosis as a report looks at them: residuals, what each effect changes, and covariates."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Run:
     """N, C driver |driver|."""
     step: Floats
     """N, change of `force` since the level before."""
-    coordinates: Mapping[str, Floats]
+    covariates: Mapping[str, Floats]
     """driver, time, time_since_step, time_since_reversal, previous_voltage, direction, and what else was recorded."""
     effects: Mapping[tuple[str, str], Floats] = field(default_factory=dict)
     """(effect, form) -> N that it changes the model by, beyond what C and the tares could take up; empty where the

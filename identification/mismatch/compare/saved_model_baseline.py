@@ -11,9 +11,9 @@ import numpy as np
 from identification.estimation.tails import normal_sf
 from identification.flexible_terms.flexible import Flexible
 from identification.mismatch.diagnosis import Diagnosis, Finding, Value
-from identification.mismatch.estimate.estimate import State
+from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import raw
-from identification.mismatch.model.model import Data, Given, Model, Spread, Theta, acting
+from identification.mismatch.model.model import Data, Given, Model, PriorPredictionFactor, Theta, acting
 from identification.mismatch.prepare.preparing import FEW_SAMPLES, Refusal
 from identification.recording import Floats, Recording
 from identification.run_history.history import CHANGED, History
@@ -42,20 +42,20 @@ def starting(twin: Twin) -> Callable[[Data, Theta], tuple[Data, Theta, Model]]:
     def begin(data: Data, theta: Theta) -> tuple[Data, Theta, Model]:
         model = Model((), given(twin))
         theta = replace(theta, C=twin.C)
-        return replace(data, spread=_both(data.spread, spread(twin, data, theta))), theta, model
+        return replace(data, prior_factor=_both(data.prior_factor, prior_factor(twin, data, theta))), theta, model
 
     return begin
 
 
-def _both(one: Spread | None, other: Spread | None) -> Spread | None:
+def _both(one: PriorPredictionFactor | None, other: PriorPredictionFactor | None) -> PriorPredictionFactor | None:
     if one is None or other is None:
         return one or other
     thrust = tuple(np.column_stack(pair) for pair in zip(one.thrust, other.thrust, strict=True))
     rate = tuple(np.column_stack(pair) for pair in zip(one.rate, other.rate, strict=False))
-    return Spread(thrust, rate)
+    return PriorPredictionFactor(thrust, rate)
 
 
-def spread(twin: Twin, data: Data, theta: Theta) -> Spread | None:
+def prior_factor(twin: Twin, data: Data, theta: Theta) -> PriorPredictionFactor | None:
     """Change of the prediction by one standard deviation along each principal axis of the terms' covariance.
 
     C is fitted anew in each diagnosis, so its own uncertainty is not in it.
@@ -80,7 +80,9 @@ def spread(twin: Twin, data: Data, theta: Theta) -> Spread | None:
             out.append((a - b) / PROBE)
     if not root.shape[1]:
         return None
-    return Spread(tuple(np.column_stack(c) for c in thrust), tuple(np.column_stack(c) for c in rate if c))
+    return PriorPredictionFactor(
+        tuple(np.column_stack(c) for c in thrust), tuple(np.column_stack(c) for c in rate if c)
+    )
 
 
 def _moved(twin: Twin, by: Floats) -> Twin:
@@ -97,9 +99,9 @@ def _moved(twin: Twin, by: Floats) -> Twin:
     return replace(twin, terms=tuple(terms))
 
 
-def twin_of(state: State, data: Data, recordings: Sequence[Recording], before: Twin | None) -> Twin:
+def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], before: Twin | None) -> Twin:
     """The fitted model as a twin; files' hashes and the time are added by who knows them."""
-    fitted = state.fit
+    fitted = estimate.fit
     terms = tuple(
         TwinTerm(
             term.id,
@@ -116,14 +118,14 @@ def twin_of(state: State, data: Data, recordings: Sequence[Recording], before: T
         C=fitted.theta.C,
         terms=terms,
         names=names_of(terms),
-        covariance=_covariance(state, data, before),
+        covariance=_covariance(estimate, data, before),
         noise=TwinNoise(
-            state.noise.white,
-            state.noise.proportional,
-            state.noise.scales,
-            state.noise.slow,
-            state.noise.bands,
-            state.noise.band,
+            estimate.noise.white,
+            estimate.noise.proportional,
+            estimate.noise.scales,
+            estimate.noise.slow,
+            estimate.noise.bands,
+            estimate.noise.band,
         ),
         sources=(
             *(() if before is None else before.sources),
@@ -144,9 +146,9 @@ def _interval(recordings: Sequence[Recording]) -> float:
     return float(min(gaps))
 
 
-def _covariance(state: State, data: Data, before: Twin | None) -> tuple[tuple[float, ...], ...]:
+def _covariance(estimate: Estimate, data: Data, before: Twin | None) -> tuple[tuple[float, ...], ...]:
     """Of C and every term's parameters: fitted ones from the fit, given ones as the twin had them."""
-    fitted = state.fit
+    fitted = estimate.fit
     full = np.nan_to_num(fitted.cov)
     place: dict[int, list[int]] = {}
     at = 1
@@ -245,16 +247,16 @@ def _too_little(name: str, history: History) -> Refusal | None:
 
 
 def with_twin(
-    answer: Diagnosis, state: State, data: Data, recordings: Sequence[Recording], before: Twin | None
+    answer: Diagnosis, estimate: Estimate, data: Data, recordings: Sequence[Recording], before: Twin | None
 ) -> Diagnosis:
     """The diagnosis with its twin; against an earlier twin the terms given are in the model, and a change is told."""
-    answer = replace(answer, twin=twin_of(state, data, recordings, before))
+    answer = replace(answer, twin=twin_of(estimate, data, recordings, before))
     if before is None:
         return answer
     known = before.origin
     C = answer.model["C"]
     findings = tuple(_relative(f, before, known) for f in answer.findings)
-    changed = changed_constant(before, state, known, C.unit)
+    changed = changed_constant(before, estimate, known, C.unit)
     if changed is not None and findings and abs(C.value / before.C - 1) < ONE_CONSTANT:
         answer = replace(answer, notes=(*answer.notes, f"{changed.statement} Part of what was found may be in it."))
     elif changed is not None:
@@ -298,9 +300,9 @@ def given_values(twin: Twin) -> dict[str, Value]:
     }
 
 
-def changed_constant(twin: Twin, state: State, known: str, unit: str) -> Finding | None:
+def changed_constant(twin: Twin, estimate: Estimate, known: str, unit: str) -> Finding | None:
     """The thrust constant is no longer the twin's, at ALARM."""
-    value, std = state.fit.theta.C, float(state.fit.std[0])
+    value, std = estimate.fit.theta.C, float(estimate.fit.std[0])
     was, was_std = twin.C, float(np.sqrt(twin.covariance[0][0]))
     both = float(np.hypot(std, was_std))
     if not isfinite(both) or both <= 0:
@@ -311,6 +313,6 @@ def changed_constant(twin: Twin, state: State, known: str, unit: str) -> Finding
         return None
     share = 100 * (value - was) / abs(was)
     says = f"Thrust constant: {value:.4g} {unit} where {known} has {was:.4g} ({share:+.2g} %, {abs(z):.0f} sigma)."
-    logn = float(np.log(max(state.fit.residual.size, 2)))
+    logn = float(np.log(max(estimate.fit.residual.size, 2)))
     parameters = {"C": Value(value, std, unit), "before": Value(was, was_std, unit)}
     return Finding("thrust_constant", "", says, parameters, p, z**2 - logn, 1.0, ())

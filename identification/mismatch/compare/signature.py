@@ -1,4 +1,4 @@
-"""Signatures: what a model leaves out, as measured and as the found physics has it, over the physics' own coordinate.
+"""Signatures: what a model leaves out, as measured and as the found physics has it, over the physics' own covariate.
 
 Everything is binned from the curves of a diagnosis. Where the recordings are at hand too, each effect is seen by itself
 (the residual of the model without it) and over what else was recorded; otherwise all effects are seen together.
@@ -44,14 +44,14 @@ SIGNATURES: Mapping[str, tuple[str, Kind]] = {
 }
 """Where an effect is best seen; over the driver, as a force, when it is not here."""
 NOWHERE = frozenset({"periodic_disturbance", "channel_fault", "thrust_constant"})
-"""Effects that no coordinate of these shows: a line of a spectrum, a channel that lies, another C."""
+"""Effects that no covariate of these shows: a line of a spectrum, a channel that lies, another C."""
 SHAPES: Mapping[str, Kind] = {"driver": "force", "time_since_step": "step", "direction": "force", "thrust": "force"}
-"""What is averaged over a coordinate where no effect says it; a share of the thrust when it is not here."""
+"""What is averaged over a covariate where no effect says it; a share of the thrust when it is not here."""
 LEVELS = 24
-"""So many values of a coordinate, at most, are levels with a bin each."""
+"""So many values of a covariate, at most, are levels with a bin each."""
 BINS = {"time": 24, "time_since_step": 12, "time_since_reversal": 12}
 MOST = 20
-"""Bins of any other coordinate."""
+"""Bins of any other covariate."""
 SMALL = 0.02
 """Share of the largest change or thrust below which a row tells nothing of a share."""
 CORRELATED = 0.9
@@ -63,7 +63,7 @@ class Signature:
     """Of one effect, bin by bin (k,)."""
 
     quantity: str
-    """The coordinate: a name of `Run.coordinates`."""
+    """The covariate: a name of `Run.covariates`."""
     kind: Kind
     at: Floats
     measured: Floats
@@ -76,7 +76,7 @@ class Signature:
 
 @dataclass(frozen=True, eq=False)
 class Profile:
-    """RMS of the residual in N over a coordinate, bin by bin (k,)."""
+    """RMS of the residual in N over a covariate, bin by bin (k,)."""
 
     quantity: str
     at: Floats
@@ -85,11 +85,11 @@ class Profile:
 
 
 def signature(runs: Sequence[Run], finding: Finding) -> Signature | None:
-    """Of one finding; None where its coordinate does not move enough to be seen."""
+    """Of one finding; None where its covariate does not move enough to be seen."""
     if finding.effect in NOWHERE:
         return None
     quantity, kind = SIGNATURES.get(finding.effect, ("driver", "force"))
-    if not all(quantity in run.coordinates for run in runs):
+    if not all(quantity in run.covariates for run in runs):
         quantity = "time" if kind == "gain" else "driver"
     key = finding.effect, finding.form
     if runs and all(key in run.effects for run in runs):
@@ -98,8 +98,8 @@ def signature(runs: Sequence[Run], finding: Finding) -> Signature | None:
 
 
 def shape(runs: Sequence[Run], quantity: str, kind: Kind | None = None) -> Signature | None:
-    """What the baseline lacks over any coordinate, and what the whole model adds to it there; None as above."""
-    if not runs or any(quantity not in run.coordinates for run in runs):
+    """What the baseline lacks over any covariate, and what the whole model adds to it there; None as above."""
+    if not runs or any(quantity not in run.covariates for run in runs):
         return None
     chosen = kind or SHAPES.get(quantity, "gain")
     return _binned(runs, quantity, chosen, [run.before - run.left for run in runs], alone=False)
@@ -108,7 +108,7 @@ def shape(runs: Sequence[Run], quantity: str, kind: Kind | None = None) -> Signa
 def _binned(
     runs: Sequence[Run], quantity: str, kind: Kind, modelled: Sequence[Floats], *, alone: bool
 ) -> Signature | None:
-    over = [run.coordinates[quantity] for run in runs]
+    over = [run.covariates[quantity] for run in runs]
     weight = [_weight(run, kind) for run in runs]
     rows = []
     for low, high in pairwise(_edges(np.concatenate(over), quantity)):
@@ -127,7 +127,7 @@ def _weight(run: Run, kind: Kind) -> Floats:
         case "force":
             return np.ones(run.time.size)
         case "turn":
-            return run.coordinates["direction_of_change"]
+            return run.covariates["direction_of_change"]
         case _:
             size = run.force if kind == "gain" else run.step
             out: Floats = np.where(np.abs(size) > SMALL * float(np.max(np.abs(run.force), initial=0.0)), size, 0.0)
@@ -176,7 +176,7 @@ def _std(u: Floats, left: Floats, slope: float, visit: NDArray[np.int64], runs: 
 
 
 def _edges(values: Floats, quantity: str) -> Floats:
-    """Of the bins: one for each level where there are few, otherwise of equal width on the coordinate's scale.
+    """Of the bins: one for each level where there are few, otherwise of equal width on the covariate's scale.
 
     A driver's bins are even in the square root of its size: what small levels do is as wide as what large ones do.
     """
@@ -208,10 +208,10 @@ def _edges(values: Floats, quantity: str) -> Floats:
 
 
 def profile(runs: Sequence[Run], quantity: str) -> Profile | None:
-    """RMS before and after over a coordinate of the runs; None where they do not have it, or it does not move."""
-    if not runs or any(quantity not in run.coordinates for run in runs):
+    """RMS before and after over a covariate of the runs; None where they do not have it, or it does not move."""
+    if not runs or any(quantity not in run.covariates for run in runs):
         return None
-    over = np.concatenate([run.coordinates[quantity] for run in runs])
+    over = np.concatenate([run.covariates[quantity] for run in runs])
     before, left = (np.concatenate([getattr(run, name) for run in runs]) for name in ("before", "left"))
     rows = []
     for low, high in pairwise(_edges(over, quantity)):

@@ -20,7 +20,7 @@ MOST_NODES = 17
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class Estimate:
     """A fit with the noise it was judged with."""
 
     fit: Fit
@@ -36,14 +36,14 @@ class State:
         return self.fit.deviance + int(self.fit.free.sum()) * float(np.log(max(self.fit.residual.size, 2)))
 
 
-def fit_without(state: State, term: Term, data: Data) -> Fit:
+def fit_without(estimate: Estimate, term: Term, data: Data) -> Fit:
     """The model without one of its terms, refitted with the same noise; once for all who ask."""
-    if term not in state.lesser:
-        smaller = state.fit.model.without(term)
-        kept = dict(zip(state.fit.model.terms, state.fit.theta.terms, strict=True))
-        theta = replace(state.fit.theta, terms=tuple(kept[t] for t in smaller.terms))
-        state.lesser[term] = fit(smaller, theta, data, state.weights)
-    return state.lesser[term]
+    if term not in estimate.lesser:
+        smaller = estimate.fit.model.without(term)
+        kept = dict(zip(estimate.fit.model.terms, estimate.fit.theta.terms, strict=True))
+        theta = replace(estimate.fit.theta, terms=tuple(kept[t] for t in smaller.terms))
+        estimate.lesser[term] = fit(smaller, theta, data, estimate.weights)
+    return estimate.lesser[term]
 
 
 def forces(fit_model: Model, theta: Theta, data: Data) -> list[Floats]:
@@ -53,8 +53,8 @@ def forces(fit_model: Model, theta: Theta, data: Data) -> list[Floats]:
 
 
 def refresh(
-    model: Model, theta: Theta, data: Data, extra: Floats | None, state: State | None, like: Noise | None = None
-) -> State:
+    model: Model, theta: Theta, data: Data, extra: Floats | None, estimate: Estimate | None, like: Noise | None = None
+) -> Estimate:
     """Noise by REML on what the model leaves, the columns of the model (and of what was pursued) taken as fitted.
 
     `like`: a noise whose time scales are kept, so that likelihoods can be compared.
@@ -72,7 +72,7 @@ def refresh(
     if extra is not None and extra.shape[1]:
         parts = [np.column_stack([p, e]) for p, e in zip(parts, by_run(extra, data), strict=True)]
     parts = _independent(parts)
-    rows = state.rows if state is not None else data.thrust_rows
+    rows = estimate.rows if estimate is not None else data.thrust_rows
     in_time = not any(h.static for h in data.histories)  # rows of a table may stand in the order of their levels
     least = 0.0 if in_time else max(reading_step(h.thrust[h.rows]) for h in data.histories) ** 2 / 12
     noise = fit_noise(rows, left, parts, size, data.bands, like, in_time=in_time, least=least)
@@ -85,12 +85,12 @@ def refresh(
             left_rate,
             at,
             [np.zeros(r.size) for r in left_rate],
-            start=state.rate_noise if state is not None else None,
+            start=estimate.rate_noise if estimate is not None else None,
             in_time=in_time,
         )
     w = weights(data, noise, size, rate_noise, rows)
     fitted = fit(model, theta, data, w)
-    return State(fitted, noise, rate_noise, w, tuple(rows))
+    return Estimate(fitted, noise, rate_noise, w, tuple(rows))
 
 
 def unweighted(data: Data) -> Weights:

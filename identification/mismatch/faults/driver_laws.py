@@ -44,7 +44,7 @@ UNNAMED = 3.0
 """A factor beyond this, or below its inverse, is no physics of a thruster even without a name."""
 LEAST_NAMED = 1.7
 STEADY = 0.1
-"""Spread of the factor over the blocks after the change, relative to its logarithm."""
+"""PriorPredictionFactor of the factor over the blocks after the change, relative to its logarithm."""
 BLURRED = 3
 """Cells on either side of a change that are not used: they may hold rows of both sides."""
 FASTEST_TURN = 1000.0

@@ -1,6 +1,6 @@
 """What no term carries: structure of any shape in what is left, over each thing that was recorded.
 
-Each coordinate (coordinates.py) has a group of columns. The size of the whitened residual in the span of a group is
+Each covariate (covariates.py) has a group of columns. The size of the whitened residual in the span of a group is
 chi-square distributed when nothing is left. The smallest p-value of all groups is judged against its own distribution
 under drawn signs of blocks, as the screening is.
 """
@@ -16,7 +16,7 @@ from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.locate.pulses import Pulses, likeliest_pulses
 from identification.mismatch.model.model import Data, Weights, predict
-from identification.mismatch.select.covariates import Coordinate, coordinates
+from identification.mismatch.select.covariates import Covariate, covariates
 from identification.mismatch.select.jumps import APART, TRIED, jumps
 from identification.mismatch.select.screening import lengths, normal_scores, orthogonal_basis, quiet, surrogate_scores
 from identification.mismatch.select.shape_error import allowed_in, corrections
@@ -27,16 +27,16 @@ ALARM = 0.004
 FAR = 4.0
 """Sigmas beyond which a row counts no more: one outlier is no structure."""
 ROUNDING = 1e-9
-"""Of a coordinate's reach: such an edge is 0."""
+"""Of a covariate's reach: such an edge is 0."""
 PLAIN_P = 1e-7
 """Of one group: what is plainly no noise, whatever its kind."""
 
 
 @dataclass(frozen=True, eq=False)
-class Judged:
-    """One coordinate's group of columns against the residual."""
+class CovariateTest:
+    """One covariate's group of columns against the residual."""
 
-    coordinate: Coordinate
+    covariate: Covariate
     statistic: float
     dof: int
     p_value: float
@@ -46,8 +46,8 @@ class Judged:
 
 
 @dataclass(frozen=True, eq=False)
-class Omnibus:
-    groups: tuple[Judged, ...]
+class ResidualStructure:
+    groups: tuple[CovariateTest, ...]
     """Smallest p-value first."""
     p_value: float
     """Family-wise, of the smallest."""
@@ -55,17 +55,17 @@ class Omnibus:
     """Of the gain, that come back: a part of what is left over time."""
 
 
-def judge_left(
+def residual_structure(
     fit: Fit,
     data: Data,
     weights: Weights,
     rng: np.random.Generator,
-    looked_at: Sequence[Coordinate] | None = None,
+    looked_at: Sequence[Covariate] | None = None,
     *,
     pulsing: bool = True,
-) -> Omnibus:
-    """Judge the residual of the thrust over every coordinate. `pulsing`: pulses that come back are looked for too."""
-    found = tuple(looked_at) if looked_at is not None else coordinates(fit, data)
+) -> ResidualStructure:
+    """Judge the residual of the thrust over every covariate. `pulsing`: pulses that come back are looked for too."""
+    found = tuple(looked_at) if looked_at is not None else covariates(fit, data)
     n = data.size
     basis = orthogonal_basis(fit.jacobian[:n])
     residual = np.clip(fit.residual[:n], -FAR, FAR)
@@ -84,25 +84,27 @@ def judge_left(
             stat, dof = stat + float(ticks @ ticks), dof + ticks.size
         extra = allowed_in(changes, Q)
         p = _tail(stat, dof, extra)
-        groups.append(Judged(c, stat, dof, p, max(stat - dof, 0.0) / max(float(residual @ residual), 1e-300)))
+        groups.append(CovariateTest(c, stat, dof, p, max(stat - dof, 0.0) / max(float(residual @ residual), 1e-300)))
         spans.append(Q)
         if c.quantity == "time":
             groups[-1] = min(groups[-1], _jump(c, fit, residual, data, weights, basis), key=lambda g: g.p_value)
     pulses = None
-    at = next((i for i, g in enumerate(groups) if g.coordinate.quantity == "time"), None)
+    at = next((i for i, g in enumerate(groups) if g.covariate.quantity == "time"), None)
     if at is not None and pulsing:
         others = [(Q, g) for Q, g in zip(spans, groups, strict=True) if g is not groups[at] and g.p_value < PLAIN_P]
         pulses = _pulses(fit, residual, data, weights, others)
         if pulses is not None:
-            groups[at] = min(groups[at], _of_pulses(groups[at].coordinate, pulses, residual), key=lambda g: g.p_value)
+            groups[at] = min(groups[at], _of_pulses(groups[at].covariate, pulses, residual), key=lambda g: g.p_value)
     order = sorted(range(len(groups)), key=lambda i: (groups[i].p_value, groups[i].dof - groups[i].statistic))
     if not groups:
-        return Omnibus((), 1.0)
+        return ResidualStructure((), 1.0)
     p_family = _family(groups, spans, residual, rng)
-    return Omnibus(tuple(groups[i] for i in order), p_family, pulses)
+    return ResidualStructure(tuple(groups[i] for i in order), p_family, pulses)
 
 
-def _family(groups: Sequence[Judged], spans: Sequence[Floats], residual: Floats, rng: np.random.Generator) -> float:
+def _family(
+    groups: Sequence[CovariateTest], spans: Sequence[Floats], residual: Floats, rng: np.random.Generator
+) -> float:
     """P-value of the smallest p-value of all groups, by draws of the residual over their spans (n, q)."""
     every = np.column_stack(spans)
     clean = quiet(residual, every)
@@ -131,7 +133,7 @@ def _of_family(least: float, scores: Floats, sizes: Sequence[int]) -> float:
     return float(p)
 
 
-def _jump(time: Coordinate, fit: Fit, residual: Floats, data: Data, weights: Weights, basis: Floats) -> Judged:
+def _jump(time: Covariate, fit: Fit, residual: Floats, data: Data, weights: Weights, basis: Floats) -> CovariateTest:
     """The likeliest jump of the zero: under slow noise it shows for seconds only, and no smooth shape follows it.
 
     Taken for one only where it is plainly no noise.
@@ -141,16 +143,16 @@ def _jump(time: Coordinate, fit: Fit, residual: Floats, data: Data, weights: Wei
     new = np.all([np.abs(when - at) > APART * data.scale.duration for at in known], axis=0)
     when, score = (when[new], score[new]) if known else (when, score)
     if not score.size:
-        return Judged(time, 0.0, 1, 1.0, 0.0)
+        return CovariateTest(time, 0.0, 1, 1.0, 0.0)
     stat = float(score[0] ** 2)
     p = TRIED * _tail(stat, 1, 0.0)
     told = replace(time, what=f"{time.what}; the reading jumps at {when[0]:.4g} s")
     share = max(stat - 1, 0.0) / max(float(residual @ residual), 1e-300)
-    return Judged(told, stat, 1, p if p < PLAIN_P else 1.0, share)
+    return CovariateTest(told, stat, 1, p if p < PLAIN_P else 1.0, share)
 
 
 def _pulses(
-    fit: Fit, residual: Floats, data: Data, weights: Weights, others: Sequence[tuple[Floats, Judged]]
+    fit: Fit, residual: Floats, data: Data, weights: Weights, others: Sequence[tuple[Floats, CovariateTest]]
 ) -> Pulses | None:
     """The likeliest pulses of the gain that come back: slow noise takes them up, and no smooth shape follows them.
 
@@ -171,10 +173,10 @@ def _pulses(
     return found
 
 
-def _of_pulses(time: Coordinate, found: Pulses, residual: Floats) -> Judged:
+def _of_pulses(time: Covariate, found: Pulses, residual: Floats) -> CovariateTest:
     stat = found.sigmas**2
     share = max(stat - 1, 0.0) / max(float(residual @ residual), 1e-300)
-    return Judged(replace(time, what=f"{time.what}; {found.statement}"), stat, 1, found.p_value, share)
+    return CovariateTest(replace(time, what=f"{time.what}; {found.statement}"), stat, 1, found.p_value, share)
 
 
 def _tail(stat: float, dof: int, extra: float) -> float:
@@ -184,7 +186,7 @@ def _tail(stat: float, dof: int, extra: float) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where over a coordinate the residual is, and its shape."""
+    """Where over a covariate the residual is, and its shape."""
 
     quantity: str
     unit: str
@@ -197,10 +199,10 @@ class Place:
     what: str
 
 
-def locate(judged: Judged, fit: Fit, data: Data, weights: Weights) -> Place:
-    """The stretch of the coordinate that holds most of what its columns make of the residual: noise is everywhere."""
-    c = judged.coordinate
-    covariate = np.concatenate(c.covariate)
+def locate(judged: CovariateTest, fit: Fit, data: Data, weights: Weights) -> Place:
+    """The stretch of the covariate that holds most of what its columns make of the residual: noise is everywhere."""
+    c = judged.covariate
+    covariate = np.concatenate(c.values)
     residual = np.concatenate(
         [
             h.thrust[r] - predict(fit.model, fit.theta, h, data.scale, i)[0][r] - fit.theta.tares[i]
@@ -225,8 +227,8 @@ def locate(judged: Judged, fit: Fit, data: Data, weights: Weights) -> Place:
     return Place(c.quantity, c.unit, low, high, share, judged.p_value, table, c.what)
 
 
-def _structure(c: Coordinate, residual: Floats, data: Data, weights: Weights) -> Floats:
-    """(n,) N, of the residual what any shape over the coordinate is: least squares with the coloured noise."""
+def _structure(c: Covariate, residual: Floats, data: Data, weights: Weights) -> Floats:
+    """(n,) N, of the residual what any shape over the covariate is: least squares with the coloured noise."""
     thrust = Weights(weights.thrust)
     ends = np.cumsum([r.size for r in data.rows])[:-1]
     columns = thrust.whiten(list(c.columns), [])

@@ -12,7 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.estimation.tails import chi2_sf
-from identification.mismatch.estimate.estimate import State, forces, refresh
+from identification.mismatch.estimate.estimate import Estimate, forces, refresh
 from identification.mismatch.model.model import Data, Weights
 from identification.mismatch.select.screening import orthogonal_basis
 from identification.recording import Floats
@@ -23,17 +23,17 @@ ALARM = 1e-5
 """Of one kind of change: the likelihood ratio of noise models is no exact chi-square (benchmarks/hidden_gains.py)."""
 
 
-def beside_slow_change(state: State, data: Data) -> State | None:
+def beside_slow_change(estimate: Estimate, data: Data) -> Estimate | None:
     """The same model with its noise estimated beside such a change; None where noise explains the residual as well."""
     if any(h.static for h in data.histories):
         return None
-    found = [(p, beside) for p, beside in slow_changes(state, data) if p < ALARM]
+    found = [(p, beside) for p, beside in slow_changes(estimate, data) if p < ALARM]
     return min(found, key=lambda each: each[0])[1] if found else None
 
 
-def slow_changes(state: State, data: Data) -> list[tuple[float, State]]:
+def slow_changes(estimate: Estimate, data: Data) -> list[tuple[float, Estimate]]:
     """The p-value of each kind of change, and the model with its noise estimated beside it."""
-    now = refresh(state.fit.model, state.fit.theta, data, None, None)
+    now = refresh(estimate.fit.model, estimate.fit.theta, data, None, None)
     found = []
     for columns in slow_columns(now, data):
         beside = refresh(now.fit.model, now.fit.theta, data, columns, now, now.noise)
@@ -42,9 +42,9 @@ def slow_changes(state: State, data: Data) -> list[tuple[float, State]]:
     return found
 
 
-def slow_columns(state: State, data: Data) -> tuple[Floats, ...]:
+def slow_columns(estimate: Estimate, data: Data) -> tuple[Floats, ...]:
     """(n, degree x runs) Legendre polynomials of time at the rows, run by run: of the zero, and times the force."""
-    force = forces(state.fit.model, state.fit.theta, data)
+    force = forces(estimate.fit.model, estimate.fit.theta, data)
     shapes, gains = [], []
     for history, rows, size in zip(data.histories, data.rows, force, strict=True):
         time = history.middle[rows]
@@ -65,11 +65,11 @@ def _each_its_own(parts: Sequence[Floats]) -> Floats:
     return out
 
 
-def _taken(state: State, data: Data, columns: Floats) -> float:
+def _taken(estimate: Estimate, data: Data, columns: Floats) -> float:
     """Of the whitened residual's square by the columns beside the model's own."""
     n = data.size
     parts = np.split(columns, np.cumsum([rows.size for rows in data.rows])[:-1])
-    whitened = Weights(state.weights.thrust).whiten(list(parts), [])
-    basis = orthogonal_basis(state.fit.jacobian[:n])
-    score = orthogonal_basis(whitened - basis @ (basis.T @ whitened)).T @ state.fit.residual[:n]
+    whitened = Weights(estimate.weights.thrust).whiten(list(parts), [])
+    basis = orthogonal_basis(estimate.fit.jacobian[:n])
+    score = orthogonal_basis(whitened - basis @ (basis.T @ whitened)).T @ estimate.fit.residual[:n]
     return float(score @ score)

@@ -13,7 +13,7 @@ from identification.estimation.singular_values import thin_svd
 from identification.mismatch.model.step_response import told
 from identification.mismatch.noise.covariance import Noise, Rows, Whitener, rows_of
 from identification.physics.catalogue import CATALOGUE
-from identification.physics.term import STAGES, Moment, Parameter, Scale, Term
+from identification.physics.term import STAGES, Parameter, Scale, Term, TermContext
 from identification.recording import Floats
 from identification.run_history.history import History
 from identification.run_history.step_response_rows import TickRows
@@ -123,7 +123,7 @@ def predict(model: Model, theta: Theta, history: History, scale: Scale, run: int
         key = (key, term, values)
         known = history.memo.get(key)
         if known is None:
-            moment = Moment(history, sizes, theta.C, theta.tares[run], x if stage >= HYDRO else value)
+            moment = TermContext(history, sizes, theta.C, theta.tares[run], x if stage >= HYDRO else value)
             value = term.apply(value, moment, values)
             remember(history, key, value)
         else:
@@ -136,7 +136,7 @@ def predict(model: Model, theta: Theta, history: History, scale: Scale, run: int
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Spread:
+class PriorPredictionFactor:
     """Directions in which a given baseline may be off, each one standard deviation long: the prediction moves by
     columns @ z with z standard normal. Raw, per run."""
 
@@ -159,7 +159,7 @@ class Data:
     """(Hz, quality) of broad peaks of the noise."""
     most_shift: float = 0.0
     """s, bound of the nuisance shift; 0 where nothing moves."""
-    spread: Spread | None = None
+    prior_factor: PriorPredictionFactor | None = None
     """How uncertain the baseline's own prediction is, where a twin gives it."""
 
     @cached_property
@@ -214,7 +214,7 @@ class Weights:
     rate: tuple[Whitener, ...] = ()
     ticks: bool = False
     """Whether what the ticks tell has rows, after all others."""
-    spread: Floats | None = None
+    prior_factor: Floats | None = None
     """(n, k) whitened columns of a baseline's uncertainty, orthogonal, each as long as its variance is large."""
 
     def whiten(self, thrust: Sequence[Floats], rate: Sequence[Floats], ticks: Sequence[Floats] = ()) -> Floats:
@@ -223,11 +223,11 @@ class Weights:
         parts += [w.whiten(c) for w, c in zip(self.rate, rate, strict=True)]
         parts += ticks
         out: Floats = np.concatenate(parts) if len(parts) > 1 else parts[0]
-        if self.spread is None or out.shape[0] != self.spread.shape[0]:
+        if self.prior_factor is None or out.shape[0] != self.prior_factor.shape[0]:
             return out
         # noise I + A A' with A = U diag(s): its inverse root is I + U diag(1/sqrt(1 + s^2) - 1) U'
-        size = np.linalg.norm(self.spread, axis=0)
-        U = self.spread / size
+        size = np.linalg.norm(self.prior_factor, axis=0)
+        U = self.prior_factor / size
         shrunk = (1 / np.sqrt(1 + size**2) - 1)[:, None] * (U.T @ out.reshape(out.shape[0], -1))
         whitened: Floats = out + (U @ shrunk).reshape(out.shape)
         return whitened
@@ -235,8 +235,8 @@ class Weights:
     @property
     def log_det(self) -> float:
         total = sum(w.log_det for w in (*self.thrust, *self.rate))
-        if self.spread is not None:
-            total += float(np.sum(np.log1p(np.sum(self.spread**2, axis=0))))
+        if self.prior_factor is not None:
+            total += float(np.sum(np.log1p(np.sum(self.prior_factor**2, axis=0))))
         return total
 
 
@@ -259,9 +259,9 @@ def weights(
     known = Weights(thrust, rate)
     if unit:
         return known
-    if data.spread is None:
+    if data.prior_factor is None:
         return replace(known, ticks=bool(data.ticks))
-    return replace(known, spread=_spread(known, data, data.spread))
+    return replace(known, prior_factor=_whitened_prior(known, data, data.prior_factor))
 
 
 def ticked(model: Model, theta: Theta, data: Data) -> list[Floats]:
@@ -270,7 +270,7 @@ def ticked(model: Model, theta: Theta, data: Data) -> list[Floats]:
     return [told(rows, terms, theta.C, theta.shift) for rows in data.ticks]
 
 
-def _spread(known: Weights, data: Data, spread: Spread) -> Floats | None:
+def _whitened_prior(known: Weights, data: Data, spread: PriorPredictionFactor) -> Floats | None:
     """Whitened, and turned into orthogonal columns."""
     thrust = spread.thrust if data.keep is None else [c[k] for c, k in zip(spread.thrust, data.keep, strict=True)]
     u, s, _ = thin_svd(known.whiten(thrust, spread.rate if known.rate else ()))

@@ -1,1 +1,1 @@
-"""From chosen terms to names that are earned, or doubted with the reason."""
+"""From chosen terms to names that are earned, or unearned with the reason."""

@@ -10,14 +10,14 @@ from itertools import combinations
 import numpy as np
 
 from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
-from identification.mismatch.estimate.estimate import State, fit_without
+from identification.mismatch.estimate.estimate import Estimate, fit_without
 from identification.mismatch.estimate.fitting import Fit, at_bound
-from identification.mismatch.locate.residual_structure_test import Omnibus
+from identification.mismatch.locate.residual_structure_test import ResidualStructure
 from identification.mismatch.model.model import Data, Weights, predict
 from identification.mismatch.prepare.preparing import DRIVERS
 from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import STATIC, static_curve
-from identification.mismatch.select.rivals import NEAR, Rival, Standing, swaps
+from identification.mismatch.select.rivals import NEAR, Rival, SwapTest, swaps
 from identification.mismatch.select.screening import orthogonal_basis
 from identification.physics.term import Term
 from identification.recording import Floats
@@ -27,11 +27,11 @@ SAME = 0.1
 ONE_SIDED = 0.1
 """Of the size of what a term does: with less of it on one side there is nothing to compare."""
 OWN_SHARE = 0.01
-"""Of what a term explains: less than this left over its own coordinate is the textbook's fault, not the name's."""
+"""Of what a term explains: less than this left over its own covariate is the textbook's fault, not the name's."""
 INCONSTANT = 1e-3
 """p-value, after all tests of a term, below which its parameter is not the same everywhere."""
-OWN_COORDINATE = 1e-4
-"""p-value of what is left over a term's own coordinate below which its name is not earned."""
+OWN_COVARIATE = 1e-4
+"""p-value of what is left over a term's own covariate below which its name is not earned."""
 CANCELLED = 0.15
 """Of what each of two terms does alone: less together, and neither is seen."""
 MANY_SHAPES = 3
@@ -54,23 +54,23 @@ class Named:
     probability: float
     rivals: tuple[Rival, ...]
     """Other effects within NEAR, best first."""
-    doubts: tuple[str, ...]
+    failed_checks: tuple[str, ...]
     """Why the name is not earned; empty when it is."""
 
 
-def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
+def failed_checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[str, ...]:
     """Where the parameter of a term is not the same: halves of the run, directions, levels, runs."""
     out = []
-    if at_bound(term, state.fit, data, state.weights):
+    if at_bound(term, estimate.fit, data, estimate.weights):
         out.append("its parameters end at what is physically possible")
-    if _unseen(state.fit, term, data):
+    if _unseen(estimate.fit, term, data):
         out.append("it is faster than the samples can show")
-    if noise_goes_on(state.fit, term, state.noise, data):
+    if noise_goes_on(estimate.fit, term, estimate.noise, data):
         out.append("the noise goes on where the readings should be flat")
-    change = _raw_effect(state.fit, (term,), data)
-    out += [f"it and {other.id} nearly cancel" for other in _cancelled(state.fit, term, change, data)]
+    change = _raw_effect(estimate.fit, (term,), data)
+    out += [f"it and {other.id} nearly cancel" for other in _cancelled(estimate.fit, term, change, data)]
     n = data.size
-    basis = orthogonal_basis(state.fit.jacobian[:n])
+    basis = orthogonal_basis(estimate.fit.jacobian[:n])
     driver = [h.driver[r] for h, r in zip(data.histories, data.rows, strict=True)]
     middle = [h.middle[r] for h, r in zip(data.histories, data.rows, strict=True)]
     half = np.median(np.abs(np.concatenate(driver)))
@@ -83,7 +83,7 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
         splits["in all runs"] = [np.full(v.size, i >= len(driver) / 2) for i, v in enumerate(driver)]
     if any(h.static for h in data.histories):
         del splits["in both halves of the run"]  # a table may stand in the order of its levels
-    weights = Weights(state.weights.thrust)
+    weights = Weights(estimate.weights.thrust)
     whole = float(np.linalg.norm(weights.whiten(change, [])))
     for what, masks in splits.items():
         column = weights.whiten([c * m for c, m in zip(change, masks, strict=True)], [])
@@ -93,7 +93,7 @@ def doubts(state: State, term: Term, data: Data, many: int) -> tuple[str, ...]:
         size = float(np.linalg.norm(rest))
         if size < 1e-3 * float(np.linalg.norm(column)) or size < 0.3:
             continue
-        score = float(rest @ state.fit.residual[:n]) / size
+        score = float(rest @ estimate.fit.residual[:n]) / size
         p = float(noncentral_chi2_sf(score**2, 1, (SAME * size) ** 2))
         if p * len(splits) * many < INCONSTANT:
             out.append(f"its parameter is not the same {what} ({abs(score) / size * 100:.0f} % apart)")
@@ -109,11 +109,11 @@ def _unseen(now: Fit, term: Term, data: Data) -> bool:
 
 def _cancelled(now: Fit, term: Term, change: list[Floats], data: Data) -> list[Term]:
     """Terms that follow a step too and undo nearly all of what this one does: a large lag with a large lead."""
-    if "time_since_step" not in term.coordinates:
+    if "time_since_step" not in term.covariates:
         return []
     found = []
     for other in now.model.terms:
-        if other != term and "time_since_step" in other.coordinates:
+        if other != term and "time_since_step" in other.covariates:
             both = np.concatenate(_raw_effect(now, (term, other), data))
             alone = np.concatenate(_raw_effect(now, (other,), data))
             least = min(float(np.linalg.norm(np.concatenate(change))), float(np.linalg.norm(alone)))
@@ -134,25 +134,25 @@ def _raw_effect(now: Fit, terms: tuple[Term, ...], data: Data) -> list[Floats]:
     return out
 
 
-def _standing(state: State, term: Term, data: Data, terms: Sequence[Term]) -> Standing:
-    less = fit_without(state, term, data)
-    return less, swaps(state, term, less, data, terms)
+def _standing(estimate: Estimate, term: Term, data: Data, terms: Sequence[Term]) -> SwapTest:
+    less = fit_without(estimate, term, data)
+    return less, swaps(estimate, term, less, data, terms)
 
 
-def _repaired(state: State, data: Data, less: Mapping[Term, Fit]) -> dict[Term, tuple[str, ...]]:
+def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[Term, tuple[str, ...]]:
     """Two shapes on one static curve that explain nearly the same, but for a little that one repairs of the other: the
     curve has neither shape, and one that is not in the catalogue would do as well.
 
     `less`: the fit without each term.
     """
     out: dict[Term, tuple[str, ...]] = {}
-    for one, other in combinations(state.fit.model.terms, 2):
+    for one, other in combinations(estimate.fit.model.terms, 2):
         curve = static_curve(one, measured=data.with_rate)
         if not curve or curve != static_curve(other, measured=data.with_rate):
             continue
-        neither = fit_without(replace(state, fit=less[one]), other, data).chi2
-        together = neither - state.fit.chi2
-        adds = [less[term].chi2 - state.fit.chi2 for term in (one, other)]
+        neither = fit_without(replace(estimate, fit=less[one]), other, data).chi2
+        together = neither - estimate.fit.chi2
+        adds = [less[term].chi2 - estimate.fit.chi2 for term in (one, other)]
         if min(adds) < REPAIR * together and max(adds) < (1 - ALIKE) * together:
             share = 100 * (1 - max(adds) / together)
             for term, beside in ((one, other), (other, one)):
@@ -162,19 +162,21 @@ def _repaired(state: State, data: Data, less: Mapping[Term, Fit]) -> dict[Term, 
 
 
 def name(
-    state: State, data: Data, terms: Sequence[Term], standing: dict[Term, Standing] | None = None
+    estimate: Estimate, data: Data, terms: Sequence[Term], standing: dict[Term, SwapTest] | None = None
 ) -> tuple[Named, ...]:
-    """Every term of the model with its rivals and doubts, the largest gain first."""
+    """Every term of the model with its rivals and failed_checks, the largest gain first."""
     out = []
-    logn = float(np.log(max(state.fit.residual.size, 2)))
+    logn = float(np.log(max(estimate.fit.residual.size, 2)))
     at = 1
-    std = state.fit.std
-    many = max(len(state.fit.model.terms), 1)
-    stands = {term: (standing or {}).get(term) or _standing(state, term, data, terms) for term in state.fit.model.terms}
-    repaired = _repaired(state, data, {term: less for term, (less, _) in stands.items()})
-    for term, values in zip(state.fit.model.terms, state.fit.theta.terms, strict=True):
+    std = estimate.fit.std
+    many = max(len(estimate.fit.model.terms), 1)
+    stands = {
+        term: (standing or {}).get(term) or _standing(estimate, term, data, terms) for term in estimate.fit.model.terms
+    }
+    repaired = _repaired(estimate, data, {term: less for term, (less, _) in stands.items()})
+    for term, values in zip(estimate.fit.model.terms, estimate.fit.theta.terms, strict=True):
         less, others = stands[term]
-        gain = less.chi2 - state.fit.chi2
+        gain = less.chi2 - estimate.fit.chi2
         close = [r for r in others if min(r.bic_loss, r.aic_loss) < NEAR and r.term.id != term.id]
         unique: dict[str, Rival] = {}
         for r in close:
@@ -190,30 +192,30 @@ def name(
                 max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
                 float(probability),
                 tuple(unique.values()),
-                (*doubts(state, term, data, many), *repaired.get(term, ())),
+                (*failed_checks(estimate, term, data, many), *repaired.get(term, ())),
             )
         )
         at += len(values)
     return tuple(sorted(out, key=lambda n: -n.chi2_gain))
 
 
-def with_doubts(named: Sequence[Named], left: Omnibus | None, *, measured: bool) -> tuple[Named, ...]:
+def with_joint_checks(named: Sequence[Named], left: ResidualStructure | None, *, measured: bool) -> tuple[Named, ...]:
     """Doubts that only show when all terms and what is left are seen together.
 
-    Something left over a term's own coordinate: its shape is not the textbook's. Many static shapes on one curve: any
+    Something left over a term's own covariate: its shape is not the textbook's. Many static shapes on one curve: any
     curve can be made of enough of them. `measured`: the rate, as a response.
     """
     shapes = Counter(static_curve(n.term, measured=measured) for n in named)
-    clear = {g.coordinate.quantity: g for g in left.groups if g.p_value < OWN_COORDINATE} if left is not None else {}
+    clear = {g.covariate.quantity: g for g in left.groups if g.p_value < OWN_COVARIATE} if left is not None else {}
     out = []
     for n in named:
         more: list[str] = []
-        names = {d for c in n.term.coordinates for d in (DRIVERS if c in STATIC else (c,))}
+        names = {d for c in n.term.covariates for d in (DRIVERS if c in STATIC else (c,))}
         own = [q for q, g in clear.items() if q in names and g.statistic - g.dof > OWN_SHARE * n.chi2_gain]
         if own:
-            more.append(f"more is left over its own coordinate, {own[0]}")
+            more.append(f"more is left over its own covariate, {own[0]}")
         curve = static_curve(n.term, measured=measured)
         if curve and shapes[curve] >= MANY_SHAPES:
             more.append(f"{shapes[curve]} shapes on one static curve make any curve")
-        out.append(replace(n, doubts=(*n.doubts, *more)))
+        out.append(replace(n, failed_checks=(*n.failed_checks, *more)))
     return tuple(out)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.next_experiment.predicted_response import Outlook
+from identification.mismatch.next_experiment.predicted_response import PredictedResponse
 from identification.recording import Floats
 
 DRAWS = 600
@@ -56,7 +56,7 @@ class Pieces:
         return Pieces(self.apart[at], tuple(s[at] for s in self.score), tuple(g[at] for g in self.gram))
 
 
-def pieces(views: Sequence[Outlook], block: NDArray[np.intp], many: int) -> Pieces:
+def pieces(views: Sequence[PredictedResponse], block: NDArray[np.intp], many: int) -> Pieces:
     """Of `many` blocks; `block` (n,) says which one each row belongs to, -1 for none."""
     values = np.column_stack([v.value for v in views])
     differences = values[:, :, None] - values[:, None, :]  # (n, true, wrong)
@@ -77,7 +77,7 @@ def distances(found: Pieces) -> Floats:
     return clean
 
 
-def power(true: Outlook, wrong: Outlook, needed: float) -> float:
+def power(true: PredictedResponse, wrong: PredictedResponse, needed: float) -> float:
     """Probability that the wrong model's chi-square grows by more than `needed` over the true one's.
 
     Draws of noise and of the true model's values as the data in hand leave them, on what either model can say.

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch.diagnosis import PlanStep
-from identification.mismatch.estimate.estimate import State, forces
+from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, bounds_of, columns_of, raw
 from identification.mismatch.model.model import Data, Theta, weights
 from identification.recording import Floats
@@ -35,7 +35,7 @@ TARE = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class Outlook:
+class PredictedResponse:
     """What one model says of a sweep, whitened, and what the data in hand leave open."""
 
     value: Floats
@@ -58,7 +58,7 @@ class Outlook:
 class Bench:
     """How the recordings were made: what a new one will look like."""
 
-    state: State
+    estimate: Estimate
     data: Data
     slew: float
     """Units of the driver per s; inf: at once."""
@@ -91,7 +91,7 @@ class Bench:
     def rehearsed(self, runs: Sequence[Sequence[PlanStep]]) -> Data:
         """Sweeps as data without measurements; each run has one flow speed."""
         histories = tuple(self._history(run, k) for k, run in enumerate(runs))
-        return replace(self.data, histories=histories, keep=None, spread=None)
+        return replace(self.data, histories=histories, keep=None, prior_factor=None)
 
     def _history(self, steps: Sequence[PlanStep], number: int) -> History:
         dt, driver, blind = intervals(steps, self.slew)
@@ -123,21 +123,23 @@ class Bench:
         rate = np.where(many > 0, others["rotation_rate"], np.nan)
         return replace(history, rate=rate, rate_count=many, rate_sampled=history.sampled)
 
-    def outlook(self, fits: Sequence[Fit], runs: Sequence[Sequence[PlanStep]]) -> tuple[tuple[Outlook, ...], Floats]:
+    def outlook(
+        self, fits: Sequence[Fit], runs: Sequence[Sequence[PlanStep]]
+    ) -> tuple[tuple[PredictedResponse, ...], Floats]:
         """What each model says of these runs, all whitened alike, with the noise of the present answer.
 
         And (n, 2) of each row: which run, and s since it began.
         """
         new = self.rehearsed(runs)
-        now = _moved(self.state.fit, len(new.histories))
-        size = forces(self.state.fit.model, now, new)
-        w = weights(new, self.state.noise, size, self.state.rate_noise)
+        now = _moved(self.estimate.fit, len(new.histories))
+        size = forces(self.estimate.fit.model, now, new)
+        w = weights(new, self.estimate.noise, size, self.estimate.rate_noise)
         out = []
         for fitted in fits:
             theta = _moved(fitted, len(new.histories))
             thrust, rate = raw(fitted.model, theta, new, with_rate=bool(w.rate))
             slopes = columns_of(fitted.model, theta, new, w, np.ones(theta.vector.size, dtype=bool))
-            out.append(Outlook(w.whiten(thrust, rate), slopes, open_ends(fitted, theta, self.data)))
+            out.append(PredictedResponse(w.whiten(thrust, rate), slopes, open_ends(fitted, theta, self.data)))
         where = [np.column_stack([np.full(h.rows.size, k), h.middle[h.rows]]) for k, h in enumerate(new.histories)]
         if w.rate:
             rated = [(k, h.middle[h.rate_rows]) for k, h in enumerate(new.histories)]
@@ -194,13 +196,13 @@ def ending(steps: Sequence[PlanStep], slew: float) -> Floats:
     return out
 
 
-def one_zero(view: Outlook, runs: int) -> Outlook:
+def one_zero(view: PredictedResponse, runs: int) -> PredictedResponse:
     """The same with one zero for all runs: blocks of one sweep share it."""
     q = view.slopes.shape[1]
     first, last = q - 3 - runs, q - 3
     zero = view.slopes[:, first:last].sum(axis=1, keepdims=True)
     keep = [*range(first + 1), *range(last, q)]
-    return Outlook(
+    return PredictedResponse(
         view.value,
         np.column_stack([view.slopes[:, :first], zero, view.slopes[:, last:]]),
         view.cov[np.ix_(keep, keep)],

@@ -15,12 +15,18 @@ from itertools import permutations
 import numpy as np
 
 from identification.mismatch.diagnosis import NextExperiment, PlanStep
-from identification.mismatch.estimate.estimate import State
+from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.model import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.next_experiment.discrimination import Pieces, distances, pieces, power
-from identification.mismatch.next_experiment.predicted_response import Bench, Outlook, ending, one_zero, stretches
+from identification.mismatch.next_experiment.predicted_response import (
+    Bench,
+    PredictedResponse,
+    ending,
+    one_zero,
+    stretches,
+)
 from identification.mismatch.next_experiment.sweeps import REST, SHORT, Block, Limits, blocks, put_together
 from identification.mismatch.select.rivals import EQUAL
 from identification.recording import Floats
@@ -77,7 +83,7 @@ class _Contest:
     """BIC by which each is worse so far."""
 
 
-def rivals_of(state: State, named: Sequence[Named]) -> _Contest | None:
+def rivals_of(estimate: Estimate, named: Sequence[Named]) -> _Contest | None:
     """The answer and what rivals it, nearest first; None when nothing rivals it."""
     close = sorted(
         ((r.bic_loss, n.term.id, r) for n in named for r in n.rivals),
@@ -87,22 +93,24 @@ def rivals_of(state: State, named: Sequence[Named]) -> _Contest | None:
         return None
     own = " with ".join(sorted({of for _, of, _ in close}))
     names = (own, *(r.term.id for _, _, r in close))
-    return _Contest(names, (state.fit, *(r.fit for _, _, r in close)), (0.0, *(loss for loss, _, _ in close)))
+    return _Contest(names, (estimate.fit, *(r.fit for _, _, r in close)), (0.0, *(loss for loss, _, _ in close)))
 
 
-def propose(state: State, data: Data, named: Sequence[Named], limits: Limits | None = None) -> NextExperiment | None:
+def propose(
+    estimate: Estimate, data: Data, named: Sequence[Named], limits: Limits | None = None
+) -> NextExperiment | None:
     """The next experiment for an answer with rivals; None when there are none.
 
     A budget that is shorter than the shortest piece is exceeded by that one.
     """
-    contest = rivals_of(state, named)
+    contest = rivals_of(estimate, named)
     if contest is None:
         return None
     limits = limits or Limits()
     if data.scale.driver_unit != "V":
         limits = replace(limits, max_voltage=None, slew=None)  # of a bench, in V
-    bench = Bench(state, data, _slew(data, limits))
-    largest = largest_level(data, state, limits)
+    bench = Bench(estimate, data, _slew(data, limits))
+    largest = largest_level(data, estimate, limits)
     known = blocks(largest, _flows(data, limits))
     shortest = next(b for b in known if not b.name)
     every = [b for b in known if b.seconds + 2 * REST <= limits.budget] or [shortest]
@@ -110,9 +118,9 @@ def propose(state: State, data: Data, named: Sequence[Named], limits: Limits | N
     return tried.answer()
 
 
-def largest_level(data: Data, state: State, limits: Limits) -> float:
+def largest_level(data: Data, estimate: Estimate, limits: Limits) -> float:
     largest = data.scale.driver if limits.max_voltage is None else min(limits.max_voltage, data.scale.driver)
-    C = abs(state.fit.theta.C)
+    C = abs(estimate.fit.theta.C)
     if limits.max_thrust is not None and C > 0:
         largest = min(largest, float(np.sqrt(limits.max_thrust / C)))
     return largest
@@ -202,7 +210,7 @@ class _Tried:
 
         Two rivals that are like each other do not count: the sweep may still tell the answer from both.
         """
-        views = self._foreseen(chosen)
+        views = self._checked_on_held_out(chosen)
         at = {(a, b): power(views[a], views[b], self._needed(a, b, views)) for a, b in self.pairs}
         return min(at[pair] for pair, counts in zip(self.pairs, self.decisive, strict=True) if counts), at
 
@@ -213,10 +221,10 @@ class _Tried:
         worst = [min(at[pair] for pair in counted if pair[0] == true) for true in range(share.size)]
         return float(share @ np.array(worst) / share.sum())
 
-    def _foreseen(self, chosen: Sequence[int]) -> tuple[Outlook, ...]:
+    def _checked_on_held_out(self, chosen: Sequence[int]) -> tuple[PredictedResponse, ...]:
         return self.bench.outlook(self.contest.fits, stretches(self._steps(chosen)))[0]
 
-    def _needed(self, true: int, wrong: int, views: Sequence[Outlook]) -> float:
+    def _needed(self, true: int, wrong: int, views: Sequence[PredictedResponse]) -> float:
         """Chi-square that the sweep has to add for the wrong model to be EQUAL worse."""
         n = self.contest.fits[0].residual.size
         sizes = [int(fit.free.sum()) for fit in self.contest.fits]
@@ -247,7 +255,7 @@ class _Tried:
 
     def _beyond(self, chosen: Sequence[int], at: dict[tuple[int, int], float]) -> list[str]:
         """What else it takes for the pairs that this sweep hardly tells apart."""
-        views = self._foreseen(chosen)
+        views = self._checked_on_held_out(chosen)
         apart = distances(pieces(views, np.zeros(views[0].value.size, dtype=np.intp), 1))[0]
         seconds = ending(self._steps(chosen), self.bench.slew)[-1]
         out = []

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identification.mismatch.periodic.order_tracking import Locked
+from identification.mismatch.periodic.order_tracking import RotorOrder
 from identification.mismatch.periodic.spectrum import Series, clipped
 from identification.mismatch.periodic.steady_segments import speed_of
 from identification.recording import Floats
@@ -20,7 +20,7 @@ SPEEDS = 100
 
 def as_turning(
     runs: Sequence[tuple[int, Series]], frequency: float, amplitude_std: float, p_value: float
-) -> Locked | None:
+) -> RotorOrder | None:
     """Of one phase while it turns, by least squares near the ratio that the usual speed asks for; None at rest.
 
     `amplitude_std`: N, of the line of one frequency: the noise is its.
@@ -45,7 +45,7 @@ def as_turning(
     amplitude = float(np.sqrt(2 * gain * noise / samples))
     spread = float(np.sqrt(np.average([np.var(turns) for turns, _ in cut], weights=n)))
     ratio_std = std / (2 * np.pi * max(amplitude, std) * spread)
-    return Locked(float(found.x), ratio_std, amplitude, std, None, None, p_value, gain, speed, ())
+    return RotorOrder(float(found.x), ratio_std, amplitude, std, None, None, p_value, gain, speed, ())
 
 
 def _while_turning(runs: Sequence[Series]) -> tuple[list[tuple[Floats, Floats]], float]:

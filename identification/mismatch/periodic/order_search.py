@@ -16,7 +16,7 @@ from scipy.fft import next_fast_len
 
 from identification.estimation.tails import chi2_sf, gamma_median, gamma_sf
 from identification.mismatch.periodic.spectrum import CELLS, OVERSAMPLING, family_wise, transform
-from identification.mismatch.periodic.steady_segments import Stretch
+from identification.mismatch.periodic.steady_segments import SteadySegment
 from identification.recording import Floats
 
 HIGHEST = 400.0
@@ -38,7 +38,7 @@ AROUND = 5
 
 
 @dataclass(frozen=True, slots=True)
-class Candidate:
+class OrderCandidate:
     ratio: float
     """Periods per turn."""
     reach: float
@@ -65,11 +65,11 @@ class _Grid:
         return out
 
 
-def most_significant(parts: Sequence[Stretch], top: float) -> Candidate:
+def most_significant(parts: Sequence[SteadySegment], top: float) -> OrderCandidate:
     """Of all ways to look; `top`: highest speed, turns per s."""
     found = [_of_powers(parts, top), *(_of_waves(parts, top, seconds) for seconds in LASTING)]
     best = min(found, key=lambda each: each.p_value)
-    return Candidate(best.ratio, best.reach, min(len(found) * best.p_value, 1.0))
+    return OrderCandidate(best.ratio, best.reach, min(len(found) * best.p_value, 1.0))
 
 
 def _grid(longest: float, top: float) -> _Grid:
@@ -81,12 +81,12 @@ def _grid(longest: float, top: float) -> _Grid:
     return _Grid(cell, length, np.arange(keep.start, keep.stop, dtype=np.float64) * step, keep, longest)
 
 
-def _groups(parts: Sequence[Stretch], top: float) -> list[int]:
+def _groups(parts: Sequence[SteadySegment], top: float) -> list[int]:
     """Group of speed of each stretch."""
     return [min(int(SPEEDS * p.speed / top), SPEEDS) for p in parts]
 
 
-def _of_powers(parts: Sequence[Stretch], top: float) -> Candidate:
+def _of_powers(parts: Sequence[SteadySegment], top: float) -> OrderCandidate:
     """Powers summed over the stretches; noise as each has it at its own speeds."""
     grid = _grid(max(float(p.turns[-1] - p.turns[0]) for p in parts), top)
     by_group = np.zeros((SPEEDS + 1, grid.ratios.size))
@@ -95,19 +95,19 @@ def _of_powers(parts: Sequence[Stretch], top: float) -> Candidate:
         by_group[g] += p.colour.out_of(grid.power(p.turns, p.value * window), grid.ratios, p.speeds)
     kept = by_group[by_group.any(axis=1)]
     if kept.shape[0] < 2:
-        return Candidate(1.0, 1.0, 1.0)
+        return OrderCandidate(1.0, 1.0, 1.0)
     total = kept.sum(axis=0)
     strong, shape = _standing(total)
     at, p_value = _highest(strong, shape, grid, 0.0)
     without, rest_shape = _standing(total - kept[int(np.argmax(kept[:, at]))])
     around = slice(max(at - AROUND // 2, 0), at + AROUND // 2 + 1)
     p_rest = float(gamma_sf(np.max(without[around]), rest_shape)) * AROUND
-    return Candidate(float(grid.ratios[at]), 0.5 / grid.longest, max(p_value, p_rest))
+    return OrderCandidate(float(grid.ratios[at]), 0.5 / grid.longest, max(p_value, p_rest))
 
 
-def _of_waves(parts: Sequence[Stretch], top: float, seconds: float) -> Candidate:
+def _of_waves(parts: Sequence[SteadySegment], top: float, seconds: float) -> OrderCandidate:
     """Whitened waves summed with their phase over pieces of so many seconds, their powers over the pieces."""
-    pieces: dict[tuple[int, int], list[tuple[Stretch, int]]] = defaultdict(list)
+    pieces: dict[tuple[int, int], list[tuple[SteadySegment, int]]] = defaultdict(list)
     for p, g in zip(parts, _groups(parts, top), strict=True):
         pieces[p.run, int(p.time[0] // seconds)].append((p, g))
     grid = _grid(max(float(s[-1][0].turns[-1] - s[0][0].turns[0]) for s in pieces.values()), top)
@@ -118,10 +118,10 @@ def _of_waves(parts: Sequence[Stretch], top: float, seconds: float) -> Candidate
     strong, shape = _standing(total)
     at, p_value = _highest(strong, shape, grid, 1.0 / grid.longest)
     ratio = float(grid.ratios[at])
-    return Candidate(ratio, 1.0 / grid.longest, max(p_value, _even(list(pieces.values()), ratio)))
+    return OrderCandidate(ratio, 1.0 / grid.longest, max(p_value, _even(list(pieces.values()), ratio)))
 
 
-def _even(pieces: Sequence[Sequence[tuple[Stretch, int]]], ratio: float) -> float:
+def _even(pieces: Sequence[Sequence[tuple[SteadySegment, int]]], ratio: float) -> float:
     """p-value of the waves without the group of speed that gives most of them; 1 when they differ between groups.
 
     A plan that comes again turns the rotor as often, and what the model lacks comes again with it: but not as one wave,

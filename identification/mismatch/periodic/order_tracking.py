@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimation.tails import chi2_sf
-from identification.mismatch.periodic.order_search import LASTING, Candidate, most_significant
+from identification.mismatch.periodic.order_search import LASTING, OrderCandidate, most_significant
 from identification.mismatch.periodic.spectrum import Series
-from identification.mismatch.periodic.steady_segments import Stretch, speed_of, stretches
+from identification.mismatch.periodic.steady_segments import SteadySegment, speed_of, stretches
 from identification.recording import Floats
 
 ODD = 0.02
@@ -54,7 +54,7 @@ def wave_of(parts: Sequence[Part], run: int, time: Floats, angle: Floats) -> Flo
 
 
 @dataclass(frozen=True, eq=False)
-class Locked:
+class RotorOrder:
     ratio: float
     ratio_std: float
     amplitude: float
@@ -70,7 +70,7 @@ class Locked:
 
 
 @dataclass(frozen=True, eq=False)
-class _Noise:
+class _LocalNoise:
     """Of the stretches, at one ratio."""
 
     own: Floats
@@ -102,7 +102,7 @@ class _Waves:
         return self.gain - 2.0 * (self.weights.size - 1)
 
 
-def find_locked(runs: Sequence[tuple[int, Series]], alarm: float, *, in_turns: bool = True) -> Locked | None:
+def find_locked(runs: Sequence[tuple[int, Series]], alarm: float, *, in_turns: bool = True) -> RotorOrder | None:
     """The most significant rotor-locked line; None without one.
 
     `in_turns`: angles are those of the propeller, whose waves come a whole number of times a turn.
@@ -124,11 +124,11 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float, *, in_turns: b
     return _fitted(list(stretches(runs, top, loud)), candidate)
 
 
-def _is_whole(candidate: Candidate) -> bool:
+def _is_whole(candidate: OrderCandidate) -> bool:
     return abs(candidate.ratio - max(round(candidate.ratio), 1)) < max(candidate.reach, WHOLE * candidate.ratio)
 
 
-def _fitted(parts: Sequence[Stretch], candidate: Candidate) -> Locked:
+def _fitted(parts: Sequence[SteadySegment], candidate: OrderCandidate) -> RotorOrder:
     """With the fewest phases that keep the power."""
     noise = _noise_at(parts, candidate.ratio)
     finest = waves = _apart(parts, noise, candidate)
@@ -142,11 +142,11 @@ def _fitted(parts: Sequence[Stretch], candidate: Candidate) -> Locked:
     return _told(parts, waves, candidate.p_value)
 
 
-def _noise_at(parts: Sequence[Stretch], ratio: float) -> _Noise:
-    return _Noise(np.array([p.colour.variance(ratio, p.speeds) for p in parts]), _beside(parts, ratio))
+def _noise_at(parts: Sequence[SteadySegment], ratio: float) -> _LocalNoise:
+    return _LocalNoise(np.array([p.colour.variance(ratio, p.speeds) for p in parts]), _beside(parts, ratio))
 
 
-def _beside(parts: Sequence[Stretch], ratio: float) -> float:
+def _beside(parts: Sequence[SteadySegment], ratio: float) -> float:
     """How much louder than its noise the residual is on either side of a line: of repeated shapes there are many."""
     powers, n = 0.0, 0
     for p in parts:
@@ -156,21 +156,21 @@ def _beside(parts: Sequence[Stretch], ratio: float) -> float:
     return max(powers / n, 1.0)
 
 
-def _pieces_of(parts: Sequence[Stretch], seconds: float) -> NDArray[np.intp]:
+def _pieces_of(parts: Sequence[SteadySegment], seconds: float) -> NDArray[np.intp]:
     """(k,) piece of so many seconds in which each stretch lies."""
     keys = [(p.run, int(p.time[0] // seconds)) for p in parts]
     known = {key: i for i, key in enumerate(dict.fromkeys(keys))}
     return np.array([known[key] for key in keys], dtype=np.intp)
 
 
-def _sums(parts: Sequence[Stretch], noise: _Noise, ratio: float) -> NDArray[np.complex128]:
+def _sums(parts: Sequence[SteadySegment], noise: _LocalNoise, ratio: float) -> NDArray[np.complex128]:
     """(k,) of value exp(-2 pi i ratio turns) over the variance of the noise."""
     waves = np.array([p.wave(ratio) for p in parts], dtype=np.complex128)
     out: NDArray[np.complex128] = waves / (np.sqrt(noise.own) * noise.beside)
     return out
 
 
-def _weights(parts: Sequence[Stretch], noise: _Noise, piece: NDArray[np.intp]) -> Floats:
+def _weights(parts: Sequence[SteadySegment], noise: _LocalNoise, piece: NDArray[np.intp]) -> Floats:
     n = np.array([p.time.size for p in parts]) / (noise.own * noise.beside)
     return np.asarray(np.bincount(piece, n), dtype=np.float64)
 
@@ -182,7 +182,7 @@ def _added(sums: NDArray[np.complex128], piece: NDArray[np.intp]) -> NDArray[np.
     return out
 
 
-def _apart(parts: Sequence[Stretch], noise: _Noise, candidate: Candidate) -> _Waves:
+def _apart(parts: Sequence[SteadySegment], noise: _LocalNoise, candidate: OrderCandidate) -> _Waves:
     """A phase for each stretch; the ratio of most power near the candidate's."""
     piece = np.arange(len(parts))
     weights = _weights(parts, noise, piece)
@@ -192,7 +192,9 @@ def _apart(parts: Sequence[Stretch], noise: _Noise, candidate: Candidate) -> _Wa
     return max(tried, key=lambda waves: waves.gain)
 
 
-def _joined(parts: Sequence[Stretch], noise: _Noise, ratio: float, reach: float, piece: NDArray[np.intp]) -> _Waves:
+def _joined(
+    parts: Sequence[SteadySegment], noise: _LocalNoise, ratio: float, reach: float, piece: NDArray[np.intp]
+) -> _Waves:
     """A phase for each piece; the ratio within `reach` of the one given at which that has most power."""
     weights = _weights(parts, noise, piece)
     centre = np.array([p.turns.mean() for p in parts])
@@ -209,7 +211,7 @@ def _joined(parts: Sequence[Stretch], noise: _Noise, ratio: float, reach: float,
     return _Waves(ratio, piece, _added(_sums(parts, noise, ratio), piece), weights)
 
 
-def _told(parts: Sequence[Stretch], waves: _Waves, p_value: float) -> Locked:
+def _told(parts: Sequence[SteadySegment], waves: _Waves, p_value: float) -> RotorOrder:
     """Amplitude, ratio and phase with what is not known of them."""
     each, total = 2 * waves.sums / waves.weights, float(waves.weights.sum())
     coherent = each.size == 1
@@ -223,7 +225,7 @@ def _told(parts: Sequence[Stretch], waves: _Waves, p_value: float) -> Locked:
     n = np.array([p.time.size for p in parts], dtype=np.float64)
     ratio_std = std / (2 * np.pi * size * _spread(parts, n, waves.piece))
     mean_turns = float(np.average([p.turns.mean() for p in parts], weights=n))
-    return Locked(
+    return RotorOrder(
         ratio=waves.ratio,
         ratio_std=ratio_std,
         amplitude=amplitude,
@@ -240,7 +242,7 @@ def _told(parts: Sequence[Stretch], waves: _Waves, p_value: float) -> Locked:
     )
 
 
-def _spread(parts: Sequence[Stretch], n: Floats, piece: NDArray[np.intp]) -> float:
+def _spread(parts: Sequence[SteadySegment], n: Floats, piece: NDArray[np.intp]) -> float:
     """Standard deviation of the angle within the pieces, turns."""
     centre = np.array([p.turns.mean() for p in parts])
     middle = np.bincount(piece, n * centre) / np.bincount(piece, n)

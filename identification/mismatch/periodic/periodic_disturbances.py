@@ -17,7 +17,7 @@ import numpy as np
 
 from identification.mismatch.periodic.line_or_order import as_turning
 from identification.mismatch.periodic.line_width import peak_p_value
-from identification.mismatch.periodic.order_tracking import Locked, Part, find_locked, wave_of
+from identification.mismatch.periodic.order_tracking import Part, RotorOrder, find_locked, wave_of
 from identification.mismatch.periodic.spectrum import (
     FAR,
     Series,
@@ -250,7 +250,7 @@ def _fixed_says(f: float, amplitude: float, spacing: float) -> str:
     return says + "."
 
 
-def _locked(found: Locked, unit: Literal["rev", "V s"]) -> Line:
+def _locked(found: RotorOrder, unit: Literal["rev", "V s"]) -> Line:
     per = "turn" if unit == "rev" else "V s of the driver"
     near = round(found.ratio)
     blades = unit == "rev" and near >= 1 and abs(found.ratio - near) < max(0.02, 4 * found.ratio_std)

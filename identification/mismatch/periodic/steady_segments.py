@@ -80,7 +80,7 @@ class Colour:
 
 
 @dataclass(frozen=True, eq=False)
-class Stretch:
+class SteadySegment:
     run: int
     time: Floats
     turns: Floats
@@ -126,7 +126,7 @@ def speed_of(series: Series) -> Floats:
     return out
 
 
-def stretches(runs: Sequence[tuple[int, Series]], top: float, lines: Sequence[Floats] = ()) -> Iterator[Stretch]:
+def stretches(runs: Sequence[tuple[int, Series]], top: float, lines: Sequence[Floats] = ()) -> Iterator[SteadySegment]:
     """Of all runs, in which the rotor turns without a step of its speed; `top`: highest speed, turns per s.
 
     `lines`: what is known to be no noise, run for run.
@@ -139,7 +139,7 @@ def stretches(runs: Sequence[tuple[int, Series]], top: float, lines: Sequence[Fl
             s = slice(low, high)
             if high - low >= LEAST and speed[s].mean() > TURNING * top and np.any(value[s]):
                 speeds = np.quantile(speed[s], QUANTILES)
-                yield Stretch(i, r.time[s], r.turns[s], value[s], white[s], speeds, colour)
+                yield SteadySegment(i, r.time[s], r.turns[s], value[s], white[s], speeds, colour)
 
 
 def _edges(time: Floats, speed: Floats, top: float) -> list[int]:

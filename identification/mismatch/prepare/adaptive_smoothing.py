@@ -49,7 +49,7 @@ class Level:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Calmed:
+class Smoothed:
     """A driver without most of its noise."""
 
     value: Floats
@@ -58,7 +58,7 @@ class Calmed:
     levels: tuple[Level, ...]
 
 
-def calmed(time: Floats, value: Floats, jumps: NDArray[np.bool_], noise: float) -> Calmed:
+def smoothed(time: Floats, value: Floats, jumps: NDArray[np.bool_], noise: float) -> Smoothed:
     """(n,) the driver without most of its white noise (standard deviation `noise`), no jump (n-1,) rounded off.
 
     A level that stands still is its mean. Elsewhere each sample is taken from a straight line through its neighbours,
@@ -89,7 +89,7 @@ def calmed(time: Floats, value: Floats, jumps: NDArray[np.bool_], noise: float) 
     for one in levels:
         least[first[level[one.first]] : one.first] = 1.0  # on its way there
         out[one.first : one.last], least[one.first : one.last] = one.value, 0.0
-    return Calmed(out, noise * np.sqrt(least), tuple(levels))
+    return Smoothed(out, noise * np.sqrt(least), tuple(levels))
 
 
 def _bent(value: Floats, jumps: NDArray[np.bool_], noise: float) -> NDArray[np.bool_]:

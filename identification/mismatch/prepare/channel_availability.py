@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from identification.mismatch.estimate.estimate import State
+from identification.mismatch.estimate.estimate import Estimate
 from identification.recording import Recording
 from identification.run_history.history import History
 
@@ -32,12 +32,12 @@ def held_by_all(
 
 
 def predictable(
-    holdout: Sequence[Recording], others: Sequence[History], state: State
+    holdout: Sequence[Recording], others: Sequence[History], estimate: Estimate
 ) -> tuple[tuple[History, ...], tuple[str, ...]]:
     """Of the runs held out, those that hold what the model looks at, and a note on each that does not."""
     kept, notes = [], []
     for recording, history in zip(holdout, others, strict=True):
-        lacking = {q: t.id for t in state.fit.model.terms for q in t.needs if q not in history.others}
+        lacking = {q: t.id for t in estimate.fit.model.terms for q in t.needs if q not in history.others}
         if not lacking:
             kept.append(history)
             continue

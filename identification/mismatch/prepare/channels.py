@@ -99,10 +99,10 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     rest = value - H[:, kept] @ theta
     by_load: Floats = columns(driven, charge)[:, kept] @ theta
     apart = np.abs(np.diff(then)) > STEP * size
-    calm, missed = _calmest(rest, REACHES, apart)
+    smooth, missed = _calmest(rest, REACHES, apart)
     if missed > (1 - REST_TOLD) * float(np.mean(rest**2)):
         return by_load
-    return by_load + np.interp(at, time, calm)
+    return by_load + np.interp(at, time, smooth)
 
 
 def torque(channel: Channel, held: Held, edges: Floats, driven: Floats) -> Floats | None:
@@ -120,8 +120,8 @@ def torque(channel: Channel, held: Held, edges: Floats, driven: Floats) -> Float
         return np.column_stack([np.ones(u.size), u, np.abs(u), u * np.abs(u), u**2])
 
     law = np.linalg.lstsq(columns(then), value, rcond=None)[0]
-    calm = _calm_where_it_rests(value - columns(then) @ law, np.abs(np.diff(then)) > STEP * size)
-    out: Floats = columns(driven) @ law + _means(time, calm, edges)
+    smooth = _calm_where_it_rests(value - columns(then) @ law, np.abs(np.diff(then)) > STEP * size)
+    out: Floats = columns(driven) @ law + _means(time, smooth, edges)
     return out
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.prepare.adaptive_smoothing import Level, calmed
+from identification.mismatch.prepare.adaptive_smoothing import Level, smoothed
 from identification.recording import Floats
 
 JUMP = 0.02
@@ -106,8 +106,8 @@ def measured(time: Floats, value: Floats) -> Measured:
     jumped = _jumped(value, noise, size)
     if noise <= LOUD * size:
         return Measured(time, value, jumped, noise, np.zeros(value.size), (), loud=False)
-    calm = calmed(time, value, jumped, noise)
-    return Measured(time, calm.value, jumped, noise, calm.error, calm.levels, loud=True)
+    smooth = smoothed(time, value, jumped, noise)
+    return Measured(time, smooth.value, jumped, noise, smooth.error, smooth.levels, loud=True)
 
 
 def noise_of(value: Floats) -> float:

@@ -7,11 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.mismatch.estimate.estimate import State, by_run, refresh, unweighted
+from identification.mismatch.estimate.estimate import Estimate, by_run, refresh, unweighted
 from identification.mismatch.estimate.fitting import Fit, extended, fit, raw
-from identification.mismatch.model.model import Data, Model, Spread, Theta, Weights
+from identification.mismatch.model.model import Data, Model, PriorPredictionFactor, Theta, Weights
 from identification.mismatch.prepare.scales import scale_of
-from identification.mismatch.select.covariates import coordinates
+from identification.mismatch.select.covariates import covariates
 from identification.mismatch.select.jumps import jumps
 from identification.mismatch.select.screening import (
     MOST_PLAIN,
@@ -48,11 +48,11 @@ def start(histories: Sequence[History]) -> tuple[Data, Theta]:
     moving = histories[0].driver_quantity == "command_voltage" and not any(h.static for h in histories)
     most = min(CLOCKS, max(h.jitter for h in histories)) if moving else 0.0
     data = Data(tuple(histories), scale_of(histories, C or 1e-12), with_rate=with_rate, most_shift=most)
-    data = replace(data, spread=level_spread(data, C))
+    data = replace(data, prior_factor=level_error_factor(data, C))
     return data, Theta(C, (), tuple(float(ym - C * fm) for fm, ym in means), k=_k(histories))
 
 
-def level_spread(data: Data, C: float) -> Spread | None:
+def level_error_factor(data: Data, C: float) -> PriorPredictionFactor | None:
     """What the thrust C n|n| is off by where a noisy driver stood still: at all of a level alike, so that levels
     scatter more than their samples say."""
     parts: list[list[Floats]] = [[] for _ in data.histories]
@@ -64,7 +64,7 @@ def level_spread(data: Data, C: float) -> Spread | None:
     if not parts[0]:
         return None
     still = tuple(np.zeros((h.rates.size, len(parts[0]))) for h in data.histories)
-    return Spread(tuple(np.column_stack(p) for p in parts), still)
+    return PriorPredictionFactor(tuple(np.column_stack(p) for p in parts), still)
 
 
 def _k(histories: Sequence[History]) -> float:
@@ -72,14 +72,14 @@ def _k(histories: Sequence[History]) -> float:
 
 
 def every_shape(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
-    """(n, k) raw columns: all trials of the catalogue's terms, and any shape over each coordinate."""
-    shapes = [np.concatenate(c.columns) for c in coordinates(fit_now, data)]
+    """(n, k) raw columns: all trials of the catalogue's terms, and any shape over each covariate."""
+    shapes = [np.concatenate(c.columns) for c in covariates(fit_now, data)]
     columns = np.column_stack([raw_directions(fit_now, data, terms), *shapes])
     some = lengths(columns) > 0
     return columns if some.all() else columns[:, some]
 
 
-def pursue(fit_now: Fit, data: Data, judged: Weights, raw_columns: Floats) -> Floats:
+def plain_shapes(fit_now: Fit, data: Data, judged: Weights, raw_columns: Floats) -> Floats:
     """(n, k) those of `every_shape` that together take what is plainly no noise.
 
     Orthogonal matching pursuit. Noise is estimated beside these columns, or a mismatch would be mistaken for it.
@@ -109,16 +109,18 @@ def raw_directions(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
     return np.column_stack(columns) if columns else np.empty((data.size, 0))
 
 
-def plain_jumps(state: State, data: Data) -> list[Floats]:
+def plain_jumps(estimate: Estimate, data: Data) -> list[Floats]:
     """(n, 1) each: steps of the reading that are plainly no noise; slow noise would follow them."""
     if any(h.static for h in data.histories):
         return []
     when = np.concatenate([h.sampled[r] for h, r in zip(data.histories, data.rows, strict=True)])
-    at, score = jumps(state.fit.residual, data, state.weights, orthogonal_basis(state.fit.jacobian[: data.size]))
+    at, score = jumps(
+        estimate.fit.residual, data, estimate.weights, orthogonal_basis(estimate.fit.jacobian[: data.size])
+    )
     return [(when[:, None] >= t).astype(np.float64) for t in at[score > PLAIN_JUMP][:1]]
 
 
-def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> State:
+def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> Estimate:
     """C V|V|, what is given and tares, with the noise that remains when what is plainly no noise is taken out.
 
     The noise is first all that is left; what stands out of even that is taken out, and so on: slow noise has many
@@ -126,13 +128,15 @@ def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> S
     """
     unit = unweighted(data)
     first = fit(model, theta, data, unit)
-    state = refresh(model, first.theta, data, None, None)
+    estimate = refresh(model, first.theta, data, None, None)
     taken = 0
-    shapes = every_shape(state.fit, data, terms)
+    shapes = every_shape(estimate.fit, data, terms)
     for _ in range(NOISE_ROUNDS):
-        plain = pursue(state.fit, data, state.weights, np.column_stack([shapes, *plain_jumps(state, data)]))
+        plain = plain_shapes(
+            estimate.fit, data, estimate.weights, np.column_stack([shapes, *plain_jumps(estimate, data)])
+        )
         if plain.shape[1] <= taken:
             break
         taken = plain.shape[1]
-        state = refresh(model, state.fit.theta, data, plain, state)
-    return state
+        estimate = refresh(model, estimate.fit.theta, data, plain, estimate)
+    return estimate

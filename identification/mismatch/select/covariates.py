@@ -35,11 +35,11 @@ FOLLOWED = (
 
 
 @dataclass(frozen=True, eq=False)
-class Coordinate:
+class Covariate:
     """One covariate at the rows of each run, and the columns of any shape over it."""
 
     quantity: str
-    covariate: tuple[Floats, ...]
+    values: tuple[Floats, ...]
     """Per run (n,), in `unit`; what a person reads."""
     unit: str
     columns: tuple[Floats, ...]
@@ -50,7 +50,7 @@ class Coordinate:
 
 @dataclass(frozen=True, eq=False)
 class _View:
-    """What the coordinates are made of, run by run at the thrust rows; force and rate in units of their scales."""
+    """What the covariates are made of, run by run at the thrust rows; force and rate in units of their scales."""
 
     fit: Fit
     data: Data
@@ -100,7 +100,7 @@ def _knots(values: Sequence[Floats], most: int) -> Floats:
     return out
 
 
-def coordinates(fit: Fit, data: Data) -> tuple[Coordinate, ...]:
+def covariates(fit: Fit, data: Data) -> tuple[Covariate, ...]:
     """All that can be looked at in these runs."""
     whole = tuple(predict(fit.model, fit.theta, h, data.scale, i) for i, h in enumerate(data.histories))
     # with the nuisances, or their slope would be a part of every gain
@@ -121,13 +121,13 @@ def coordinates(fit: Fit, data: Data) -> tuple[Coordinate, ...]:
 
 def _splines(
     quantity: str, unit: str, over: Sequence[Floats], knots: Floats, gains: Sequence[Sequence[Floats]], what: str
-) -> Coordinate:
+) -> Covariate:
     """Hats over the covariate, plain and times each gain."""
     columns = []
     for i, value in enumerate(over):
         basis = hats(value, knots)
         columns.append(np.column_stack([basis, *(basis * g[i][:, None] for g in gains)]))
-    return Coordinate(quantity, tuple(over), unit, tuple(columns), what)
+    return Covariate(quantity, tuple(over), unit, tuple(columns), what)
 
 
 WAKE = (0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
@@ -136,7 +136,7 @@ LATE = (1.0, 10.0, 100.0)
 """Intervals of the finest kind."""
 
 
-def _levels(view: _View) -> Iterator[Coordinate]:
+def _levels(view: _View) -> Iterator[Covariate]:
     data, V = view.data, view.driver
     most = MOST_HATS if data.size >= FEW_ROWS else max(3, data.size // 4)
     quantity = data.histories[0].driver_quantity
@@ -144,10 +144,10 @@ def _levels(view: _View) -> Iterator[Coordinate]:
     least = TURNING * data.scale.driver
     sides = [np.column_stack([v > least, v < -least]).astype(np.float64) for v in V]
     columns = tuple(np.column_stack([s, s * f[:, None]]) for s, f in zip(sides, view.force, strict=True))
-    yield Coordinate("direction", tuple(np.sign(v) for v in V), "1", columns, "the two directions differ")
+    yield Covariate("direction", tuple(np.sign(v) for v in V), "1", columns, "the two directions differ")
 
 
-def _times(view: _View) -> Iterator[Coordinate]:
+def _times(view: _View) -> Iterator[Covariate]:
     data = view.data
     t = [h.middle[r] for h, r in zip(data.histories, data.rows, strict=True)]
     knots = np.linspace(0, max(float(h.edges[-1]) for h in data.histories), 11)
@@ -162,7 +162,7 @@ def _times(view: _View) -> Iterator[Coordinate]:
         jump = f - before * np.abs(before) / data.scale.driver**2
         steps = (basis * kind[:, None] for kind in (jump, f))
         columns.append(np.column_stack([*steps, _turned(view, i), *_late(view, i)]))
-    yield Coordinate("time_since_step", since, "s", tuple(columns), "it follows a step late, or overshoots")
+    yield Covariate("time_since_step", since, "s", tuple(columns), "it follows a step late, or overshoots")
 
 
 def _turned(view: _View, run: int) -> Floats:
@@ -182,7 +182,7 @@ def _late(view: _View, run: int) -> Iterator[Floats]:
             yield (delayed(force, history.edges, delay * view.data.scale.interval) - force)[rows]
 
 
-def _memories(view: _View) -> Iterator[Coordinate]:
+def _memories(view: _View) -> Iterator[Covariate]:
     data = view.data
     unit = data.scale.driver_unit
     knots = _knots(view.previous, 9)
@@ -192,9 +192,9 @@ def _memories(view: _View) -> Iterator[Coordinate]:
         u[:, None] * np.column_stack([np.ones_like(f), np.abs(x), np.abs(f), f])
         for u, f, x in zip(up, view.force, view.rate, strict=True)
     )
-    yield Coordinate("direction_of_change", up, "1", columns, "up and down differ")
+    yield Covariate("direction_of_change", up, "1", columns, "up and down differ")
     loads = tuple(_loads(view, i) for i in range(len(data.histories)))
-    yield Coordinate("load_history", tuple(np.abs(f) for f in view.force), "1", loads, "it remembers long loads")
+    yield Covariate("load_history", tuple(np.abs(f) for f in view.force), "1", loads, "it remembers long loads")
 
 
 def _loads(view: _View, run: int) -> Floats:
@@ -210,7 +210,7 @@ def _loads(view: _View, run: int) -> Floats:
     return np.column_stack(columns) if columns else np.empty((rows.size, 0))
 
 
-def _channels(view: _View) -> Iterator[Coordinate]:
+def _channels(view: _View) -> Iterator[Covariate]:
     data = view.data
     size = tuple(np.abs(x) for x in view.rate)
     for quantity, unit in FOLLOWED:
@@ -228,10 +228,10 @@ def _channels(view: _View) -> Iterator[Coordinate]:
             gap = slip(h, x, view.fit.theta.k or 1.0)[r] / data.scale.driver
             columns.append(np.column_stack([gap, gap * s, gap * rate]))
         what = "thrust follows the measured rate where it leaves the command"
-        yield Coordinate("rotation_rate", view.of("rotation_rate"), "rev/s", tuple(columns), what)
+        yield Covariate("rotation_rate", view.of("rotation_rate"), "rev/s", tuple(columns), what)
 
 
-def _torque(view: _View) -> Coordinate:
+def _torque(view: _View) -> Covariate:
     """Beyond what the driver makes of it: a torque is a response as the thrust is, and has the same static curves."""
     torque, knots = view.of("torque"), _knots(view.driver, MOST_HATS)
     curve = [hats(v, knots) for v in view.driver]
@@ -241,4 +241,4 @@ def _torque(view: _View) -> Coordinate:
         gap = (q - known @ law) / view.data.scale.torque
         columns.append(np.column_stack([gap, gap * np.abs(rate), gap * rate]))
     what = "thrust follows the measured torque where it leaves the command"
-    return Coordinate("torque", torque, "N.m", tuple(columns), what)
+    return Covariate("torque", torque, "N.m", tuple(columns), what)

@@ -9,10 +9,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.tails import chi2_isf
-from identification.mismatch.estimate.estimate import State, fit_without, refresh
+from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
 from identification.mismatch.estimate.fitting import DELAYING, Fit, at_bound, extended, fit
 from identification.mismatch.model.model import Data, Model, Theta, price
-from identification.mismatch.select.baseline import baseline, every_shape, pursue, start
+from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
 from identification.mismatch.select.screening import (
     Screening,
     directions,
@@ -36,7 +36,7 @@ HIDDEN = 2.0
 """Sigmas from which a candidate is tried with noise of its own, where none passes."""
 CLEARER = 3.0
 """The same of a first term that takes its time only where the plan does: a staircase of minutes."""
-SLOW_COORDINATES = frozenset({"time", "flow_speed"})
+SLOW_COVARIATES = frozenset({"time", "flow_speed"})
 """Coordinates along which nothing changes quickly: slow noise takes for its own what an effect does over them."""
 MOST_HIDDEN = 3
 MOST_INSTANTS = 5
@@ -101,20 +101,20 @@ def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class Selected:
     """What the search ends with."""
 
     data: Data
     terms: tuple[Term, ...]
-    before: State
-    after: State
+    before: Estimate
+    after: Estimate
     screenings: tuple[Screening, ...]
     last: Screening
 
 
 def static_curve(term: Term, *, measured: bool) -> str:
     """On which static curve a term is a shape; none: "". A measured rate makes two of one, V to n and n to thrust."""
-    if not set(term.coordinates) <= set(STATIC):
+    if not set(term.covariates) <= set(STATIC):
         return ""
     return "rate" if measured and term.stage in ("command", "rotor") else "thrust"
 
@@ -130,7 +130,7 @@ def search(
     given: Callable[[Data, Theta], tuple[Data, Theta, Model]] | None = None,
     bands: tuple[tuple[float, float], ...] = (),
     without: Collection[str] = (),
-) -> Found:
+) -> Selected:
     """Forward: screen, fit the best few, keep the best, refresh the noise; until nothing passes. Then prune.
 
     `given` puts the baseline of a twin in the place of C V|V|; effects `without` are taken out of the catalogue.
@@ -143,68 +143,68 @@ def search(
     return _forward(data, terms, before, before, rng, trace)
 
 
-def resumed(found: Found, state: State, rng: np.random.Generator) -> Found:
-    """The search gone on with from `state`, a model of the same recordings that is not the one that was `found`."""
-    return _forward(found.data, found.terms, found.before, state, rng, None, frozenset(found.after.fit.model.terms))
+def resumed(found: Selected, estimate: Estimate, rng: np.random.Generator) -> Selected:
+    """The search gone on with from `estimate`, a model of the same recordings that is not the one that was `found`."""
+    return _forward(found.data, found.terms, found.before, estimate, rng, None, frozenset(found.after.fit.model.terms))
 
 
 def _forward(
     data: Data,
     terms: Sequence[Term],
-    before: State,
-    state: State,
+    before: Estimate,
+    estimate: Estimate,
     rng: np.random.Generator,
     trace: list[str] | None,
     *known: frozenset[Term],
-) -> Found:
-    """Larger models from `state` on while something passes, none of those that are `known`."""
+) -> Selected:
+    """Larger models from `estimate` on while something passes, none of those that are `known`."""
     screenings = []
-    seen = {frozenset(state.fit.model.terms), *known}
+    seen = {frozenset(estimate.fit.model.terms), *known}
     while True:
-        ids = {t.id for t in state.fit.model.terms}
-        judged = _screened(state, data, terms, rng)
+        ids = {t.id for t in estimate.fit.model.terms}
+        judged = _screened(estimate, data, terms, rng)
         screenings.append(judged)
         if trace is not None:
             trace.append(
-                f"{[t.id for t in state.fit.model.terms]} largest {judged.largest:.1f} of {judged.threshold:.2f} "
+                f"{[t.id for t in estimate.fit.model.terms]} largest {judged.largest:.1f} of {judged.threshold:.2f} "
                 + str([(t.id, t.form, round(z, 1)) for t, _, z in judged.best(6)])
             )
         if len(ids) >= MOST_TERMS:
             break
-        larger = _lasting(state, judged, data, terms, seen)
+        larger = _lasting(estimate, judged, data, terms, seen)
         if larger is None:
             break
-        state = larger
-        seen.add(frozenset(state.fit.model.terms))
-    return Found(data, tuple(terms), before, state, tuple(screenings), judged)
+        estimate = larger
+        seen.add(frozenset(estimate.fit.model.terms))
+    return Selected(data, tuple(terms), before, estimate, tuple(screenings), judged)
 
 
-def _screened(state: State, data: Data, terms: Sequence[Term], rng: np.random.Generator) -> Screening:
+def _screened(estimate: Estimate, data: Data, terms: Sequence[Term], rng: np.random.Generator) -> Screening:
     """What may still be added to the model, judged."""
-    inside = state.fit.model.terms
+    inside = estimate.fit.model.terms
     ids = {t.id for t in inside}
     shapes = Counter(static_curve(t, measured=data.with_rate) for t in inside)
     left = [t for t in terms if t.id not in ids]
     left = [t for t in left if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < MOST_STATIC]
     if ids & TWINS and data.scale.torque <= 0:
         left = [t for t in left if t.id not in TWINS]
-    found = directions(state.fit, data, state.weights, left)
-    spared = allowed(corrections(state.fit, data, state.weights), found.columns)
-    return screen(state.fit, found, rng, ALARM, spared)
+    found = directions(estimate.fit, data, estimate.weights, left)
+    spared = allowed(corrections(estimate.fit, data, estimate.weights), found.columns)
+    return screen(estimate.fit, found, rng, ALARM, spared)
 
 
 def _lasting(
-    state: State, judged: Screening, data: Data, terms: Sequence[Term], seen: Collection[frozenset[Term]]
-) -> State | None:
+    estimate: Estimate, judged: Screening, data: Data, terms: Sequence[Term], seen: Collection[frozenset[Term]]
+) -> Estimate | None:
     """The larger model, pruned; of additions that are dropped again the next best. None where none lasts."""
     refused: set[Term] = set()
     found = judged.largest > judged.threshold
-    while larger := _larger(state, judged, data, terms, refused) if found else None:
+    while larger := _larger(estimate, judged, data, terms, refused) if found else None:
         pruned = prune(larger, data)
         if frozenset(pruned.fit.model.terms) not in seen:
             return pruned
-        refused |= set(larger.fit.model.terms) - set(state.fit.model.terms)
-    hidden = _hidden(state, judged, data)
+        refused |= set(larger.fit.model.terms) - set(estimate.fit.model.terms)
+    hidden = _hidden(estimate, judged, data)
     if hidden is None:
         return None
     pruned = prune(hidden, data)
@@ -212,35 +212,35 @@ def _lasting(
 
 
 def _larger(
-    state: State, judged: Screening, data: Data, terms: Sequence[Term], refused: Collection[Term]
-) -> State | None:
+    estimate: Estimate, judged: Screening, data: Data, terms: Sequence[Term], refused: Collection[Term]
+) -> Estimate | None:
     """The model with one more term, none of those `refused`, its noise estimated anew."""
-    best = _best_addition(state, judged, data, refused)
+    best = _best_addition(estimate, judged, data, refused)
     if best is None:
         return None
     remaining = [t for t in terms if t.id not in {u.id for u in best.model.terms}]
-    plain = pursue(best, data, state.weights, every_shape(best, data, remaining))
-    return refresh(best.model, best.theta, data, plain, state)
+    plain = plain_shapes(best, data, estimate.weights, every_shape(best, data, remaining))
+    return refresh(best.model, best.theta, data, plain, estimate)
 
 
-def _hidden(state: State, judged: Screening, data: Data) -> State | None:
+def _hidden(estimate: Estimate, judged: Screening, data: Data) -> Estimate | None:
     """The model with a term that the noise had taken for its own: they are told apart when estimated together."""
-    least = CLEARER if not state.fit.model.terms else np.inf  # shape error would be taken for what is hidden
+    least = CLEARER if not estimate.fit.model.terms else np.inf  # shape error would be taken for what is hidden
     likely = [
         (t, v)
         for rank, (t, v, z) in enumerate(judged.best(2 * MOST_HIDDEN))
-        if (rank < MOST_HIDDEN or t.id in STEADY) and z > (HIDDEN if SLOW_COORDINATES & set(t.coordinates) else least)
+        if (rank < MOST_HIDDEN or t.id in STEADY) and z > (HIDDEN if SLOW_COVARIATES & set(t.covariates) else least)
     ]
     likely = [each for t, v in likely for each in ((t, at) for at in _instants(judged, t, data) or (v,))]
     if not likely:
         return None
-    now = refresh(state.fit.model, state.fit.theta, data, None, None)
+    now = refresh(estimate.fit.model, estimate.fit.theta, data, None, None)
     found = []
     for term, values in likely:
-        bigger = state.fit.model.plus(term)
-        begin = refined(state.fit, data, state.weights, term, values)
-        theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
-        first = fit(bigger, theta, data, state.weights)
+        bigger = estimate.fit.model.plus(term)
+        begin = refined(estimate.fit, data, estimate.weights, term, values)
+        theta = extended(estimate.fit.theta, estimate.fit.model, term, begin, bigger)
+        first = fit(bigger, theta, data, estimate.weights)
         new = refresh(bigger, first.theta, data, None, now, now.noise)
         gain = now.fit.deviance - new.fit.deviance
         if gain > _asked_of_hidden(term, judged, data):
@@ -288,19 +288,19 @@ def _candidates(judged: Screening, data: Data) -> list[tuple[Term, tuple[float, 
     return list(likely.items())
 
 
-def _best_addition(state: State, judged: Screening, data: Data, refused: Collection[Term]) -> Fit | None:
+def _best_addition(estimate: Estimate, judged: Screening, data: Data, refused: Collection[Term]) -> Fit | None:
     fits = []
     for term, values in _candidates(judged, data):
         if term in refused:
             continue
-        bigger = state.fit.model.plus(term)
-        begin = refined(state.fit, data, state.weights, term, values)
-        theta = extended(state.fit.theta, state.fit.model, term, begin, bigger)
-        new = fit(bigger, theta, data, state.weights)
-        gain = state.fit.chi2 - new.chi2
+        bigger = estimate.fit.model.plus(term)
+        begin = refined(estimate.fit, data, estimate.weights, term, values)
+        theta = extended(estimate.fit.theta, estimate.fit.model, term, begin, bigger)
+        new = fit(bigger, theta, data, estimate.weights)
+        gain = estimate.fit.chi2 - new.chi2
         cost = price(term, data) * np.log(new.residual.size)
         if gain > max(cost, np.log(new.residual.size)):
-            fits.append((at_bound(term, new, data, state.weights), gain - cost, len(values), new))
+            fits.append((at_bound(term, new, data, estimate.weights), gain - cost, len(values), new))
     if not fits:
         return None
     possible = [each for each in fits if not each[0]] or fits
@@ -309,15 +309,15 @@ def _best_addition(state: State, judged: Screening, data: Data, refused: Collect
     return min(near, key=lambda each: (each[2], -each[1]))[3]
 
 
-def prune(state: State, data: Data) -> State:
+def prune(estimate: Estimate, data: Data) -> Estimate:
     """Drop terms that no longer earn their place."""
-    while state.fit.model.terms:
+    while estimate.fit.model.terms:
         costs = []
-        for term, values in zip(state.fit.model.terms, state.fit.theta.terms, strict=True):
-            less = fit_without(state, term, data)
-            costs.append((less.chi2 - state.fit.chi2 - accept_threshold(len(values)), less))
+        for term, values in zip(estimate.fit.model.terms, estimate.fit.theta.terms, strict=True):
+            less = fit_without(estimate, term, data)
+            costs.append((less.chi2 - estimate.fit.chi2 - accept_threshold(len(values)), less))
         worst, less = min(costs, key=lambda pair: pair[0])
         if worst > 0:
             break
-        state = refresh(less.model, less.theta, data, None, state)
-    return state
+        estimate = refresh(less.model, less.theta, data, None, estimate)
+    return estimate

@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from identification.mismatch.estimate.estimate import State, fit_without, refresh
+from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
 from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, extended, fit
 from identification.mismatch.model.model import Data, price
 from identification.mismatch.select.flatness import noise_goes_on
@@ -48,44 +48,46 @@ class Rival:
     """By how much its AIC is worse: BIC alone would hide a rival with more parameters than the data can tell apart."""
 
 
-Standing = tuple[Fit, list[Rival]]
+SwapTest = tuple[Fit, list[Rival]]
 """The fit without a term, and the rivals in its place."""
 
 
-def settle_forms(state: State, data: Data, terms: Sequence[Term]) -> tuple[State, dict[Term, Standing] | None]:
+def swap_tests(estimate: Estimate, data: Data, terms: Sequence[Term]) -> tuple[Estimate, dict[Term, SwapTest] | None]:
     """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end."""
     for _ in range(ROUNDS):
         best: tuple[float, Fit] | None = None
-        standing: dict[Term, Standing] = {}
-        for term in state.fit.model.terms:
-            less = fit_without(state, term, data)
-            standing[term] = (less, swaps(state, term, less, data, terms))
+        standing: dict[Term, SwapTest] = {}
+        for term in estimate.fit.model.terms:
+            less = fit_without(estimate, term, data)
+            standing[term] = (less, swaps(estimate, term, less, data, terms))
             # a value that is not possible explains nothing: whatever does nearly as well goes before it
             price = 0.0
-            if at_bound(term, state.fit, data, state.weights) or noise_goes_on(state.fit, term, state.noise, data):
-                price = PRESSED_SHARE * (less.chi2 - state.fit.chi2)
+            if at_bound(term, estimate.fit, data, estimate.weights) or noise_goes_on(
+                estimate.fit, term, estimate.noise, data
+            ):
+                price = PRESSED_SHARE * (less.chi2 - estimate.fit.chi2)
             for rival in standing[term][1]:
                 loss = rival.bic_loss - price
                 lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.term.parameters(data.scale)))
                 if lasts and loss < -BETTER and (best is None or loss < best[0]):
                     best = (loss, rival.fit)
-        best = _one_for_two(state, data, terms, best)
+        best = _one_for_two(estimate, data, terms, best)
         if best is None:
-            return state, standing
-        state = refresh(best[1].model, best[1].theta, data, None, state)
-    return state, None
+            return estimate, standing
+        estimate = refresh(best[1].model, best[1].theta, data, None, estimate)
+    return estimate, None
 
 
 def _one_for_two(
-    state: State, data: Data, terms: Sequence[Term], best: tuple[float, Fit] | None
+    estimate: Estimate, data: Data, terms: Sequence[Term], best: tuple[float, Fit] | None
 ) -> tuple[float, Fit] | None:
     """The better of `best` and one term in the place of two: a search that goes step by step may miss it."""
-    now = state.fit
+    now = estimate.fit
     logn = float(np.log(max(now.residual.size, 2)))
     for pair in combinations(now.model.terms, 2):
-        less = fit_without(replace(state, fit=fit_without(state, pair[0], data)), pair[1], data)
+        less = fit_without(replace(estimate, fit=fit_without(estimate, pair[0], data)), pair[1], data)
         others = [t for t in terms if t.id not in {u.id for u in less.model.terms} and t not in pair]
-        found = directions(less, data, state.weights, others)
+        found = directions(less, data, estimate.weights, others)
         score = found.columns.T @ less.residual
         tried: set[Term] = set()
         for j in np.argsort(-np.where(found.one_sided, score, np.abs(score))):
@@ -99,25 +101,25 @@ def _one_for_two(
             tried.add(other)
             values = mirrored(other, found.values[j], data) if score[j] < 0 else found.values[j]
             bigger = less.model.plus(other)
-            begin = refined(less, data, state.weights, other, values)
+            begin = refined(less, data, estimate.weights, other, values)
             theta = extended(less.theta, less.model, other, begin, bigger)
-            new = fit(bigger, theta, data, state.weights, RIVAL_STEPS, wanted)
+            new = fit(bigger, theta, data, estimate.weights, RIVAL_STEPS, wanted)
             loss = new.chi2 - now.chi2 + more
-            if loss < -BETTER and (best is None or loss < best[0]) and not at_bound(other, new, data, state.weights):
+            if loss < -BETTER and (best is None or loss < best[0]) and not at_bound(other, new, data, estimate.weights):
                 best = (float(loss), new)
     return best
 
 
-def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> list[Rival]:
+def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> list[Rival]:
     """Every other term (and form) that could do what this one does, refitted in its place; best first."""
-    now = state.fit
+    now = estimate.fit
     gain = less.chi2 - now.chi2
     inside = {t.id for t in now.model.terms} - {term.id}
     others = [t for t in terms if t.id not in inside and t != term]
-    found = directions(less, data, state.weights, others)
+    found = directions(less, data, estimate.weights, others)
     if not found.terms:
         return []
-    change = _effect(now, term, data, state)
+    change = _effect(now, term, data, estimate)
     basis = orthogonal_basis(less.jacobian)
     change = change - basis @ (basis.T @ change)
     size = float(np.linalg.norm(change))
@@ -138,15 +140,15 @@ def swaps(state: State, term: Term, less: Fit, data: Data, terms: Sequence[Term]
         if (1 - r**2) * gain > LIKELY and r < 0.9:
             break
         bigger = less.model.plus(other)
-        begin = refined(less, data, state.weights, other, values)
+        begin = refined(less, data, estimate.weights, other, values)
         more = price(other, data) - extra_now
         extra = more * logn
         begun = extended(less.theta, less.model, other, begin, bigger)
         if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
-            new = fit(bigger, begun, data, state.weights)
+            new = fit(bigger, begun, data, estimate.weights)
         else:
-            new = fit(bigger, begun, data, state.weights, RIVAL_STEPS, now.chi2 + NEAR - min(extra, 2.0 * more))
-        if at_bound(other, new, data, state.weights) or noise_goes_on(new, other, state.noise, data):
+            new = fit(bigger, begun, data, estimate.weights, RIVAL_STEPS, now.chi2 + NEAR - min(extra, 2.0 * more))
+        if at_bound(other, new, data, estimate.weights) or noise_goes_on(new, other, estimate.noise, data):
             continue
         loss = new.chi2 - now.chi2 + extra
         out.append(Rival(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))
@@ -160,9 +162,9 @@ def mirrored(term: Term, values: tuple[float, ...], data: Data) -> tuple[float, 
     return (min(max(2 * first.neutral - values[0], first.low), first.high), *values[1:])
 
 
-def _effect(now: Fit, term: Term, data: Data, state: State) -> Floats:
+def _effect(now: Fit, term: Term, data: Data, estimate: Estimate) -> Floats:
     """(n,) whitened change that the term makes at its fitted values; the rate's rows with it."""
     smaller = now.model.without(term)
     known = dict(zip(now.model.terms, now.theta.terms, strict=True))
     theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
-    return state.weights.whiten(*change_of((smaller, theta), (now.model, now.theta), data, state.weights))
+    return estimate.weights.whiten(*change_of((smaller, theta), (now.model, now.theta), data, estimate.weights))

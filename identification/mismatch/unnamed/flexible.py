@@ -1,6 +1,6 @@
-"""A flexible term where no physics fits: a spline over the located coordinate, so that the fit still improves.
+"""A flexible term where no physics fits: a spline over the located covariate, so that the fit still improves.
 
-Coordinate, multiplier, knots and degree are chosen on a part of the data with the state's coloured noise; a term is
+Covariate, multiplier, knots and degree are chosen on a part of the data with the estimate's coloured noise; a term is
 kept only when the rest of the data, which it has not seen, is predicted better. Then the terms are fitted to all rows,
 their knots chosen anew.
 Where a term of the catalogue fits but its name was not earned, the flexible term may take its place.
@@ -8,61 +8,45 @@ Where a term of the catalogue fits but its name was not earned, the flexible ter
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.flexible_terms.flexible import Flexible
-from identification.mismatch.estimate.estimate import State, forces, refresh
-from identification.mismatch.estimate.fitting import Fit, extended, fit
+from identification.mismatch.estimate.estimate import Estimate, refresh
+from identification.mismatch.estimate.fitting import extended, fit
 from identification.mismatch.locate.pulses import Pulses
-from identification.mismatch.locate.residual_structure_test import ALARM, judge_left
-from identification.mismatch.model.model import Data, weights
+from identification.mismatch.locate.residual_structure_test import ALARM, residual_structure
+from identification.mismatch.model.model import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.unnamed.flexible_kinds import UNITS
-from identification.mismatch.unnamed.flexible_knots import Candidate, best_of, best_over
-from identification.mismatch.validate.held_out import Score, blocks, judge_blocks, judge_runs, refitted
+from identification.mismatch.unnamed.flexible_knots import FlexibleCandidate, best_of, best_over
+from identification.mismatch.validate.held_out import Score
+from identification.mismatch.validate.train_test_split import Judge, TrainTestSplit, better
 from identification.physics.term import Term
-from identification.run_history.history import History
 
 MOST_TERMS = 3
-MOST_COORDINATES = 3
+MOST_COVARIATES = 3
 """Coordinates tried for each term, the clearest first."""
 EQUAL = 10.0
-"""BIC within which two coordinates do equally well."""
+"""BIC within which two covariates do equally well."""
 MONOTONE = 0.9
 """Rank correlation with time above which a recorded quantity goes one way only."""
 LOCATED = 0.8
-"""Share of the best coordinate's gain at which the located one is kept."""
+"""Share of the best covariate's gain at which the located one is kept."""
 FOLLOW_LOAD = ("bus_voltage", "current", "torque", "load_history")
 """Quantities that a thruster's own load moves."""
 AS_GOOD = 1.02
 """Held-out RMSE over that of terms without an earned name at which a shape that claims nothing takes their place."""
 FIT_STEPS = 10
-WORTH = 6.0
-"""By which chi-square must fall on what was not fitted, beside 2 for each parameter."""
-SLACK = 1.002
-"""RMSE may grow by this where chi-square falls: the loudest noise weighs most in it."""
-Judge = Callable[[Fit], Score]
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Parted:
-    """A model fitted to one part of the data, and what judges it on the rest."""
-
-    data: Data
-    """What is fitted."""
-    judge: Judge
-    state: State
-    """The model fitted to that."""
 
 
 @dataclass(frozen=True, eq=False)
 class Extended:
     """A model with flexible terms, on all rows."""
 
-    state: State
+    estimate: Estimate
     terms: tuple[Flexible, ...]
     """In the order in which they were found."""
     dropped: tuple[Term, ...]
@@ -76,51 +60,46 @@ class Extended:
 
 
 def extend(
-    after: State,
-    before: State,
+    after: Estimate,
+    before: Estimate,
     data: Data,
     located: str,
-    doubted: Sequence[Named],
-    parted: Parted,
+    unearned: Sequence[Named],
+    split: TrainTestSplit,
     rng: np.random.Generator,
 ) -> Extended | None:
     """The model with up to MOST_TERMS flexible terms; None where none improves what was not fitted.
 
     None also where they predict it worse than the baseline, `before`.
 
-    `located`: the coordinate over which it is left; `doubted`: terms whose name was not earned; `parted`: `after`,
+    `located`: the covariate over which it is left; `unearned`: terms whose name was not earned; `split`: `after`,
     fitted to a part of the data.
     """
-    part, judge, begin = parted.data, parted.judge, parted.state
+    part, judge, begin = split.data, split.judge, split.estimate
     first = judge(begin.fit)
     plain = judge(fit(before.fit.model, before.fit.theta, part, begin.weights))
-    for smaller in _bases(begin, part, [n.term for n in doubted]):
-        state, terms, held, equals = _grown(smaller, part, located, judge, rng)
+    for smaller in _bases(begin, part, [n.term for n in unearned]):
+        estimate, terms, held, equals = _grown(smaller, part, located, judge, rng)
         improves = better(held, first, 0) or (smaller is not begin and held.rmse < AS_GOOD * first.rmse)
         if terms and improves and held.rmse < plain.rmse:
             break
     else:
         return None
-    whole = refresh(state.fit.model, replace(state.fit.theta, tares=after.fit.theta.tares), data, None, None)
+    whole = refresh(estimate.fit.model, replace(estimate.fit.theta, tares=after.fit.theta.tares), data, None, None)
     whole, final = _anew(whole, terms, data)
-    dropped = tuple(t for t in after.fit.model.terms if t not in state.fit.model.terms)
+    dropped = tuple(t for t in after.fit.model.terms if t not in estimate.fit.model.terms)
     return Extended(whole, tuple(final), dropped, first.rmse, held.rmse, equals)
 
 
-def foremost(state: State, data: Data, order: Sequence[str], pulses: Pulses | None) -> str:
-    """The coordinate, of those in `order`, over which a flexible term gains most; the first when none gains."""
-    tried = [best_over(quantity, state, data, pulses) for quantity in order[:MOST_COORDINATES]]
+def foremost(estimate: Estimate, data: Data, order: Sequence[str], pulses: Pulses | None) -> str:
+    """The covariate, of those in `order`, over which a flexible term gains most; the first when none gains."""
+    tried = [best_over(quantity, estimate, data, pulses) for quantity in order[:MOST_COVARIATES]]
     found = [c for c in tried if c is not None]
     best = max(found, key=lambda c: c.gain, default=None)
     return order[0] if best is None or best.gain <= 0 else best.term.quantity
 
 
-def better(new: Score, old: Score, parameters: int) -> bool:
-    """Whether what was not fitted is predicted better by more than chance."""
-    return new.chi2 < old.chi2 - (WORTH + 2 * parameters if parameters else 0) and new.rmse < SLACK * old.rmse
-
-
-def _anew(whole: State, terms: Sequence[Flexible], data: Data) -> tuple[State, list[Flexible]]:
+def _anew(whole: Estimate, terms: Sequence[Flexible], data: Data) -> tuple[Estimate, list[Flexible]]:
     """Knots chosen again with all rows, one term after the other."""
     final = []
     for term in terms:
@@ -137,44 +116,32 @@ def _anew(whole: State, terms: Sequence[Flexible], data: Data) -> tuple[State, l
     return whole, final
 
 
-def split(after: State, data: Data, others: Sequence[History]) -> Parted:
-    """All of it is fitted where `others`, whole runs, are there to judge on; otherwise blocks of time are kept back."""
-    if others:
-        return Parted(data, judge_runs(after, data, others), after)
-    keep = [blocks(h) for h in data.histories]
-    part = replace(data, keep=tuple(keep))
-    begin = refitted(after, data, keep)
-    w = weights(part, after.noise, forces(begin.model, begin.theta, part), after.rate_noise)
-    state = State(begin, after.noise, after.rate_noise, w, part.thrust_rows)
-    return Parted(part, judge_blocks(state, data, keep), state)
-
-
-def _bases(begin: State, part: Data, doubted: Sequence[Term]) -> list[State]:
-    """The model without what was doubted, and as it is."""
-    if not doubted:
+def _bases(begin: Estimate, part: Data, unearned: Sequence[Term]) -> list[Estimate]:
+    """The model without what was unearned, and as it is."""
+    if not unearned:
         return [begin]
     model, theta = begin.fit.model, begin.fit.theta
-    kept = tuple(v for t, v in zip(model.terms, theta.terms, strict=True) if t not in doubted)
-    smaller = replace(model, terms=tuple(t for t in model.terms if t not in doubted))
+    kept = tuple(v for t, v in zip(model.terms, theta.terms, strict=True) if t not in unearned)
+    smaller = replace(model, terms=tuple(t for t in model.terms if t not in unearned))
     less = fit(smaller, replace(theta, terms=kept), part, begin.weights)
     return [replace(begin, fit=less), begin]
 
 
 def _grown(
-    state: State, part: Data, located: str, judge: Judge, rng: np.random.Generator
-) -> tuple[State, list[Flexible], Score, tuple[str, ...]]:
+    estimate: Estimate, part: Data, located: str, judge: Judge, rng: np.random.Generator
+) -> tuple[Estimate, list[Flexible], Score, tuple[str, ...]]:
     """Terms one after another while each predicts better what was not fitted; and the first one's equals."""
     terms: list[Flexible] = []
     equals: tuple[str, ...] = ()
-    held = judge(state.fit)
-    left, pulses = _left(state, part, rng)
+    held = judge(estimate.fit)
+    left, pulses = _left(estimate, part, rng)
     order = list(dict.fromkeys((located, *left)))
     while True:
         taken = {t.quantity for t in terms}
         new = None
-        candidates = _candidates(state, part, [q for q in order if q not in taken], pulses)
+        candidates = _candidates(estimate, part, [q for q in order if q not in taken], pulses)
         for candidate in candidates:
-            tried, term = _added(state, part, candidate)
+            tried, term = _added(estimate, part, candidate)
             score = judge(tried.fit)
             if better(score, held, len(term.parameters(part.scale))):
                 new, held = tried, score
@@ -182,26 +149,26 @@ def _grown(
                 terms.append(term)
                 break
         if new is None:
-            return state, terms, held, equals
-        state = new
+            return estimate, terms, held, equals
+        estimate = new
         if len(terms) == MOST_TERMS:
-            return state, terms, held, equals
-        order, pulses = _left(state, part, rng)
+            return estimate, terms, held, equals
+        order, pulses = _left(estimate, part, rng)
 
 
-def _left(state: State, part: Data, rng: np.random.Generator) -> tuple[list[str], Pulses | None]:
+def _left(estimate: Estimate, part: Data, rng: np.random.Generator) -> tuple[list[str], Pulses | None]:
     """Coordinates over which something is left, the clearest first, and pulses that come back."""
-    left = judge_left(state.fit, part, state.weights, rng)
-    clear = [g.coordinate.quantity for g in left.groups if g.p_value < ALARM]
+    left = residual_structure(estimate.fit, part, estimate.weights, rng)
+    clear = [g.covariate.quantity for g in left.groups if g.p_value < ALARM]
     return (clear, left.pulses) if left.p_value < ALARM else ([], None)
 
 
-def _candidates(state: State, part: Data, order: Sequence[str], pulses: Pulses | None) -> list[Candidate]:
-    """The best over each of the first coordinates; the located one first unless others gain more, or a recorded
+def _candidates(estimate: Estimate, part: Data, order: Sequence[str], pulses: Pulses | None) -> list[FlexibleCandidate]:
+    """The best over each of the first covariates; the located one first unless others gain more, or a recorded
     quantity gains as much: what a channel does, time can do too. A quantity that never turns back is time by another
     name, and time claims less. Where a quantity that follows the load is best, the static curve itself goes before it
     when it gains nearly as much."""
-    found = [best_over(quantity, state, part, pulses) for quantity in order[:MOST_COORDINATES]]
+    found = [best_over(quantity, estimate, part, pulses) for quantity in order[:MOST_COVARIATES]]
     gaining = [c for c in found if c is not None and c.gain > 0]
     if not gaining:
         return []
@@ -212,7 +179,7 @@ def _candidates(state: State, part: Data, order: Sequence[str], pulses: Pulses |
     follows = max(gaining, key=lambda c: c.gain).term.quantity in FOLLOW_LOAD
     static = (part.histories[0].driver_quantity, "direction")
 
-    def rank(c: Candidate) -> tuple[bool, bool, bool, float]:
+    def rank(c: FlexibleCandidate) -> tuple[bool, bool, bool, float]:
         near = c.gain > LOCATED * most
         itself = follows and near and c.term.quantity in static
         recorded = c.term.quantity in equal - rising and c.term.quantity in UNITS
@@ -230,16 +197,16 @@ def _with_time(quantity: str, data: Data) -> bool:
     return bool(np.min(np.abs(order)) > MONOTONE)
 
 
-def _equals(chosen: Candidate, candidates: Sequence[Candidate]) -> tuple[str, ...]:
+def _equals(chosen: FlexibleCandidate, candidates: Sequence[FlexibleCandidate]) -> tuple[str, ...]:
     """Coordinates of the others that gain about as much."""
     return tuple(c.term.quantity for c in candidates if c is not chosen and c.gain > chosen.gain - EQUAL)
 
 
-def _added(state: State, part: Data, candidate: Candidate) -> tuple[State, Flexible]:
+def _added(estimate: Estimate, part: Data, candidate: FlexibleCandidate) -> tuple[Estimate, Flexible]:
     """The model with the term, its noise estimated anew, and the knots chosen again with that noise."""
-    first = _joined(state, part, candidate)
+    first = _joined(estimate, part, candidate)
     first = refresh(first.fit.model, first.fit.theta, part, None, replace(first, rows=part.thrust_rows))
-    less = fit(state.fit.model, state.fit.theta, part, first.weights)
+    less = fit(estimate.fit.model, estimate.fit.theta, part, first.weights)
     again = best_of([candidate.term], replace(first, fit=less), part)
     if again is None or again.term == candidate.term:
         return first, candidate.term
@@ -247,7 +214,7 @@ def _added(state: State, part: Data, candidate: Candidate) -> tuple[State, Flexi
     return (second, again.term) if second.bic < first.bic else (first, candidate.term)
 
 
-def _joined(state: State, part: Data, candidate: Candidate) -> State:
-    bigger = state.fit.model.plus(candidate.term)
-    theta = extended(state.fit.theta, state.fit.model, candidate.term, candidate.start, bigger)
-    return replace(state, fit=fit(bigger, theta, part, state.weights, FIT_STEPS))
+def _joined(estimate: Estimate, part: Data, candidate: FlexibleCandidate) -> Estimate:
+    bigger = estimate.fit.model.plus(candidate.term)
+    theta = extended(estimate.fit.theta, estimate.fit.model, candidate.term, candidate.start, bigger)
+    return replace(estimate, fit=fit(bigger, theta, part, estimate.weights, FIT_STEPS))

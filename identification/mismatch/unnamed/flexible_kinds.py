@@ -1,4 +1,4 @@
-"""What a flexible term over a coordinate may multiply."""
+"""What a flexible term over a covariate may multiply."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ UNITS = {**dict(FOLLOWED), "torque": "N.m"}
 
 
 def shapes_over(quantity: str, data: Data) -> list[Flexible]:
-    """What a flexible term over this coordinate may multiply; knots to be chosen."""
+    """What a flexible term over this covariate may multiply; knots to be chosen."""
     driver = data.histories[0].driver_quantity
     units = {"time": "s", "time_since_step": "s", "previous_voltage": data.scale.driver_unit, **UNITS}
 

@@ -1,4 +1,4 @@
-"""The best flexible term over one coordinate: what it multiplies, its degree and its knots."""
+"""The best flexible term over one covariate: what it multiplies, its degree and its knots."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.flexible_terms.flexible import Flexible, Multiplier, lately, turned
-from identification.mismatch.estimate.estimate import State
+from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.locate.pulses import Pulses
 from identification.mismatch.model.model import Data, Weights, predict
@@ -24,7 +24,7 @@ JUMPS = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
+class FlexibleCandidate:
     """One flexible term with its linear estimate."""
 
     term: Flexible
@@ -33,8 +33,8 @@ class Candidate:
     """Of BIC."""
 
 
-def best_over(quantity: str, state: State, data: Data, pulses: Pulses | None = None) -> Candidate | None:
-    """The best flexible term over a coordinate by BIC; None where there is none that could be.
+def best_over(quantity: str, estimate: Estimate, data: Data, pulses: Pulses | None = None) -> FlexibleCandidate | None:
+    """The best flexible term over a covariate by BIC; None where there is none that could be.
 
     `pulses` of one run: a spline over time may begin anew with each.
     """
@@ -42,30 +42,30 @@ def best_over(quantity: str, state: State, data: Data, pulses: Pulses | None = N
     if quantity == "time" and pulses is not None and len(data.histories) == 1:
         edges = sorted({pulses.begin % pulses.period, (pulses.begin + pulses.length) % pulses.period})
         shapes.append(Flexible("time", "s", tuple(edges), (), ("gain",), period=pulses.period))
-    return best_of(shapes, state, data)
+    return best_of(shapes, estimate, data)
 
 
-def best_of(shapes: Sequence[Flexible], state: State, data: Data) -> Candidate | None:
+def best_of(shapes: Sequence[Flexible], estimate: Estimate, data: Data) -> FlexibleCandidate | None:
     """The best of several kinds of flexible term, their knots chosen."""
-    found = [chosen for shape in shapes if (chosen := with_knots(shape, state, data)) is not None]
+    found = [chosen for shape in shapes if (chosen := with_knots(shape, estimate, data)) is not None]
     return max(found, key=lambda c: c.gain, default=None)
 
 
-def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
-    """Knots and degree by BIC, from the whitened residual of the state, its own parameters free to follow."""
-    over, columns = seen_at(shape, state.fit, data)
+def with_knots(shape: Flexible, estimate: Estimate, data: Data) -> FlexibleCandidate | None:
+    """Knots and degree by BIC, from the whitened residual of the estimate, its own parameters free to follow."""
+    over, columns = seen_at(shape, estimate.fit, data)
     if shape.quantity == "time_since_step":
         shape = replace(shape, knots=(min(1.5 * data.scale.interval, *(h.spacing for h in data.histories)),))
     axis = [shape.axis(v) for v in over]
     every = np.concatenate(axis)
     if float(np.ptp(every)) <= 1e-9 * max(float(np.max(np.abs(every))), 1e-12):
         return None
-    jumps = _jumps(shape, every, columns, state, data)
+    jumps = _jumps(shape, every, columns, estimate, data)
     through = (0.0,) if every.min() < 0 < every.max() and shape.quantity != "time_since_step" else ()
     nodes = nodes_of(every, (*through, *(t for pair in jumps for t in pair)))
     if nodes.size < 2:
         return None
-    moments = _moments(shape, nodes, axis, columns, state, data)
+    moments = _moments(shape, nodes, axis, columns, estimate, data)
     zero = _zero_nodes(shape, nodes, data)
     beside = [tuple(int(np.argmin(np.abs(nodes - t))) for t in pair) for pair in jumps]
     found = choose(moments, zero, begin=[tuple(j for pair in beside for j in pair)] if shape.period else beside)
@@ -77,20 +77,20 @@ def with_knots(shape: Flexible, state: State, data: Data) -> Candidate | None:
     zeros = tuple(i for i, k in enumerate(found.knots) if k in zero)
     term = replace(shape, knots=knots, zero=zeros, degree=found.degree)
     start = heights(moments, found.knots, found.degree, [term.free(m) for m in term.times])
-    return Candidate(term, tuple(map(float, start)), found.gain)
+    return FlexibleCandidate(term, tuple(map(float, start)), found.gain)
 
 
 def _jumps(
-    shape: Flexible, over: Floats, columns: Sequence[Floats], state: State, data: Data
+    shape: Flexible, over: Floats, columns: Sequence[Floats], estimate: Estimate, data: Data
 ) -> list[tuple[float, float]]:
     """Instants before and after which what a term over time multiplies may have jumped: even knots cannot follow."""
     if shape.quantity != "time":
         return []
     if shape.period:
         return _beside(shape.knots, over)
-    basis = orthogonal_basis(state.fit.jacobian[: data.size])
+    basis = orthogonal_basis(estimate.fit.jacobian[: data.size])
     each = ([c[:, k] for c in columns] for k in range(len(shape.times)))
-    found = [at for of in each for at in likeliest_jumps(state.fit, data, state.weights, basis, JUMPS, of)]
+    found = [at for of in each for at in likeliest_jumps(estimate.fit, data, estimate.weights, basis, JUMPS, of)]
     return _beside(found, over)
 
 
@@ -102,7 +102,7 @@ def _beside(instants: Sequence[float], over: Floats) -> list[tuple[float, float]
 
 
 def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], list[Floats]]:
-    """Per run at its thrust rows: the coordinate (n,), and what each multiplier makes of 1 (n, multipliers)."""
+    """Per run at its thrust rows: the covariate (n,), and what each multiplier makes of 1 (n, multipliers)."""
     over, columns = [], []
     for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, x = predict(fitted.model, fitted.theta, h, data.scale, i)
@@ -118,24 +118,24 @@ def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], lis
         }
         if "late" in shape.times:
             made["late"] = lately(F, h.dt, shape.memory)
-        over.append(shape.covariate(h, x, data.scale)[r])
+        over.append(shape.over(h, x, data.scale)[r])
         columns.append(np.column_stack([made[m][r] for m in shape.times]))
     return over, columns
 
 
 def _moments(
-    shape: Flexible, nodes: Floats, axis: Sequence[Floats], columns: Sequence[Floats], state: State, data: Data
+    shape: Flexible, nodes: Floats, axis: Sequence[Floats], columns: Sequence[Floats], estimate: Estimate, data: Data
 ) -> Moments:
     n = data.size
     raw = []
     for values, times in zip(axis, columns, strict=True):
         hats = spline(values, nodes, np.eye(nodes.size), 1)
         raw.append(np.column_stack([hats * times[:, [j]] for j in range(times.shape[1])]))
-    white = Weights(state.weights.thrust).whiten(raw, [])
-    basis = orthogonal_basis(state.fit.jacobian[:n])
+    white = Weights(estimate.weights.thrust).whiten(raw, [])
+    basis = orthogonal_basis(estimate.fit.jacobian[:n])
     white = white - basis @ (basis.T @ white)
     constant = tuple(not replace(shape, zero=(0,)).zeros(m) for m in shape.times)
-    return Moments(nodes, white.T @ white, white.T @ state.fit.residual[:n], n, constant)
+    return Moments(nodes, white.T @ white, white.T @ estimate.fit.residual[:n], n, constant)
 
 
 def _zero_nodes(shape: Flexible, nodes: Floats, data: Data) -> tuple[int, ...]:

@@ -1,4 +1,4 @@
-"""The shape of a flexible term with its error, beside what was measured in bins of its coordinate."""
+"""The shape of a flexible term with its error, beside what was measured in bins of its covariate."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from identification.flexible_terms.flexible import WORDS, Flexible, Multiplier
 from identification.mismatch.answer.remainder import FlexibleShape, Spline
 from identification.mismatch.diagnosis import HeldOutRmse, Unexplained, Value
-from identification.mismatch.estimate.estimate import State
+from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.model import Data, Weights
 from identification.mismatch.name.naming import Named
@@ -30,8 +30,8 @@ BINS = 14
 
 def shapes_of(extended: Extended, data: Data) -> tuple[FlexibleShape, ...]:
     """In the order in which they were found."""
-    weights = Weights(extended.state.weights.thrust)
-    return tuple(shape_of(term, extended.state.fit, data, weights) for term in extended.terms)
+    weights = Weights(extended.estimate.weights.thrust)
+    return tuple(shape_of(term, extended.estimate.fit, data, weights) for term in extended.terms)
 
 
 def shape_of(term: Flexible, fitted: Fit, data: Data, weights: Weights) -> FlexibleShape:
@@ -174,7 +174,7 @@ def with_held(held: HeldOut, extended: Extended | None) -> HeldOutRmse:
     return HeldOutRmse(held.before, extended.held, held.noise, what)
 
 
-def refitted_names(named: Sequence[Named], final: State) -> list[Named]:
+def refitted_names(named: Sequence[Named], final: Estimate) -> list[Named]:
     """Terms whose names were earned with their values in the final model."""
     places, at = {}, 1
     for term, values in zip(final.fit.model.terms, final.fit.theta.terms, strict=True):
@@ -188,10 +188,10 @@ def refitted_names(named: Sequence[Named], final: State) -> list[Named]:
 
 
 def shared(terms: Sequence[Term], extended: Extended) -> list[Term]:
-    """Of these terms those that change what a flexible one changes, over the same coordinate: beside a shape that may
+    """Of these terms those that change what a flexible one changes, over the same covariate: beside a shape that may
     be anything their values mean nothing."""
     over = {q for term in extended.terms for q in _also(term.quantity)}
-    return [term for term in terms if over & {q for c in term.coordinates for q in _also(c)}]
+    return [term for term in terms if over & {q for c in term.covariates for q in _also(c)}]
 
 
 def _also(quantity: str) -> frozenset[str]:

@@ -1,9 +1,9 @@
 """Sparse regression over a small grammar of recorded quantities: a formula for what is left, if one agrees everywhere.
 
 Products and powers up to the third degree of at most two quantities, added or times the thrust; one or two of them, by
-BIC with the state's coloured noise and a price for how many were looked at (Chen and Chen, Biometrika 95, 2008). It is
-accepted only when data that were not fitted are predicted nearly as well as by the free shape, when both halves of the
-runs give the same coefficients, and when nothing of any shape is left over the formula's own coordinates.
+BIC with the estimate's coloured noise and a price for how many were looked at (Chen and Chen, Biometrika 95, 2008). It
+is accepted only when data that were not fitted are predicted nearly as well as by the free shape, when both halves of
+the runs give the same coefficients, and when nothing of any shape is left over the formula's own covariates.
 """
 
 from __future__ import annotations
@@ -28,14 +28,15 @@ from identification.flexible_terms.formula import (
 )
 from identification.flexible_terms.formula import times as multiplied
 from identification.mismatch.answer.remainder import FormulaFound
-from identification.mismatch.estimate.estimate import State
+from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, extended, fit
 from identification.mismatch.model.model import Data, Theta, Weights, predict
 from identification.mismatch.select.screening import orthogonal_basis
-from identification.mismatch.unnamed.flexible import Extended, better, split
+from identification.mismatch.unnamed.flexible import Extended
 from identification.mismatch.unnamed.flexible_knots import best_over
 from identification.mismatch.unnamed.formula_words import legend, told
 from identification.mismatch.validate.held_out import Score
+from identification.mismatch.validate.train_test_split import better, train_test_split
 from identification.recording import Floats
 from identification.run_history.history import History
 
@@ -72,8 +73,8 @@ class _Grid:
 def find_formula(extended_by: Extended, data: Data, others: Sequence[History]) -> FormulaFound | None:
     """The formula in the place of the flexible terms; None where none agrees with what was not fitted."""
     bare = without_flexible(extended_by, data)
-    parted = split(bare, data, others)
-    part, judge, begin = parted.data, parted.judge, parted.state
+    split = train_test_split(bare, data, others)
+    part, judge, begin = split.data, split.judge, split.estimate
     grid = _grid(begin, part)
     if grid is None:
         return None
@@ -110,31 +111,33 @@ def term_of(monomials: tuple[Monomial, ...], sizes: dict[str, float], data: Data
     return Formula(monomials, tuple((q, sizes[q]) for q in symbols), middles)
 
 
-def without_flexible(found: Extended, data: Data) -> State:
+def without_flexible(found: Extended, data: Data) -> Estimate:
     """The final model without its flexible terms, with its noise."""
-    state = found.state
+    estimate = found.estimate
     pairs = [
-        (t, v) for t, v in zip(state.fit.model.terms, state.fit.theta.terms, strict=True) if not isinstance(t, Flexible)
+        (t, v)
+        for t, v in zip(estimate.fit.model.terms, estimate.fit.theta.terms, strict=True)
+        if not isinstance(t, Flexible)
     ]
-    model = replace(state.fit.model, terms=tuple(t for t, _ in pairs))
-    theta = replace(state.fit.theta, terms=tuple(v for _, v in pairs))
-    return replace(state, fit=fit(model, theta, data, state.weights))
+    model = replace(estimate.fit.model, terms=tuple(t for t, _ in pairs))
+    theta = replace(estimate.fit.theta, terms=tuple(v for _, v in pairs))
+    return replace(estimate, fit=fit(model, theta, data, estimate.weights))
 
 
-def _with(term: Formula, state: State, data: Data) -> State:
-    bigger = state.fit.model.plus(term)
+def _with(term: Formula, estimate: Estimate, data: Data) -> Estimate:
+    bigger = estimate.fit.model.plus(term)
     zeros = (0.0,) * len(term.monomials)
-    theta: Theta = extended(state.fit.theta, state.fit.model, term, zeros, bigger)
-    return replace(state, fit=fit(bigger, theta, data, state.weights))
+    theta: Theta = extended(estimate.fit.theta, estimate.fit.model, term, zeros, bigger)
+    return replace(estimate, fit=fit(bigger, theta, data, estimate.weights))
 
 
-def _fitted_shapes(found: Extended, state: State, data: Data) -> Fit:
+def _fitted_shapes(found: Extended, estimate: Estimate, data: Data) -> Fit:
     """The flexible terms beside the same model, on the same rows."""
-    known = dict(zip(found.state.fit.model.terms, found.state.fit.theta.terms, strict=True))
-    fitted = state.fit
+    known = dict(zip(found.estimate.fit.model.terms, found.estimate.fit.theta.terms, strict=True))
+    fitted = estimate.fit
     for term in found.terms:
         bigger = fitted.model.plus(term)
-        fitted = fit(bigger, extended(fitted.theta, fitted.model, term, known[term], bigger), data, state.weights)
+        fitted = fit(bigger, extended(fitted.theta, fitted.model, term, known[term], bigger), data, estimate.weights)
     return fitted
 
 
@@ -177,19 +180,19 @@ def monomials_of(symbols: Sequence[str]) -> list[tuple[tuple[str, int], ...]]:
     return single + double
 
 
-def _grid(state: State, data: Data) -> _Grid | None:
+def _grid(estimate: Estimate, data: Data) -> _Grid | None:
     known = symbols_of(data)
     sizes = {q: float(max(np.max(np.abs(v)) for v in values)) for q, values in known.items()}
     found = [Monomial(powers, m) for powers in monomials_of(list(known)) for m in TIMES]
     raw = []
     for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
-        F, _ = predict(state.fit.model, state.fit.theta, h, data.scale, i)
+        F, _ = predict(estimate.fit.model, estimate.fit.theta, h, data.scale, i)
         unit = {q: values[i][r] / sizes[q] for q, values in known.items()}
         raw.append(np.column_stack([_column(m, unit, F[r]) for m in found]))
     n = data.size
-    white = Weights(state.weights.thrust).whiten(raw, [])
+    white = Weights(estimate.weights.thrust).whiten(raw, [])
     first = np.linalg.norm(white, axis=0)
-    basis = orthogonal_basis(state.fit.jacobian[:n])
+    basis = orthogonal_basis(estimate.fit.jacobian[:n])
     white -= basis @ (basis.T @ white)
     size = np.linalg.norm(white, axis=0)
     kept = size > 1e-5 * np.maximum(first, 1e-300)
@@ -197,7 +200,7 @@ def _grid(state: State, data: Data) -> _Grid | None:
         return None
     white = white[:, kept] / size[kept]
     names = tuple(m for m, k in zip(found, kept, strict=True) if k)
-    score = white.T @ state.fit.residual[:n]
+    score = white.T @ estimate.fit.residual[:n]
     return _Grid(names, tuple(sizes.items()), white.T @ white, score, float(np.log(max(n, 2))))
 
 
@@ -241,11 +244,11 @@ def _plainness(found: tuple[Monomial, ...]) -> tuple[bool, int, int, int, int]:
     return "t" in symbols, len(symbols), len(kinds), len(found), sum(m.degree for m in found)
 
 
-def halves(term: Formula, state: State, data: Data) -> float:
+def halves(term: Formula, estimate: Estimate, data: Data) -> float:
     """p-value of the same coefficients in the first and the second half of each run."""
     n, q = data.size, len(term.monomials)
-    smaller = state.fit.model.without(term)
-    theta = _less(term, state.fit)
+    smaller = estimate.fit.model.without(term)
+    theta = _less(term, estimate.fit)
     first, second = [], []
     for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
         F, _ = predict(smaller, theta, h, data.scale, i)
@@ -255,14 +258,14 @@ def halves(term: Formula, state: State, data: Data) -> float:
         late = (h.middle[r] > 0.5 * (h.middle[r][0] + h.middle[r][-1]))[:, None]
         first.append(np.column_stack([columns * ~late, np.where(late, 0.0, F[r][:, None])]))
         second.append(columns * late)
-    weights = Weights(state.weights.thrust)
+    weights = Weights(estimate.weights.thrust)
     split_columns = np.column_stack([weights.whiten(first, []), weights.whiten(second, [])])
-    base = orthogonal_basis(state.fit.jacobian[:n, :])
+    base = orthogonal_basis(estimate.fit.jacobian[:n, :])
     rest = split_columns[:, : q + 1] - base @ (base.T @ split_columns[:, : q + 1])
     # beyond common coefficients: those of the first half, with another C there
     Q, C = rest[:, :q], orthogonal_basis(rest[:, q:])
     Q = orthogonal_basis(Q - C @ (C.T @ Q))
-    score = Q.T @ state.fit.residual[:n]
+    score = Q.T @ estimate.fit.residual[:n]
     return float(chi2_sf(float(score @ score), Q.shape[1])) if Q.shape[1] else 1.0
 
 
@@ -271,7 +274,7 @@ def _less(term: Formula, fitted: Fit) -> Theta:
     return replace(fitted.theta, terms=kept)
 
 
-def _left_over(term: Formula, state: State, data: Data, flexible: Sequence[Flexible]) -> bool:
-    """Whether a free shape over the formula's own coordinates, or the located one, still gains anything."""
-    own = dict.fromkeys((*term.coordinates, *(f.quantity for f in flexible)))
-    return any((found := best_over(q, state, data)) is not None and found.gain > 0 for q in own)
+def _left_over(term: Formula, estimate: Estimate, data: Data, flexible: Sequence[Flexible]) -> bool:
+    """Whether a free shape over the formula's own covariates, or the located one, still gains anything."""
+    own = dict.fromkeys((*term.covariates, *(f.quantity for f in flexible)))
+    return any((found := best_over(q, estimate, data)) is not None and found.gain > 0 for q in own)

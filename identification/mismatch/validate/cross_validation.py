@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.mismatch.estimate.estimate import State, forces
+from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.model import Data, weights
 from identification.mismatch.noise.covariance import Noise
@@ -19,7 +19,7 @@ ALIKE = 0.5
 """Of the largest driver of all runs, and of their median number of samples: a run with less tells too little."""
 
 
-def by_folds(before: State, after: State, data: Data, measured: Data, quiet: Noise) -> HeldOut:
+def by_folds(before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise) -> HeldOut:
     """Both models fitted without a run and judged on it, every run in turn; of the run itself only its tare is fitted.
 
     By blocks of time where there is one run, or one that is no match for the others. Arguments as of `by_blocks`.
@@ -43,10 +43,10 @@ def _alike(data: Data) -> bool:
     return bool(driver.min() > ALIKE * driver.max() and samples.min() > ALIKE * float(np.median(samples)))
 
 
-def _judged(state: State, data: Data, fold: Sequence[int]) -> tuple[float, float]:
+def _judged(estimate: Estimate, data: Data, fold: Sequence[int]) -> tuple[float, float]:
     """RMSE in N and samples of the runs of a fold, by the model fitted to the others."""
     others = [i for i in range(len(data.histories)) if i not in fold]
-    model = _fitted(state, _of(data, others), others)
+    model = _fitted(estimate, _of(data, others), others)
     unseen = replace(_of(data, fold), with_rate=False)
     theta = with_tares(model.model, model.theta, unseen)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
@@ -55,13 +55,13 @@ def _judged(state: State, data: Data, fold: Sequence[int]) -> tuple[float, float
 
 
 def _of(data: Data, runs: Sequence[int]) -> Data:
-    return replace(data, histories=tuple(data.histories[i] for i in runs), keep=None, spread=None)
+    return replace(data, histories=tuple(data.histories[i] for i in runs), keep=None, prior_factor=None)
 
 
-def _fitted(state: State, part: Data, runs: Sequence[int]) -> Fit:
-    theta = replace(state.fit.theta, tares=tuple(state.fit.theta.tares[i] for i in runs))
-    w = weights(part, state.noise, forces(state.fit.model, theta, part), state.rate_noise)
-    return fit(state.fit.model, theta, part, w)
+def _fitted(estimate: Estimate, part: Data, runs: Sequence[int]) -> Fit:
+    theta = replace(estimate.fit.theta, tares=tuple(estimate.fit.theta.tares[i] for i in runs))
+    w = weights(part, estimate.noise, forces(estimate.fit.model, theta, part), estimate.rate_noise)
+    return fit(estimate.fit.model, theta, part, w)
 
 
 def _together(parts: Sequence[tuple[float, float]]) -> float:

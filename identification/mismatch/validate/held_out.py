@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimation.tails import chi2_sf
-from identification.mismatch.estimate.estimate import State, forces
+from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit, raw
 from identification.mismatch.model.model import Data, Model, Theta, weights
 from identification.mismatch.noise.covariance import Noise
@@ -84,14 +84,14 @@ def noise_rms(noise: Noise, model: Model, theta: Theta, data: Data, which: Seque
     return float(np.sqrt(total / samples)) if samples else float("nan")
 
 
-def refitted(state: State, data: Data, keep: Sequence[NDArray[np.bool_]]) -> Fit:
+def refitted(estimate: Estimate, data: Data, keep: Sequence[NDArray[np.bool_]]) -> Fit:
     """Parameters of the same model from a part of the rows, with the same noise."""
     part = replace(data, keep=tuple(keep))
-    w = weights(part, state.noise, forces(state.fit.model, state.fit.theta, part), state.rate_noise)
-    return fit(state.fit.model, state.fit.theta, part, w)
+    w = weights(part, estimate.noise, forces(estimate.fit.model, estimate.fit.theta, part), estimate.rate_noise)
+    return fit(estimate.fit.model, estimate.fit.theta, part, w)
 
 
-def by_blocks(before: State, after: State, data: Data, measured: Data, quiet: Noise) -> HeldOut:
+def by_blocks(before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise) -> HeldOut:
     """Parameters of both models without every fourth block, judged on those blocks.
 
     `measured`: the same runs with the periodic disturbances still in them, for the model before. `quiet`: noise of
@@ -106,14 +106,14 @@ def by_blocks(before: State, after: State, data: Data, measured: Data, quiet: No
     return HeldOut(rmse(old.model, old.theta, measured, back), rmse(new.model, new.theta, data, back), noise, what)
 
 
-def by_runs(before: State, after: State, data: Data, others: Sequence[History], quiet: Noise) -> HeldOut:
+def by_runs(before: Estimate, after: Estimate, data: Data, others: Sequence[History], quiet: Noise) -> HeldOut:
     """Both models on whole runs that were not fitted; of these only the tare is. `quiet` as in `by_blocks`."""
     unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
     errors = []
-    for state in (before, after):
-        theta = with_tares(state.fit.model, state.fit.theta, unseen)
-        errors.append(rmse(state.fit.model, theta, unseen, every))
+    for estimate in (before, after):
+        theta = with_tares(estimate.fit.model, estimate.fit.theta, unseen)
+        errors.append(rmse(estimate.fit.model, theta, unseen, every))
     noise = least_noise(after.fit, (after.noise, quiet), data, [np.ones(r.size, dtype=bool) for r in data.rows])
     names = ", ".join(h.recording_id for h in others)
     return HeldOut(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
@@ -129,11 +129,11 @@ class Score:
     """Of the residual, whitened with one and the same noise."""
 
 
-def judge_blocks(state: State, data: Data, keep: Sequence[NDArray[np.bool_]]) -> Callable[[Fit], Score]:
-    """Judges fits of the rows in `keep` on all others, with the noise of `state`."""
+def judge_blocks(estimate: Estimate, data: Data, keep: Sequence[NDArray[np.bool_]]) -> Callable[[Fit], Score]:
+    """Judges fits of the rows in `keep` on all others, with the noise of `estimate`."""
     back = [~k for k in keep]
     part = replace(data, keep=tuple(back))
-    w = weights(part, state.noise, forces(state.fit.model, state.fit.theta, part), None)
+    w = weights(part, estimate.noise, forces(estimate.fit.model, estimate.fit.theta, part), None)
 
     def score(found: Fit) -> Score:
         thrust, _ = raw(found.model, found.theta, part, with_rate=False)
@@ -143,12 +143,12 @@ def judge_blocks(state: State, data: Data, keep: Sequence[NDArray[np.bool_]]) ->
     return score
 
 
-def judge_runs(state: State, data: Data, others: Sequence[History]) -> Callable[[Fit], Score]:
+def judge_runs(estimate: Estimate, data: Data, others: Sequence[History]) -> Callable[[Fit], Score]:
     """Judges fits on whole runs, their tares fitted; a fit that needs what one of these lacks is infinitely bad."""
     unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
-    first = with_tares(state.fit.model, state.fit.theta, unseen)
-    w = weights(unseen, state.noise, forces(state.fit.model, first, unseen), None)
+    first = with_tares(estimate.fit.model, estimate.fit.theta, unseen)
+    w = weights(unseen, estimate.noise, forces(estimate.fit.model, first, unseen), None)
 
     def score(found: Fit) -> Score:
         if any(not set(term.needs) <= set(h.others) for term in found.model.terms for h in others):

@@ -83,7 +83,7 @@ def _finding(n: Named, state: State, data: Prepared) -> Finding:
 
 def where_of(structure: Structure) -> Where:
     place = place_of(structure)
-    return Where(structure.coordinate.quantity, place.low, place.high, structure.coordinate.unit)
+    return Where(structure.covariate.quantity, place.low, place.high, structure.covariate.unit)
 
 
 def _place(where: Where, data: Prepared) -> str:
@@ -94,14 +94,14 @@ def _place(where: Where, data: Prepared) -> str:
 
 
 def places_of(left: Left, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
-    """Where the baseline fails, the clearest coordinates first."""
+    """Where the baseline fails, the clearest covariates first."""
     out = []
     for structure in left.structures[:MOST_PLACES]:
         if structure.p_value > ALARM:
             break
         where = where_of(structure)
         says = (
-            f"{structure.coordinate.what} explains {100 * structure.share:.0f} % of the whitened residual, most at "
+            f"{structure.covariate.what} explains {100 * structure.share:.0f} % of the whitened residual, most at "
             f"{_place(where, data)}."
         )
         out.append(Mismatch(channel, where, structure.share, structure.p_value, says[0].upper() + says[1:]))
@@ -109,9 +109,9 @@ def places_of(left: Left, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
 
 
 def place_of_findings(left: Left, found: Found, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
-    """Where no free force shows through slow noise, but named terms do: over the coordinate that the first shows in."""
-    own = found.after.terms[0].coordinates
-    structure = next((s for s in left.structures if s.coordinate.quantity in own), None)
+    """Where no free force shows through slow noise, but named terms do: over the covariate that the first shows in."""
+    own = found.after.terms[0].covariates
+    structure = next((s for s in left.structures if s.covariate.quantity in own), None)
     structure = structure or next(iter(left.structures), None)
     if structure is None:
         return ()
@@ -121,7 +121,7 @@ def place_of_findings(left: Left, found: Found, data: Prepared, channel: str) ->
     where, share = where_of(structure), gain / found.before.fit.chi2
     says = (
         f"What was found explains {100 * share:.2g} % of the whitened residual together; of a free force over "
-        f"{structure.coordinate.quantity} most would act at {_place(where, data)}."
+        f"{structure.covariate.quantity} most would act at {_place(where, data)}."
     )
     return (Mismatch(channel, where, share, p, says),)
 
@@ -132,11 +132,11 @@ def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Unexpl
         return None
     structure = left.structures[0]
     if left.p_value >= ALARM:
-        own = {c for n in named for c in n.term.coordinates}
-        structure = next((s for s in left.structures if s.coordinate.quantity in own), structure)
+        own = {c for n in named for c in n.term.covariates}
+        structure = next((s for s in left.structures if s.covariate.quantity in own), structure)
     where = where_of(structure)
     says = (
-        f"Something is left that no effect of the catalogue carries: {structure.coordinate.what}, clearest at "
+        f"Something is left that no effect of the catalogue carries: {structure.covariate.what}, clearest at "
         f"{_place(where, data)}, {100 * structure.share:.2g} % of the whitened residual."
     )
     resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in named)

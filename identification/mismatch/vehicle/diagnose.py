@@ -137,7 +137,7 @@ def _beside(n: Named, last: State, left: Left) -> Named:
     """A name beside the free force: where the term stands now, or what took its place."""
     if n.term in last.terms:
         return replace(n, index=last.terms.index(n.term))
-    instead = f"a free force over {left.structures[0].coordinate.quantity} takes its place"
+    instead = f"a free force over {left.structures[0].covariate.quantity} takes its place"
     return replace(n, doubts=(*n.doubts, instead))
 
 

@@ -26,7 +26,7 @@ BACK = 1e-300
 
 
 @dataclass(frozen=True, eq=False)
-class Coordinate:
+class Covariate:
     """A covariate (g,) of each run on its grid, and the knots (b,) of a free force over it."""
 
     quantity: str
@@ -46,11 +46,11 @@ class Coordinate:
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """A free force over one coordinate, fitted to what remains."""
+    """A free force over one covariate, fitted to what remains."""
 
-    coordinate: Coordinate
+    covariate: Covariate
     p_value: float
-    """Of the coordinate, allowing for how many were tried."""
+    """Of the covariate, allowing for how many were tried."""
     share: float
     """Of the whitened residual's sum of squares."""
     force: Floats
@@ -60,7 +60,7 @@ class Structure:
     """(b,) as fitted: `force` about its mean, which the model's own parameters may hold."""
 
 
-def coordinates(fitted: Fit, data: Prepared) -> tuple[Coordinate, ...]:
+def covariates(fitted: Fit, data: Prepared) -> tuple[Covariate, ...]:
     """What a force that was left out may depend on."""
     speed = tuple(_middle(m.v) for m in fitted.motions)
     place = tuple(_middle(m.x) for m in fitted.motions)
@@ -93,7 +93,7 @@ def _command(run: Run) -> Floats:
     return out
 
 
-def _coordinate(quantity: str, unit: str, values: tuple[Floats, ...], what: str) -> Coordinate | None:
+def _coordinate(quantity: str, unit: str, values: tuple[Floats, ...], what: str) -> Covariate | None:
     whole = np.concatenate(values)
     whole = whole[np.isfinite(whole)]
     if whole.size == 0 or float(np.ptp(whole)) == 0:
@@ -104,40 +104,40 @@ def _coordinate(quantity: str, unit: str, values: tuple[Floats, ...], what: str)
     for knot in knots[1:]:
         if knot - kept[-1] > 0.03 * span:
             kept.append(knot)
-    return Coordinate(quantity, unit, values, np.array(kept), what) if len(kept) > 1 else None
+    return Covariate(quantity, unit, values, np.array(kept), what) if len(kept) > 1 else None
 
 
-def _by_run(data: Prepared) -> Coordinate:
+def _by_run(data: Prepared) -> Covariate:
     index = tuple(np.full(run.steps, float(j + 1)) for j, run in enumerate(data.runs))
-    return Coordinate("run", "1", index, np.arange(1.0, len(data.runs) + 1), "a force that differs from run to run")
+    return Covariate("run", "1", index, np.arange(1.0, len(data.runs) + 1), "a force that differs from run to run")
 
 
 @dataclass(frozen=True, eq=False)
 class Left:
-    """Every coordinate against the residual, the clearest first."""
+    """Every covariate against the residual, the clearest first."""
 
     p_value: float
     structures: tuple[Structure, ...]
 
 
-def free_columns(fitted: Fit, data: Prepared, coordinate: Coordinate) -> list[Floats]:
+def free_columns(fitted: Fit, data: Prepared, covariate: Covariate) -> list[Floats]:
     """(n, b) per run: what a unit of force at each knot changes of the measurement."""
     layout, theta = fitted.layout, fitted.theta
     return [
-        respond(layout, theta, data, j, fitted.motions[j], coordinate.bumps(j))[:, :-2] for j in range(len(data.runs))
+        respond(layout, theta, data, j, fitted.motions[j], covariate.bumps(j))[:, :-2] for j in range(len(data.runs))
     ]
 
 
 def judge_left(fitted: Fit, white: Weights, data: Prepared, rng: np.random.Generator) -> Left:
-    """Does a free force over any coordinate still explain something?"""
+    """Does a free force over any covariate still explain something?"""
     base = _base(fitted)
     flipped = surrogates(fitted.residual, [w.rows.time.size for w in white], rng)
     flipped = flipped - base @ (base.T @ flipped)
     size = max(float(np.mean(fitted.residual**2)), 1e-12)
     found = []
-    seen = coordinates(fitted, data)
-    for coordinate in seen:
-        columns = _stacked(white, free_columns(fitted, data, coordinate), fitted.residual.size)
+    seen = covariates(fitted, data)
+    for covariate in seen:
+        columns = _stacked(white, free_columns(fitted, data, covariate), fitted.residual.size)
         Q = beyond(base, columns)
         if not Q.shape[1]:
             continue
@@ -145,7 +145,7 @@ def judge_left(fitted: Fit, white: Weights, data: Prepared, rng: np.random.Gener
         usual = float(np.mean(np.sum((Q.T @ flipped) ** 2, axis=0))) / Q.shape[1]
         p = float(chi2_law.sf(gain / max(usual, size, 1.0), Q.shape[1]))
         beta, std = _solved(columns, base, fitted.residual)
-        found.append((p, gain, coordinate, beta, std))
+        found.append((p, gain, covariate, beta, std))
     found.sort(key=lambda one: (one[0], -one[1]))
     total = float(fitted.residual @ fitted.residual)
     structures = tuple(
@@ -186,12 +186,12 @@ class Place:
 
 def place_of(structure: Structure) -> Place:
     """From the knot before to the one after the stretch with most force, in standard errors."""
-    knots = structure.coordinate.knots
+    knots = structure.covariate.knots
     weight = np.abs(structure.force) / np.where(structure.std > 0, structure.std, np.inf)
     i = int(np.argmax(weight))
     last = knots.size - 1
     low, high = float(knots[max(i - 1, 0)]), float(knots[min(i + 1, last)])
-    if structure.coordinate.quantity == "run":
+    if structure.covariate.quantity == "run":
         low = high = float(knots[i])
     rows = zip(knots.tolist(), structure.force.tolist(), structure.std.tolist(), strict=True)
     return Place(low, high, tuple(rows))

@@ -10,7 +10,7 @@ import numpy as np
 from identification.mismatch.noise.covariance import Rows
 from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.vehicle.setup import ANY_AXIS, Stated, VehicleSetup, thrust_known
-from identification.physics.vehicle.term import Moment, Scale
+from identification.physics.vehicle.term import Scale, VehicleContext
 from identification.recording import Channel, Floats, Recording
 from identification.vehicle.efficiency import Installation
 from identification.vehicle.trials import response_of, thruster_volts
@@ -42,7 +42,7 @@ class Run:
     """(T,)"""
     basis: tuple[tuple[int, ...], ...]
     """Of each thruster: where its coefficients stand among all."""
-    moment: Moment
+    moment: VehicleContext
     installation: Installation
 
     @property
@@ -261,7 +261,7 @@ def _run(
         at.append(tuple(range(ends, ends + len(thruster.names))))
         ends += len(thruster.names)
     heading = np.full(middle.size, np.nan) if axis == "yaw" else _heading(recording, middle)
-    moment = Moment(
+    moment = VehicleContext(
         scale,
         grid.step,
         np.array([grid.volts[name] for name in names]),

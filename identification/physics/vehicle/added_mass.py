@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from identification.physics.term import Parameter
-from identification.physics.vehicle.term import Body, Moment, Scale, Stage, Untouched
+from identification.physics.vehicle.term import Body, Scale, Stage, Untouched, VehicleContext
 
 MOST: Mapping[str, float] = {"surge": 1.0, "sway": 3.0, "heave": 3.0, "yaw": 3.0}
 """Of the stated inertia. A sphere has 0.5 of what it displaces, slender bodies less lengthwise and 1 across (Newman,
@@ -21,7 +21,7 @@ class AddedMass(Untouched):
     id: ClassVar[str] = "added_mass"
     stage: ClassVar[Stage] = "body"
     physics: ClassVar[str] = "water is accelerated with the vehicle"
-    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
     form: str = ""
 
     def needs(self, scale: Scale) -> str:
@@ -35,7 +35,7 @@ class AddedMass(Untouched):
         most = self.parameters(scale)[0].high
         return tuple((share * most,) for share in (0.05, 0.3, 0.8))
 
-    def on_body(self, body: Body, now: Moment, theta: tuple[float, ...]) -> Body:
+    def on_body(self, body: Body, now: VehicleContext, theta: tuple[float, ...]) -> Body:
         return replace(body, mass=body.mass + theta[0])
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from identification.physics.term import Parameter
-from identification.physics.vehicle.term import Body, Moment, Scale, Stage, Untouched
+from identification.physics.vehicle.term import Body, Scale, Stage, Untouched, VehicleContext
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +16,7 @@ class BuoyancyOffset(Untouched):
     id: ClassVar[str] = "buoyancy_offset"
     stage: ClassVar[Stage] = "body"
     physics: ClassVar[str] = "weight and buoyancy do not balance"
-    coordinates: ClassVar[tuple[str, ...]] = ("time",)
+    covariates: ClassVar[tuple[str, ...]] = ("time",)
     form: Literal["shared", "by_ballast"] = "shared"
 
     def needs(self, scale: Scale) -> str:
@@ -32,7 +32,7 @@ class BuoyancyOffset(Untouched):
         count = len(self.parameters(scale))
         return ((0.02 * scale.force,) * count, (-0.02 * scale.force,) * count)
 
-    def on_body(self, body: Body, now: Moment, theta: tuple[float, ...]) -> Body:
+    def on_body(self, body: Body, now: VehicleContext, theta: tuple[float, ...]) -> Body:
         force = theta[0] if self.form == "shared" else theta[now.scale.ballasts.index(now.ballast)]
         return replace(body, steady=body.steady + force)
 

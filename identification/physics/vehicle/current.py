@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter
-from identification.physics.vehicle.term import Body, Moment, Scale, Stage, Untouched
+from identification.physics.vehicle.term import Body, Scale, Stage, Untouched, VehicleContext
 
 ONE_HEADING = 0.02
 """Spread of the heading below which only the current along it is seen."""
@@ -22,7 +22,7 @@ class Current(Untouched):
     id: ClassVar[str] = "current"
     stage: ClassVar[Stage] = "body"
     physics: ClassVar[str] = "the water moves"
-    coordinates: ClassVar[tuple[str, ...]] = ("heading", "speed")
+    covariates: ClassVar[tuple[str, ...]] = ("heading", "speed")
     form: Literal["uniform", "along"] = "uniform"
 
     def needs(self, scale: Scale) -> str:
@@ -44,7 +44,7 @@ class Current(Untouched):
             return ((size,), (-size,), (8 * size,), (-8 * size,))
         return tuple((size * f * a, size * f * b) for f in (1, 6) for a, b in ((1, 1), (1, -1), (-1, 1), (-1, -1)))
 
-    def on_body(self, body: Body, now: Moment, theta: tuple[float, ...]) -> Body:
+    def on_body(self, body: Body, now: VehicleContext, theta: tuple[float, ...]) -> Body:
         if self.form == "along":
             return replace(body, water=body.water + theta[0])
         psi = np.where(np.isfinite(now.heading), now.heading, 0.0)

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter
-from identification.physics.vehicle.term import Moment, Scale, Stage, Untouched
+from identification.physics.vehicle.term import Scale, Stage, Untouched, VehicleContext
 from identification.recording import Floats
 
 EDGE = 0.02
@@ -22,7 +22,7 @@ class DeadBand(Untouched):
     id: ClassVar[str] = "dead_band"
     stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "below a voltage the rotors do not turn"
-    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     form: Literal["shrink", "jump"] = "shrink"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -31,7 +31,7 @@ class DeadBand(Untouched):
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((share * scale.volts,) for share in (0.02, 0.05, 0.1, 0.2, 0.35))
 
-    def on_volts(self, volts: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def on_volts(self, volts: Floats, now: VehicleContext, theta: tuple[float, ...]) -> Floats:
         size = np.abs(volts)
         if self.form == "jump":
             out: Floats = volts * np.clip((size - theta[0]) / (EDGE * now.scale.volts) + 0.5, 0.0, 1.0)

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter
-from identification.physics.vehicle.term import Moment, Scale, Stage, Untouched
+from identification.physics.vehicle.term import Scale, Stage, Untouched, VehicleContext
 from identification.recording import Floats
 
 LEAST = 0.05
@@ -22,7 +22,7 @@ class InstallationEfficiency(Untouched):
     id: ClassVar[str] = "installation_efficiency"
     stage: ClassVar[Stage] = "thrust"
     physics: ClassVar[str] = "installed, thrusters give less than alone in the tunnel"
-    coordinates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     form: Literal["overall", "propeller_hull", "propeller_propeller"] = "overall"
     name: str = "eta"
 
@@ -41,7 +41,7 @@ class InstallationEfficiency(Untouched):
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.97,), (0.85,), (0.5,))
 
-    def on_thrust(self, thrust: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def on_thrust(self, thrust: Floats, now: VehicleContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = (
             thrust * theta[0] if self.form == "overall" else np.where(now.active[self.name], thrust * theta[0], thrust)
         )

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from identification.physics.term import Parameter
-from identification.physics.vehicle.term import Body, Moment, Scale, Stage, Untouched
+from identification.physics.vehicle.term import Body, Scale, Stage, Untouched, VehicleContext
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +16,7 @@ class LinearDrag(Untouched):
     id: ClassVar[str] = "linear_drag"
     stage: ClassVar[Stage] = "body"
     physics: ClassVar[str] = "drag has a part in proportion to the speed"
-    coordinates: ClassVar[tuple[str, ...]] = ("speed",)
+    covariates: ClassVar[tuple[str, ...]] = ("speed",)
     form: str = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -25,7 +25,7 @@ class LinearDrag(Untouched):
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((share * scale.force / scale.speed,) for share in (0.03, 0.2, 0.7))
 
-    def on_body(self, body: Body, now: Moment, theta: tuple[float, ...]) -> Body:
+    def on_body(self, body: Body, now: VehicleContext, theta: tuple[float, ...]) -> Body:
         return replace(body, linear=body.linear + theta[0])
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from identification.physics.term import Parameter
-from identification.physics.vehicle.term import Moment, Scale, Stage, Untouched
+from identification.physics.vehicle.term import Scale, Stage, Untouched, VehicleContext
 from identification.recording import Floats
 
 
@@ -20,7 +20,7 @@ class MotorLag(Untouched):
     id: ClassVar[str] = "motor_lag"
     stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "the rotors need time to follow"
-    coordinates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
     form: str = "first_order"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -30,7 +30,7 @@ class MotorLag(Untouched):
         most = min(10.0, 0.1 * scale.duration)
         return tuple((tau,) for tau in (0.1, 0.3, 1.0, 3.0) if tau <= 0.5 * most)
 
-    def on_volts(self, volts: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def on_volts(self, volts: Floats, now: VehicleContext, theta: tuple[float, ...]) -> Floats:
         tau = theta[0]
         looks = volts.shape[2]
         dt = now.step / looks

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar
 
 from identification.physics.term import Parameter
-from identification.physics.vehicle.term import Body, Moment, Scale, Stage, Untouched
+from identification.physics.vehicle.term import Body, Scale, Stage, Untouched, VehicleContext
 
 
 @dataclass(frozen=True, slots=True)
@@ -16,7 +16,7 @@ class QuadraticDrag(Untouched):
     id: ClassVar[str] = "quadratic_drag"
     stage: ClassVar[Stage] = "body"
     physics: ClassVar[str] = "the quadratic drag ahead and astern differ"
-    coordinates: ClassVar[tuple[str, ...]] = ("speed",)
+    covariates: ClassVar[tuple[str, ...]] = ("speed",)
     form: str = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -25,7 +25,7 @@ class QuadraticDrag(Untouched):
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((-0.2,), (0.2,), (1.0,))
 
-    def on_body(self, body: Body, now: Moment, theta: tuple[float, ...]) -> Body:
+    def on_body(self, body: Body, now: VehicleContext, theta: tuple[float, ...]) -> Body:
         return replace(body, astern=body.astern * (1 + theta[0]))
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

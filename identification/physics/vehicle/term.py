@@ -76,7 +76,7 @@ class Scale:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Moment:
+class VehicleContext:
     """What a term may look at in one run, on its grid of g steps with S looks at the command in each."""
 
     scale: Scale
@@ -129,7 +129,7 @@ class VehicleTerm(Protocol):
         """One clause: what it says is left out."""
 
     @property
-    def coordinates(self) -> tuple[str, ...]:
+    def covariates(self) -> tuple[str, ...]:
         """Covariates over which its shape shows."""
 
     def needs(self, scale: Scale) -> str:
@@ -141,13 +141,13 @@ class VehicleTerm(Protocol):
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         """Amounts to start a fit from."""
 
-    def on_volts(self, volts: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def on_volts(self, volts: Floats, now: VehicleContext, theta: tuple[float, ...]) -> Floats:
         """(T, g, S)"""
 
-    def on_thrust(self, thrust: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def on_thrust(self, thrust: Floats, now: VehicleContext, theta: tuple[float, ...]) -> Floats:
         """(T, g, S) N"""
 
-    def on_body(self, body: Body, now: Moment, theta: tuple[float, ...]) -> Body: ...
+    def on_body(self, body: Body, now: VehicleContext, theta: tuple[float, ...]) -> Body: ...
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         """One sentence a person can act on."""
@@ -161,11 +161,11 @@ class Untouched:
     def needs(self, scale: Scale) -> str:
         return ""
 
-    def on_volts(self, volts: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def on_volts(self, volts: Floats, now: VehicleContext, theta: tuple[float, ...]) -> Floats:
         return volts
 
-    def on_thrust(self, thrust: Floats, now: Moment, theta: tuple[float, ...]) -> Floats:
+    def on_thrust(self, thrust: Floats, now: VehicleContext, theta: tuple[float, ...]) -> Floats:
         return thrust
 
-    def on_body(self, body: Body, now: Moment, theta: tuple[float, ...]) -> Body:
+    def on_body(self, body: Body, now: VehicleContext, theta: tuple[float, ...]) -> Body:
         return body

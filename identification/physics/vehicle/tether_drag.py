@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import ClassVar, Literal
 
 from identification.physics.term import Parameter
-from identification.physics.vehicle.term import Body, Moment, Scale, Stage, Untouched
+from identification.physics.vehicle.term import Body, Scale, Stage, Untouched, VehicleContext
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +19,7 @@ class TetherDrag(Untouched):
     id: ClassVar[str] = "tether_drag"
     stage: ClassVar[Stage] = "body"
     physics: ClassVar[str] = "a tether drags or pulls, the more the farther out"
-    coordinates: ClassVar[tuple[str, ...]] = ("position",)
+    covariates: ClassVar[tuple[str, ...]] = ("position",)
     form: Literal["drag", "pull"] = "drag"
 
     def needs(self, scale: Scale) -> str:
@@ -35,7 +35,7 @@ class TetherDrag(Untouched):
         most = self.parameters(scale)[0].high
         return tuple((share * most,) for share in (0.002, 0.02, 0.1))
 
-    def on_body(self, body: Body, now: Moment, theta: tuple[float, ...]) -> Body:
+    def on_body(self, body: Body, now: VehicleContext, theta: tuple[float, ...]) -> Body:
         if self.form == "drag":
             return replace(body, line_drag=body.line_drag + theta[0])
         return replace(body, line_pull=body.line_pull + theta[0])
