@@ -64,9 +64,7 @@ def main(before: str, after: str, *options: str) -> int:
         if found or ("--figures" in options and by > MOVED):
             print(f"{case}: {'; '.join(found)} (figures move by {by:.1e})")
         other += bool(found)
-    print(
-        f"{len(both)} cases in both, {other} answered otherwise, {shifted} with a figure that moved by {MOVED:g} or more"
-    )
+    print(f"{len(both)} cases in both: {other} answered otherwise; {shifted} with a figure moved by {MOVED:g} or more")
     return 1 if other else 0
 
 

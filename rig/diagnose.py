@@ -129,7 +129,7 @@ def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = ())
 
     `recordings`: those diagnosed; with them the page draws each effect by itself. Raises OSError, ConfigError.
     """
-    from identification.mismatch.diagnosis import diagnosis_json
+    from identification.mismatch.answer.as_json import diagnosis_json
     from rig.diagnose_text import diagnosis_text
 
     if wanted.save_twin is not None and found.twin is not None:

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 from math import floor, isfinite, log10
 from textwrap import wrap
 
-from identification.mismatch.answer.remainder import FlexibleShape, FormulaFound
-from identification.mismatch.diagnosis import NOT_WHITE, Diagnosis, Finding, Unexplained, Value, Where
+from identification.mismatch.diagnosis import NOT_WHITE, Diagnosis, Finding, FlexibleShape, FormulaFound, Remainder
+from identification.mismatch.value import Value, Where
 
 WIDTH = 100
 MOST_STEPS = 12
@@ -102,7 +102,7 @@ def _finding(f: Finding) -> Iterator[str]:
         yield from _para(f"- or {rival.effect} (BIC worse by {rival.bic_loss:.1f}): {rival.statement}", "  ")
 
 
-def _unexplained(u: Unexplained, force: str) -> Iterator[str]:
+def _unexplained(u: Remainder, force: str) -> Iterator[str]:
     yield f"Not explained: {100 * u.share:.0f} % of what remains, at {place(u.where)} ({rarity(u.p_value)})"
     yield from _shape(u, force)
     for text in u.resembles:
@@ -139,7 +139,7 @@ def _formula(f: FormulaFound) -> Iterator[str]:
         yield from _para(f"about as well: {', '.join(f.equals)} (F: the thrust)", "  ")
 
 
-def _shape(u: Unexplained, force: str) -> Iterator[str]:
+def _shape(u: Remainder, force: str) -> Iterator[str]:
     """The residual over the covariate, bin by bin, as numbers and bars."""
     rows = [(a, b, c) for a, b, c in u.shape if isfinite(b)]
     size = max((abs(b) for _, b, _ in rows), default=0.0)

@@ -252,7 +252,7 @@ PATH = click.Path(path_type=Path)
 
 def _leave(settling: Settling, found: Diagnosis, course: Course, end: End, wanted: Wanted) -> None:
     """JSON, page and text. Raises RigError where one cannot be written."""
-    from identification.mismatch.diagnosis import diagnosis_json
+    from identification.mismatch.answer.as_json import diagnosis_json
     from identification.mismatch.next_experiment.sequential_experiment import course_json
 
     answer = json.dumps({**diagnosis_json(found), "settling": course_json(course, end)}, indent=1, allow_nan=False)

@@ -1,18 +1,14 @@
-"""The answer: adequate, explained, ambiguous or unexplained, and all that a person or a program needs with it."""
+"""What a diagnosis comes to: the verdict as a sum type, and all that a person or a program needs with it. Data only."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import isfinite
-from typing import Literal
+from typing import ClassVar, Literal
 
-from identification.mismatch.answer.remainder import FlexibleShape, FormulaFound, flexible_json, formula_json
+from identification.mismatch.value import Value, Where
 from identification.recording import Floats
 from identification.twin import Twin
-
-QUANTILE = 1.959964
-"""Standard errors to the end of a 95 % interval."""
 
 WHITE = 0.01
 """p-value of whiteness below which what remains is called not white."""
@@ -20,34 +16,6 @@ NOT_WHITE = (
     "intervals and p-values rest on the noise model, which does not describe all of it: they may be surer than they "
     "should"
 )
-
-Verdict = Literal["adequate", "explained", "ambiguous", "unexplained"]
-
-
-@dataclass(frozen=True, slots=True)
-class Value:
-    value: float
-    std: float
-    """Such that value +- 1.96 std holds the whole 95 % interval."""
-    unit: str
-    ends: tuple[float, float] | None = None
-    """Of the 95 % interval, where it is not value +- 1.96 std."""
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """The 95 % interval; NaN where the data do not determine the value."""
-        half = QUANTILE * self.std
-        return self.ends or (self.value - half, self.value + half)
-
-
-@dataclass(frozen=True, slots=True)
-class Where:
-    """A stretch of a quantity of recording-format.md, or of time, time_since_step, previous_voltage, direction ..."""
-
-    quantity: str
-    low: float
-    high: float
-    unit: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,7 +56,60 @@ class Finding:
 
 
 @dataclass(frozen=True, eq=False)
-class Unexplained:
+class Spline:
+    """What a flexible term multiplies by, over its covariate."""
+
+    times: str
+    """`force` (1), `gain` (thrust), `even` (|thrust|), `step` (change of thrust), `rate` (|drive|) or `drive`."""
+    what: str
+    """The same as a clause."""
+    unit: str
+    at: Floats
+    value: Floats
+    std: Floats
+    """The curve, (n,) each."""
+    table: tuple[tuple[float, float, float, float], ...]
+    """(covariate, value of the spline, value measured there, its standard error) bin by bin."""
+
+
+@dataclass(frozen=True, eq=False)
+class FlexibleShape:
+    """A flexible term of the final model: a spline over a covariate, no physics."""
+
+    covariate: str
+    unit: str
+    knots: tuple[float, ...]
+    degree: int
+    memory: float
+    """s, of load_history; otherwise 0."""
+    period: float
+    """s after which a spline over time begins anew; 0: never."""
+    coefficients: Mapping[str, Value]
+    splines: tuple[Spline, ...]
+    statement: str
+
+
+@dataclass(frozen=True, eq=False)
+class FormulaFound:
+    """A formula that agrees with held-out data and in both halves; a formula, not a physics."""
+
+    text: str
+    """`residual = ...`"""
+    symbols: str
+    """What its symbols stand for: `T_w: water_temperature`."""
+    coefficients: Mapping[str, Value]
+    bic_gain: float
+    heldout_before: float
+    heldout_after: float
+    """RMSE per sample on what was not fitted, without and with the formula alone, N."""
+    halves_p: float
+    """p-value of the same coefficients in both halves."""
+    equals: tuple[str, ...] = ()
+    """Other formulas that do about as well."""
+
+
+@dataclass(frozen=True, eq=False)
+class Remainder:
     """Structure that no term of the catalogue carries."""
 
     where: Where
@@ -145,6 +166,45 @@ class NextExperiment:
         return "rev/s" if self.quantity == "rotation_rate" else "V"
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Adequate:
+    """Nothing is missing, at the stated false-alarm rate."""
+
+    name: ClassVar[Literal["adequate"]] = "adequate"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Explained:
+    """The findings account for the mismatch, and what remains is noise."""
+
+    name: ClassVar[Literal["explained"]] = "explained"
+    findings: tuple[Finding, ...]
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Ambiguous:
+    """Some finding has a rival that does as well."""
+
+    name: ClassVar[Literal["ambiguous"]] = "ambiguous"
+    findings: tuple[Finding, ...]
+    next_experiment: NextExperiment | None
+    """The sweep that tells the rivals apart; None where the bench allows none."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Unexplained:
+    """Structure is left that no term of the catalogue carries; what is known beside it is in the findings."""
+
+    name: ClassVar[Literal["unexplained"]] = "unexplained"
+    findings: tuple[Finding, ...]
+    remainder: Remainder
+    next_experiment: NextExperiment | None
+
+
+Verdict = Adequate | Explained | Ambiguous | Unexplained
+VerdictName = Literal["adequate", "explained", "ambiguous", "unexplained"]
+
+
 @dataclass(frozen=True, eq=False)
 class Curves:
     """What a report draws, per run: on the intervals with thrust, (n,) each."""
@@ -161,12 +221,10 @@ class Curves:
 class Diagnosis:
     recordings: tuple[str, ...]
     thruster: str
-    verdict: Verdict
+    answer: Verdict
     baseline_model: str
     baseline: Mapping[str, Value]
     mismatch: tuple[Mismatch, ...]
-    findings: tuple[Finding, ...]
-    unexplained: Unexplained | None
     model_terms: tuple[str, ...]
     model: Mapping[str, Value]
     """`C`, tares and `effect.parameter` of the final model."""
@@ -174,7 +232,6 @@ class Diagnosis:
     heldout: HeldOutRmse
     chi2_per_dof: float
     whiteness_p: float
-    next_experiment: NextExperiment | None
     notes: tuple[str, ...] = ()
     curves: tuple[Curves, ...] = field(default=(), repr=False)
     twin: Twin | None = field(default=None, repr=False)
@@ -192,22 +249,41 @@ class Diagnosis:
         return self.whiteness_p >= WHITE
 
     @property
+    def verdict(self) -> VerdictName:
+        """The answer's name."""
+        return self.answer.name
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What was left out, by name; channel faults first, the clearest first among the others."""
+        return () if isinstance(self.answer, Adequate) else self.answer.findings
+
+    @property
+    def unexplained(self) -> Remainder | None:
+        """What no name carries."""
+        return self.answer.remainder if isinstance(self.answer, Unexplained) else None
+
+    @property
+    def next_experiment(self) -> NextExperiment | None:
+        """What would settle an answer that is still open."""
+        return self.answer.next_experiment if isinstance(self.answer, Ambiguous | Unexplained) else None
+
+    @property
     def statement(self) -> str:
         """The verdict in one sentence."""
-        match self.verdict:
-            case "adequate":
+        match self.answer:
+            case Adequate():
                 return f"Nothing is missing: {self.baseline_model} describes these recordings within their noise."
-            case "explained":
-                return "Left out: " + " ".join(f.statement for f in self.findings)
-            case "ambiguous":
-                rivals = "; ".join(_either(f) for f in self.findings if f.rivals)
-                sure = " ".join(f.statement for f in self.findings if not f.rivals)
+            case Explained(findings):
+                return "Left out: " + " ".join(f.statement for f in findings)
+            case Ambiguous(findings):
+                rivals = "; ".join(_either(f) for f in findings if f.rivals)
+                sure = " ".join(f.statement for f in findings if not f.rivals)
                 known = f" Left out besides: {sure}" if sure else ""
                 return f"These recordings cannot tell {rivals}: run the next experiment.{known}"
-            case _:
-                assert self.unexplained is not None
-                known = " Known: " + " ".join(f.statement for f in self.findings) if self.findings else ""
-                return self.unexplained.statement + known
+            case Unexplained(findings, remainder):
+                known = " Known: " + " ".join(f.statement for f in findings) if findings else ""
+                return remainder.statement + known
 
 
 def _either(f: Finding) -> str:
@@ -215,106 +291,3 @@ def _either(f: Finding) -> str:
     every = [(f.effect, f.form), *((r.effect, r.form) for r in f.rivals)]
     same = len({effect for effect, _ in every}) < len(every)
     return " or ".join(f"{effect} ({form})" if same and form else effect for effect, form in every)
-
-
-def diagnosis_json(d: Diagnosis) -> dict[str, object]:
-    """`thruster-rig-diagnosis` version 1, see docs/howto/diagnose.md."""
-    return {
-        "format": "thruster-rig-diagnosis",
-        "version": 1,
-        "recordings": list(d.recordings),
-        "thruster": d.thruster,
-        "response": {"quantity": d.response, "unit": d.unit, "force_unit": d.force_unit},
-        "verdict": d.verdict,
-        "statement": d.statement,
-        "baseline": {"model": d.baseline_model, "parameters": _values(d.baseline)},
-        "mismatch": [
-            {
-                "channel": m.channel,
-                "where": _where(m.where),
-                "share": _number(m.share),
-                "p_value": _number(m.p_value),
-                "statement": m.statement,
-            }
-            for m in d.mismatch
-        ],
-        "findings": [_finding(f) for f in d.findings],
-        "unexplained": None if d.unexplained is None else _unexplained(d.unexplained),
-        "model": {"terms": list(d.model_terms), "parameters": _values(d.model)},
-        "fit": {
-            "train": {"rmse_before": _number(d.train.before), "rmse_after": _number(d.train.after)},
-            "heldout": {
-                "rmse_before": _number(d.heldout.before),
-                "rmse_after": _number(d.heldout.after),
-                "noise": _number(d.heldout.noise),
-                "what": d.heldout.what,
-            },
-            "chi2_per_dof": _number(d.chi2_per_dof),
-            "whiteness_p": _number(d.whiteness_p),
-        },
-        "next_experiment": None
-        if d.next_experiment is None
-        else {
-            "why": d.next_experiment.why,
-            "steps": [
-                {d.next_experiment.quantity: s.command_voltage, "duration": s.duration, "flow_speed": s.flow_speed}
-                for s in d.next_experiment.steps
-            ],
-            "expected_power": _number(d.next_experiment.expected_power),
-        },
-        "notes": list(d.notes),
-    }
-
-
-def _number(x: float) -> float | None:
-    return float(x) if isfinite(x) else None
-
-
-def _values(values: Mapping[str, Value]) -> dict[str, object]:
-    out: dict[str, object] = {}
-    for name, v in values.items():
-        low, high = v.interval
-        told = {"value": _number(v.value), "std": _number(v.std), "low": _number(low), "high": _number(high)}
-        out[name] = {**told, "unit": v.unit}
-    return out
-
-
-def _where(w: Where) -> dict[str, object]:
-    return {"quantity": w.quantity, "from": _number(w.low), "to": _number(w.high), "unit": w.unit}
-
-
-def _finding(f: Finding) -> dict[str, object]:
-    return {
-        "effect": f.effect,
-        "form": f.form,
-        "statement": f.statement,
-        "parameters": _values(f.parameters),
-        "p_value": _number(f.p_value),
-        "bic_gain": _number(f.bic_gain),
-        "probability": _number(f.probability),
-        "rivals": [r.effect for r in f.rivals],
-        "rival_details": [
-            {
-                "effect": r.effect,
-                "form": r.form,
-                "parameters": _values(r.parameters),
-                "bic_loss": _number(r.bic_loss),
-                "statement": r.statement,
-            }
-            for r in f.rivals
-        ],
-    }
-
-
-def _unexplained(u: Unexplained) -> dict[str, object]:
-    return {
-        "where": _where(u.where),
-        "share": _number(u.share),
-        "p_value": _number(u.p_value),
-        "shape": [{"at": _number(a), "residual": _number(b), "std": _number(c)} for a, b, c in u.shape],
-        "statement": u.statement,
-        "resembles": list(u.resembles),
-        "equals": list(u.equals),
-        "flexible": flexible_json(u.flexible, u.replaces, u.heldout_without),
-        "formula": None if u.formula is None else formula_json(u.formula),
-    }

@@ -18,8 +18,9 @@ from typing import Any
 
 import numpy as np
 
+from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.compare.simulation import Drive, Prediction, held, others_of, simulate
-from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
+from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import Refusal
 from identification.recording import Floats, Recording

@@ -7,7 +7,8 @@ from math import isfinite, sqrt
 from pathlib import Path
 
 from identification.mismatch.compare.reported_runs import Run, runs_of
-from identification.mismatch.diagnosis import NOT_WHITE, Diagnosis, NextExperiment, Value
+from identification.mismatch.diagnosis import NOT_WHITE, Diagnosis, NextExperiment
+from identification.mismatch.value import Value
 from identification.recording import Recording
 from rig.report import page as pages
 from rig.report import provenance

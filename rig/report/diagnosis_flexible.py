@@ -6,8 +6,8 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from identification.mismatch.answer.remainder import FlexibleShape, Spline
-from identification.mismatch.diagnosis import Unexplained, Value
+from identification.mismatch.diagnosis import FlexibleShape, Remainder, Spline
+from identification.mismatch.value import Value
 from rig.report.diagnosis_words import axis, effect_name, rarity, value_cells, words
 from rig.report.figures import Curve, Group
 from rig.report.figures_diagnosis import spline_over
@@ -26,7 +26,7 @@ ORDINATES: Mapping[str, tuple[str, float]] = {
 """Label and factor of what a spline multiplies."""
 
 
-def modelled_remarks(u: Unexplained) -> Iterator[Remark]:
+def modelled_remarks(u: Remainder) -> Iterator[Remark]:
     """What takes the place of physics, and how well it does on data that it has not seen."""
     for shape in u.flexible:
         yield Remark(words(shape.statement))
@@ -53,7 +53,7 @@ def _told(value: Value) -> str:
     return f"{shown} {unit.replace('degC', '°C')}".strip()
 
 
-def flexible_pictures(u: Unexplained, driver: str) -> Iterator[Picture]:
+def flexible_pictures(u: Remainder, driver: str) -> Iterator[Picture]:
     """Each spline with its band beside the residual in bins."""
     for f in u.flexible:
         for s in f.splines:

@@ -9,7 +9,8 @@ import numpy as np
 from identification.mismatch.compare.reported_runs import Run
 from identification.mismatch.compare.signature import SPREAD_OUT, Signature, profile, signature
 from identification.mismatch.compare.signature import shape as shape_of
-from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, NextExperiment, Unexplained, Where
+from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, NextExperiment, Remainder
+from identification.mismatch.value import Where
 from rig.report.diagnosis_words import KINDS, axis, driver_quantity, effect_name, evidence, stretch, words
 from rig.report.figures import Curve, Group
 from rig.report.figures_diagnosis import residual_size, shape, signature_over, steps_plot
@@ -165,7 +166,7 @@ def shape_pictures(d: Diagnosis, runs: Sequence[Run]) -> Iterator[Picture]:
             yield Picture(f"Left out over {x}", plot, caption)
 
 
-def unexplained_picture(u: Unexplained, driver: str) -> Picture | None:
+def unexplained_picture(u: Remainder, driver: str) -> Picture | None:
     """Shape of what is left."""
     rows = np.array([row for row in u.shape if np.isfinite(row[1])])
     if len(rows) < 2:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.mismatch.diagnosis import Curves, Diagnosis, Unexplained
+from identification.mismatch.diagnosis import Curves, Diagnosis, Remainder
 from identification.recording import Recording
 from rig.report import page as pages
 from rig.report.diagnosis import (
@@ -97,7 +97,7 @@ def unexplained_section(d: Diagnosis) -> tuple[Section, ...]:
     return (Section("What is not explained", (*sentences(told), *_left(u, d))),)
 
 
-def _left(u: Unexplained, d: Diagnosis) -> Iterator[Picture]:
+def _left(u: Remainder, d: Diagnosis) -> Iterator[Picture]:
     rows = np.array([row for row in u.shape if np.isfinite(row[1])])
     if len(rows) < 2:
         return

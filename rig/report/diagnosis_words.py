@@ -7,7 +7,8 @@ from collections.abc import Mapping
 from math import isfinite
 
 from identification.mismatch.compare.signature import Kind
-from identification.mismatch.diagnosis import Diagnosis, Finding, Value, Where
+from identification.mismatch.diagnosis import Diagnosis, Finding
+from identification.mismatch.value import Value, Where
 from identification.thruster.thrust_report import digits
 from rig.report.look import prose, unit_text
 from rig.report.rivals import REVEALED_BY

@@ -10,8 +10,9 @@ from diagnosed_runs import C, run
 
 from identification.flexible_terms.flexible import MULTIPLIERS, Flexible, turned
 from identification.flexible_terms.formula import Monomial
+from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.compare.simulation import Drive, Prediction, others_of, simulate
-from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
+from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.model.model import Data
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import history_of

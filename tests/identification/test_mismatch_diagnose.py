@@ -8,7 +8,8 @@ import pytest
 from diagnosed_runs import NOISE, TOP, C, dead_band, levels, run, table
 
 from identification.mismatch import pipeline as diagnosing
-from identification.mismatch.diagnosis import Diagnosis, Where, diagnosis_json
+from identification.mismatch.answer.as_json import diagnosis_json
+from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.estimate.fitting import extended, fit
 from identification.mismatch.model.model import Model
 from identification.mismatch.name.naming import failed_checks
@@ -21,6 +22,7 @@ from identification.mismatch.select.forward_selection import search
 from identification.mismatch.validate.held_out import Score
 from identification.mismatch.validate.prediction import predicting, predicts, worse_predicted
 from identification.mismatch.validate.train_test_split import train_test_split
+from identification.mismatch.value import Where
 from identification.physics.dead_band import DeadBand
 from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.motor_lag import MotorLag

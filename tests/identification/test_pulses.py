@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
+from identification.mismatch.answer.as_json import diagnosis_json
+from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.locate.pulses import likeliest_pulses
 from identification.mismatch.locate.residual_structure_test import PLAIN_P
 from identification.mismatch.model.model import Model

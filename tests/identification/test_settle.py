@@ -10,10 +10,9 @@ from identification.mismatch.diagnosis import (
     HeldOutRmse,
     NextExperiment,
     PlanStep,
+    Remainder,
     RivalFinding,
     Rmse,
-    Unexplained,
-    Where,
 )
 from identification.mismatch.next_experiment.sequential_experiment import (
     LEAST,
@@ -26,6 +25,7 @@ from identification.mismatch.next_experiment.sequential_experiment import (
     opening_line,
     round_line,
 )
+from identification.mismatch.value import Where
 
 SWEEP = NextExperiment("separates exponent from dead_band", (PlanStep(0.0, 3.0), PlanStep(9.0, 4.0)), 0.9)
 
@@ -37,7 +37,7 @@ def finding(effect, **rivals):
 
 def diagnosis(verdict, *findings, experiment=None, place=""):
     where = Where(place, 0.0, 1.0, "V")
-    left = Unexplained(where, 0.5, 1e-9, (), "Something is left.") if place else None
+    left = Remainder(where, 0.5, 1e-9, (), "Something is left.") if place else None
     return Diagnosis(
         *(("a",), "T1", verdict, "C V|V|", {}, (), findings, left, (), {}),
         *(Rmse(1.0, 0.1), HeldOutRmse(1.0, 0.1, 0.1, "blocks"), 1.0, 0.5, experiment),

@@ -7,7 +7,8 @@ import pytest
 
 from identification.mismatch.compare.reported_runs import runs_of
 from identification.mismatch.compare.signature import profile, shape, signature
-from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, HeldOutRmse, Rmse, Value
+from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, HeldOutRmse, Rmse
+from identification.mismatch.value import Value
 
 LEVELS = np.array([0.0, 8.0, -8.0, 2.0, 16.0, -16.0, -2.0, 0.0, 12.0, 4.0, -12.0, -4.0])
 HOLD, RATE, C = 10.0, 20.0, 0.4

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from diagnosed_runs import NOISE, C, levels, run
 
+from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.compare.simulation import Drive, simulate, wave_notes
-from identification.mismatch.diagnosis import diagnosis_json
 from identification.mismatch.periodic.rotor_angle import turned
 from identification.mismatch.pipeline import diagnose
 from identification.recording import Channel, Recording

@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from diagnosed_runs import run
 
+from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.answer.proxies import PROXIES, proxies
-from identification.mismatch.diagnosis import Diagnosis, Finding, RivalFinding, Value, diagnosis_json
+from identification.mismatch.diagnosis import Diagnosis, Finding, RivalFinding
 from identification.mismatch.model.model import Given, Model
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.channel_availability import held_by_all
 from identification.mismatch.prepare.preparing import Refusal, history_of
+from identification.mismatch.value import Value
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.heating import Heating
 from identification.recording import Channel

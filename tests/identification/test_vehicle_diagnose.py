@@ -9,7 +9,8 @@ from math import isfinite
 import numpy as np
 import pytest
 
-from identification.mismatch.diagnosis import Diagnosis, diagnosis_json
+from identification.mismatch.answer.as_json import diagnosis_json
+from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.vehicle.diagnose import diagnose_vehicle

@@ -7,23 +7,23 @@ import pytest
 from report_reading import open_fonts, read
 
 from identification.flexible_terms.flexible import MULTIPLIERS, WORDS
-from identification.mismatch.answer.remainder import FlexibleShape, Spline
 from identification.mismatch.diagnosis import (
     NOT_WHITE,
     Curves,
     Diagnosis,
     Finding,
+    FlexibleShape,
     HeldOutRmse,
     Mismatch,
     NextExperiment,
     PlanStep,
+    Remainder,
     RivalFinding,
     Rmse,
-    Unexplained,
-    Value,
-    Where,
+    Spline,
 )
 from identification.mismatch.prepare.preparing import history_of
+from identification.mismatch.value import Value, Where
 from identification.physics.term import Scale
 from identification.recording import Channel, Recording
 from identification.twin import Source, Twin, TwinNoise, TwinTerm
@@ -72,7 +72,7 @@ LAGS = Finding(
     *({"time_constant": Value(LAG, 0.001, "s")}, 0.0, 5000.0, 0.7, (SKEW,)),
 )
 NEXT = NextExperiment("separates motor_lag from time_skew", (PlanStep(2.0, 4.0), PlanStep(-9.0, 3.0, 0.5)), 0.97)
-ODD = Unexplained(
+ODD = Remainder(
     *(Where("time", 5.0, 20.0, "s"), 0.3, 1e-5, ((2.0, 0.1, 0.02), (8.0, -0.3, 0.03), (20.0, np.nan, np.nan))),
     *("Something is left at time 5 to 20 s.", ("heating: its parameters end at what is physically possible",)),
 )

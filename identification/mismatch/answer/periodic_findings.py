@@ -7,23 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.estimation.tails import normal_sf
-from identification.mismatch.diagnosis import (
-    Diagnosis,
-    Finding,
-    Mismatch,
-    NextExperiment,
-    PlanStep,
-    RivalFinding,
-    Value,
-    Where,
-)
-from identification.mismatch.estimate.estimate import Estimate
-from identification.mismatch.model.model import Data
-from identification.mismatch.next_experiment.proposal import largest_level
-from identification.mismatch.next_experiment.sweeps import REST, Limits
+from identification.mismatch.answer.draft import Draft
+from identification.mismatch.diagnosis import Finding, Mismatch, RivalFinding
 from identification.mismatch.periodic.periodic_disturbances import Line
-from identification.mismatch.select.rivals import EQUAL, NEAR
+from identification.mismatch.select.rivals import NEAR
+from identification.mismatch.value import Value, Where
 from identification.twin import Twin, TwinLine
 
 EFFECT = "periodic_disturbance"
@@ -36,12 +24,6 @@ GRID = 0.002
 """Relative: the mains are kept within it nearly always (ENTSO-E)."""
 CHANGED = 3.3
 """Standard errors by which an amplitude must have changed to be a finding."""
-SECOND_LEVEL = 0.7
-"""Of the highest: a line that goes with the rotor is plainly elsewhere there."""
-LONGEST, SHORTEST = 120.0, 10.0
-"""s of one level of the sweep that tells a fixed line from one that goes with the rotor."""
-ENOUGH = 20.0
-"""Expected chi-square apart at which the probability of a right decision is about 0.95."""
 
 
 def twin_line(line: Line) -> TwinLine:
@@ -94,34 +76,35 @@ def line_place(line: Line, residual: float) -> Mismatch:
     return Mismatch("thrust", Where("frequency", low, high, "Hz"), share, max(line.p_value, LEAST_P), text)
 
 
-def with_lines(
-    answer: Diagnosis, lines: Sequence[Line], estimate: Estimate, data: Data, before: Twin | None, limits: Limits | None
-) -> Diagnosis:
-    """The answer with periodic disturbances: a place, a finding, parameters of the model, a part of the twin.
+def told_lines(lines: Sequence[Line], before: Twin | None) -> tuple[Line, ...]:
+    """Those that are news: one that the twin `before` has is only where it changed."""
+    known = () if before is None else before.lines
+    return tuple(line for line in lines if (j := _known_as(line, known)) is None or _changed(line, known[j]))
 
-    One that the twin `before` has is a finding only where it changed; one that is there no more is noted.
+
+def with_lines(draft: Draft, lines: Sequence[Line], residual: float, before: Twin | None) -> Draft:
+    """The draft with periodic disturbances: a place, a finding, parameters of the model, a part of the twin.
+
+    `residual`: rms of what the baseline leaves, N per sample. A line of the twin that is gone is noted.
     """
     known = () if before is None else before.lines
     same = {i: j for i, line in enumerate(lines) if (j := _known_as(line, known)) is not None}
-    told = [line for i, line in enumerate(lines) if i not in same or _changed(line, known[same[i]])]
+    told = told_lines(lines, before)
     gone = {j: line for j, line in enumerate(known) if j not in same.values()}
     others = iter(range(len(known), len(known) + len(lines)))
     found = {same[i] if i in same else next(others): twin_line(line) for i, line in enumerate(lines)}
     origin = "" if before is None else before.origin
-    answer = replace(
-        answer,
-        baseline={**answer.baseline, **_named(dict(enumerate(known)))},
-        mismatch=(*answer.mismatch, *(line_place(line, answer.train.before) for line in told)),
-        findings=(*answer.findings, *(_beside_known(line, known, origin) for line in told)),
-        model_terms=(*answer.model_terms, *(EFFECT for _ in lines)),
-        model={**answer.model, **_named(found)},
-        notes=(
-            *answer.notes,
-            *(f"{origin} has a line at {g.frequency:.4g} Hz, not found here." for g in gone.values()),
-        ),
-        twin=None if answer.twin is None else replace(answer.twin, lines=(*found.values(), *gone.values())),
+    missing = (f"{origin} has a line at {g.frequency:.4g} Hz, not found here." for g in gone.values())
+    return replace(
+        draft,
+        baseline={**draft.baseline, **_named(dict(enumerate(known)))},
+        mismatch=(*draft.mismatch, *(line_place(line, residual) for line in told)),
+        findings=(*draft.findings, *(_beside_known(line, known, origin) for line in told)),
+        model_terms=(*draft.model_terms, *(EFFECT for _ in lines)),
+        model={**draft.model, **_named(found)},
+        notes=(*draft.notes, *missing),
+        twin=None if draft.twin is None else replace(draft.twin, lines=(*found.values(), *gone.values())),
     )
-    return _decided(answer, told, estimate, data, limits) if told else answer
 
 
 def _named(lines: Mapping[int, TwinLine]) -> dict[str, Value]:
@@ -159,38 +142,3 @@ def _beside_known(line: Line, known: Sequence[TwinLine], origin: str) -> Finding
     if j is None:
         return found
     return replace(found, statement=f"{found.statement[:-1]}, where {origin} has {known[j].amplitude:.3g} N.")
-
-
-def _decided(
-    answer: Diagnosis, told: Sequence[Line], estimate: Estimate, data: Data, limits: Limits | None
-) -> Diagnosis:
-    """With the verdict that the lines make, and the levels that tell one of a fixed frequency from one that turns."""
-    open_ = [f for f in answer.findings if f.effect == EFFECT and any(r.bic_loss < EQUAL for r in f.rivals)]
-    if not open_:
-        return replace(answer, verdict="explained") if answer.verdict == "adequate" else answer
-    line = next(line for line in told if line.rival is not None and line.gain - line.rival.gain < EQUAL)
-    return replace(
-        answer,
-        verdict="ambiguous" if answer.verdict in ("adequate", "explained") else answer.verdict,
-        next_experiment=answer.next_experiment or two_levels(line, estimate, data, limits or Limits()),
-    )
-
-
-def two_levels(line: Line, estimate: Estimate, data: Data, limits: Limits) -> NextExperiment:
-    """Two levels of one direction: a line of a fixed frequency stays, one that goes with the rotor moves.
-
-    At the second level only the true kind gains, in proportion to the time; chi-square apart is normal, its standard
-    deviation twice the root of its mean.
-    """
-    volts = data.scale.driver_unit == "V"
-    limits = limits if volts else replace(limits, max_voltage=None)  # of a bench, in V
-    top = largest_level(data, estimate, limits)
-    gain = line.gain / sum(float(h.edges[-1] - h.edges[0]) for h in data.histories)
-    longest = max(0.5 * (limits.budget - 2 * REST), SHORTEST)
-    seconds = float(np.clip(np.ceil(ENOUGH / max(gain, 1e-9)), SHORTEST, min(LONGEST, longest)))
-    apart = gain * seconds
-    power = float(normal_sf((EQUAL - apart) / (2 * np.sqrt(apart)))) if apart > 0 else 0.5
-    steps = ((0.0, REST), (float(f"{top:.6g}"), seconds), (float(f"{SECOND_LEVEL * top:.3g}"), seconds), (0.0, REST))
-    why = f"separates a line at {line.frequency:.4g} Hz from one that goes with the rotor: two levels of one direction"
-    held = "command_voltage" if volts else "rotation_rate"
-    return NextExperiment(why, tuple(PlanStep(level, s) for level, s in steps), power, held)

@@ -3,42 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
-import numpy as np
-
-from identification.mismatch.diagnosis import (
-    QUANTILE,
-    Curves,
-    Finding,
-    Mismatch,
-    RivalFinding,
-    Value,
-    Where,
-)
+from identification.mismatch.diagnosis import Curves, Finding, RivalFinding
 from identification.mismatch.estimate.confidence_intervals import Interval
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, raw
-from identification.mismatch.faults.channel_faults import Fault
-from identification.mismatch.locate.residual_structure_test import ALARM, CovariateTest, locate, residual_structure
-from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.model.model import Data
 from identification.mismatch.name.naming import Named
-from identification.mismatch.prepare.preparing import DRIVERS
-from identification.mismatch.select.forward_selection import STATIC, Selected
-from identification.mismatch.select.rivals import Rival
+from identification.mismatch.select.forward_selection import Rival
+from identification.mismatch.value import QUANTILE, Value
 from identification.physics.term import Term
-
-MOST_PLACES = 3
-CLEAR = 1e-3
-"""p-value of a place below which it is told beside the clearest one."""
-LEAST_P = 1e-300
-
-
-def fault_finding(fault: Fault) -> Finding:
-    values = {k: Value(v.value, v.std, v.unit) for k, v in fault.parameters.items()}
-    p = max(fault.p_value, LEAST_P)
-    return Finding("channel_fault", fault.kind, fault.statement, values, p, -2 * float(np.log(p)), 1.0, ())
-
 
 Intervals = Mapping[Term, tuple[Interval, ...]]
 
@@ -100,47 +74,6 @@ def _rival(rival: Rival, data: Data) -> RivalFinding:
             return RivalFinding(term.id, term.form, known, rival.bic_loss, term.statement(values, data.scale))
         at += len(values)
     raise ValueError(f"{rival.term.id} is not in its own fit")
-
-
-def where_of(
-    judged: CovariateTest, fitted: Fit, data: Data, weights: Weights
-) -> tuple[Where, float, tuple[tuple[float, float, float], ...]]:
-    place = locate(judged, fitted, data, weights)
-    return Where(place.quantity, place.low, place.high, place.unit), place.share, place.table
-
-
-def says(where: Where, share: float, what: str) -> str:
-    unit = "" if where.unit == "1" else f" {where.unit}"
-    place = f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
-    return f"{100 * share:.0f} % of the residual lies at {place}: {what}."
-
-
-def places_of(found: Selected, after: Estimate, rng: np.random.Generator, *, pulsing: bool) -> tuple[Mismatch, ...]:
-    """Where the baseline fails: covariates of what was found first, the clearest first among them.
-
-    Its C and tares are those of the model `after`: with its own it shares out the mismatch over all there is.
-    `pulsing`: pulses that come back were found.
-    """
-    before, data = found.before.fit, found.data
-    seen = residual_structure(before, data, found.before.weights, rng, pulsing=pulsing)
-    if seen.p_value >= ALARM and not after.fit.model.terms:
-        return ()
-    same = replace(before.theta, C=after.fit.theta.C, tares=after.fit.theta.tares, shift=after.fit.theta.shift)
-    bare = replace(before, theta=same)
-    clear = [g for i, g in enumerate(seen.groups) if i == 0 or g.p_value <= CLEAR]
-    own = {q for term in after.fit.model.terms for c in term.covariates for q in (DRIVERS if c in STATIC else (c,))}
-    places = [
-        _mismatch(g, bare, data, after.weights) for g in sorted(clear, key=lambda g: g.covariate.quantity not in own)
-    ]
-    told = [place for place, whole in places if not whole] or [place for place, _ in places]
-    return tuple(told[:MOST_PLACES])
-
-
-def _mismatch(judged: CovariateTest, bare: Fit, data: Data, weights: Weights) -> tuple[Mismatch, bool]:
-    """Of one covariate, and whether it is all of that covariate, which says nothing."""
-    where, share, table = where_of(judged, bare, data, weights)
-    told = Mismatch("thrust", where, share, judged.p_value, says(where, share, judged.covariate.what))
-    return told, where.low <= table[0][0] and where.high >= table[-1][0]
 
 
 def curves_of(before: Estimate, after: Estimate, data: Data) -> tuple[Curves, ...]:

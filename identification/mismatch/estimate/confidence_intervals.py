@@ -14,9 +14,9 @@ from math import log, sqrt
 
 import numpy as np
 
-from identification.mismatch.diagnosis import QUANTILE
 from identification.mismatch.estimate.fitting import LEAST_REACH, Fit, bounds_of, columns_of, residual_of
 from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.value import QUANTILE
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 

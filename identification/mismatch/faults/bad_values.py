@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.diagnosis import Value
 from identification.mismatch.faults.cells import Cells, explained, fitted, own, shapes
+from identification.mismatch.value import Value
 from identification.recording import Channel, Floats, Recording
 
 MISSING_SHARE = 0.01

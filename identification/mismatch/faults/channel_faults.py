@@ -17,7 +17,6 @@ from typing import Literal
 
 import numpy as np
 
-from identification.mismatch.diagnosis import Value
 from identification.mismatch.faults.bad_values import Stuck, missing, stuck
 from identification.mismatch.faults.cells import Cells, cells_of, own
 from identification.mismatch.faults.driver_laws import (
@@ -28,6 +27,7 @@ from identification.mismatch.faults.driver_laws import (
     unsigned,
 )
 from identification.mismatch.faults.swaps import swapped_voltages, swaps
+from identification.mismatch.value import Value
 from identification.recording import Channel, Recording
 
 Kind = Literal["swapped", "rescaled", "reversed", "frozen", "unsigned", "nan"]

@@ -12,7 +12,6 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from identification.estimation.tails import student_sf
-from identification.mismatch.diagnosis import Value
 from identification.mismatch.faults.cells import (
     BLOCKS,
     Cells,
@@ -21,6 +20,7 @@ from identification.mismatch.faults.cells import (
     gain,
     shapes,
 )
+from identification.mismatch.value import Value
 from identification.recording import Floats
 
 LINEAR = ("rotation_rate", "motor_voltage")

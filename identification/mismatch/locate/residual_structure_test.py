@@ -15,10 +15,10 @@ import numpy as np
 from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.locate.pulses import Pulses, likeliest_pulses
-from identification.mismatch.model.model import Data, Weights, predict
+from identification.mismatch.model.model import Data, Weights
 from identification.mismatch.select.covariates import Covariate, covariates
 from identification.mismatch.select.jumps import APART, TRIED, jumps
-from identification.mismatch.select.screening import lengths, normal_scores, orthogonal_basis, quiet, surrogate_scores
+from identification.mismatch.select.screening import normal_scores, orthogonal_basis, quiet, surrogate_scores
 from identification.mismatch.select.shape_error import allowed_in, corrections
 from identification.recording import Floats
 
@@ -26,8 +26,6 @@ ALARM = 0.004
 """False-alarm rate of what is left, family-wise: with the search for effects and for lines some 1 % of a diagnosis."""
 FAR = 4.0
 """Sigmas beyond which a row counts no more: one outlier is no structure."""
-ROUNDING = 1e-9
-"""Of a covariate's reach: such an edge is 0."""
 PLAIN_P = 1e-7
 """Of one group: what is plainly no noise, whatever its kind."""
 
@@ -182,87 +180,3 @@ def _of_pulses(time: Covariate, found: Pulses, residual: Floats) -> CovariateTes
 def _tail(stat: float, dof: int, extra: float) -> float:
     p = float(noncentral_chi2_sf(stat, dof, extra)) if extra > 1e-9 else float(chi2_sf(stat, dof))
     return p if np.isfinite(p) else 0.0
-
-
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where over a covariate the residual is, and its shape."""
-
-    quantity: str
-    unit: str
-    low: float
-    high: float
-    share: float
-    p_value: float
-    table: tuple[tuple[float, float, float], ...]
-    """(covariate, mean residual in N, its standard error) bin by bin."""
-    what: str
-
-
-def locate(judged: CovariateTest, fit: Fit, data: Data, weights: Weights) -> Place:
-    """The stretch of the covariate that holds most of what its columns make of the residual: noise is everywhere."""
-    c = judged.covariate
-    covariate = np.concatenate(c.values)
-    residual = np.concatenate(
-        [
-            h.thrust[r] - predict(fit.model, fit.theta, h, data.scale, i)[0][r] - fit.theta.tares[i]
-            for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True))
-        ]
-    )
-    count = np.concatenate([h.count[r] for h, r in zip(data.histories, data.rows, strict=True)]).astype(np.float64)
-    edges = _bins(covariate)
-    index = np.clip(np.searchsorted(edges, covariate, side="right") - 1, 0, edges.size - 2)
-    k = edges.size - 1
-    weight = np.bincount(index, weights=count, minlength=k)
-    mean = np.bincount(index, weights=count * residual, minlength=k) / np.maximum(weight, 1e-300)
-    rows = np.bincount(index, minlength=k)
-    spread = np.bincount(index, weights=count * (residual - mean[index]) ** 2, minlength=k) / np.maximum(weight, 1e-300)
-    error = np.sqrt(spread / np.maximum(rows, 1))
-    power = np.bincount(index, weights=count * _structure(c, residual, data, weights) ** 2, minlength=k)
-    full = rows > 0
-    low, high, share = _stretch(edges, np.asarray(power, dtype=np.float64))
-    low, high = (0.0 if abs(edge) < ROUNDING * (edges[-1] - edges[0]) else edge for edge in (low, high))
-    center = 0.5 * (edges[1:] + edges[:-1])
-    table = tuple((float(center[i]), float(mean[i]), float(error[i])) for i in np.flatnonzero(full))
-    return Place(c.quantity, c.unit, low, high, share, judged.p_value, table, c.what)
-
-
-def _structure(c: Covariate, residual: Floats, data: Data, weights: Weights) -> Floats:
-    """(n,) N, of the residual what any shape over the covariate is: least squares with the coloured noise."""
-    thrust = Weights(weights.thrust)
-    ends = np.cumsum([r.size for r in data.rows])[:-1]
-    columns = thrust.whiten(list(c.columns), [])
-    size = lengths(columns)
-    unit = columns / np.where(size > 0, size, 1.0)
-    left = thrust.whiten(list(np.split(residual, ends)), [])
-    inverse = np.linalg.pinv(unit.T @ unit, hermitian=True, rcond=1e-9)
-    out: Floats = np.concatenate(c.columns) @ (inverse @ (unit.T @ left) / np.where(size > 0, size, 1.0))
-    return out
-
-
-def _bins(covariate: Floats) -> Floats:
-    """About 16 bins: levels where there are few, otherwise of equal numbers."""
-    levels = np.unique(np.round(covariate, 9))
-    if levels.size <= 24:
-        if levels.size == 1:
-            return np.array([levels[0] - 0.5, levels[0] + 0.5])
-        middle = 0.5 * (levels[1:] + levels[:-1])
-        return np.concatenate([[levels[0] - (middle[0] - levels[0])], middle, [levels[-1] + (levels[-1] - middle[-1])]])
-    found = np.unique(np.quantile(covariate, np.linspace(0, 1, 17)))
-    found[-1] = np.nextafter(found[-1], np.inf)
-    return found
-
-
-def _stretch(edges: Floats, power: Floats) -> tuple[float, float, float]:
-    """The shortest run of bins that holds 70 % of the power, or the whole."""
-    total = float(power.sum())
-    if total <= 0:
-        return float(edges[0]), float(edges[-1]), 0.0
-    best = (0, power.size)
-    cumulative = np.concatenate([[0.0], np.cumsum(power)])
-    for i in range(power.size):
-        j = int(np.searchsorted(cumulative, cumulative[i] + 0.7 * total))
-        if j <= power.size and edges[j] - edges[i] < edges[best[1]] - edges[best[0]]:
-            best = (i, j)
-    share = float((cumulative[best[1]] - cumulative[best[0]]) / total)
-    return float(edges[best[0]]), float(edges[best[1]]), share

@@ -16,8 +16,8 @@ from identification.mismatch.locate.residual_structure_test import ResidualStruc
 from identification.mismatch.model.model import Data, Weights, predict
 from identification.mismatch.prepare.preparing import DRIVERS
 from identification.mismatch.select.flatness import noise_goes_on
-from identification.mismatch.select.forward_selection import STATIC, static_curve
-from identification.mismatch.select.rivals import NEAR, Rival, SwapTest, swaps
+from identification.mismatch.select.forward_selection import STATIC, Rival, SwapTest, static_curve
+from identification.mismatch.select.rivals import NEAR, swaps
 from identification.mismatch.select.screening import orthogonal_basis
 from identification.physics.term import Term
 from identification.recording import Floats
@@ -162,7 +162,7 @@ def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[
 
 
 def name(
-    estimate: Estimate, data: Data, terms: Sequence[Term], standing: dict[Term, SwapTest] | None = None
+    estimate: Estimate, data: Data, terms: Sequence[Term], standing: Mapping[Term, SwapTest] | None = None
 ) -> tuple[Named, ...]:
     """Every term of the model with its rivals and failed_checks, the largest gain first."""
     out = []

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
-from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment, Verdict
+from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment, VerdictName
 from identification.mismatch.next_experiment.sweeps import BUDGET
 from identification.mismatch.select.rivals import EQUAL
 
@@ -30,7 +30,7 @@ Reason = Literal["settled", "unexplained", "hopeless", "same_doubt", "budget", "
 class Belief:
     """What one diagnosis amounts to."""
 
-    verdict: Verdict
+    verdict: VerdictName
     says: str
     """As in `believed dead_band or exponent`."""
     effects: frozenset[str]

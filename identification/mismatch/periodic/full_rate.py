@@ -1,10 +1,9 @@
-"""The residual at the recording's own samples: lines in it are taken out, broad peaks are told to the noise model."""
+"""The residual at the recording's own samples, with the angle of the rotor beside it."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,34 +11,18 @@ from numpy.typing import NDArray
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.model import Data, predict
 from identification.mismatch.model.sub_interval import sample_lead
-from identification.mismatch.periodic.periodic_disturbances import Line, find_lines
-from identification.mismatch.periodic.resonances import find_bands
+from identification.mismatch.periodic.periodic_disturbances import Line
 from identification.mismatch.periodic.rotor_angle import turned
 from identification.mismatch.periodic.spectrum import Series
-from identification.recording import Floats
 from identification.run_history.filters import delayed, within_intervals
 from identification.run_history.history import History
 
-UNSETTLED = 0.4
-"""s after a step in which a residual is no noise."""
-MOST_BANDS = 1
-FEW_SAMPLES = 400
 STEADY = 10.0
 """s of the blocks over which a measured rate is compared with the model's."""
 FEW_BLOCKS = 10
 """Fewer tell nothing of a rate."""
 MUCH = 4.0
 """Standard deviations of a mean over the blocks beyond which a rate wanders."""
-
-
-@dataclass(frozen=True, eq=False)
-class Cleaned:
-    """What was found at full rate."""
-
-    lines: tuple[Line, ...]
-    bands: tuple[tuple[float, float], ...]
-    histories: tuple[History, ...]
-    """Without the lines."""
 
 
 def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
@@ -82,7 +65,7 @@ def _blocks(history: History) -> NDArray[np.intp]:
     return (history.middle[history.rate_rows] / STEADY).astype(np.intp)
 
 
-def _scale_std(fitted: Fit, data: Data) -> float:
+def scale_std_of(fitted: Fit, data: Data) -> float:
     """Relative standard error of the scale of turns: noise of the rate is in the angle, summed or fitted."""
     _, modelled = raw(fitted.model, fitted.theta, data, with_rate=True)
     noise = size = 0.0
@@ -93,10 +76,10 @@ def _scale_std(fitted: Fit, data: Data) -> float:
     return float(np.sqrt(noise)) / size if size > 0 else 0.0
 
 
-def _with_scale(line: Line, scale_std: float, series: Sequence[Series]) -> Line:
+def with_scale(line: Line, scale_std: float, series: Sequence[Series]) -> Line:
     """A line locked to the rotor, with the error that the scale of its turns adds to periods per turn and phase."""
     if line.rival is not None:
-        line = replace(line, rival=_with_scale(line.rival, scale_std, series))
+        line = replace(line, rival=with_scale(line.rival, scale_std, series))
     if line.ratio is None or line.ratio_std is None:
         return line
     ratio_std = float(np.hypot(line.ratio_std, line.ratio * scale_std))
@@ -108,49 +91,3 @@ def _with_scale(line: Line, scale_std: float, series: Sequence[Series]) -> Line:
         ratio_std=ratio_std,
         phase_std=float(np.hypot(line.phase_std, 2 * np.pi * line.ratio * scale_std * turns)),
     )
-
-
-def look(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned | None:
-    """Lines and bands of what this fit leaves; None when there are neither."""
-    series = series_of(fitted, data)
-    if all(s.time.size < FEW_SAMPLES for s in series):
-        return None
-    has_rate = all("rotation_rate" in (h.driver_quantity, *h.others) for h in data.histories)
-    unit: Literal["rev", "V s"] = "rev" if has_rate else "V s"
-    lines = find_lines(series, turns_unit=unit)
-    if lines and data.with_rate:
-        scale_std = _scale_std(fitted, data)
-        lines = tuple(_with_scale(line, scale_std, series) for line in lines)
-    still = []
-    for i, (s, h) in enumerate(zip(series, data.histories, strict=True)):
-        left = s.residual.copy()
-        for line in lines:
-            left -= line.at(s.time, s.turns, i)
-        left[h.since_step[_interval(h, s.time)] < UNSETTLED] = np.nan
-        still.append(replace(s, residual=left))
-    bands = find_bands(still, most=MOST_BANDS)
-    if not lines and not bands:
-        return None
-    cleaned = tuple(
-        _without(h, [line.at(s.time, s.turns, i) for line in lines])
-        for i, (h, s) in enumerate(zip(originals, series, strict=True))
-    )
-    return Cleaned(lines, bands, cleaned)
-
-
-def _interval(history: History, time: Floats) -> NDArray[np.intp]:
-    index = np.searchsorted(history.edges, time, side="right") - 1
-    return np.clip(index, 0, history.driver.size - 1)
-
-
-def _without(history: History, lines: Sequence[Floats]) -> History:
-    """The history of the same samples less the lines."""
-    if not lines:
-        return history
-    value = history.sample_thrust - np.sum(lines, axis=0)
-    index = _interval(history, history.sample_time)
-    M = history.driver.size
-    some = np.maximum(history.count, 1)
-    mean = np.where(history.count > 0, np.bincount(index, weights=value, minlength=M) / some, np.nan)
-    within = np.asarray(np.bincount(index, weights=(value - mean[index]) ** 2, minlength=M), dtype=np.float64)
-    return replace(history, thrust=mean, within=within, sample_thrust=value)

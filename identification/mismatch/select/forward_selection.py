@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -100,16 +100,37 @@ def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
     return tuple(out)
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class Rival:
+    """Another term in the place of one, refitted."""
+
+    term: Term
+    fit: Fit
+    bic_loss: float
+    """By how much its BIC is worse."""
+    aic_loss: float
+    """By how much its AIC is worse: BIC alone would hide a rival with more parameters than the data can tell apart."""
+
+
+SwapTest = tuple[Fit, list[Rival]]
+"""The fit without a term, and the rivals in its place."""
+
+
 @dataclass(frozen=True, eq=False)
 class Selected:
     """What the search ends with."""
 
     data: Data
     terms: tuple[Term, ...]
+    """Of the catalogue, that could be chosen."""
     before: Estimate
+    """The baseline."""
     after: Estimate
     screenings: tuple[Screening, ...]
-    last: Screening
+    last: Screening | None
+    """Of the model `after`; None once it was exchanged for another."""
+    standing: Mapping[Term, SwapTest] | None = None
+    """How each term stands against its rivals, where that is known."""
 
 
 def static_curve(term: Term, *, measured: bool) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -12,7 +12,7 @@ from identification.mismatch.estimate.estimate import Estimate, fit_without, ref
 from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, extended, fit
 from identification.mismatch.model.model import Data, price
 from identification.mismatch.select.flatness import noise_goes_on
-from identification.mismatch.select.forward_selection import accept_threshold
+from identification.mismatch.select.forward_selection import Rival, SwapTest, accept_threshold
 from identification.mismatch.select.screening import directions, orthogonal_basis, refined
 from identification.physics.term import Term
 from identification.recording import Floats
@@ -34,22 +34,6 @@ MOST_REFITS = 7
 BETTER = 0.5
 """BIC units by which a rival must be better to take the place."""
 ROUNDS = 3
-
-
-@dataclass(frozen=True, eq=False)
-class Rival:
-    """Another term in the place of one, refitted."""
-
-    term: Term
-    fit: Fit
-    bic_loss: float
-    """By how much its BIC is worse."""
-    aic_loss: float
-    """By how much its AIC is worse: BIC alone would hide a rival with more parameters than the data can tell apart."""
-
-
-SwapTest = tuple[Fit, list[Rival]]
-"""The fit without a term, and the rivals in its place."""
 
 
 def swap_tests(estimate: Estimate, data: Data, terms: Sequence[Term]) -> tuple[Estimate, dict[Term, SwapTest] | None]:

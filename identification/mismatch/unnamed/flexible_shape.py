@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.flexible_terms.flexible import WORDS, Flexible, Multiplier
-from identification.mismatch.answer.remainder import FlexibleShape, Spline
-from identification.mismatch.diagnosis import HeldOutRmse, Unexplained, Value
+from identification.mismatch.diagnosis import FlexibleShape, HeldOutRmse, Remainder, Spline
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.model import Data, Weights
@@ -18,6 +17,7 @@ from identification.mismatch.unnamed.flexible import Extended
 from identification.mismatch.unnamed.flexible_knots import seen_at
 from identification.mismatch.unnamed.formula import find_formula
 from identification.mismatch.validate.held_out import HeldOut
+from identification.mismatch.value import Value
 from identification.physics.term import Term
 from identification.recording import Floats
 from identification.run_history.history import History
@@ -141,7 +141,7 @@ def _edges(values: Floats) -> Floats:
 CURVE = frozenset({"command_voltage", "motor_voltage", "rotation_rate", "thrust", "direction"})
 
 
-def with_flexible(found: Unexplained, extended: Extended | None, data: Data, others: Sequence[History]) -> Unexplained:
+def with_flexible(found: Remainder, extended: Extended | None, data: Data, others: Sequence[History]) -> Remainder:
     """What is unexplained, with the flexible terms that model it, and a formula where one agrees everywhere."""
     if extended is None:
         return found

@@ -27,7 +27,7 @@ from identification.flexible_terms.formula import (
     quantity,
 )
 from identification.flexible_terms.formula import times as multiplied
-from identification.mismatch.answer.remainder import FormulaFound
+from identification.mismatch.diagnosis import FormulaFound
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, extended, fit
 from identification.mismatch.model.model import Data, Theta, Weights, predict

@@ -7,9 +7,9 @@ from math import sqrt
 import numpy as np
 
 from identification.flexible_terms.formula import CHANNELS, Formula, Monomial, driver_symbol
-from identification.mismatch.diagnosis import Value
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.model import Data
+from identification.mismatch.value import Value
 from identification.recording import Floats
 
 

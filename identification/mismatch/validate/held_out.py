@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.estimation.tails import chi2_sf
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit, raw
 from identification.mismatch.model.model import Data, Model, Theta, weights
@@ -20,7 +19,6 @@ KEPT_BACK = 4
 BLOCKS_PER_RUN = 24
 LEAST_BLOCK = 8.0
 """s."""
-LAGS = 20
 
 
 @dataclass(frozen=True, slots=True)
@@ -170,17 +168,3 @@ def with_tares(model: Model, theta: Theta, data: Data) -> Theta:
         for y, f, h, r in zip(data.thrust, thrust, data.histories, data.rows, strict=True)
     ]
     return replace(theta, tares=tuple(tares))
-
-
-def whiteness(fitted: Fit, data: Data) -> float:
-    """p-value of Ljung and Box over LAGS lags of the whitened thrust residual, run by run."""
-    ends = np.cumsum([r.size for r in data.rows])
-    statistic, dof = 0.0, 0
-    for part in np.split(fitted.residual[: ends[-1]], ends[:-1]):
-        n, lags = part.size, min(LAGS, part.size // 5)
-        e = np.clip(part - part.mean(), -4, 4)
-        power = float(e @ e)
-        for k in range(1, lags + 1):
-            statistic += n * (n + 2) * (float(e[k:] @ e[:-k]) / power) ** 2 / (n - k) if power > 0 else 0.0
-        dof += lags
-    return float(chi2_sf(statistic, dof)) if dof else 1.0

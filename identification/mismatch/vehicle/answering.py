@@ -7,7 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
-from identification.mismatch.diagnosis import Curves, Finding, Mismatch, RivalFinding, Unexplained, Value, Where
+from identification.mismatch.diagnosis import Curves, Finding, Mismatch, Remainder, RivalFinding
+from identification.mismatch.noise.whiteness import whiteness
+from identification.mismatch.value import Value, Where
 from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.left import ALARM, BACK, Left, Structure, place_of
 from identification.mismatch.vehicle.naming import Named
@@ -15,7 +17,6 @@ from identification.mismatch.vehicle.runs import Prepared
 from identification.mismatch.vehicle.search import Found, State
 
 MOST_PLACES = 3
-LAGS = 20
 
 
 def baseline_words(data: Prepared) -> str:
@@ -126,7 +127,7 @@ def place_of_findings(left: Left, found: Found, data: Prepared, channel: str) ->
     return (Mismatch(channel, where, share, p, says),)
 
 
-def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Unexplained | None:
+def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Remainder | None:
     """What remains; `named` are those whose name is doubted."""
     if not left.structures or (left.p_value >= ALARM and not named):
         return None
@@ -143,21 +144,12 @@ def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Unexpl
     if named:
         says += f" It resembles {', '.join(n.term.id for n in named)}, but {named[0].doubts[0]}."
     table = place_of(structure).table
-    return Unexplained(where, structure.share, left.p_value, table, says, resembles)
+    return Remainder(where, structure.share, left.p_value, table, says, resembles)
 
 
-def whiteness(state: State) -> float:
-    """p-value of Ljung and Box over LAGS lags of the whitened residual, run by run."""
-    ends = np.cumsum([w.rows.time.size for w in state.white])
-    statistic, dof = 0.0, 0
-    for part in np.split(state.fit.residual[: ends[-1]], ends[:-1]):
-        n, lags = part.size, min(LAGS, part.size // 5)
-        e = np.clip(part - part.mean(), -4, 4)
-        power = float(e @ e)
-        for k in range(1, lags + 1):
-            statistic += n * (n + 2) * (float(e[k:] @ e[:-k]) / power) ** 2 / (n - k) if power > 0 else 0.0
-        dof += lags
-    return float(chi2_law.sf(statistic, dof)) if dof else 1.0
+def state_whiteness(state: State) -> float:
+    """p-value of `whiteness` of the whitened residual."""
+    return whiteness(state.fit.residual, [w.rows.time.size for w in state.white])
 
 
 def curves_of(before: Fit, after: Fit, data: Prepared) -> tuple[Curves, ...]:

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.mismatch.diagnosis import Diagnosis, Mismatch, Rmse, Verdict
+from identification.mismatch.answer.verdict import decided
+from identification.mismatch.diagnosis import Diagnosis, Mismatch, Rmse
 from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.vehicle.answering import (
     baseline_words,
@@ -15,16 +16,16 @@ from identification.mismatch.vehicle.answering import (
     findings_of,
     place_of_findings,
     places_of,
+    state_whiteness,
     ties,
     unexplained_of,
     values_of,
-    whiteness,
 )
 from identification.mismatch.vehicle.experiment import propose
 from identification.mismatch.vehicle.free_force import FreeForce, free_index, with_free_force
 from identification.mismatch.vehicle.judging import better_predicting, held_out, only, residuals, rms
 from identification.mismatch.vehicle.left import ALARM, Left, judge_left
-from identification.mismatch.vehicle.naming import EQUAL, Named, name
+from identification.mismatch.vehicle.naming import Named, name
 from identification.mismatch.vehicle.runs import Prepared, prepare
 from identification.mismatch.vehicle.screening import applicable
 from identification.mismatch.vehicle.search import Found, State, less, pruned, search
@@ -104,17 +105,16 @@ def _diagnosed(
         held, last = better_predicting(found.before, (held, last), less(last, data, unnamed), data, unseen)
     earned = [_beside(n, last, left) for n in standing if not n.doubts]
     unexplained = unexplained_of(_as_fitted(left, last), doubted, data)
+    experiment = propose(after, earned, data) if unexplained is None else None
     n, p = last.fit.residual.size, int(np.sum(last.fit.free))
     channel = _channel(data)
     return Diagnosis(
         recordings=tuple(r.recording_id for r in recordings),
         thruster=recordings[0].thruster,
-        verdict="unexplained" if unexplained is not None else _verdict(earned),
+        answer=decided(findings_of(earned, last, data), unexplained, experiment),
         baseline_model=baseline_words(data),
         baseline=values_of(found.before.fit, data),
         mismatch=_places(found, data, channel, left, rng),
-        findings=findings_of(earned, last, data),
-        unexplained=unexplained,
         model_terms=tuple(term.id for term in last.terms),
         model=values_of(last.fit, data),
         train=Rmse(
@@ -123,8 +123,7 @@ def _diagnosed(
         ),
         heldout=held,
         chi2_per_dof=last.fit.chi2 / max(n - p, 1),
-        whiteness_p=whiteness(last),
-        next_experiment=propose(after, earned, data) if unexplained is None else None,
+        whiteness_p=state_whiteness(last),
         notes=(*ties(data, last.fit, unseen_effects), *_noise_note(last, data)),
         curves=curves_of(found.before.fit, last.fit, data),
         response=channel,
@@ -157,12 +156,6 @@ def _as_fitted(left: Left, last: State) -> Left:
     return replace(left, structures=(replace(left.structures[0], force=force, std=std), *left.structures[1:]))
 
 
-def _verdict(earned: Sequence[Named]) -> Verdict:
-    if not earned:
-        return "adequate"
-    return "ambiguous" if any(r.bic_loss < EQUAL for n in earned for r in n.rivals) else "explained"
-
-
 def _channel(data: Prepared) -> str:
     if data.runs[0].quantity == "speed":
         return "speed"
@@ -180,7 +173,7 @@ def _places(found: Found, data: Prepared, channel: str, left: Left, rng: np.rand
 def _noise_note(after: State, data: Prepared) -> tuple[str, ...]:
     """Slow noise is where a disturbance (waves, wind, a hand on the cable) goes that no term carries."""
     out = []
-    if whiteness(after) < NOT_WHITE:
+    if state_whiteness(after) < NOT_WHITE:
         out.append(
             "what remains is not white: white and slow noise do not describe this sensor (a filter, steps of its own); "
             "standard errors may be too small"

@@ -1,0 +1,174 @@
+"""The fitted model as a twin, and the answer against an earlier one: given terms, and a changed thrust constant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import isfinite
+
+import numpy as np
+
+from identification.estimation.tails import normal_sf
+from identification.flexible_terms.flexible import Flexible
+from identification.mismatch.answer.draft import Draft
+from identification.mismatch.diagnosis import Finding
+from identification.mismatch.estimate.estimate import Estimate
+from identification.mismatch.model.model import Data, acting
+from identification.mismatch.value import Value
+from identification.recording import Recording
+from identification.twin import Source, Twin, TwinNoise, TwinTerm, names_of
+
+ALARM = 0.01
+"""False-alarm rate of a changed thrust constant."""
+ONE_CONSTANT = 0.02
+"""Relative: where another effect was found, C may move by this much with what that effect refers to (a highest bus
+voltage, say), and is no finding of its own."""
+
+
+def with_twin(
+    draft: Draft, estimate: Estimate, data: Data, recordings: Sequence[Recording], before: Twin | None
+) -> Draft:
+    """The draft with its twin; against an earlier twin the terms given are in the model, and a change is told."""
+    draft = replace(draft, twin=twin_of(estimate, data, recordings, before))
+    if before is None:
+        return draft
+    known = before.origin
+    C = draft.model["C"]
+    findings = tuple(_relative(f, before, known) for f in draft.findings)
+    changed = changed_constant(before, estimate, known, C.unit)
+    if changed is not None and findings and abs(C.value / before.C - 1) < ONE_CONSTANT:
+        draft = replace(draft, notes=(*draft.notes, f"{changed.statement} Part of what was found may be in it."))
+    elif changed is not None:
+        findings = (*findings, changed)
+    was = given_values(before)
+    named = ", ".join(dict.fromkeys(t.effect for t in before.terms))
+    return replace(
+        draft,
+        findings=findings,
+        baseline_model=f"{known} ({draft.baseline_model}{' with ' + named if named else ''})",
+        baseline={**draft.baseline, **was},
+        model_terms=(*(t.effect for t in before.terms), *draft.model_terms),
+        model={**was, **_renamed(draft.model, was)},
+    )
+
+
+def _relative(finding: Finding, before: Twin, known: str) -> Finding:
+    """What is found of an effect that the baseline has already comes on top of it."""
+    if all(term.effect != finding.effect for term in before.terms):
+        return finding
+    return replace(finding, statement=f"On top of what {known} has: {finding.statement}")
+
+
+def _renamed(found: Mapping[str, Value], was: Mapping[str, Value]) -> dict[str, Value]:
+    out = {}
+    for name, value in found.items():
+        effect, dot, parameter = name.partition(".")
+        out[f"{effect}#2{dot}{parameter}" if name in was else name] = value
+    return out
+
+
+def given_values(twin: Twin) -> dict[str, Value]:
+    """The twin's terms as they are given."""
+    std = np.sqrt(np.diag(np.array(twin.covariance)))
+    units = [p.unit for t in twin.terms for p in t.term.parameters(t.scale)]
+    numbers = [v for t in twin.terms for v in t.values]
+    return {
+        name: Value(value, float(s), unit)
+        for name, value, s, unit in zip(twin.names[1:], numbers, std[1:], units, strict=True)
+    }
+
+
+def changed_constant(twin: Twin, estimate: Estimate, known: str, unit: str) -> Finding | None:
+    """The thrust constant is no longer the twin's, at ALARM."""
+    value, std = estimate.fit.theta.C, float(estimate.fit.std[0])
+    was, was_std = twin.C, float(np.sqrt(twin.covariance[0][0]))
+    both = float(np.hypot(std, was_std))
+    if not isfinite(both) or both <= 0:
+        return None
+    z = (value - was) / both
+    p = max(2 * float(normal_sf(abs(z))), 1e-300)
+    if p >= ALARM:
+        return None
+    share = 100 * (value - was) / abs(was)
+    says = f"Thrust constant: {value:.4g} {unit} where {known} has {was:.4g} ({share:+.2g} %, {abs(z):.0f} sigma)."
+    logn = float(np.log(max(estimate.fit.residual.size, 2)))
+    parameters = {"C": Value(value, std, unit), "before": Value(was, was_std, unit)}
+    return Finding("thrust_constant", "", says, parameters, p, z**2 - logn, 1.0, ())
+
+
+def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], before: Twin | None) -> Twin:
+    """The fitted model as a twin; files' hashes and the time are added by who knows them."""
+    fitted = estimate.fit
+    terms = tuple(
+        TwinTerm(
+            term.id,
+            term.form,
+            {p.name: value for p, value in zip(term.parameters(sizes), values, strict=True)},
+            sizes,
+            term if isinstance(term, Flexible) else None,
+        )
+        for term, values, sizes in acting(fitted.model, fitted.theta, data.scale)
+    )
+    return Twin(
+        thruster=recordings[0].thruster,
+        driver_quantity=data.histories[0].driver_quantity,
+        C=fitted.theta.C,
+        terms=terms,
+        names=names_of(terms),
+        covariance=_covariance(estimate, data, before),
+        noise=TwinNoise(
+            estimate.noise.white,
+            estimate.noise.proportional,
+            estimate.noise.scales,
+            estimate.noise.slow,
+            estimate.noise.bands,
+            estimate.noise.band,
+        ),
+        sources=(
+            *(() if before is None else before.sources),
+            *(
+                Source(r.recording_id, tare=tare)
+                for r, tare in zip(recordings, fitted.theta.tares, strict=True)
+                if before is None or all(s.recording_id != r.recording_id for s in before.sources)
+            ),
+        ),
+        interval=_interval(recordings),
+        highest_driver=max(data.scale.driver, 0.0 if before is None else before.highest_driver),
+        rate_per_driver=fitted.theta.k if data.with_rate else None,
+    )
+
+
+def _interval(recordings: Sequence[Recording]) -> float:
+    gaps = [np.median(np.diff(r.first_of("thrust").time)) for r in recordings]  # type: ignore[union-attr]  # a diagnosis has thrust
+    return float(min(gaps))
+
+
+def _covariance(estimate: Estimate, data: Data, before: Twin | None) -> tuple[tuple[float, ...], ...]:
+    """Of C and every term's parameters: fitted ones from the fit, given ones as the twin had them."""
+    fitted = estimate.fit
+    full = np.nan_to_num(fitted.cov)
+    place: dict[int, list[int]] = {}
+    at = 1
+    for term, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
+        place[id(term)] = list(range(at, at + len(values)))
+        at += len(values)
+    old = np.zeros((1, 1)) if before is None else np.array(before.covariance)
+    old_place, at = {}, 1
+    for g in fitted.model.given:
+        old_place[id(g.values)] = list(range(at, at + len(g.values)))
+        at += len(g.values)
+    fresh: list[int | None] = [0]
+    kept: list[int | None] = [None]
+    for term, values, _ in acting(fitted.model, fitted.theta, data.scale):
+        was = old_place.get(id(values))
+        fresh += place[id(term)] if was is None else [None] * len(was)
+        kept += [None] * len(values) if was is None else was
+    out = np.zeros((len(fresh), len(fresh)))
+    for i in range(len(fresh)):
+        for j in range(len(fresh)):
+            a, b, c, d = fresh[i], fresh[j], kept[i], kept[j]
+            if a is not None and b is not None:
+                out[i, j] = full[a, b]
+            elif c is not None and d is not None:
+                out[i, j] = old[c, d]
+    return tuple(tuple(map(float, row)) for row in out)

@@ -1,0 +1,98 @@
+"""The stage: all that was found in, the diagnosis out: a draft, then the verdict."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.mismatch.answer.against_twin import with_twin
+from identification.mismatch.answer.draft import Draft
+from identification.mismatch.answer.fault_findings import with_channels
+from identification.mismatch.answer.periodic_findings import with_lines
+from identification.mismatch.answer.proxies import proxies
+from identification.mismatch.answer.remainder import remainder_of
+from identification.mismatch.answer.report_assembly import curves_of, finding_of, values_of
+from identification.mismatch.answer.verdict import decided
+from identification.mismatch.diagnosis import Diagnosis, NextExperiment, Rmse
+from identification.mismatch.faults.stage import Sound
+from identification.mismatch.locate.places import places_of
+from identification.mismatch.locate.stage import Located
+from identification.mismatch.noise.whiteness import whiteness
+from identification.mismatch.periodic.periodic_disturbances import Line
+from identification.mismatch.select.forward_selection import Selected
+from identification.mismatch.unnamed.flexible_shape import with_held
+from identification.mismatch.unnamed.stage import Completed
+from identification.mismatch.validate.held_out import rmse
+from identification.mismatch.validate.stage import score
+from identification.recording import Recording
+from identification.run_history.history import History
+from identification.twin import Twin
+
+DRIVER_NAMES = {"command_voltage": "V|V|", "motor_voltage": "V|V|", "rotation_rate": "n|n|"}
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Case:
+    """What the answer is of."""
+
+    recordings: tuple[Recording, ...]
+    sound: Sound
+    unseen: tuple[History, ...]
+    """Of the runs held out, those that can be predicted."""
+    lines: tuple[Line, ...]
+    baseline: Twin | None
+    notes: tuple[str, ...]
+    """What was left aside, and what cannot be predicted."""
+
+
+def run(
+    case: Case,
+    selected: Selected,
+    located: Located,
+    completed: Completed,
+    experiment: NextExperiment | None,
+    rng: np.random.Generator,
+) -> Diagnosis:
+    """The verdict is decided last, from all findings: names, channel faults, a changed constant, lines."""
+    data, before, after = selected.data, selected.before, completed.after
+    measured = replace(data, histories=case.sound.histories)
+    every = [np.ones(r.size, dtype=bool) for r in data.rows]
+    train = Rmse(
+        rmse(before.fit.model, before.fit.theta, measured, every), rmse(after.fit.model, after.fit.theta, data, every)
+    )
+    remainder = remainder_of(completed, data, case.unseen)
+    flexible = completed.flexible
+    quiet = located.estimate.noise
+    held = score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None)
+    draft = Draft(
+        baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
+        baseline=values_of(before.fit, data),
+        mismatch=places_of(selected, after, rng, pulsing=located.left.pulses is not None),
+        findings=tuple(finding_of(n, data, completed.intervals) for n in completed.earned),
+        model_terms=tuple(t.id for t in after.fit.model.terms),
+        model=values_of(after.fit, data, completed.intervals),
+    )
+    ids = tuple(r.recording_id for r in case.recordings)
+    draft = with_channels(draft, case.sound.faults, ids)
+    draft = with_twin(draft, after, data, case.recordings, case.baseline)
+    draft = with_lines(draft, case.lines, train.before, case.baseline)
+    stands_in = proxies(after.fit.model, draft.findings, case.recordings, case.sound.histories)
+    n, p = after.fit.residual.size, int(after.fit.free.sum())
+    return Diagnosis(
+        recordings=ids,
+        thruster=case.recordings[0].thruster,
+        answer=decided(draft.findings, remainder, experiment),
+        baseline_model=draft.baseline_model,
+        baseline=draft.baseline,
+        mismatch=draft.mismatch,
+        model_terms=draft.model_terms,
+        model=draft.model,
+        train=train,
+        heldout=with_held(held, flexible),
+        chi2_per_dof=after.fit.chi2 / max(n - p, 1),
+        whiteness_p=whiteness(after.fit.residual, [r.size for r in data.rows]),
+        notes=(*draft.notes, *case.notes, *stands_in),
+        curves=curves_of(before, after, data),
+        twin=draft.twin,
+    )

@@ -1,0 +1,151 @@
+"""Where a residual is: the stretch of a covariate that holds most of it, in figures and in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.mismatch.diagnosis import Mismatch
+from identification.mismatch.estimate.estimate import Estimate
+from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.locate.residual_structure_test import ALARM, CovariateTest, residual_structure
+from identification.mismatch.model.model import Data, Weights, predict
+from identification.mismatch.prepare.preparing import DRIVERS
+from identification.mismatch.select.covariates import Covariate
+from identification.mismatch.select.forward_selection import STATIC, Selected
+from identification.mismatch.select.screening import lengths
+from identification.mismatch.value import Where
+from identification.recording import Floats
+
+MOST_PLACES = 3
+"""Places that an answer tells of."""
+CLEAR = 1e-3
+"""p-value of a place below which it is told beside the clearest one."""
+ROUNDING = 1e-9
+"""Of a covariate's reach: such an edge is 0."""
+
+
+def where_of(
+    judged: CovariateTest, fitted: Fit, data: Data, weights: Weights
+) -> tuple[Where, float, tuple[tuple[float, float, float], ...]]:
+    place = locate(judged, fitted, data, weights)
+    return Where(place.quantity, place.low, place.high, place.unit), place.share, place.table
+
+
+def says(where: Where, share: float, what: str) -> str:
+    unit = "" if where.unit == "1" else f" {where.unit}"
+    place = f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
+    return f"{100 * share:.0f} % of the residual lies at {place}: {what}."
+
+
+def places_of(found: Selected, after: Estimate, rng: np.random.Generator, *, pulsing: bool) -> tuple[Mismatch, ...]:
+    """Where the baseline fails: covariates of what was found first, the clearest first among them.
+
+    Its C and tares are those of the model `after`: with its own it shares out the mismatch over all there is.
+    `pulsing`: pulses that come back were found.
+    """
+    before, data = found.before.fit, found.data
+    seen = residual_structure(before, data, found.before.weights, rng, pulsing=pulsing)
+    if seen.p_value >= ALARM and not after.fit.model.terms:
+        return ()
+    same = replace(before.theta, C=after.fit.theta.C, tares=after.fit.theta.tares, shift=after.fit.theta.shift)
+    bare = replace(before, theta=same)
+    clear = [g for i, g in enumerate(seen.groups) if i == 0 or g.p_value <= CLEAR]
+    own = {q for term in after.fit.model.terms for c in term.covariates for q in (DRIVERS if c in STATIC else (c,))}
+    places = [
+        _mismatch(g, bare, data, after.weights) for g in sorted(clear, key=lambda g: g.covariate.quantity not in own)
+    ]
+    told = [place for place, whole in places if not whole] or [place for place, _ in places]
+    return tuple(told[:MOST_PLACES])
+
+
+def _mismatch(judged: CovariateTest, bare: Fit, data: Data, weights: Weights) -> tuple[Mismatch, bool]:
+    """Of one covariate, and whether it is all of that covariate, which says nothing."""
+    where, share, table = where_of(judged, bare, data, weights)
+    told = Mismatch("thrust", where, share, judged.p_value, says(where, share, judged.covariate.what))
+    return told, where.low <= table[0][0] and where.high >= table[-1][0]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where over a covariate the residual is, and its shape."""
+
+    quantity: str
+    unit: str
+    low: float
+    high: float
+    share: float
+    p_value: float
+    table: tuple[tuple[float, float, float], ...]
+    """(covariate, mean residual in N, its standard error) bin by bin."""
+    what: str
+
+
+def locate(judged: CovariateTest, fit: Fit, data: Data, weights: Weights) -> Place:
+    """The stretch of the covariate that holds most of what its columns make of the residual: noise is everywhere."""
+    c = judged.covariate
+    covariate = np.concatenate(c.values)
+    residual = np.concatenate(
+        [
+            h.thrust[r] - predict(fit.model, fit.theta, h, data.scale, i)[0][r] - fit.theta.tares[i]
+            for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True))
+        ]
+    )
+    count = np.concatenate([h.count[r] for h, r in zip(data.histories, data.rows, strict=True)]).astype(np.float64)
+    edges = _bins(covariate)
+    index = np.clip(np.searchsorted(edges, covariate, side="right") - 1, 0, edges.size - 2)
+    k = edges.size - 1
+    weight = np.bincount(index, weights=count, minlength=k)
+    mean = np.bincount(index, weights=count * residual, minlength=k) / np.maximum(weight, 1e-300)
+    rows = np.bincount(index, minlength=k)
+    spread = np.bincount(index, weights=count * (residual - mean[index]) ** 2, minlength=k) / np.maximum(weight, 1e-300)
+    error = np.sqrt(spread / np.maximum(rows, 1))
+    power = np.bincount(index, weights=count * _structure(c, residual, data, weights) ** 2, minlength=k)
+    full = rows > 0
+    low, high, share = _stretch(edges, np.asarray(power, dtype=np.float64))
+    low, high = (0.0 if abs(edge) < ROUNDING * (edges[-1] - edges[0]) else edge for edge in (low, high))
+    center = 0.5 * (edges[1:] + edges[:-1])
+    table = tuple((float(center[i]), float(mean[i]), float(error[i])) for i in np.flatnonzero(full))
+    return Place(c.quantity, c.unit, low, high, share, judged.p_value, table, c.what)
+
+
+def _structure(c: Covariate, residual: Floats, data: Data, weights: Weights) -> Floats:
+    """(n,) N, of the residual what any shape over the covariate is: least squares with the coloured noise."""
+    thrust = Weights(weights.thrust)
+    ends = np.cumsum([r.size for r in data.rows])[:-1]
+    columns = thrust.whiten(list(c.columns), [])
+    size = lengths(columns)
+    unit = columns / np.where(size > 0, size, 1.0)
+    left = thrust.whiten(list(np.split(residual, ends)), [])
+    inverse = np.linalg.pinv(unit.T @ unit, hermitian=True, rcond=1e-9)
+    out: Floats = np.concatenate(c.columns) @ (inverse @ (unit.T @ left) / np.where(size > 0, size, 1.0))
+    return out
+
+
+def _bins(covariate: Floats) -> Floats:
+    """About 16 bins: levels where there are few, otherwise of equal numbers."""
+    levels = np.unique(np.round(covariate, 9))
+    if levels.size <= 24:
+        if levels.size == 1:
+            return np.array([levels[0] - 0.5, levels[0] + 0.5])
+        middle = 0.5 * (levels[1:] + levels[:-1])
+        return np.concatenate([[levels[0] - (middle[0] - levels[0])], middle, [levels[-1] + (levels[-1] - middle[-1])]])
+    found = np.unique(np.quantile(covariate, np.linspace(0, 1, 17)))
+    found[-1] = np.nextafter(found[-1], np.inf)
+    return found
+
+
+def _stretch(edges: Floats, power: Floats) -> tuple[float, float, float]:
+    """The shortest run of bins that holds 70 % of the power, or the whole."""
+    total = float(power.sum())
+    if total <= 0:
+        return float(edges[0]), float(edges[-1]), 0.0
+    best = (0, power.size)
+    cumulative = np.concatenate([[0.0], np.cumsum(power)])
+    for i in range(power.size):
+        j = int(np.searchsorted(cumulative, cumulative[i] + 0.7 * total))
+        if j <= power.size and edges[j] - edges[i] < edges[best[1]] - edges[best[0]]:
+            best = (i, j)
+    share = float((cumulative[best[1]] - cumulative[best[0]]) / total)
+    return float(edges[best[0]]), float(edges[best[1]]), share

@@ -1,0 +1,68 @@
+"""The stage: the selected model in, what it leaves over every covariate out, with the noise that shows it."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.mismatch.estimate.estimate import Estimate
+from identification.mismatch.locate.residual_structure_test import ALARM, ResidualStructure, residual_structure
+from identification.mismatch.locate.slow_change import beside_slow_change
+from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.noise.whiteness import whiteness
+from identification.mismatch.select.forward_selection import Selected
+from identification.mismatch.select.shape_error import SHAPE_ERROR, corrections
+
+COLOURED = 1e-25
+"""p-value of whiteness below which no noise is blamed; 1/f noise alone was seen to reach 1e-21."""
+UNCARRIED = 6.0
+"""Sigmas of a direction of the last screening that no term made anything of: it is left, whatever its shape."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Located:
+    """What the selected model leaves."""
+
+    estimate: Estimate
+    """The model with the noise by which that was judged: beside a slow change, where there is one."""
+    left: ResidualStructure
+
+    @property
+    def structured(self) -> bool:
+        """Whether more than noise is left."""
+        return self.left.p_value < ALARM
+
+
+def run(selected: Selected, rng: np.random.Generator) -> Located:
+    """Structure over any covariate; else what the last screening could not carry; else a slow change."""
+    data, after = selected.data, selected.after
+    left = _with_colour(residual_structure(after.fit, data, after.weights, rng), after, data)
+    if left.p_value < ALARM or not left.groups:
+        return Located(after, left)
+    last = selected.last
+    if last is not None and last.largest > max(last.threshold, UNCARRIED):
+        best = last.directions.terms[int(np.argmax(last.z))]
+        worse = replace(left, p_value=min(last.p_value, left.p_value))
+        return Located(after, _foremost_over(worse, best.covariates))
+    beside = beside_slow_change(after, data)
+    if beside is None:
+        return Located(after, left)
+    return Located(beside, _foremost_over(residual_structure(beside.fit, data, beside.weights, rng), ("time",)))
+
+
+def _foremost_over(left: ResidualStructure, quantities: Collection[str]) -> ResidualStructure:
+    """The same with these covariates first."""
+    return replace(left, groups=tuple(sorted(left.groups, key=lambda g: g.covariate.quantity not in quantities)))
+
+
+def _with_colour(left: ResidualStructure, after: Estimate, data: Data) -> ResidualStructure:
+    """What is left counts as structure too when it is far from white, and more than the terms' shapes may leave."""
+    colour = whiteness(after.fit.residual, [r.size for r in data.rows])
+    if not after.fit.model.terms or colour > COLOURED or left.p_value < ALARM:
+        return left
+    changes = corrections(after.fit, data, Weights(after.weights.thrust))
+    spared = SHAPE_ERROR**2 * float(sum(change @ change for change in changes))
+    excess = float(after.fit.residual[: data.size] @ after.fit.residual[: data.size]) - data.size
+    return replace(left, p_value=colour) if excess > spared else left

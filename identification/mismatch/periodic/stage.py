@@ -1,0 +1,100 @@
+"""The stage: a first model and the runs in, the runs without their lines out, and where the noise has a broad peak.
+
+It looks at what the first model leaves at every sample; the means over intervals would have averaged a line away.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.model.model import Data
+from identification.mismatch.periodic.full_rate import scale_std_of, series_of, with_scale
+from identification.mismatch.periodic.periodic_disturbances import Line, find_lines
+from identification.mismatch.periodic.resonances import find_bands
+from identification.mismatch.periodic.spectrum import Series
+from identification.recording import Floats
+from identification.run_history.history import History
+
+UNSETTLED = 0.4
+"""s after a step in which a residual is no noise."""
+MOST_BANDS = 1
+"""Broad peaks that the noise may have."""
+FEW_SAMPLES = 400
+"""Of a run; fewer have no spectrum to speak of."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Cleaned:
+    """What was found at full rate."""
+
+    lines: tuple[Line, ...]
+    """Periodic disturbances, the clearest first."""
+    bands: tuple[tuple[float, float], ...]
+    """(Hz, quality) of broad peaks of the noise."""
+    histories: tuple[History, ...]
+    """The runs without the lines."""
+
+    @property
+    def changed(self) -> bool:
+        """Whether the model has to be selected again, on these runs and with this noise."""
+        return bool(self.lines or self.bands)
+
+
+def run(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned:
+    """Lines and bands of what this fit leaves; `originals`: the runs from which lines are taken."""
+    series = series_of(fitted, data)
+    if all(s.time.size < FEW_SAMPLES for s in series):
+        return Cleaned((), (), tuple(originals))
+    lines = _lines(fitted, data, series)
+    bands = find_bands(_still(series, lines, data), most=MOST_BANDS)
+    histories = tuple(
+        _without(h, [line.at(s.time, s.turns, i) for line in lines])
+        for i, (h, s) in enumerate(zip(originals, series, strict=True))
+    )
+    return Cleaned(lines, bands, histories)
+
+
+def _lines(fitted: Fit, data: Data, series: Sequence[Series]) -> tuple[Line, ...]:
+    has_rate = all("rotation_rate" in (h.driver_quantity, *h.others) for h in data.histories)
+    unit: Literal["rev", "V s"] = "rev" if has_rate else "V s"
+    lines = find_lines(series, turns_unit=unit)
+    if not lines or not data.with_rate:
+        return lines
+    scale_std = scale_std_of(fitted, data)
+    return tuple(with_scale(line, scale_std, series) for line in lines)
+
+
+def _still(series: Sequence[Series], lines: Sequence[Line], data: Data) -> list[Series]:
+    """The residuals without the lines, NaN shortly after steps, where they are no noise."""
+    out = []
+    for i, (s, h) in enumerate(zip(series, data.histories, strict=True)):
+        left = s.residual.copy()
+        for line in lines:
+            left -= line.at(s.time, s.turns, i)
+        left[h.since_step[_interval(h, s.time)] < UNSETTLED] = np.nan
+        out.append(replace(s, residual=left))
+    return out
+
+
+def _interval(history: History, time: Floats) -> NDArray[np.intp]:
+    index = np.searchsorted(history.edges, time, side="right") - 1
+    return np.clip(index, 0, history.driver.size - 1)
+
+
+def _without(history: History, lines: Sequence[Floats]) -> History:
+    """The history of the same samples less the lines."""
+    if not lines:
+        return history
+    value = history.sample_thrust - np.sum(lines, axis=0)
+    index = _interval(history, history.sample_time)
+    M = history.driver.size
+    some = np.maximum(history.count, 1)
+    mean = np.where(history.count > 0, np.bincount(index, weights=value, minlength=M) / some, np.nan)
+    within = np.asarray(np.bincount(index, weights=(value - mean[index]) ** 2, minlength=M), dtype=np.float64)
+    return replace(history, thrust=mean, within=within, sample_thrust=value)

@@ -1,0 +1,46 @@
+"""The stage: runs in, the model that earns its terms out: forward selection, then rivals exchanged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.mismatch.estimate.estimate import Estimate
+from identification.mismatch.select.aliases import within_samples
+from identification.mismatch.select.forward_selection import Selected, SwapTest, prune, resumed
+from identification.mismatch.select.rivals import swap_tests
+from identification.physics.term import Term
+
+
+def exchange_rivals(found: Selected, rng: np.random.Generator) -> Selected:
+    """With rivals exchanged; and once more what lies beyond, where the exchange made another model of it."""
+    if not found.after.fit.model.terms:
+        return found
+    after, standing = _exchanged(found)
+    if frozenset(after.fit.model.terms) == frozenset(found.after.fit.model.terms):
+        return _settled(found, after, standing)
+    again = resumed(found, after, rng)
+    if again.after is after:
+        return _settled(found, after, standing)
+    return _settled(again, *_exchanged(again))
+
+
+def _settled(found: Selected, after: Estimate, standing: dict[Term, SwapTest] | None) -> Selected:
+    last = found.last if after is found.after else None
+    return replace(found, after=after, last=last, standing=standing)
+
+
+def _exchanged(found: Selected) -> tuple[Estimate, dict[Term, SwapTest] | None]:
+    """With rivals exchanged, pruned as a search ends; as found where what was exchanged for a term is dropped again."""
+    after, standing = swap_tests(found.after, found.data, found.terms)
+    slower = within_samples(after, found.data)
+    if slower is not after:
+        return slower, None
+    if after is found.after:
+        return after, standing
+    pruned = prune(after, found.data)
+    if pruned is after:
+        return after, standing
+    exchanged = set(after.fit.model.terms) - set(found.after.fit.model.terms)
+    return (pruned if exchanged <= set(pruned.fit.model.terms) else found.after), None

@@ -1,0 +1,103 @@
+"""The stage: names in, the final model out: flexible terms in it where structure is left that no physics carries."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from identification.mismatch.estimate.confidence_intervals import Interval, intervals
+from identification.mismatch.estimate.estimate import Estimate, refresh
+from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.locate.residual_structure_test import ALARM, ResidualStructure, residual_structure
+from identification.mismatch.locate.stage import Located
+from identification.mismatch.model.model import Data
+from identification.mismatch.name.naming import Named
+from identification.mismatch.select.forward_selection import STATIC, Selected
+from identification.mismatch.unnamed.flexible import Extended, extend
+from identification.mismatch.unnamed.flexible_shape import refitted_names, shared
+from identification.mismatch.validate.prediction import predicting, predicts, without_terms
+from identification.mismatch.validate.stage import Validated
+from identification.physics.term import Term
+from identification.run_history.history import History
+
+ALONE = "without terms that have no name it predicts what was not fitted worse than the baseline"
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Completed:
+    """The final model, and what of it has no name."""
+
+    after: Estimate
+    earned: tuple[Named, ...]
+    """With their values in it, the largest gain first."""
+    intervals: Mapping[Term, tuple[Interval, ...]]
+    """Of their parameters."""
+    unearned: tuple[Named, ...]
+    flexible: Extended | None
+    """The final model's flexible terms; None where none predicts better what was not fitted."""
+    open_ended: bool
+    """Whether something is left, or is modelled without a name."""
+    bare: Estimate
+    """The model without the terms whose names were not earned."""
+    left: ResidualStructure
+    """What `bare` leaves, where that shows the place better."""
+
+
+def run(
+    selected: Selected, located: Located, validated: Validated, unseen: Sequence[History], rng: np.random.Generator
+) -> Completed:
+    """Flexible terms where they predict better; else the named model, without unnamed terms that predict no better."""
+    data, before, now = selected.data, selected.before, located.estimate
+    earned, unearned, split = validated.earned, validated.unearned, validated.split
+    open_ended = (located.structured or bool(unearned)) and bool(located.left.groups)
+    bare, left, flexible = now, located.left, None
+    if open_ended:
+        bare, left = _located(now, data, located.left, unearned, rng)
+        over = foremost_covariate(left, unearned, data)
+        flexible = extend(now, before, data, over, unearned, split, rng)
+    if flexible is not None:
+        valued, known = _with_values(earned, now, flexible.estimate, data, flexible)
+        return Completed(flexible.estimate, valued, known, unearned, flexible, open_ended, bare, left)
+    after = predicting(now, split, data, selected.terms, [n.term for n in unearned], unseen)
+    if earned and unearned and not predicts(after, before, data, unseen):
+        after, unearned, earned = before, (*unearned, *(replace(n, failed_checks=(ALONE,)) for n in earned)), ()
+        bare, left = _located(now, data, located.left, unearned, rng)
+    valued, known = _with_values(earned, now, after, data, None)
+    return Completed(after, valued, known, unearned, None, open_ended, bare, left)
+
+
+def _located(
+    after: Estimate, data: Data, left: ResidualStructure, unearned: Sequence[Named], rng: np.random.Generator
+) -> tuple[Estimate, ResidualStructure]:
+    """What is left without the terms whose names were not earned: they are no physics, and would hide its place."""
+    if not unearned:
+        return after, left
+    bare = replace(after, fit=fit(*without_terms(after, [n.term for n in unearned]), data, after.weights))
+    seen = residual_structure(bare.fit, data, after.weights, rng)
+    return (bare, seen) if seen.p_value < ALARM else (after, left)
+
+
+def foremost_covariate(left: ResidualStructure, unearned: Sequence[Named], data: Data) -> str:
+    """The covariate over which it is left most clearly; a static curve is one over what drives."""
+    if left.p_value >= ALARM:  # nothing beyond noise is left: the doubt itself is the place
+        driver = data.histories[0].driver_quantity
+        own = {driver if c in STATIC else c for n in unearned for c in n.term.covariates}
+        return next((g for g in left.groups if g.covariate.quantity in own), left.groups[0]).covariate.quantity
+    return left.groups[0].covariate.quantity
+
+
+def _with_values(
+    earned: Sequence[Named], before: Estimate, after: Estimate, data: Data, free: Extended | None
+) -> tuple[tuple[Named, ...], dict[Term, tuple[Interval, ...]]]:
+    """Names with their values and intervals in the final model, `after`; of those that share a covariate with a
+    flexible term in the model without any."""
+    alone = shared([n.term for n in earned], free) if free is not None else []
+    named = refitted_names([n for n in earned if n.term not in alone], after)
+    known = intervals(after.fit, data, after.weights, [n.term for n in named])
+    if free is not None and alone:
+        bare = refresh(*without_terms(before, free.dropped), data, None, None)  # what it leaves is noise to it
+        named += refitted_names([n for n in earned if n.term in alone], bare)
+        known |= intervals(bare.fit, data, bare.weights, alone)
+    return tuple(sorted(named, key=lambda n: -n.chi2_gain)), known

@@ -1,0 +1,59 @@
+"""The stage: a model and its names in, what judges it on what was not fitted out, and the names that fail there."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from identification.mismatch.estimate.estimate import Estimate
+from identification.mismatch.model.model import Data
+from identification.mismatch.name.naming import Named
+from identification.mismatch.noise.covariance import Noise
+from identification.mismatch.validate.cross_validation import by_folds
+from identification.mismatch.validate.held_out import HeldOut, by_blocks, by_runs
+from identification.mismatch.validate.prediction import worse_predicted
+from identification.mismatch.validate.train_test_split import TrainTestSplit, train_test_split
+from identification.run_history.history import History
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Validated:
+    """The names after their last check."""
+
+    split: TrainTestSplit
+    """The model fitted to a part of the data, and what judges it on the rest."""
+    earned: tuple[Named, ...]
+    unearned: tuple[Named, ...]
+    """Each with the checks that it failed."""
+
+
+def run(estimate: Estimate, named: Sequence[Named], data: Data, unseen: Sequence[History]) -> Validated:
+    """`unseen`: whole runs held out; where there are none blocks of time are kept back."""
+    split = train_test_split(estimate, data, unseen)
+    asked = [n.term for n in named if not n.failed_checks]
+    worse = worse_predicted(split, asked, same_run=not unseen)
+    failed = "what was not fitted is predicted better without it"
+    checked = [replace(n, failed_checks=(*n.failed_checks, failed)) if n.term in worse else n for n in named]
+    earned = tuple(n for n in checked if not n.failed_checks)
+    return Validated(split, earned, tuple(n for n in checked if n.failed_checks))
+
+
+def score(
+    before: Estimate,
+    after: Estimate,
+    data: Data,
+    measured: Data,
+    unseen: Sequence[History],
+    quiet: Noise,
+    *,
+    flexible: bool,
+) -> HeldOut:
+    """Errors on the runs held out; where none are on each run in turn; on blocks of time where one run is all there is,
+    and where flexible terms were chosen on the rest of these.
+
+    `measured`: the runs with periodic disturbances still in them. `quiet`: noise of another model of these runs.
+    """
+    if unseen:
+        return by_runs(before, after, data, unseen, quiet)
+    judge = by_blocks if flexible else by_folds
+    return judge(before, after, data, measured, quiet)
