@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from identification.mismatch.answer.verdict import decided
 from identification.mismatch.diagnosis import (
     Diagnosis,
     Finding,
@@ -38,10 +39,12 @@ def finding(effect, **rivals):
 def diagnosis(verdict, *findings, experiment=None, place=""):
     where = Where(place, 0.0, 1.0, "V")
     left = Remainder(where, 0.5, 1e-9, (), "Something is left.") if place else None
-    return Diagnosis(
-        *(("a",), "T1", verdict, "C V|V|", {}, (), findings, left, (), {}),
-        *(Rmse(1.0, 0.1), HeldOutRmse(1.0, 0.1, 0.1, "blocks"), 1.0, 0.5, experiment),
+    found = Diagnosis(
+        *(("a",), "T1", decided(findings, left, experiment), "C V|V|", {}, (), (), {}),
+        *(Rmse(1.0, 0.1), HeldOutRmse(1.0, 0.1, 0.1, "blocks"), 1.0, 0.5),
     )
+    assert found.verdict == verdict
+    return found
 
 
 DOUBT = diagnosis("ambiguous", finding("exponent", dead_band=1.0, linear_term=8.0), experiment=SWEEP)

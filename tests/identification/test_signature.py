@@ -7,7 +7,7 @@ import pytest
 
 from identification.mismatch.compare.reported_runs import runs_of
 from identification.mismatch.compare.signature import profile, shape, signature
-from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, HeldOutRmse, Rmse
+from identification.mismatch.diagnosis import Adequate, Curves, Diagnosis, Finding, HeldOutRmse, Rmse
 from identification.mismatch.value import Value
 
 LEVELS = np.array([0.0, 8.0, -8.0, 2.0, 16.0, -16.0, -2.0, 0.0, 12.0, 4.0, -12.0, -4.0])
@@ -20,8 +20,8 @@ F = C * V * np.abs(V)
 def diagnosis(*curves):
     base = {"C": Value(C, 0.001, "N/V^2")}
     ids = tuple(c.recording_id for c in curves)
-    some = (Rmse(1.0, 0.1), HeldOutRmse(1.0, 0.1, 0.1, ""), 1.0, 0.5, None, ())
-    return Diagnosis(ids, "T1", "adequate", "C V|V|", base, (), (), None, (), base, *some, curves)
+    some = (Rmse(1.0, 0.1), HeldOutRmse(1.0, 0.1, 0.1, ""), 1.0, 0.5, ())
+    return Diagnosis(ids, "T1", Adequate(), "C V|V|", base, (), (), base, *some, curves)
 
 
 def runs(true, model=None, noise=0.1, seed=0):

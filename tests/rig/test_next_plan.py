@@ -7,7 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from identification.mismatch.diagnosis import Diagnosis, HeldOutRmse, NextExperiment, PlanStep, Rmse
+from identification.mismatch.diagnosis import (
+    Adequate,
+    Ambiguous,
+    Diagnosis,
+    HeldOutRmse,
+    NextExperiment,
+    PlanStep,
+    Rmse,
+)
 from identification.recording import Recording
 from rig.answer_files import Wanted
 from rig.check import check_campaign
@@ -21,9 +29,13 @@ RIGHT = Path(__file__).parent / "wrong" / "right.toml"
 STEPS = (PlanStep(0.0, 3.0), PlanStep(15.0, 1.0), PlanStep(-15.0, 4.0), PlanStep(0.0, 3.0))
 NEXT = NextExperiment("separates exponent from linear_term", STEPS, 0.96)
 FOUND = Diagnosis(
-    *(("a",), "T1", "ambiguous", "C V|V|", {}, (), (), None, (), {}),
-    *(Rmse(1.0, 0.1), HeldOutRmse(1.0, 0.1, 0.1, "blocks"), 1.0, 0.5, NEXT),
+    *(("a",), "T1", Ambiguous((), NEXT), "C V|V|", {}, (), (), {}),
+    *(Rmse(1.0, 0.1), HeldOutRmse(1.0, 0.1, 0.1, "blocks"), 1.0, 0.5),
 )
+
+
+def wanting(experiment):
+    return replace(FOUND, answer=Ambiguous((), experiment))
 
 
 @pytest.fixture
@@ -43,16 +55,16 @@ def test_the_sweep_is_a_campaign_that_rig_check_accepts(campaign, tmp_path):
 
 def test_one_file_for_each_flow_speed(campaign, tmp_path):
     moving = NextExperiment("w", (*STEPS, PlanStep(0.0, 3.0, 0.5), PlanStep(10.0, 3.0, 0.5)), 0.9)
-    files = write_next(replace(FOUND, next_experiment=moving), campaign, tmp_path / "next.toml")
+    files = write_next(wanting(moving), campaign, tmp_path / "next.toml")
     assert [load_campaign(file).flow_speed for file in files] == [0.0, 0.5]
     of_before = replace(campaign, path=tmp_path / "next-1.toml")
     with pytest.raises(ConfigError, match=r"next-1.toml: this is the campaign that the plan is made from"):
-        write_next(replace(FOUND, next_experiment=moving), of_before, tmp_path / "next.toml")
+        write_next(wanting(moving), of_before, tmp_path / "next.toml")
 
 
 def test_refusals(campaign, tmp_path):
-    assert write_next(replace(FOUND, next_experiment=None), campaign, tmp_path / "next.toml") == ()
-    turning = replace(FOUND, next_experiment=replace(NEXT, quantity="rotation_rate"))
+    assert write_next(wanting(None), campaign, tmp_path / "next.toml") == ()
+    turning = wanting(replace(NEXT, quantity="rotation_rate"))
     with pytest.raises(ConfigError, match="levels of the next experiment are in rev/s; a campaign is driven in V"):
         write_next(turning, campaign, tmp_path / "next.toml")
     with pytest.raises(ConfigError, match="recordings are of thruster T9"):
@@ -120,7 +132,7 @@ def test_a_campaign_of_other_thrusters_is_refused_before_anything_is_computed(ca
 
 def test_no_next_experiment_is_an_answer(campaign, tmp_path, capsys):
     plan = tmp_path / "next.toml"
-    tell(replace(FOUND, verdict="adequate", next_experiment=None), Wanted(plan=plan, campaign=campaign))
+    tell(replace(FOUND, answer=Adequate()), Wanted(plan=plan, campaign=campaign))
     said = capsys.readouterr()
     assert said.err == f"no next experiment is needed, for no finding has a rival; {plan} was not written\n"
     assert "T1: adequate" in said.out

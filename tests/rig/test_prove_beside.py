@@ -11,7 +11,7 @@ from blind_scores import whole_proof
 from click.testing import CliRunner
 from report_reading import open_fonts
 
-from identification.mismatch.diagnosis import Diagnosis, Finding, HeldOutRmse, RivalFinding, Rmse
+from identification.mismatch.diagnosis import Ambiguous, Diagnosis, Finding, HeldOutRmse, RivalFinding, Rmse
 from rig.blind.beside import (
     AtStrength,
     Found,
@@ -81,14 +81,13 @@ def diagnosis() -> Diagnosis:
     rival = RivalFinding("exponent", "", {}, 1.0, "Or so.")
     finding = Finding("dead_band", "shrink", "A dead band.", {}, 0.0, 50.0, 0.9, (rival,))
     held = HeldOutRmse(2.0, 1.0, float("nan"), "blocks of time")
-    nothing = {"mismatch": (), "unexplained": None, "model_terms": (), "model": {}, "next_experiment": None}
+    nothing = {"mismatch": (), "model_terms": (), "model": {}}
     return Diagnosis(
         recordings=("r",),
         thruster="T1",
-        verdict="ambiguous",
+        answer=Ambiguous((finding,), None),
         baseline_model="C V|V|",
         baseline={},
-        findings=(finding,),
         train=Rmse(2.0, 1.0),
         heldout=held,
         chi2_per_dof=1.0,

@@ -7,6 +7,7 @@ import pytest
 from report_reading import open_fonts, read
 
 from identification.flexible_terms.flexible import MULTIPLIERS, WORDS
+from identification.mismatch.answer.verdict import decided
 from identification.mismatch.diagnosis import (
     NOT_WHITE,
     Curves,
@@ -78,12 +79,20 @@ ODD = Remainder(
 )
 
 
-def answer(**changes):
+def answer(findings=(LAGS,), unexplained=None, experiment=NEXT, **changes):
     base = {"C": Value(0.39, 0.001, "N/V^2"), "tare": Value(1.0, 0.01, "N")}
     d = Diagnosis(
-        *(("a",), NAME, "ambiguous", "C V|V|", base, (LATE, HIGH), (LAGS,), None, ("motor_lag",)),
+        *(
+            ("a",),
+            NAME,
+            decided(tuple(findings), unexplained, experiment),
+            "C V|V|",
+            base,
+            (LATE, HIGH),
+            ("motor_lag",),
+        ),
         {**base, "motor_lag.time_constant": Value(LAG, 0.001, "s"), "heating.loss": Value(0.1, np.nan, "1")},
-        *(Rmse(5.0, 0.1), HeldOutRmse(5.0, 0.11, 0.1, "every fourth block of time"), 1.02, 0.4, NEXT),
+        *(Rmse(5.0, 0.1), HeldOutRmse(5.0, 0.11, 0.1, "every fourth block of time"), 1.02, 0.4),
         *(("the motor's temperature was not recorded",), (lagging(),), twin()),
     )
     return replace(d, **changes)
@@ -144,7 +153,7 @@ def test_each_section_has_its_figures():
 
 
 def test_unexplained_shows_shapes_and_what_it_resembles():
-    page = diagnosis_page(answer(verdict="unexplained", unexplained=ODD, findings=(), next_experiment=None))
+    page = diagnosis_page(answer(unexplained=ODD, findings=(), experiment=None))
     assert titles(page)["What is not explained"] == [
         *("What is left over time", "Left out over time since step", "Left out over command voltage")
     ]
@@ -164,7 +173,7 @@ def test_a_flexible_term_of_each_kind_is_drawn(times):
     at = np.linspace(0.0, 3.0, 5)
     spline = Spline(times, WORDS[times], "1", at, 0.1 * at, 0.01 + 0.0 * at, ((0.5, 0.05, 0.04, 0.01),))
     found = FlexibleShape("time_since_step", "s", (0.0, 1.0, 3.0), 1, 0.0, 0.0, {}, (spline,), "A flexible term.")
-    page = diagnosis_page(answer(verdict="unexplained", unexplained=replace(ODD, flexible=(found,)), findings=()))
+    page = diagnosis_page(answer(unexplained=replace(ODD, flexible=(found,)), findings=()))
     assert f"Flexible term over time since step: {times}" in titles(page)["What is not explained"]
 
 
@@ -172,7 +181,7 @@ def test_adequate_page_has_little_to_say():
     curves = replace(lagging(), model=lagging().baseline)
     page = diagnosis_page(
         answer(
-            **{"verdict": "adequate", "mismatch": (), "findings": (), "model_terms": (), "next_experiment": None},
+            **{"mismatch": (), "findings": (), "model_terms": (), "experiment": None},
             **{"notes": (), "twin": None, "curves": (curves,), "heldout": HeldOutRmse(0.1, 0.1, np.nan, "blocks")},
             model={"C": Value(np.nan, np.nan, "N/V^2")},
         )
@@ -226,7 +235,7 @@ def test_the_next_sweep_is_drawn_in_its_own_unit():
         (NEXT, "voltage between -9 and 2 V", "voltage / V"),
         (turning, "rotation rate between -9 and 2 rev/s", "rotation rate / (rev/s)"),
     ):
-        section = next(s for s in diagnosis_page(answer(next_experiment=n)).sections if s.title.startswith("The next"))
+        section = next(s for s in diagnosis_page(answer(experiment=n)).sections if s.title.startswith("The next"))
         assert said in section.parts[1].plot.alt
         assert label in svg(section.parts[1].plot)
 
@@ -239,7 +248,7 @@ def test_finding_without_a_coordinate_is_a_sentence():
 
 
 def test_same_answer_same_bytes():
-    few = answer(curves=(), mismatch=(HIGH,), findings=(), unexplained=ODD, verdict="unexplained")
+    few = answer(curves=(), mismatch=(HIGH,), findings=(), unexplained=ODD)
     assert html(diagnosis_page(few)) == html(diagnosis_page(few))
 
 
