@@ -28,11 +28,12 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
 from identification.mismatch.estimate.estimate import Estimate, refresh
-from identification.mismatch.estimate.fitting import extended, fit
+from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.locate.slow_change import ALARM, slow_changes
-from identification.mismatch.model.model import Data, Model
-from identification.mismatch.pipeline import _histories
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import Model
 from identification.mismatch.prepare.preparing import Refusal
+from identification.mismatch.prepare.stage import histories_of
 from identification.mismatch.select import forward_selection as search
 from identification.mismatch.select.baseline import baseline, start
 from identification.mismatch.select.screening import Screening, directions, refined, screen
@@ -70,7 +71,7 @@ class Seen:
 
 def seen(case: concealed.Case, *without: str) -> Seen:
     """Of effects `without` nothing is asked: they are in no catalogue."""
-    histories = _histories(recordings(case))
+    histories = histories_of(recordings(case))
     if isinstance(histories, Refusal):
         return Seen()
     data, theta = start(histories)
@@ -89,9 +90,8 @@ def _tried(estimate: Estimate, judged: Screening, data: Data) -> Iterator[Gain]:
     for term, values, screened in judged.best(2 * search.MOST_HIDDEN):
         if screened < LEAST:
             continue
-        bigger = estimate.fit.model.plus(term)
         begin = refined(estimate.fit, data, estimate.weights, term, values)
-        theta = extended(estimate.fit.theta, estimate.fit.model, term, begin, bigger)
+        bigger, theta = estimate.fit.more(term, begin)
         first = fit(bigger, theta, data, estimate.weights)
         new = refresh(bigger, first.theta, data, None, now, now.noise)
         asked = search._asked_of_hidden(term, judged, data)

@@ -32,8 +32,10 @@ import h5py
 import numpy as np
 
 from identification.mismatch.estimate.estimate import Estimate, refresh
-from identification.mismatch.estimate.fitting import extended
-from identification.mismatch.model.model import Data, Model, Theta, predict
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import Model, extended
+from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.predictor import predict
 from identification.mismatch.noise.covariance import Whitener
 from identification.mismatch.prepare.grid import Held
 from identification.mismatch.prepare.preparing import Refusal, history_of
@@ -43,6 +45,7 @@ from identification.mismatch.select.screening import directions
 from identification.recording import Recording
 from identification.run_history.filters import delayed
 from identification.run_history.history import History
+from identification.run_history.remembered import RememberedRun
 from rig.hdf5 import load
 from sim_devices import concealed
 
@@ -146,11 +149,11 @@ def _each_sample(recording: Recording, coarse: History) -> History:
 def _at_samples(data: Data, estimate: Estimate) -> tuple[Whitener, np.ndarray, np.ndarray]:
     """Whitener, whitened columns of the baseline (C, tare and, where it is free, the shift of the clocks), residual."""
     (history,), theta = data.histories, estimate.fit.theta
-    F, _ = predict(Model(), theta, history, data.scale)
+    F, _ = predict(Model(), theta, data.runs[0], data.scale)
     later = [delayed(F, history.edges, theta.shift + more)[history.rows] for more in (0.0, SLIGHT)]
     whitener = Whitener(estimate.noise, data.thrust_rows[0], np.abs(later[0]))
     base = [later[0], np.ones(later[0].size)]
-    if estimate.fit.free[-3]:
+    if estimate.fit.free[estimate.fit.layout.shift]:
         base.append((later[1] - later[0]) / SLIGHT)
     left = history.thrust[history.rows] - later[0] - theta.tares[0]
     return whitener, whitener.whiten(np.column_stack(base)), whitener.whiten(left)
@@ -159,12 +162,10 @@ def _at_samples(data: Data, estimate: Estimate) -> tuple[Whitener, np.ndarray, n
 def _candidates(data: Data, theta: Theta) -> Iterator[tuple[str, np.ndarray]]:
     """Each trial's change of the thrust, at every sample."""
     model, (history,) = Model(), data.histories
-    base, _ = predict(model, theta, history, data.scale)
+    base, _ = predict(model, theta, data.runs[0], data.scale)
     for term in available(data):
-        bigger = model.plus(term)
         for trial in term.trials(data.scale):
-            new, _ = predict(bigger, extended(theta, model, term, trial, bigger), history, data.scale)
-            history.memo.clear()
+            new, _ = predict(*extended(model, theta, term, trial), RememberedRun(history), data.scale)
             yield f"{term.id} {term.form} {trial}", (new - base)[history.rows]
 
 

@@ -17,7 +17,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.mismatch.estimate.fitting import Fit, fit, raw
-from identification.mismatch.model.model import Data, Model, Theta, weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.periodic.full_rate import series_of
 from identification.mismatch.prepare.preparing import Refusal, history_of

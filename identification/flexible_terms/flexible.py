@@ -17,6 +17,7 @@ from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import lowpass, since_opposite
 from identification.run_history.history import TURNING, History
+from identification.run_history.remembered import RememberedRun
 from identification.run_history.splines import spline
 
 Multiplier = Literal["force", "gain", "even", "step", "reversed", "rate", "drive", "late"]
@@ -112,7 +113,7 @@ class Flexible:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        over = self.axis(self.over(now.history, now.x, now.scale))
+        over = self.axis(self.over(now.run, now.x, now.scale))
         out, at = value, 0
         for m in self.times:
             free = self.free(m)
@@ -124,8 +125,9 @@ class Flexible:
             )
         return out
 
-    def over(self, history: History, x: Floats, scale: Scale) -> Floats:
-        """(M,) in `unit`."""
+    def over(self, run: RememberedRun, x: Floats, scale: Scale) -> Floats:
+        """(M,) of the covariate, in `unit`."""
+        history = run.history
         match self.quantity:
             case "time":
                 return history.middle % self.period if self.period else history.middle
@@ -142,7 +144,7 @@ class Flexible:
             case "load_history":
                 return lowpass((x / scale.driver) ** 2, history.dt, self.memory)[1]
             case "rotation_rate" if "drive" in self.times:
-                return slip(history, x, history.rate_per_driver)
+                return slip(run, x, history.rate_per_driver)
             case quantity if quantity == history.driver_quantity:
                 return history.driver
             case quantity:

@@ -55,7 +55,7 @@ class MotorLag:
         tau = theta[0]
         if tau <= 1e-6:
             return value
-        return now.history.followed(value, torques(self.form, theta, now.scale.driver))
+        return now.run.followed(value, torques(self.form, theta, now.scale.driver))
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         alike = self.form == "first_order" or (self.form == "mixed" and theta[1] > NEARLY_LINEAR)

@@ -10,19 +10,20 @@ import numpy as np
 from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed
-from identification.run_history.history import History
 from identification.run_history.rate_gap import running, without_ticks
+from identification.run_history.remembered import RememberedRun
 
 
-def slip(history: History, x: Floats, k: float) -> Floats:
+def slip(run: RememberedRun, x: Floats, k: float) -> Floats:
     """(M,) measured rate / k minus x, without the noise of the rate."""
+    history = run.history
     rows = history.rate_rows
     if history.rate is None or history.rate_sampled is None or rows.size < 2:
         return np.zeros_like(x)
     there = reconstructed(x, history.middle, history.rate_sampled)[rows]
     gap = without_ticks(history.rate[rows] / k - there, history)
-    if history.rate_gap is not None:
-        return history.rate_gap.calmed(gap, history)
+    if run.rate_gap is not None:
+        return run.rate_gap.calmed(gap, history)
     amount, share = running(gap, np.ones_like(gap)), running(gap, there)
     by_share = share.error < amount.error
     found = share if by_share else amount
@@ -51,7 +52,7 @@ class RotationCoupling:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        out: Floats = value + theta[0] * slip(now.history, value, now.history.rate_per_driver)
+        out: Floats = value + theta[0] * slip(now.run, value, now.history.rate_per_driver)
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

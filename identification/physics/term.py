@@ -12,6 +12,7 @@ from typing import Literal, Protocol
 
 from identification.recording import Floats
 from identification.run_history.history import History
+from identification.run_history.remembered import RememberedRun
 
 Stage = Literal["command", "rotor", "hydro", "stand", "cell"]
 STAGES: tuple[Stage, ...] = ("command", "rotor", "hydro", "stand", "cell")
@@ -61,13 +62,17 @@ class Parameter:
 class TermContext:
     """What a term may look at beside the value that it changes. Arrays (M,) on the intervals of the history."""
 
-    history: History
+    run: RememberedRun
     scale: Scale
     C: float
     tare: float
     """N, of this run."""
     x: Floats
     """Rate of the rotor in units of the driver: thrust is C x|x| without any term. In stage command: the driver."""
+
+    @property
+    def history(self) -> History:
+        return self.run.history
 
 
 class Term(Protocol):

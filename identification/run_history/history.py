@@ -6,7 +6,6 @@ some thousand of them and a motor lag is still seen. Values are means over the i
 
 from __future__ import annotations
 
-from collections import OrderedDict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,10 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
-from identification.run_history.filters import lag
-from identification.run_history.kept import LeastRecentlyUsed
-from identification.run_history.rate_gap import RateGap, rate_gap
-from identification.run_history.step_response_rows import TickRows, tick_rows
 
 TURNING = 0.02
 """Share of the largest driver above which it counts as driving."""
@@ -28,9 +23,6 @@ BACK = 0.005
 """Share of the largest driver by which it must come back to have turned round."""
 NOISES = 5.0
 """Standard deviations of a measured driver: a smaller difference may be its noise."""
-MOST_LEADS = 160
-"""Remembered: those of all trials of a screening, twice."""
-MOST_LATELY = 12
 LARGEST_LEAD = 0.08
 """Of the largest driver: what changes by more is a step even in a fast ramp, and no tick."""
 LOUD_READINGS = 0.4, 0.9
@@ -58,26 +50,16 @@ class Samples:
     middle: Floats
     """(M,) s, their mean time; the middle of the interval where there are none."""
 
-    known: dict[float, tuple[NDArray[np.intp], Floats]] = field(default_factory=dict, repr=False)
-    """`after`, by the delay asked for last."""
-
     def after(self, when: Floats, delay: float) -> tuple[NDArray[np.intp], Floats]:
         """(N,) the last of the ticks `when` that is `delay` s ago or longer, else the first, and s since then."""
-        if delay not in self.known:
-            self.known.clear()
-            self.known[delay] = ticks_before(self.time - delay, when)
-        return self.known[delay]
+        last = np.maximum(np.searchsorted(when, self.time - delay, side="right") - 1, 0)
+        return last, np.maximum(self.time - delay - when[last], 0.0)
 
     def means(self, value: Floats) -> Floats:
         """(M,) means of values (N,) over each interval; 0 where there are none."""
         total = np.bincount(self.interval, weights=value, minlength=self.count.size)
         out: Floats = total / np.maximum(self.count, 1)
         return out
-
-
-def ticks_before(time: Floats, when: Floats) -> tuple[NDArray[np.intp], Floats]:
-    last = np.maximum(np.searchsorted(when, time, side="right") - 1, 0)
-    return last, np.maximum(time - when[last], 0.0)
 
 
 def samples_in(time: Floats, edges: Floats) -> Samples:
@@ -144,12 +126,6 @@ class History:
     sample_thrust: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     rate_time: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     """(n,) s, every sample of the rotation rate."""
-    memo: OrderedDict[object, Floats] = field(default_factory=OrderedDict, repr=False)
-    """Values behind the first terms of models predicted lately: a fit moves one parameter at a time."""
-    leads: LeastRecentlyUsed = field(default_factory=lambda: LeastRecentlyUsed(MOST_LEADS), repr=False)
-    """What dynamics make of the ticks: each screening tries the same ones."""
-    lately: LeastRecentlyUsed = field(default_factory=lambda: LeastRecentlyUsed(MOST_LATELY), repr=False)
-    """What the rates of the last few models make at the samples: most terms change none."""
     static: bool = False
     """Levels without a course of time: nothing that moves can be seen."""
 
@@ -166,22 +142,6 @@ class History:
     def middle(self) -> Floats:
         out: Floats = 0.5 * (self.edges[1:] + self.edges[:-1])
         return out
-
-    @cached_property
-    def tick_rows(self) -> TickRows | None:
-        """What the ticks of the command tell within the intervals; None where they tell nothing."""
-        return tick_rows(self)
-
-    @cached_property
-    def rate_gap(self) -> RateGap | None:
-        """What takes the noise out of how far the measured rate is from a model."""
-        return rate_gap(self)
-
-    def followed(self, value: Floats, rotor: tuple[float, float]) -> Floats:
-        """(M,) means of the rate of a rotor that follows (filters.lag), sought from the last one: it is seldom far."""
-        end, mean = lag(value, self.dt, *rotor, float(value[0]), self.memo.get("rotor"))
-        self.memo["rotor"] = end
-        return mean
 
     @cached_property
     def thrust_samples(self) -> Samples:

@@ -8,17 +8,15 @@ from row to row, as that of a rotor that lags, is no wandering: it is taken as i
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed
+from identification.run_history.history import History
 from identification.run_history.splines import spline
 from identification.run_history.wandering import Smoother
-
-if TYPE_CHECKING:
-    from identification.run_history.history import History
 
 NODES, ROWS_A_NODE = 17, 50
 """Of the curve of the driver, at quantiles of it, at most; and the rows that one takes."""

@@ -16,16 +16,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
-from identification.run_history.kept import LeastRecentlyUsed
-
-if TYPE_CHECKING:
-    from identification.run_history.history import History
+from identification.run_history.history import History
+from identification.run_history.least_recently_used import LeastRecentlyUsed
 
 DENSE = 0.03
 """s between samples: where they are farther apart, hardly any share an interval."""
@@ -74,7 +71,7 @@ class TickRows:
     """(B + 1,) s after a tick; at the last nothing is held back."""
     levels: Floats
     """(5,) |V| of the ticks."""
-    kept: LeastRecentlyUsed = field(default_factory=lambda: LeastRecentlyUsed(MOST_KEPT), repr=False)
+    kept: LeastRecentlyUsed[Floats] = field(default_factory=lambda: LeastRecentlyUsed[Floats](MOST_KEPT), repr=False)
     """Responses and rows worked out lately: most parameters of a model move none."""
 
     def predicted(self, C: float, held_back: Floats, jump: float = 0.0) -> Floats:

@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
-from identification.run_history.filters import complex_recursion, delayed, lag_ends, lagged, recursion, resonant
-from identification.run_history.history import History
+from identification.run_history.filters import complex_recursion, delayed, lagged, recursion, resonant
+from identification.run_history.remembered import RememberedRun
 
 SETTLED = 25.0
 """Time constants after which a rotor has followed and ringing has died away."""
@@ -33,41 +33,30 @@ class Passed:
     delay: float = 0.0
     """s."""
 
-    def means(self, history: History) -> Floats:
+    def means(self, run: RememberedRun) -> Floats:
         """(M,) of the rotor's rate, means over intervals, of a driver that stands still in each."""
-        out = history.driver if self.rotor is None else history.followed(history.driver, self.rotor)
+        history = run.history
+        out = history.driver if self.rotor is None else run.followed(history.driver, self.rotor)
         return delayed(out, history.edges, self.delay) if self.delay else out
 
-    def rung_means(self, history: History) -> Floats:
+    def rung_means(self, run: RememberedRun) -> Floats:
         """(M,) of rate |rate| as the stand shows it, means over intervals, of a driver that stands still in each."""
         assert self.ring is not None
-        x = history.driver if self.rotor is None else history.followed(history.driver, self.rotor)
+        history = run.history
+        x = history.driver if self.rotor is None else run.followed(history.driver, self.rotor)
         force = x * np.abs(x)
         moved = force - history.driver[0] * np.abs(history.driver[0])
         out = force + self.ring[0] * (resonant(moved, history.dt, *self.ring[1:]) - moved)
         return delayed(out, history.edges, self.delay) if self.delay else out
 
-    def at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
-        """(N,) the rate `since` s + delay after the tick `last`, of a driver that takes `value` (T,) at the ticks
-        `when` (T,) s. It was settled before the first.
-        """
-        return self.followed(last, since, value, self.rates(when, value))
-
-    def rung_at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
-        """(N,) rate |rate| as the stand shows it then."""
-        rate = self.at(last, since, when, value)
+    def rung_at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats, rates: Floats) -> Floats:
+        """(N,) rate |rate| as the stand shows it then; the ticks at `when` (T,) s."""
+        rate = self.followed(last, since, value, rates)
         return rate * np.abs(rate) + self.ringing(last, since, when, value)
 
-    def rates(self, when: Floats, value: Floats, near: Floats | None = None) -> Floats:
-        """(T,) of the rotor at each tick. `near`: those of a rotor that is not far off."""
-        if self.rotor is None:
-            return value
-        begin = float(value[0])
-        end = lag_ends(value[:-1], np.diff(when), *self.rotor, begin, None if near is None else near[1:])
-        return np.concatenate([value[:1], end])
-
     def followed(self, last: NDArray[np.intp], since: Floats, value: Floats, rates: Floats) -> Floats:
-        """(N,) as `at`; `rates` (T,) at the ticks."""
+        """(N,) the rate `since` s + delay after the tick `last`, of a driver that takes `value` (T,) at the ticks;
+        `rates` (T,) of the rotor there."""
         out: Floats = value[last]
         if self.rotor is not None:
             quadratic, linear = self.rotor

@@ -4,6 +4,7 @@ import numpy as np
 
 from identification.physics.term import Scale, TermContext
 from identification.run_history.history import History
+from identification.run_history.remembered import RememberedRun
 
 
 def uneven(rng, n, low=0.004, high=0.25):
@@ -67,4 +68,4 @@ def scale(h, volts=1.0, newtons=1.0, noise=1.0, flow=1.0):
 
 
 def moment(h, s, tare=0.0, x=None):
-    return TermContext(h, s, s.thrust / s.driver**2, tare, h.driver if x is None else x)
+    return TermContext(RememberedRun(h), s, s.thrust / s.driver**2, tare, h.driver if x is None else x)

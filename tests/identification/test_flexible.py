@@ -13,7 +13,7 @@ from identification.flexible_terms.formula import Monomial
 from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.compare.simulation import Drive, Prediction, others_of, simulate
 from identification.mismatch.diagnosis import Diagnosis
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.prepare.scales import scale_of
@@ -22,6 +22,7 @@ from identification.mismatch.unnamed.spline_knot_selection import Moments, choos
 from identification.physics.term import Scale, TermContext
 from identification.recording import Channel
 from identification.run_history.history import History
+from identification.run_history.remembered import RememberedRun
 from identification.run_history.splines import spline
 from rig.diagnose_text import diagnosis_text
 from rig.errors import TwinError
@@ -141,7 +142,7 @@ def test_what_a_spline_multiplies(multiplier):
     term = Flexible("time", "s", (0.0, 5.0, 10.0), (0,), (multiplier,), degree=1, memory=2.0)
     known = term.parameters(SCALE)
     theta = tuple(0.1 * float(p.name.split("_")[-1]) for p in known)
-    now = TermContext(h, SCALE, C, 0.0, h.driver)
+    now = TermContext(RememberedRun(h), SCALE, C, 0.0, h.driver)
     moved = term.apply(F, now, theta) - F
     assert moved == pytest.approx(0.1 * np.minimum(h.middle, 10.0) * expected, rel=1e-5), "constant beyond the knots"
     assert term.apply(F, now, (0.0,) * len(known)) == pytest.approx(F)
@@ -153,7 +154,7 @@ def test_what_a_spline_multiplies(multiplier):
 def test_coordinates_that_every_run_has(quantity):
     h = history()
     term = Flexible(quantity, "1", (0.5, 2.0), (), ("force",), memory=5.0)
-    assert term.over(h, h.driver, SCALE).shape == h.driver.shape
+    assert term.over(RememberedRun(h), h.driver, SCALE).shape == h.driver.shape
     assert term.needs == ()
     assert term.trials(SCALE) == term.finer((0.0,), SCALE) == ()
 
@@ -170,7 +171,7 @@ def test_time_since_it_turned_the_other_way_is_seen_on_a_sine():
     away = known & (np.abs(V) > 0.5)
     assert since[away] == pytest.approx((t[away] + 0.25) % 10.0, abs=0.76)
     term = Flexible("time_since_step", "s", (0.5, 10.0), (1,), ("reversed",))
-    assert term.over(h, V, SCALE) == pytest.approx(since)
+    assert term.over(RememberedRun(h), V, SCALE) == pytest.approx(since)
 
 
 def test_a_recorded_quantity_is_needed():
@@ -178,7 +179,7 @@ def test_a_recorded_quantity_is_needed():
     assert term.needs == ("water_temperature",)
     warm = history(water_temperature=np.full(40, 15.0))
     F = np.ones(40)
-    assert term.apply(F, TermContext(warm, SCALE, C, 0.0, F), (-0.2,)) == pytest.approx(0.9 * F)
+    assert term.apply(F, TermContext(RememberedRun(warm), SCALE, C, 0.0, F), (-0.2,)) == pytest.approx(0.9 * F)
     assert Flexible("rotation_rate", "V", (-1.0, 0.0), (1,), ("drive",)).stage == "rotor"
 
 
@@ -299,10 +300,10 @@ def test_a_formula_counts_its_gain_from_the_middle_of_the_data():
     """Counted from 0 degC it would make C another, and with it the response to a tick of the command."""
     history = history_of(run(lambda _t, _V, F: F, extra=(warming(),)))
     monomials = (Monomial((("T_w", 1),), "F"), Monomial((("T_w", 2),), "F"))
-    data = Data((history,), scale_of((history,), C))
+    data = Data((history,), scale_of((RememberedRun(history),), C))
     term = term_of(monomials, {"T_w": 20.0}, data)
     size = data.scale.driver
-    now = TermContext(history, data.scale, C, 0.0, np.full(history.driver.size, size))
+    now = TermContext(RememberedRun(history), data.scale, C, 0.0, np.full(history.driver.size, size))
     gain = term.apply(np.ones(history.driver.size), now, (3.0, -2.0))[data.rows[0]]
     assert abs(np.mean(gain) - 1) < 1e-9
     assert np.ptp(gain) > 0.1

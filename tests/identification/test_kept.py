@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 
 from identification.recording import Floats
-from identification.run_history.kept import LeastRecentlyUsed
+from identification.run_history.least_recently_used import LeastRecentlyUsed
 
 
 def test_the_longest_unused_is_forgotten() -> None:

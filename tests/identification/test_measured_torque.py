@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from diagnosed_runs import TOP, levels, run
 
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.channels import torque
 from identification.mismatch.prepare.grid import Held
@@ -15,6 +15,7 @@ from identification.mismatch.prepare.scales import scale_of
 from identification.mismatch.select.forward_selection import available
 from identification.physics.torque_crosstalk import MeasuredTorque, TorqueCrosstalk
 from identification.recording import Channel
+from identification.run_history.remembered import RememberedRun
 from rig.report.rivals import told_apart
 
 FULL = 3.0
@@ -104,7 +105,7 @@ def test_a_noisy_torque_that_the_cell_does_not_feel_is_no_finding(seed):
 def test_the_measured_form_takes_the_place_of_the_proxy():
     def forms(*recordings):
         histories = tuple(history_of(r) for r in recordings)
-        data = Data(histories, scale_of(histories, 0.5))
+        data = Data(histories, scale_of([RememberedRun(h) for h in histories], 0.5))
         return [t for t in available(data) if t.id == "torque_crosstalk"]
 
     one, bare = recorded(), run(seed=5)

@@ -10,7 +10,7 @@ from diagnosed_runs import NOISE, TOP, C, dead_band, levels, run, table
 from identification.mismatch import pipeline as diagnosing
 from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.diagnosis import Diagnosis
-from identification.mismatch.estimate.fitting import extended, fit
+from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.model import Model
 from identification.mismatch.name.naming import failed_checks
 from identification.mismatch.noise.covariance import Noise
@@ -634,8 +634,7 @@ def unnamed(recording, term, values):
     """The model that `predicting` leaves of C V|V| with one term whose name was not earned."""
     found = search((history_of(recording),), np.random.default_rng(0))
     first = found.before.fit
-    bigger = first.model.plus(term)
-    fitted = fit(bigger, extended(first.theta, first.model, term, values, bigger), found.data, found.before.weights)
+    fitted = fit(*first.more(term, values), found.data, found.before.weights)
     after = replace(found.before, fit=fitted)
     return predicting(after, train_test_split(after, found.data, ()), found.data, found.terms, [term], ())
 

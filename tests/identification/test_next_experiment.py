@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from identification.mismatch.diagnosis import PlanStep
+from identification.mismatch.model.parameters import Layout
 from identification.mismatch.next_experiment.discrimination import distances, pieces, power
 from identification.mismatch.next_experiment.predicted_response import (
     AFTER_STEP,
@@ -175,7 +176,10 @@ def test_intervals_of_a_plan_follow_its_slew():
 
 def test_distance_is_what_the_wrong_model_cannot_follow():
     rng = np.random.default_rng(3)
-    views = [PredictedResponse(rng.normal(size=50), rng.normal(size=(50, 2)), np.diag([0.5, 2.0])) for _ in range(2)]
+    views = [
+        PredictedResponse(rng.normal(size=50), rng.normal(size=(50, 2)), np.diag([0.5, 2.0]), Layout((), (), 0))
+        for _ in range(2)
+    ]
     block = np.repeat([0, 1, -1], [20, 25, 5])
     both = pieces(views, block, 2)
     total = both[0] + both[1]
@@ -188,7 +192,7 @@ def test_distance_is_what_the_wrong_model_cannot_follow():
 
 def test_power_of_models_alike_and_far_apart():
     slopes, cov = np.ones((100, 1)), np.eye(1)
-    flat = PredictedResponse(np.zeros(100), slopes, cov)
+    flat = PredictedResponse(np.zeros(100), slopes, cov, Layout((), (), 0))
     assert power(flat, flat, 4.0) == 0.0
     far = replace(flat, value=np.where(np.arange(100) % 2, 1.0, -1.0))
     assert power(flat, far, 4.0) > 0.99
@@ -198,7 +202,7 @@ def test_power_of_models_alike_and_far_apart():
 
 def test_one_zero_for_all_runs():
     slopes = np.arange(24.0).reshape(4, 6)
-    view = one_zero(PredictedResponse(np.zeros(4), slopes, np.eye(6)), 2)
+    view = one_zero(PredictedResponse(np.zeros(4), slopes, np.eye(6), Layout((), (), 2)))
     assert view.slopes.shape == (4, 5)
     assert view.slopes[:, 1].tolist() == (slopes[:, 1] + slopes[:, 2]).tolist()
     assert view.cov.shape == (5, 5)

@@ -11,11 +11,14 @@ from runs_on_intervals import history, moment, scale, uneven
 from scipy.integrate import solve_ivp
 from scipy.signal import lfilter
 
-from identification.mismatch.model.model import Model, Theta, predict
+from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.predictor import predict
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.rotation_coupling import slip
 from identification.physics.term import STAGES
 from identification.run_history import filters
+from identification.run_history.remembered import RememberedRun
 
 H = history()
 S = scale(H)
@@ -38,7 +41,9 @@ def neutral(term):
 
 
 def predicted(terms, thetas, h=H, s=S, C=0.5, tare=0.0):
-    return predict(Model(tuple(terms)), Theta(C, tuple(thetas), (tare,)), h, s)
+    """`h`: a history, or a run that remembers."""
+    run = h if isinstance(h, RememberedRun) else RememberedRun(h)
+    return predict(Model(tuple(terms)), Theta(C, tuple(thetas), (tare,)), run, s, tare)
 
 
 def base(h=H, C=0.5):
@@ -397,7 +402,7 @@ def test_the_expected_gap_is_neither_damped_nor_followed_by_noise():
         rate = 2.0 * (driver + wave + 0.2 * rng.standard_normal(driver.size))
         one = np.ones(driver.size, dtype=np.int64)
         measured = replace(h, rate=rate, rate_count=one, rate_sampled=h.middle, rate_per_driver=2.0)
-        gap = slip(measured, driver, 2.0)
+        gap = slip(RememberedRun(measured), driver, 2.0)
         found.append(gap @ wave / (gap @ gap))
         errors.append(np.mean((gap - wave) ** 2) / np.mean(wave**2))
         raw = rate / 2.0 - driver
@@ -411,7 +416,7 @@ def test_the_gap_moves_in_proportion_to_what_moves_it():
     """A fit takes slopes of it: what takes the noise out is fixed beforehand."""
     noise = 0.3 * np.random.default_rng(10).standard_normal(H.driver.size)
     measured = replace(H, rate=2.0 * (H.driver + 0.8 * np.sin(0.03 * H.middle) + noise))
-    at = [slip(measured, H.driver + share * np.sign(H.driver), 2.0) for share in (0.0, 0.1, 0.2)]
+    at = [slip(RememberedRun(measured), H.driver + share * np.sign(H.driver), 2.0) for share in (0.0, 0.1, 0.2)]
     assert at[2] - at[1] == pytest.approx(at[1] - at[0], abs=1e-9)
     assert np.any(at[1] != at[0])
 
@@ -637,7 +642,7 @@ def test_a_term_that_reads_the_measured_rate_does_not_explain_that_rate():
 
 
 def test_what_is_remembered_is_what_is_computed():
-    fresh, old = history(), history()
+    fresh, old = history(), RememberedRun(history())
     lag, clip = term("motor_lag"), term("load_cell_saturation")
     for C, tau, limit, tare in [
         (0.5, 0.1, 60.0, 0.0),
@@ -646,5 +651,5 @@ def test_what_is_remembered_is_what_is_computed():
         (0.5, 0.1, 60.0, 0.0),
     ]:
         again, _ = predicted([lag, clip], [(tau,), (limit,)], old, S, C, tare)
-        first, _ = predicted([lag, clip], [(tau,), (limit,)], replace(fresh, memo=type(fresh.memo)()), S, C, tare)
+        first, _ = predicted([lag, clip], [(tau,), (limit,)], fresh, S, C, tare)
         assert np.array_equal(again, first)

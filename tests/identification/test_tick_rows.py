@@ -10,6 +10,8 @@ from identification.physics.motor_lag import MotorLag
 from identification.physics.stand_resonance import StandResonance
 from identification.physics.time_skew import TimeSkew
 from identification.recording import Channel, Recording
+from identification.run_history.remembered import RememberedRun
+from identification.run_history.step_response_rows import tick_rows
 
 C = 0.5
 TICK = 0.05
@@ -64,8 +66,8 @@ def ramped(response, noise=0.02, seed=0):
 
 def chi2(history, term=None, values=()):
     """Of the rows for a term with these values, and how many there are."""
-    rows = history.tick_rows
-    acting = [] if term is None else [(term, values, scale_of([history], C))]
+    rows = tick_rows(history)
+    acting = [] if term is None else [(term, values, scale_of([RememberedRun(history)], C))]
     left = rows.target - told(rows, acting, C, 0.0)
     return float(left @ left), left.size - 3
 
@@ -105,7 +107,7 @@ def test_a_lag_shorter_than_the_spacing_is_measured():
 
 def test_a_gain_that_is_off_by_some_per_cent_is_no_mismatch_of_the_response():
     history = ramped(at_once)
-    rows = history.tick_rows
+    rows = tick_rows(history)
     left = rows.target - told(rows, [], 0.93 * C, 0.0)
     assert float(left @ left) < left.size + 5 * np.sqrt(2 * left.size)
 
@@ -124,5 +126,5 @@ def test_sparse_samples_or_levels_have_no_rows():
         )
         return history_of(Recording("r", "T1", channels, source="r.h5"))
 
-    assert history(t, volts, t).tick_rows is None
-    assert history(start, level, np.arange(0.0, 60.0, 0.003)).tick_rows is None
+    assert tick_rows(history(t, volts, t)) is None
+    assert tick_rows(history(start, level, np.arange(0.0, 60.0, 0.003))) is None

@@ -13,8 +13,7 @@ from identification.mismatch.select.baseline import start
 from identification.physics.motor_lag import MotorLag
 from identification.physics.stand_resonance import StandResonance
 from identification.recording import Channel, Recording
-from identification.run_history.filters import lag
-from identification.run_history.history import ticks_before
+from identification.run_history.filters import lag, lag_ends
 from identification.run_history.sub_interval_dynamics import Passed
 
 TICK = 0.05
@@ -51,6 +50,19 @@ def answered(t, response, delay=0.0, value=VOLTS):
     return out
 
 
+def ticks_before(time, when):
+    """Of each time the last tick before it, and s since then."""
+    last = np.maximum(np.searchsorted(when, time, side="right") - 1, 0)
+    return last, np.maximum(time - when[last], 0.0)
+
+
+def rates(passed, when, value):
+    """Of the rotor at each tick; it was settled before the first."""
+    if passed.rotor is None:
+        return value
+    return np.concatenate([value[:1], lag_ends(value[:-1], np.diff(when), *passed.rotor, value[0])])
+
+
 @pytest.mark.parametrize(
     ("response", "passed", "delay"),
     [
@@ -64,9 +76,11 @@ def test_each_tick_is_answered_as_the_dynamics_do(response, passed, delay):
     t = np.arange(0.0, 12.0, 0.01)
     before = ticks_before(t - delay, AT)
     if response is lagging:
-        assert passed.at(*before, AT, VOLTS) == pytest.approx(answered(t, response), abs=1e-9)
+        assert passed.followed(*before, VOLTS, rates(passed, AT, VOLTS)) == pytest.approx(
+            answered(t, response), abs=1e-9
+        )
         return
-    found = passed.rung_at(*before, AT, VOLTS)
+    found = passed.rung_at(*before, AT, VOLTS, rates(passed, AT, VOLTS))
     assert found == pytest.approx(answered(t, response, delay, VOLTS**2), abs=0.01 if response is both else 1e-9)
 
 
@@ -76,7 +90,8 @@ def test_a_rotor_that_turns_round_follows_the_torque_balance():
     stands = -np.arctan(n0 / w) / (q * w)
     t = np.linspace(0.0, 0.4, 81)
     when = np.concatenate([[-1.0], np.linspace(0.0, 0.4, 41)])
-    found = Passed((q, 0.0)).at(*ticks_before(t, when), when, np.concatenate([[n0], np.full(41, w)]))
+    passed, value = Passed((q, 0.0)), np.concatenate([[n0], np.full(41, w)])
+    found = passed.followed(*ticks_before(t, when), value, rates(passed, when, value))
     turned = w * np.where(t < stands, np.tan(q * w * t + np.arctan(n0 / w)), np.tanh(q * w * (t - stands)))
     assert found == pytest.approx(turned, abs=2e-3)
 

@@ -13,7 +13,8 @@ from identification.flexible_terms.flexible import Flexible
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.diagnosis import Finding
 from identification.mismatch.estimate.estimate import Estimate
-from identification.mismatch.model.model import Data, acting
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import acting
 from identification.mismatch.value import Value
 from identification.recording import Recording
 from identification.twin import Source, Twin, TwinNoise, TwinTerm, names_of
@@ -147,11 +148,8 @@ def _covariance(estimate: Estimate, data: Data, before: Twin | None) -> tuple[tu
     """Of C and every term's parameters: fitted ones from the fit, given ones as the twin had them."""
     fitted = estimate.fit
     full = np.nan_to_num(fitted.cov)
-    place: dict[int, list[int]] = {}
-    at = 1
-    for term, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
-        place[id(term)] = list(range(at, at + len(values)))
-        at += len(values)
+    every = list(range(fitted.layout.size))
+    place = {id(term): every[fitted.layout.of(term)] for term in fitted.model.terms}
     old = np.zeros((1, 1)) if before is None else np.array(before.covariance)
     old_place, at = {}, 1
     for g in fitted.model.given:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from identification.mismatch.diagnosis import Remainder
 from identification.mismatch.locate.places import says, where_of
 from identification.mismatch.locate.residual_structure_test import ALARM
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.unnamed.flexible import foremost
 from identification.mismatch.unnamed.flexible_shape import with_flexible
 from identification.mismatch.unnamed.stage import Completed, foremost_covariate

@@ -8,7 +8,7 @@ from identification.mismatch.diagnosis import Curves, Finding, RivalFinding
 from identification.mismatch.estimate.confidence_intervals import Interval
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, raw
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.select.forward_selection import Rival
 from identification.mismatch.value import QUANTILE, Value
@@ -22,15 +22,13 @@ def values_of(fitted: Fit, data: Data, known: Intervals | None = None) -> dict[s
     std = fitted.std
     unit = data.scale.driver_unit
     out = {"C": Value(fitted.theta.C, float(std[0]), f"N/{unit}^2" if unit == "V" else "N s^2/rev^2")}
-    at = 1
-    for term, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
-        told = _term_values(term, values, std[at : at + len(values)].tolist(), data, (known or {}).get(term))
+    at = fitted.layout
+    for term, values in fitted.values.items():
+        told = _term_values(term, values, std[at.of(term)].tolist(), data, (known or {}).get(term))
         out |= {f"{term.id}.{name}": value for name, value in told.items()}
-        at += len(values)
-    for history, tare in zip(data.histories, fitted.theta.tares, strict=True):
+    for run, (history, tare) in enumerate(zip(data.histories, fitted.theta.tares, strict=True)):
         key = "tare" if len(data.histories) == 1 else f"tare[{history.recording_id}]"
-        out[key] = Value(tare, float(std[at]), "N")
-        at += 1
+        out[key] = Value(tare, float(std[at.tare(run)]), "N")
     return out
 
 
@@ -66,14 +64,10 @@ def finding_of(named: Named, data: Data, known: Intervals) -> Finding:
 
 
 def _rival(rival: Rival, data: Data) -> RivalFinding:
-    fitted, at = rival.fit, 1
-    for term, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
-        if term == rival.term:
-            std = fitted.std[at : at + len(values)]
-            known = _term_values(term, values, [float(s) for s in std], data)
-            return RivalFinding(term.id, term.form, known, rival.bic_loss, term.statement(values, data.scale))
-        at += len(values)
-    raise ValueError(f"{rival.term.id} is not in its own fit")
+    term, values = rival.term, rival.fit.values[rival.term]
+    std = rival.fit.std[rival.fit.layout.of(term)].tolist()
+    known = _term_values(term, values, std, data)
+    return RivalFinding(term.id, term.form, known, rival.bic_loss, term.statement(values, data.scale))
 
 
 def curves_of(before: Estimate, after: Estimate, data: Data) -> tuple[Curves, ...]:

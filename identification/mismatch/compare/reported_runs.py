@@ -10,11 +10,14 @@ from numpy.typing import NDArray
 
 from identification.mismatch.compare.saved_model_baseline import given
 from identification.mismatch.diagnosis import Curves, Diagnosis
-from identification.mismatch.model.model import Model, Theta, predict
+from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.predictor import predict
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.prepare.scales import scale_of
 from identification.recording import Floats, Recording
 from identification.run_history.history import TURNING, History
+from identification.run_history.remembered import RememberedRun
 from identification.twin import Twin
 
 
@@ -125,10 +128,11 @@ def _since_reversal(history: History, turning: Floats) -> Floats:
 def _effects(twin: Twin, history: History, rows: NDArray[np.intp]) -> dict[tuple[str, str], Floats]:
     """What each term of the twin changes, the others there."""
     theta = Theta(twin.C, (), (0.0,), k=twin.rate_per_driver or 1.0)
-    terms, scale = given(twin), scale_of([history], twin.C)
-    full, _ = predict(Model((), terms), theta, history, scale)
+    run = RememberedRun(history)
+    terms, scale = given(twin), scale_of([run], twin.C)
+    full, _ = predict(Model((), terms), theta, run, scale)
     out: dict[tuple[str, str], Floats] = {}
     for i, term in enumerate(twin.terms):
-        less, _ = predict(Model((), (*terms[:i], *terms[i + 1 :])), theta, history, scale)
+        less, _ = predict(Model((), (*terms[:i], *terms[i + 1 :])), theta, run, scale)
         out[term.effect, term.form] = (full - less)[rows]
     return out

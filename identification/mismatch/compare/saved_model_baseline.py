@@ -8,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from identification.mismatch.estimate.fitting import raw
-from identification.mismatch.model.model import Data, Given, Model, PriorPredictionFactor, Theta
+from identification.mismatch.model.data import Data, PriorPredictionFactor
+from identification.mismatch.model.model import Given, Model
+from identification.mismatch.model.parameters import Theta
 from identification.recording import Floats
 from identification.twin import Twin
 

@@ -12,7 +12,9 @@ from scipy.linalg import expm
 from scipy.signal import lfilter
 
 from identification.mismatch.compare.saved_model_baseline import given
-from identification.mismatch.model.model import Model, Theta, predict
+from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.predictor import predict
 from identification.mismatch.periodic.rotor_angle import turned
 from identification.mismatch.prepare.channels import neighbour_at
 from identification.mismatch.prepare.preparing import FOLLOWED, Refusal
@@ -20,6 +22,7 @@ from identification.physics.term import Scale
 from identification.recording import Floats, Recording
 from identification.run_history.filters import within_intervals
 from identification.run_history.history import TURNING, History
+from identification.run_history.remembered import RememberedRun
 from identification.twin import Twin, TwinNoise
 
 FINE = 0.0025
@@ -64,7 +67,7 @@ def simulate(twin: Twin, drive: Drive, times: Floats, rng: np.random.Generator |
     history, at = _history(twin, drive, times)
     scale = Scale(twin.highest_driver or 1.0, "", 0.0, float(times[-1] - times[0]), FINE)
     theta = Theta(twin.C, (), (0.0,), k=twin.rate_per_driver or 1.0)
-    force, x = predict(Model((), given(twin)), theta, history, scale)
+    force, x = predict(Model((), given(twin)), theta, RememberedRun(history), scale)
     thrust = force[at] + waves(twin, history, x, times)
     if rng is not None and times.size > 1:
         thrust = thrust + drawn(twin.noise, thrust, float(np.median(np.diff(times))), rng)

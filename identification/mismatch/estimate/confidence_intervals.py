@@ -15,7 +15,8 @@ from math import log, sqrt
 import numpy as np
 
 from identification.mismatch.estimate.fitting import LEAST_REACH, Fit, bounds_of, columns_of, residual_of
-from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.value import QUANTILE
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
@@ -48,12 +49,11 @@ class Interval:
 
 def intervals(fitted: Fit, data: Data, weights: Weights, terms: Collection[Term]) -> dict[Term, tuple[Interval, ...]]:
     """Of all parameters of those of its `terms`."""
-    out, at = {}, 1
-    for term, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
+    out = {}
+    for term in fitted.model.terms:
         if term in terms:
-            known = enumerate(term.parameters(data.scale), at)
+            known = enumerate(term.parameters(data.scale), fitted.layout.of(term).start)
             out[term] = tuple(_interval(fitted, data, weights, j, p) for j, p in known)
-        at += len(values)
     return out
 
 

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.estimation.singular_values import thin_svd
 from identification.mismatch.estimate.fitting import Fit, bounds_of, columns_of, fit, raw
-from identification.mismatch.model.model import Data, Model, Theta, Weights, weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.whitening import Weights, weights
 from identification.mismatch.noise.covariance import Noise, Rows
 from identification.mismatch.noise.variances import fit_noise
 from identification.physics.term import Term
@@ -28,8 +31,6 @@ class Estimate:
     rate_noise: Noise | None
     weights: Weights
     rows: tuple[Rows, ...]
-    lesser: dict[Term, Fit] = field(default_factory=dict, init=False, repr=False)
-    """By `fit_without`."""
 
     @property
     def bic(self) -> float:
@@ -38,12 +39,12 @@ class Estimate:
 
 def fit_without(estimate: Estimate, term: Term, data: Data) -> Fit:
     """The model without one of its terms, refitted with the same noise; once for all who ask."""
-    if term not in estimate.lesser:
-        smaller = estimate.fit.model.without(term)
-        kept = dict(zip(estimate.fit.model.terms, estimate.fit.theta.terms, strict=True))
-        theta = replace(estimate.fit.theta, terms=tuple(kept[t] for t in smaller.terms))
-        estimate.lesser[term] = fit(smaller, theta, data, estimate.weights)
-    return estimate.lesser[term]
+
+    def made() -> Fit:
+        return fit(*estimate.fit.less(term), data, estimate.weights)
+
+    found: Fit = data.predictor.once(("without", term), made, estimate, data)
+    return found
 
 
 def forces(fit_model: Model, theta: Theta, data: Data) -> list[Floats]:
@@ -63,10 +64,11 @@ def refresh(
     thrust, rate = raw(model, theta, data, with_rate=data.with_rate)
     left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
     unit = unweighted(data)
-    may = np.ones(theta.vector.size, dtype=bool)
-    may[-2:] = False
     low, high, _ = bounds_of(model, data, theta)
-    may[-3] = high[-3] > low[-3]
+    layout = model.layout(theta)
+    may = np.ones(layout.size, dtype=bool)
+    may[[layout.rate_shift, layout.k]] = False
+    may[layout.shift] = high[layout.shift] > low[layout.shift]
     J = columns_of(model, theta, data, unit, may)
     parts = by_run(J, data)
     if extra is not None and extra.shape[1]:
@@ -75,7 +77,8 @@ def refresh(
     rows = estimate.rows if estimate is not None else data.thrust_rows
     in_time = not any(h.static for h in data.histories)  # rows of a table may stand in the order of their levels
     least = 0.0 if in_time else max(reading_step(h.thrust[h.rows]) for h in data.histories) ** 2 / 12
-    noise = fit_noise(rows, left, parts, size, data.bands, like, in_time=in_time, least=least)
+    shapes = data.predictor.shapes
+    noise = fit_noise(rows, left, parts, size, data.bands, like, in_time=in_time, least=least, shapes=shapes)
     rate_noise = None
     if data.with_rate:
         left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=True)]
@@ -87,6 +90,7 @@ def refresh(
             [np.zeros(r.size) for r in left_rate],
             start=estimate.rate_noise if estimate is not None else None,
             in_time=in_time,
+            shapes=shapes,
         )
     w = weights(data, noise, size, rate_noise, rows)
     fitted = fit(model, theta, data, w)

@@ -8,8 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimation.singular_values import thin_svd
-from identification.mismatch.model.model import Data, Model, Theta, Weights, parameters, predict, ticked
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import Model, extended, parameters, reduced
+from identification.mismatch.model.parameters import Layout, Theta
+from identification.mismatch.model.predictor import predict
+from identification.mismatch.model.step_response import ticked
 from identification.mismatch.model.sub_interval import ahead, delay_of, shown, turning
+from identification.mismatch.model.whitening import Weights
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 from identification.run_history.filters import delayed, reconstructed
@@ -67,24 +72,48 @@ class Fit:
 
     @property
     def std(self) -> Floats:
+        """(q,) standard errors, NaN where not free."""
         return np.sqrt(np.diag(self.cov))
+
+    @property
+    def layout(self) -> Layout:
+        return self.model.layout(self.theta)
+
+    @property
+    def values(self) -> dict[Term, tuple[float, ...]]:
+        """The values of each term."""
+        return self.model.values(self.theta)
+
+    def less(self, *terms: Term) -> tuple[Model, Theta]:
+        """The rest of the model without some terms, its values as they are."""
+        return reduced(self.model, self.theta, terms)
+
+    def more(self, term: Term, values: tuple[float, ...]) -> tuple[Model, Theta]:
+        """The model with one term more, which begins at `values`."""
+        return extended(self.model, self.theta, term, values)
 
 
 def bounds_of(model: Model, data: Data, theta: Theta) -> tuple[Floats, Floats, Floats]:
     """(low, high, step) of the whole vector."""
-    scale = data.scale
+    scale, at = data.scale, model.layout(theta)
     known = [p for group in parameters(model, scale) for p in group]
-    R = len(theta.tares)
     most = 0.0 if any(term.id == "time_skew" for term in model.terms) else data.most_shift
-    low = np.array([-np.inf, *(p.low for p in known), *([-np.inf] * R), -most, -data.most_shift, -np.inf])
-    high = np.array([np.inf, *(p.high for p in known), *([np.inf] * R), most, data.most_shift, np.inf])
-    C = scale.thrust / scale.driver**2
-    steps = [1e-4 * C]
-    for p, value in zip(known, theta.vector[1 : 1 + len(known)], strict=True):
-        span = p.high - p.low
-        steps.append(min(1e-3 * span, 1e-3 * max(abs(value), 0.02 * span)))
-    steps += [1e-3 * scale.thrust] * R + [1e-4, 1e-4, 1e-4 * (abs(theta.k) or 1.0)]
-    return low, high, np.array(steps)
+    low, high, step = np.full(at.size, -np.inf), np.full(at.size, np.inf), np.empty(at.size)
+    low[at.of_terms], high[at.of_terms] = [p.low for p in known], [p.high for p in known]
+    low[at.shift], high[at.shift] = -most, most
+    low[at.rate_shift], high[at.rate_shift] = -data.most_shift, data.most_shift
+    step[at.C] = 1e-4 * scale.thrust / scale.driver**2
+    step[at.of_terms] = [_step(p, value) for p, value in zip(known, theta.vector[at.of_terms], strict=True)]
+    step[at.tares] = 1e-3 * scale.thrust
+    step[at.shift] = step[at.rate_shift] = 1e-4
+    step[at.k] = 1e-4 * (abs(theta.k) or 1.0)
+    return low, high, step
+
+
+def _step(p: Parameter, value: float) -> float:
+    """Of a difference: small beside the value, or beside its range where that is small."""
+    span = p.high - p.low
+    return min(1e-3 * span, 1e-3 * max(abs(value), 0.02 * span))
 
 
 def raw(
@@ -98,15 +127,16 @@ def raw(
     thrust, rate = [], []
     there = near or theta
     late = delay_of(model, there) + there.shift
-    for i, (history, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
-        F, x = predict(model, theta, history, data.scale, i)
-        more = theta.C * shown(model, theta, history, F, x, theta.tares[i])
-        more = more * ahead(model, theta, history, x, data.scale.driver, late)
+    for run, rows, tare in zip(data.runs, data.rows, theta.tares, strict=True):
+        history = run.history
+        F, x = predict(model, theta, run, data.scale, tare)
+        more = theta.C * shown(model, theta, history, F, x, tare)
+        more = more * ahead(model, theta, run, x, data.scale.driver, late)
         if theta.shift:
             F = delayed(F, history.edges, theta.shift)
-        thrust.append((reconstructed(F, history.middle, history.sampled) + more)[rows] + theta.tares[i])
+        thrust.append((reconstructed(F, history.middle, history.sampled) + more)[rows] + tare)
         if with_rate:
-            seen = turning(model, theta, history, x, data.scale.driver, there.rate_shift)
+            seen = turning(model, theta, run, x, data.scale.driver, there.rate_shift)
             rate.append(theta.k * seen[history.rate_rows])
     return thrust, rate
 
@@ -139,14 +169,14 @@ def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: 
     del low
     base_thrust, base_rate = raw(model, theta, data, with_rate=bool(weights.rate))
     vector = theta.vector
-    R, q = len(theta.tares), vector.size
+    R, layout = len(theta.tares), model.layout(theta)
     base_ticks = ticks_told(model, theta, data, weights)
     thrust: list[list[Floats]] = [[] for _ in data.histories]
     rate: list[list[Floats]] = [[] for _ in data.histories]
     ticks: list[list[Floats]] = [[] for _ in base_ticks]
     for j in np.flatnonzero(which):
-        run = j - (q - 3 - R)
-        if 0 <= run < R:  # a tare moves its own run by one
+        run = layout.run_of(int(j))
+        if run is not None:  # a tare moves its own run by one
             for i in range(R):
                 thrust[i].append(np.full(base_thrust[i].size, float(i == run)))
                 if weights.rate:
@@ -204,10 +234,11 @@ def _descended(model: Model, start: Theta, data: Data, weights: Weights, most_st
     """Levenberg-Marquardt from one start."""
     low, high, _ = bounds_of(model, data, start)
     theta = start.with_vector(np.clip(start.vector, low, high))
-    may = np.ones(theta.vector.size, dtype=bool)
-    may[-1] = bool(weights.rate)
-    may[-3] = high[-3] > low[-3]
-    may[-2] = bool(weights.rate) and high[-2] > low[-2]
+    at = model.layout(theta)
+    may = np.ones(at.size, dtype=bool)
+    may[at.k] = bool(weights.rate)
+    may[at.shift] = high[at.shift] > low[at.shift]
+    may[at.rate_shift] = bool(weights.rate) and high[at.rate_shift] > low[at.rate_shift]
     residual = residual_of(model, theta, data, weights)
     damping = 1e-3
     J = columns_of(model, theta, data, weights, may)
@@ -250,28 +281,18 @@ def _movable(vector: Floats, J: Floats, residual: Floats, low: Floats, high: Flo
     return out
 
 
-def extended(theta: Theta, model: Model, term: object, values: tuple[float, ...], bigger: Model) -> Theta:
-    """Theta of `bigger` = model + term, started at `values` for the new one."""
-    known = dict(zip(model.terms, theta.terms, strict=True))
-    return replace(theta, terms=tuple(values if t == term else known[t] for t in bigger.terms))
-
-
 def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:
     """Whether a parameter is pressed against the end of what is physically possible.
 
     One that merely lies there, because the data say little of it, is not: beyond the end the fit would be no better.
     """
-    at = 1
-    for other, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
-        if other == term:
-            break
-        at += len(values)
+    begin, values = fitted.layout.of(term).start, fitted.values[term]
     known = term.parameters(data.scale)
     ended = [_ends(p, value) for p, value in zip(known, values, strict=True)]
     inner = [end for p, end in zip(known, ended, strict=True) if p.neutral is None]
     if (inner and all(inner)) or any(e and p.neutral is not None for p, e in zip(known, ended, strict=True)):
         return True
-    return any(e and abs(_push(at + j, fitted, data, weights)) > PRESSED for j, e in enumerate(ended))
+    return any(e and abs(_push(begin + j, fitted, data, weights)) > PRESSED for j, e in enumerate(ended))
 
 
 def _ends(p: Parameter, value: float) -> bool:

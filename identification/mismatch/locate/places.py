@@ -10,7 +10,9 @@ from identification.mismatch.diagnosis import Mismatch
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.locate.residual_structure_test import ALARM, CovariateTest, residual_structure
-from identification.mismatch.model.model import Data, Weights, predict
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.predictor import predict
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.prepare.preparing import DRIVERS
 from identification.mismatch.select.covariates import Covariate
 from identification.mismatch.select.forward_selection import STATIC, Selected
@@ -88,8 +90,8 @@ def locate(judged: CovariateTest, fit: Fit, data: Data, weights: Weights) -> Pla
     covariate = np.concatenate(c.values)
     residual = np.concatenate(
         [
-            h.thrust[r] - predict(fit.model, fit.theta, h, data.scale, i)[0][r] - fit.theta.tares[i]
-            for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True))
+            y - predict(fit.model, fit.theta, run, data.scale, tare)[0][r] - tare
+            for y, run, r, tare in zip(data.thrust, data.runs, data.rows, fit.theta.tares, strict=True)
         ]
     )
     count = np.concatenate([h.count[r] for h, r in zip(data.histories, data.rows, strict=True)]).astype(np.float64)

@@ -15,7 +15,8 @@ import numpy as np
 from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.locate.pulses import Pulses, likeliest_pulses
-from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.covariates import Covariate, covariates
 from identification.mismatch.select.jumps import APART, TRIED, jumps
 from identification.mismatch.select.screening import normal_scores, orthogonal_basis, quiet, surrogate_scores
@@ -137,7 +138,7 @@ def _jump(time: Covariate, fit: Fit, residual: Floats, data: Data, weights: Weig
     Taken for one only where it is plainly no noise.
     """
     when, score = jumps(residual, data, weights, basis)
-    known = [v[1] for t, v in zip(fit.model.terms, fit.theta.terms, strict=True) if t.id == "zero_offset"]
+    known = [v[1] for t, v in fit.values.items() if t.id == "zero_offset"]
     new = np.all([np.abs(when - at) > APART * data.scale.duration for at in known], axis=0)
     when, score = (when[new], score[new]) if known else (when, score)
     if not score.size:

@@ -13,7 +13,8 @@ import numpy as np
 
 from identification.estimation.tails import chi2_sf
 from identification.mismatch.estimate.estimate import Estimate, forces, refresh
-from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.screening import orthogonal_basis
 from identification.recording import Floats
 

@@ -10,7 +10,8 @@ import numpy as np
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.locate.residual_structure_test import ALARM, ResidualStructure, residual_structure
 from identification.mismatch.locate.slow_change import beside_slow_change
-from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.whiteness import whiteness
 from identification.mismatch.select.forward_selection import Selected
 from identification.mismatch.select.shape_error import SHAPE_ERROR, corrections

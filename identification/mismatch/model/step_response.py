@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import Model, acting
+from identification.mismatch.model.parameters import Theta
 from identification.physics.motor_lag import MotorLag, rate_at
 from identification.physics.term import Scale, Term
 from identification.recording import Floats
@@ -13,6 +16,12 @@ from identification.run_history.step_response_rows import TickRows
 DYNAMIC = ("motor_lag", "stand_resonance", "time_skew")
 """What shows within a few ticks."""
 Acting = tuple[Term, tuple[float, ...], Scale]
+
+
+def ticked(model: Model, theta: Theta, data: Data) -> list[Floats]:
+    """What the model says of the rows of the ticks, run by run."""
+    terms = acting(model, theta, data.scale)
+    return [told(rows, terms, theta.C, theta.shift) for rows in data.ticks]
 
 
 def told(rows: TickRows, acting: list[Acting], C: float, shift: float) -> Floats:

@@ -1,22 +1,23 @@
 """What ticks of the command do at the samples beside the line through means, as a model's dynamics pass them on.
 
-What a screening or a fit asks for again is kept with the history.
+What a screening or a fit asks for again is remembered with the run.
 """
 
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Literal
 
 import numpy as np
 
-from identification.mismatch.model.model import Model, Theta
+from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
 from identification.physics.command_saturation import CommandSaturation
 from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.motor_lag import MotorLag, torques
 from identification.recording import Floats
 from identification.run_history.filters import delayed, reconstructed
-from identification.run_history.history import History, Samples
+from identification.run_history.history import History
+from identification.run_history.remembered import Channel, RememberedRun
 from identification.run_history.sub_interval_dynamics import Passed
 from identification.run_history.sub_interval_leads import curvature, each_lead, lead
 
@@ -24,7 +25,6 @@ LONGEST_TICK = 0.2
 """s: what is written more seldom are steps."""
 LEAST_DELAY = 0.02
 """Of a tick: a shorter delay leaves what the driver does within its ticks where it was."""
-Channel = Literal["thrust", "rate"]
 
 
 def delay_of(model: Model, theta: Theta) -> float:
@@ -32,24 +32,26 @@ def delay_of(model: Model, theta: Theta) -> float:
     return sum(v[0] for t, v in zip(model.terms, theta.terms, strict=True) if t.id == "time_skew")
 
 
-def ahead(model: Model, theta: Theta, history: History, x: Floats, largest: float, late: float) -> Floats:
+def ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: float, late: float) -> Floats:
     """(M,) driver |driver|, at the thrust samples less the line through means: of a force at the rates x (M,) that a
     stand may pass on, and that comes `late` s after."""
+    history = run.history
     passed = Passed(_rotor(model, theta, largest), _ring(model, theta), late if _is_late(late, history) else 0.0)
     share = passed_on(model, theta, history)
     if not _changes(passed, history):
-        return history.lately("ahead", lambda: share * (2 * np.abs(x) * history.lead + history.curved), x, share)
-    known = _remembered(history, "thrust", passed)
+        return run.lately("ahead", lambda: share * (2 * np.abs(x) * history.lead + history.curved), x, share)
+    known = _remembered(run, "thrust", passed)
     if passed.ring is not None:
         return np.asarray(share * known[0], dtype=np.float64)
-    return history.lately("ahead", lambda: share * (2 * np.abs(x) * known[0] + known[1]), x, known, share)
+    return run.lately("ahead", lambda: share * (2 * np.abs(x) * known[0] + known[1]), x, known, share)
 
 
-def turning(model: Model, theta: Theta, history: History, x: Floats, largest: float, late: float) -> Floats:
+def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: float, late: float) -> Floats:
     """(M,) rate at its samples, in units of the driver, of a rotor whose mean rates are `x` (M,), read `late` s after;
     the rotor alone passes ticks on."""
+    history = run.history
     passed = Passed(_rotor(model, theta, largest), delay=late if _is_late(late, history) else 0.0)
-    known = _remembered(history, "rate", passed) if _changes(passed, history) else history.rate_lead
+    known = _remembered(run, "rate", passed) if _changes(passed, history) else history.rate_lead
     share, shift = passed_on(model, theta, history), theta.rate_shift
 
     def made() -> Floats:
@@ -58,19 +60,24 @@ def turning(model: Model, theta: Theta, history: History, x: Floats, largest: fl
         line = reconstructed(moved, history.middle, history.rate_sampled)
         return np.asarray(line + share * np.atleast_2d(known)[0], dtype=np.float64)
 
-    return history.lately(("turning", shift), made, x, known, share)
+    return run.lately(("turning", shift), made, x, known, share)
 
 
-def sample_lead(model: Model, theta: Theta, history: History, rate: Floats, largest: float) -> Floats:
+def sample_lead(model: Model, theta: Theta, run: RememberedRun, rate: Floats, largest: float) -> Floats:
     """(N,) driver |driver|: as `ahead`, at each sample, where the rates are `rate` (N,)."""
+    history = run.history
     passed = Passed(_rotor(model, theta, largest), _ring(model, theta), delay_of(model, theta) + theta.shift)
     if not _changes(passed, history):
         return 2 * np.abs(rate) * history.sample_lead
     assert history.ticks is not None
     when, value = history.ticks
-    answer = passed.at if passed.ring is None else passed.rung_at
-    seen = answer(*history.thrust_samples.after(when, passed.delay), when, value)
-    beside = each_lead(history, seen, _means(history, passed), _size(history, passed))
+    last, since = run.after_ticks("thrust", passed.delay)
+    rates = run.rates_at_ticks(passed.rotor)
+    if passed.ring is None:
+        seen = passed.followed(last, since, value, rates)
+    else:
+        seen = passed.rung_at(last, since, when, value, rates)
+    beside = each_lead(history, seen, _means(run, passed), _size(history, passed))
     return beside if passed.ring is not None else 2 * np.abs(rate) * beside
 
 
@@ -99,57 +106,46 @@ def _changes(passed: Passed, history: History) -> bool:
     return passed != Passed() and history.ticks is not None and history.tick <= LONGEST_TICK
 
 
-def _remembered(history: History, channel: Channel, passed: Passed) -> Floats:
+def _remembered(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:
     """(2, M) `lead` and `curvature` of a channel; of a stand that rings the lead of the force."""
-    return history.leads((channel, passed), lambda: _leads(history, channel, passed))
+    return run.leads((channel, passed), lambda: _leads(run, channel, passed))
 
 
-def _leads(history: History, channel: Channel, passed: Passed) -> Floats:
-    samples, means, size = _samples(history, channel), _means(history, passed), _size(history, passed)
-    seen, force = _followed(history, channel, replace(passed, ring=None))
+def _leads(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:
+    history = run.history
+    samples, means, size = run.samples(channel), _means(run, passed), _size(history, passed)
+    seen, force = _followed(run, channel, replace(passed, ring=None))
     if passed.ring is None:
         beside = lead(history, seen, means, samples, size)
         return np.array([beside, curvature(history, force, means, beside, samples)])
     assert history.ticks is not None
     when, value = history.ticks
-    rung = force + samples.means(passed.ringing(*samples.after(when, passed.delay), when, value))
+    rung = force + samples.means(passed.ringing(*run.after_ticks(channel, passed.delay), when, value))
     beside = lead(history, rung, means, samples, size)
     return np.array([beside, np.zeros(beside.size)])
 
 
-def _followed(history: History, channel: Channel, passed: Passed) -> Floats:
+def _followed(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:
     """(2, M) means at the samples of rate and rate |rate|: a stand that rings in any way has the same rotor."""
-    samples = _samples(history, channel)
+    samples = run.samples(channel)
 
     def made() -> Floats:
-        assert history.ticks is not None
-        when, value = history.ticks
-        rate = passed.followed(*samples.after(when, passed.delay), value, _rates(history, passed))
+        assert run.history.ticks is not None
+        value = run.history.ticks[1]
+        rate = passed.followed(*run.after_ticks(channel, passed.delay), value, _rates(run, passed))
         return np.array([samples.means(rate), samples.means(rate * np.abs(rate))])
 
-    return history.lately((channel, passed), made)
+    return run.lately((channel, passed), made)
 
 
-def _rates(history: History, passed: Passed) -> Floats:
-    """(T,) of the rotor at the ticks, sought from the last one: it is seldom far."""
-    assert history.ticks is not None
-    when, value = history.ticks
-
-    def made() -> Floats:
-        found = passed.rates(when, value, history.memo.get("rates"))
-        history.memo["rates"] = found
-        return found
-
-    return history.lately(("rates", passed.rotor), made)
+def _rates(run: RememberedRun, passed: Passed) -> Floats:
+    """(T,) of the rotor at the ticks."""
+    return run.lately(("rates", passed.rotor), lambda: run.rates_at_ticks(passed.rotor))
 
 
-def _samples(history: History, channel: Channel) -> Samples:
-    return history.thrust_samples if channel == "thrust" else history.rate_samples
-
-
-def _means(history: History, passed: Passed) -> Floats:
+def _means(run: RememberedRun, passed: Passed) -> Floats:
     made = passed.means if passed.ring is None else passed.rung_means
-    return history.leads(passed, lambda: made(history))
+    return run.leads(passed, lambda: made(run))
 
 
 def _size(history: History, passed: Passed) -> float:

@@ -13,7 +13,9 @@ from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
 from identification.mismatch.estimate.estimate import Estimate, fit_without
 from identification.mismatch.estimate.fitting import Fit, at_bound
 from identification.mismatch.locate.residual_structure_test import ResidualStructure
-from identification.mismatch.model.model import Data, Weights, predict
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.predictor import predict
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.prepare.preparing import DRIVERS
 from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import STATIC, Rival, SwapTest, static_curve
@@ -102,8 +104,7 @@ def failed_checks(estimate: Estimate, term: Term, data: Data, many: int) -> tupl
 
 def _unseen(now: Fit, term: Term, data: Data) -> bool:
     """Ringing beyond half the sampling rate: between the samples it may be any other delay."""
-    values = dict(zip(now.model.terms, now.theta.terms, strict=True))[term]
-    named = dict(zip((p.name for p in term.parameters(data.scale)), values, strict=True))
+    named = dict(zip((p.name for p in term.parameters(data.scale)), now.values[term], strict=True))
     return term.id == "stand_resonance" and named["frequency"] > 0.5 / min(h.spacing for h in data.histories)
 
 
@@ -123,13 +124,11 @@ def _cancelled(now: Fit, term: Term, change: list[Floats], data: Data) -> list[T
 
 
 def _raw_effect(now: Fit, terms: tuple[Term, ...], data: Data) -> list[Floats]:
-    smaller = replace(now.model, terms=tuple(t for t in now.model.terms if t not in terms))
-    known = dict(zip(now.model.terms, now.theta.terms, strict=True))
-    theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
+    smaller = now.less(*terms)
     out = []
-    for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
-        full, _ = predict(now.model, now.theta, h, data.scale, i)
-        less, _ = predict(smaller, theta, h, data.scale, i)
+    for run, r, tare in zip(data.runs, data.rows, now.theta.tares, strict=True):
+        full, _ = predict(now.model, now.theta, run, data.scale, tare)
+        less, _ = predict(*smaller, run, data.scale, tare)
         out.append((full - less)[r])
     return out
 
@@ -167,14 +166,13 @@ def name(
     """Every term of the model with its rivals and failed_checks, the largest gain first."""
     out = []
     logn = float(np.log(max(estimate.fit.residual.size, 2)))
-    at = 1
     std = estimate.fit.std
     many = max(len(estimate.fit.model.terms), 1)
     stands = {
         term: (standing or {}).get(term) or _standing(estimate, term, data, terms) for term in estimate.fit.model.terms
     }
     repaired = _repaired(estimate, data, {term: less for term, (less, _) in stands.items()})
-    for term, values in zip(estimate.fit.model.terms, estimate.fit.theta.terms, strict=True):
+    for term, values in estimate.fit.values.items():
         less, others = stands[term]
         gain = less.chi2 - estimate.fit.chi2
         close = [r for r in others if min(r.bic_loss, r.aic_loss) < NEAR and r.term.id != term.id]
@@ -186,7 +184,7 @@ def name(
             Named(
                 term,
                 values,
-                tuple(float(s) for s in std[at : at + len(values)]),
+                tuple(map(float, std[estimate.fit.layout.of(term)])),
                 gain,
                 gain - len(values) * logn,
                 max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
@@ -195,7 +193,6 @@ def name(
                 (*failed_checks(estimate, term, data, many), *repaired.get(term, ())),
             )
         )
-        at += len(values)
     return tuple(sorted(out, key=lambda n: -n.chi2_gain))
 
 

@@ -17,7 +17,10 @@ from numpy.typing import NDArray
 from identification.mismatch.diagnosis import PlanStep
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, bounds_of, columns_of, raw
-from identification.mismatch.model.model import Data, Theta, weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.parameters import Layout, Theta
+from identification.mismatch.model.predictor import Predictor
+from identification.mismatch.model.whitening import weights
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 from identification.run_history.history import History
@@ -44,6 +47,8 @@ class PredictedResponse:
     """(n, q) over its parameters."""
     cov: Floats
     """(q, q) of the parameters of `slopes`; 0 where they are known or not free."""
+    layout: Layout
+    """Of these."""
 
     @cached_property
     def root(self) -> Floats:
@@ -91,7 +96,7 @@ class Bench:
     def rehearsed(self, runs: Sequence[Sequence[PlanStep]]) -> Data:
         """Sweeps as data without measurements; each run has one flow speed."""
         histories = tuple(self._history(run, k) for k, run in enumerate(runs))
-        return replace(self.data, histories=histories, keep=None, prior_factor=None)
+        return replace(self.data, histories=histories, keep=None, prior_factor=None, predictor=Predictor())
 
     def _history(self, steps: Sequence[PlanStep], number: int) -> History:
         dt, driver, blind = intervals(steps, self.slew)
@@ -139,7 +144,8 @@ class Bench:
             theta = _moved(fitted, len(new.histories))
             thrust, rate = raw(fitted.model, theta, new, with_rate=bool(w.rate))
             slopes = columns_of(fitted.model, theta, new, w, np.ones(theta.vector.size, dtype=bool))
-            out.append(PredictedResponse(w.whiten(thrust, rate), slopes, open_ends(fitted, theta, self.data)))
+            cov = open_ends(fitted, theta, self.data)
+            out.append(PredictedResponse(w.whiten(thrust, rate), slopes, cov, fitted.model.layout(theta)))
         where = [np.column_stack([np.full(h.rows.size, k), h.middle[h.rows]]) for k, h in enumerate(new.histories)]
         if w.rate:
             rated = [(k, h.middle[h.rate_rows]) for k, h in enumerate(new.histories)]
@@ -196,17 +202,13 @@ def ending(steps: Sequence[PlanStep], slew: float) -> Floats:
     return out
 
 
-def one_zero(view: PredictedResponse, runs: int) -> PredictedResponse:
+def one_zero(view: PredictedResponse) -> PredictedResponse:
     """The same with one zero for all runs: blocks of one sweep share it."""
-    q = view.slopes.shape[1]
-    first, last = q - 3 - runs, q - 3
-    zero = view.slopes[:, first:last].sum(axis=1, keepdims=True)
-    keep = [*range(first + 1), *range(last, q)]
-    return PredictedResponse(
-        view.value,
-        np.column_stack([view.slopes[:, :first], zero, view.slopes[:, last:]]),
-        view.cov[np.ix_(keep, keep)],
-    )
+    at = view.layout
+    zero = view.slopes[:, at.tares].sum(axis=1, keepdims=True)
+    slopes = np.column_stack([view.slopes[:, : at.tare(0)], zero, view.slopes[:, at.shift :]])
+    keep = np.delete(np.arange(at.size), np.arange(at.tare(1), at.shift))
+    return PredictedResponse(view.value, slopes, view.cov[np.ix_(keep, keep)], replace(at, runs=1))
 
 
 def _widths(seconds: float) -> Floats:
@@ -229,15 +231,13 @@ def open_ends(fitted: Fit, theta: Theta, data: Data) -> Floats:
 
     A parameter that the data hardly fix is known from its bounds all the same: a quarter of their span.
     """
-    R, runs = len(fitted.theta.tares), len(theta.tares)
-    q = fitted.free.size
+    here, there = fitted.layout, fitted.model.layout(theta)
     low, high, _ = bounds_of(fitted.model, data, fitted.theta)
     known = np.where(np.isfinite(high - low) & (high > low), 4.0 / np.maximum(high - low, 1e-300), 0.0)
-    old = np.zeros((q, q))
+    old = np.zeros((here.size, here.size))
     old[np.ix_(fitted.free, fitted.free)] = _inverse(fitted.jacobian, known[fitted.free])
-    shared = [*range(q - 3 - R), *range(q - 3, q)]
-    out = np.diag(np.full(q - R + runs, (TARE * data.scale.thrust) ** 2))
-    keep = [*range(q - 3 - R), *range(q - 3 - R + runs, q - R + runs)]
+    out = np.diag(np.full(there.size, (TARE * data.scale.thrust) ** 2))
+    shared, keep = (np.delete(np.arange(at.size), at.tares) for at in (here, there))
     out[np.ix_(keep, keep)] = old[np.ix_(shared, shared)]
     return out
 

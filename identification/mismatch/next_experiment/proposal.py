@@ -17,7 +17,7 @@ import numpy as np
 from identification.mismatch.diagnosis import NextExperiment, PlanStep
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.next_experiment.discrimination import Pieces, distances, pieces, power
 from identification.mismatch.next_experiment.predicted_response import (
@@ -288,7 +288,7 @@ def _looked_at(bench: Bench, fits: Sequence[Fit], every: Sequence[Block]) -> Pie
     for run, (end, group) in enumerate(zip(ends, groups, strict=True)):
         mine = np.flatnonzero((where[:, 0] == run) & (where[:, 1] > REST))
         block[mine] = np.array(group)[np.minimum(np.searchsorted(end, where[mine, 1]), len(group) - 1)]
-    return pieces([one_zero(view, len(runs)) for view in views], block, len(every))
+    return pieces([one_zero(view) for view in views], block, len(every))
 
 
 def _other_means(one: str, other: str, recorded: Collection[str]) -> str:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from identification.mismatch.diagnosis import NextExperiment
 from identification.mismatch.estimate.estimate import Estimate
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.next_experiment.proposal import propose
 from identification.mismatch.next_experiment.sweeps import Limits

@@ -9,7 +9,7 @@ import numpy as np
 from identification.estimation.tails import normal_sf
 from identification.mismatch.diagnosis import NextExperiment, PlanStep
 from identification.mismatch.estimate.estimate import Estimate
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.next_experiment.proposal import largest_level
 from identification.mismatch.next_experiment.sweeps import REST, Limits
 from identification.mismatch.periodic.periodic_disturbances import Line

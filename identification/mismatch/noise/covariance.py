@@ -8,20 +8,21 @@ apart make any noise between white and 1/f^2. All variances enter linearly; `noi
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from celerite2 import driver
 from numpy.typing import NDArray
 
 from identification.recording import Floats
+from identification.run_history.least_recently_used import LeastRecentlyUsed
 
 MOST_GROWTH = 60.0
 """Exponent of what lies farther apart than any correlation reaches."""
 WITHIN = 0.999
 """Of the room that rows take: what is nearer is no rounding."""
-MOST_REMEMBERED = 8
-"""Sets of scales and bands whose matrices are kept with the rows."""
+MOST_SHAPES = 64
+"""Matrices that are remembered: of some sets of scales and bands on the rows of each run, whole and in parts."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +37,6 @@ class Rows:
     """(n,) variance factor of the white part, above 1 for rows that are trusted less."""
     width: Floats
     """(n,) s over which the samples of a row are spread."""
-    memo: dict[object, Shape] = field(default_factory=dict, init=False, repr=False)
-    """(scales, bands) -> the matrices of the noise on these rows at unit variances."""
 
 
 def rows_of(time: Floats, count: Floats, spacing: float) -> Rows:
@@ -97,26 +96,15 @@ class Noise:
             band=tuple(map(float, values[2 + J :])),
         )
 
-    def correlated(self, rows: Rows, size: Floats) -> tuple[Floats, Floats, Floats, Floats]:
-        """c, a, U, V of celerite's matrices for rows at which the force is `size` (n,)."""
+    def correlated(self, rows: Rows, size: Floats, shape: Shape) -> tuple[Floats, Floats, Floats, Floats]:
+        """c, a, U, V of celerite's matrices for rows at which the force is `size` (n,); `shape`: of this on them."""
         diag = (self.white + self.proportional * size**2) * rows.extra / rows.count
-        shape = self.shape(rows)
         spread = np.array([*self.slow, *self.band])
         a = diag + shape.gain2 @ spread if spread.size else diag
         columns = np.repeat(spread, [1] * len(self.slow) + [2] * len(self.band))
         return shape.c, a, shape.U * columns, shape.V
 
     def shape(self, rows: Rows) -> Shape:
-        """As a search for variances asks for it again and again."""
-        key = (self.scales, self.bands)
-        known = rows.memo.get(key)
-        if known is None:
-            if len(rows.memo) >= MOST_REMEMBERED:
-                rows.memo.clear()
-            known = rows.memo[key] = self._shape(rows)
-        return known
-
-    def _shape(self, rows: Rows) -> Shape:
         """Exact for samples that lie evenly within each row.
 
         Where single samples have the covariance Re(A e^(p |dt|)), the mean of a row and that of a later one have
@@ -170,6 +158,16 @@ def _mean_variance(rho: NDArray[np.complex128], m: Floats, height: complex) -> F
     return out
 
 
+class Shapes:
+    """The matrices of noises on rows: a search for variances asks for the same again and again."""
+
+    def __init__(self) -> None:
+        self._known = LeastRecentlyUsed[Shape](MOST_SHAPES)
+
+    def __call__(self, noise: Noise, rows: Rows) -> Shape:
+        return self._known((noise.scales, noise.bands), lambda: noise.shape(rows), rows)
+
+
 MOSTLY = 0.8
 """Share of columns that are not all zero, above which it does not pay to leave out those that are."""
 
@@ -177,9 +175,10 @@ MOSTLY = 0.8
 class Whitener:
     """The factored covariance of one run's rows."""
 
-    def __init__(self, noise: Noise, rows: Rows, size: Floats) -> None:
+    def __init__(self, noise: Noise, rows: Rows, size: Floats, shapes: Shapes | None = None) -> None:
         self.noise, self.rows = noise, rows
-        self._c, a, self._U, V = noise.correlated(rows, size)
+        shape = noise.shape(rows) if shapes is None else shapes(noise, rows)
+        self._c, a, self._U, V = noise.correlated(rows, size, shape)
         n, J = self._U.shape
         if J == 0:
             self._d, self._W = a, V

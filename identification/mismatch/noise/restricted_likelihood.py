@@ -9,12 +9,12 @@ Biometrika 58, 545, 1971) and its average information y' P V_i P V_j P y/2 (Gilm
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from celerite2 import backprop, driver
 
-from identification.mismatch.noise.covariance import Noise, Rows, Shape
+from identification.mismatch.noise.covariance import Noise, Rows, Shape, Shapes
 from identification.recording import Floats
 
 LinAlgError = driver.LinAlgError
@@ -32,6 +32,8 @@ class Response:
     residual: Floats
     columns: Floats
     size: Floats
+    shapes: Shapes = field(default_factory=Shapes, repr=False)
+    """What remembers the matrices of the noise on these rows."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +144,7 @@ def _differences(noise: Noise, responses: Sequence[Response], value: float) -> F
 
 def _factored(noise: Noise, response: Response) -> _Factored:
     time = response.rows.time
-    c, a, U, V = noise.correlated(response.rows, response.size)
+    c, a, U, V = noise.correlated(response.rows, response.size, response.shapes(noise, response.rows))
     n, J = U.shape
     Y = np.ascontiguousarray(np.column_stack([response.columns, response.residual]))
     if J == 0:  # celerite2 wants a column at least
@@ -177,7 +179,7 @@ def _backwards(time: Floats, f: _Factored, Z: Floats, turn: Floats) -> tuple[Flo
 def _over_variances(noise: Noise, response: Response, ba: Floats, bU: Floats) -> Floats:
     """Slope over each variance of the noise, from those over celerite's a and U."""
     rows, size = response.rows, response.size
-    shape = noise.shape(rows)
+    shape = response.shapes(noise, rows)
     per_count = rows.extra / rows.count
     moved = np.sum(bU * shape.U, axis=0)  # U is linear in the variances
     J = len(noise.slow)
@@ -206,7 +208,7 @@ def _solved(time: Floats, f: _Factored, z: Floats) -> Floats:
 def _moved(noise: Noise, response: Response, s: Floats) -> tuple[Floats, Floats]:
     """(V_i s (n, k), s' V_i s / 2 (k,))."""
     rows, size = response.rows, response.size
-    shape = noise.shape(rows)
+    shape = response.shapes(noise, rows)
     own = s * rows.extra / rows.count
     columns = [own, own * size**2]
     J = len(noise.slow)

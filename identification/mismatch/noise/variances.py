@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.mismatch.noise.covariance import Noise, Rows
+from identification.mismatch.noise.covariance import Noise, Rows, Shapes
 from identification.mismatch.noise.restricted_likelihood import Likelihood, LinAlgError, Response, likelihood
 from identification.recording import Floats
 
@@ -73,10 +73,13 @@ def fit_noise(
     *,
     in_time: bool = True,
     least: float = 0.0,
+    shapes: Shapes | None = None,
 ) -> Noise:
     """Restricted maximum likelihood of all variances, common to all runs; without slow noise if rows are not in time.
 
     No white variance below `least`.
+
+    `shapes`: what remembers the noise's matrices, where others ask for them too.
 
     `residuals` (n,) and `columns` (n, p) of what was fitted to them, `sizes` (n,) |F|, one of each per run.
     """
@@ -89,7 +92,8 @@ def fit_noise(
         left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0] if X.shape[1] else y
         return Noise(float(np.sum(left**2) / max(total.size - X.shape[1], 1)) or 1e-300, 0.0)
     F2 = float(np.mean(np.concatenate(sizes) ** 2)) or 1.0
-    responses = [Response(*each) for each in zip(runs, residuals, columns, sizes, strict=True)]
+    known = shapes or Shapes()
+    responses = [Response(*each, known) for each in zip(runs, residuals, columns, sizes, strict=True)]
 
     def likeliest(begin: Noise) -> Noise:
         more = [variance] * (len(begin.scales) + len(begin.bands))

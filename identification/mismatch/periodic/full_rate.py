@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch.estimate.fitting import Fit, raw
-from identification.mismatch.model.model import Data, predict
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.sub_interval import sample_lead
 from identification.mismatch.periodic.periodic_disturbances import Line
 from identification.mismatch.periodic.rotor_angle import turned
@@ -29,14 +30,15 @@ def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
     """Measured minus predicted at every sample that the intervals hold; turns from the rate, or from the model."""
     out = []
     follows = _rate_follows(fitted, data)
-    for i, h in enumerate(data.histories):
-        F, x = predict(fitted.model, fitted.theta, h, data.scale, i)
+    for run, tare in zip(data.runs, fitted.theta.tares, strict=True):
+        h = run.history
+        F, x = predict(fitted.model, fitted.theta, run, data.scale, tare)
         if fitted.theta.shift:
             F = delayed(F, h.edges, fitted.theta.shift)
         at = within_intervals(F, h.edges, h.sample_time)
         rate = within_intervals(x, h.edges, h.sample_time)
-        at += fitted.theta.C * sample_lead(fitted.model, fitted.theta, h, rate, data.scale.driver)
-        residual = h.sample_thrust - at - fitted.theta.tares[i]
+        at += fitted.theta.C * sample_lead(fitted.model, fitted.theta, run, rate, data.scale.driver)
+        residual = h.sample_thrust - at - tare
         speed = fitted.theta.k * x if follows else h.others.get("rotation_rate", x)
         out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time)))
     return tuple(out)

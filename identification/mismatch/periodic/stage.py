@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch.estimate.fitting import Fit
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.periodic.full_rate import scale_std_of, series_of, with_scale
 from identification.mismatch.periodic.periodic_disturbances import Line, find_lines
 from identification.mismatch.periodic.resonances import find_bands

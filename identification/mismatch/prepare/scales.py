@@ -8,12 +8,14 @@ import numpy as np
 
 from identification.physics.term import Scale
 from identification.run_history.history import History
+from identification.run_history.remembered import RememberedRun
 
 MANY_SAMPLES = 100
 
 
-def scale_of(histories: Sequence[History], C: float) -> Scale:
+def scale_of(runs: Sequence[RememberedRun], C: float) -> Scale:
     """Sizes of these runs; C from a first fit."""
+    histories = [run.history for run in runs]
     driver = max(h.size for h in histories)
     unit = "rev/s" if histories[0].driver_quantity == "rotation_rate" else "V"
     flows = [float(np.max(np.abs(h.others["flow_speed"]))) for h in histories if "flow_speed" in h.others]
@@ -22,7 +24,7 @@ def scale_of(histories: Sequence[History], C: float) -> Scale:
         driver_unit=unit,
         thrust=abs(C) * driver**2,
         duration=max(float(h.edges[-1] - h.edges[0]) for h in histories),
-        interval=min(_resolution(h) for h in histories),
+        interval=min(map(_resolution, runs)),
         flow=max(flows, default=0.0),
         reading=max(float(np.nanmax(np.abs(h.thrust))) for h in histories),
         noise=float(np.median([_scatter(h) for h in histories])),
@@ -39,10 +41,11 @@ def _full_torque(histories: Sequence[History]) -> float:
     return power / size if size > 0 else 0.0
 
 
-def _resolution(history: History) -> float:
+def _resolution(run: RememberedRun) -> float:
     """s: the shorter intervals, or what the ticks of the command resolve."""
-    shortest = float(np.median(np.sort(history.dt)[: max(history.dt.size // 4, 1)]))
-    return shortest if history.tick_rows is None else min(shortest, history.tick_rows.resolution)
+    dt = run.history.dt
+    shortest = float(np.median(np.sort(dt)[: max(dt.size // 4, 1)]))
+    return shortest if run.step_responses is None else min(shortest, run.step_responses.resolution)
 
 
 def _scatter(history: History) -> float:

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 from identification.mismatch.estimate.estimate import Estimate, refresh
-from identification.mismatch.estimate.fitting import Fit, fit
-from identification.mismatch.model.model import Data
+from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import with_values
 
 ALIKE = 4.0
 """Of chi-square: a model that loses less by ringing that the samples can show is as good."""
@@ -15,14 +14,11 @@ ALIKE = 4.0
 def within_samples(estimate: Estimate, data: Data) -> Estimate:
     """Of ringing beyond half the sampling rate the alias below it, where that does nearly as well."""
     limit = 0.5 / min(h.spacing for h in data.histories)
-    for i, (term, values) in enumerate(zip(estimate.fit.model.terms, estimate.fit.theta.terms, strict=True)):
+    now = estimate.fit
+    for term, values in now.values.items():
         if term.id == "stand_resonance" and limit < values[1] < 2 * limit:
-            found = _slower(estimate.fit, i, (values[0], 2 * limit - values[1], values[2]), data, estimate)
-            if found.theta.terms[i][1] < limit and found.chi2 < estimate.fit.chi2 + ALIKE:
+            slower = with_values(now.model, now.theta, term, (values[0], 2 * limit - values[1], values[2]))
+            found = fit(now.model, slower, data, estimate.weights)
+            if found.values[term][1] < limit and found.chi2 < now.chi2 + ALIKE:
                 return refresh(found.model, found.theta, data, None, estimate)
     return estimate
-
-
-def _slower(now: Fit, at: int, values: tuple[float, ...], data: Data, estimate: Estimate) -> Fit:
-    terms = (*now.theta.terms[:at], values, *now.theta.terms[at + 1 :])
-    return fit(now.model, replace(now.theta, terms=terms), data, estimate.weights)

@@ -8,8 +8,12 @@ from dataclasses import replace
 import numpy as np
 
 from identification.mismatch.estimate.estimate import Estimate, by_run, refresh, unweighted
-from identification.mismatch.estimate.fitting import Fit, extended, fit, raw
-from identification.mismatch.model.model import Data, Model, PriorPredictionFactor, Theta, Weights
+from identification.mismatch.estimate.fitting import Fit, fit, raw
+from identification.mismatch.model.data import Data, PriorPredictionFactor
+from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.predictor import Predictor
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.prepare.scales import scale_of
 from identification.mismatch.select.covariates import covariates
 from identification.mismatch.select.jumps import jumps
@@ -47,7 +51,9 @@ def start(histories: Sequence[History]) -> tuple[Data, Theta]:
     with_rate = all(h.rate is not None and h.rate_rows.size > 20 for h in histories)
     moving = histories[0].driver_quantity == "command_voltage" and not any(h.static for h in histories)
     most = min(CLOCKS, max(h.jitter for h in histories)) if moving else 0.0
-    data = Data(tuple(histories), scale_of(histories, C or 1e-12), with_rate=with_rate, most_shift=most)
+    predictor = Predictor()
+    scale = scale_of([predictor.run(h) for h in histories], C or 1e-12)
+    data = Data(tuple(histories), scale, with_rate=with_rate, most_shift=most, predictor=predictor)
     data = replace(data, prior_factor=level_error_factor(data, C))
     return data, Theta(C, (), tuple(float(ym - C * fm) for fm, ym in means), k=_k(histories))
 
@@ -101,9 +107,8 @@ def raw_directions(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
     base, _ = raw(fit_now.model, fit_now.theta, data, with_rate=False)
     columns = []
     for term in terms:
-        bigger = fit_now.model.plus(term)
         for trial in term.trials(data.scale):
-            theta = extended(fit_now.theta, fit_now.model, term, trial, bigger)
+            bigger, theta = fit_now.more(term, trial)
             new, _ = raw(bigger, theta, data, with_rate=False)
             columns.append(np.concatenate(new) - np.concatenate(base))
     return np.column_stack(columns) if columns else np.empty((data.size, 0))

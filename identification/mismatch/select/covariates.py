@@ -13,7 +13,8 @@ import numpy as np
 
 from identification.flexible_terms.flexible import turned
 from identification.mismatch.estimate.fitting import Fit, raw
-from identification.mismatch.model.model import Data, predict
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.predictor import predict
 from identification.physics.rotation_coupling import slip
 from identification.recording import Floats
 from identification.run_history.filters import delayed, lowpass
@@ -102,7 +103,8 @@ def _knots(values: Sequence[Floats], most: int) -> Floats:
 
 def covariates(fit: Fit, data: Data) -> tuple[Covariate, ...]:
     """All that can be looked at in these runs."""
-    whole = tuple(predict(fit.model, fit.theta, h, data.scale, i) for i, h in enumerate(data.histories))
+    every = zip(data.runs, fit.theta.tares, strict=True)
+    whole = tuple(predict(fit.model, fit.theta, run, data.scale, tare) for run, tare in every)
     # with the nuisances, or their slope would be a part of every gain
     thrust, _ = raw(fit.model, fit.theta, data, with_rate=False)
     view = _View(
@@ -224,8 +226,8 @@ def _channels(view: _View) -> Iterator[Covariate]:
         yield _torque(view)
     if all(h.rate is not None for h in data.histories):
         columns = []
-        for h, r, (_, x), rate, s in zip(data.histories, data.rows, view.whole, view.rate, size, strict=True):
-            gap = slip(h, x, view.fit.theta.k or 1.0)[r] / data.scale.driver
+        for run, r, (_, x), rate, s in zip(data.runs, data.rows, view.whole, view.rate, size, strict=True):
+            gap = slip(run, x, view.fit.theta.k or 1.0)[r] / data.scale.driver
             columns.append(np.column_stack([gap, gap * s, gap * rate]))
         what = "thrust follows the measured rate where it leaves the command"
         yield Covariate("rotation_rate", view.of("rotation_rate"), "rev/s", tuple(columns), what)

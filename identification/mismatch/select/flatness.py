@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from identification.mismatch.estimate.fitting import Fit
-from identification.mismatch.model.model import Data, predict
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.predictor import predict
 from identification.mismatch.noise.covariance import Noise
 from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.term import Term
@@ -29,11 +28,11 @@ def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
     """Whether the readings scatter as ever where a load-cell saturation of the model says that they clip."""
     if not isinstance(term, LoadCellSaturation):
         return False
-    values = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))[term]
+    values = fitted.values[term]
     left = scatter = told = samples = 0.0
     for i, (h, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         whole = _force(fitted, term, data, i)
-        shown = predict(fitted.model, fitted.theta, h, data.scale, i)[0][rows]
+        shown = predict(fitted.model, fitted.theta, data.runs[i], data.scale, fitted.theta.tares[i])[0][rows]
         edges = np.concatenate([whole[:1], 0.5 * (whole[1:] + whole[:-1]), whole[-1:]])
         force, first, last = whole[rows], edges[:-1][rows], edges[1:][rows]
         variance = noise.white + noise.proportional * force**2 + sum(noise.slow) + sum(noise.band)
@@ -55,7 +54,4 @@ def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
 
 def _force(fitted: Fit, term: Term, data: Data, run: int) -> Floats:
     """(M,) N, of a run without the term."""
-    known = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))
-    bare = fitted.model.without(term)
-    theta = replace(fitted.theta, terms=tuple(known[t] for t in bare.terms))
-    return predict(bare, theta, data.histories[run], data.scale, run)[0]
+    return predict(*fitted.less(term), data.runs[run], data.scale, fitted.theta.tares[run])[0]

@@ -10,8 +10,10 @@ import numpy as np
 
 from identification.estimation.tails import chi2_isf
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
-from identification.mismatch.estimate.fitting import DELAYING, Fit, at_bound, extended, fit
-from identification.mismatch.model.model import Data, Model, Theta, price
+from identification.mismatch.estimate.fitting import DELAYING, Fit, at_bound, fit
+from identification.mismatch.model.data import Data, price
+from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
 from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
 from identification.mismatch.select.screening import (
     Screening,
@@ -258,9 +260,8 @@ def _hidden(estimate: Estimate, judged: Screening, data: Data) -> Estimate | Non
     now = refresh(estimate.fit.model, estimate.fit.theta, data, None, None)
     found = []
     for term, values in likely:
-        bigger = estimate.fit.model.plus(term)
         begin = refined(estimate.fit, data, estimate.weights, term, values)
-        theta = extended(estimate.fit.theta, estimate.fit.model, term, begin, bigger)
+        bigger, theta = estimate.fit.more(term, begin)
         first = fit(bigger, theta, data, estimate.weights)
         new = refresh(bigger, first.theta, data, None, now, now.noise)
         gain = now.fit.deviance - new.fit.deviance
@@ -314,9 +315,8 @@ def _best_addition(estimate: Estimate, judged: Screening, data: Data, refused: C
     for term, values in _candidates(judged, data):
         if term in refused:
             continue
-        bigger = estimate.fit.model.plus(term)
         begin = refined(estimate.fit, data, estimate.weights, term, values)
-        theta = extended(estimate.fit.theta, estimate.fit.model, term, begin, bigger)
+        bigger, theta = estimate.fit.more(term, begin)
         new = fit(bigger, theta, data, estimate.weights)
         gain = estimate.fit.chi2 - new.chi2
         cost = price(term, data) * np.log(new.residual.size)
@@ -334,7 +334,7 @@ def prune(estimate: Estimate, data: Data) -> Estimate:
     """Drop terms that no longer earn their place."""
     while estimate.fit.model.terms:
         costs = []
-        for term, values in zip(estimate.fit.model.terms, estimate.fit.theta.terms, strict=True):
+        for term, values in estimate.fit.values.items():
             less = fit_without(estimate, term, data)
             costs.append((less.chi2 - estimate.fit.chi2 - accept_threshold(len(values)), less))
         worst, less = min(costs, key=lambda pair: pair[0])

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.mismatch.estimate.fitting import Fit
-from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.whitening import Weights
 from identification.recording import Floats
 
 TRIED = 600

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from identification.mismatch.estimate.fitting import Fit
-from identification.mismatch.model.model import Data, acting
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import acting
 from identification.mismatch.model.step_response import told
 from identification.physics.term import Term
 from identification.recording import Floats

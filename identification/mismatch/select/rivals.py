@@ -9,8 +9,8 @@ from itertools import combinations
 import numpy as np
 
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
-from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, extended, fit
-from identification.mismatch.model.model import Data, price
+from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, fit
+from identification.mismatch.model.data import Data, price
 from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import Rival, SwapTest, accept_threshold
 from identification.mismatch.select.screening import directions, orthogonal_basis, refined
@@ -84,9 +84,8 @@ def _one_for_two(
                 break
             tried.add(other)
             values = mirrored(other, found.values[j], data) if score[j] < 0 else found.values[j]
-            bigger = less.model.plus(other)
             begin = refined(less, data, estimate.weights, other, values)
-            theta = extended(less.theta, less.model, other, begin, bigger)
+            bigger, theta = less.more(other, begin)
             new = fit(bigger, theta, data, estimate.weights, RIVAL_STEPS, wanted)
             loss = new.chi2 - now.chi2 + more
             if loss < -BETTER and (best is None or loss < best[0]) and not at_bound(other, new, data, estimate.weights):
@@ -123,11 +122,10 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
     for other, (r, values) in ranked[:MOST_REFITS]:
         if (1 - r**2) * gain > LIKELY and r < 0.9:
             break
-        bigger = less.model.plus(other)
         begin = refined(less, data, estimate.weights, other, values)
         more = price(other, data) - extra_now
         extra = more * logn
-        begun = extended(less.theta, less.model, other, begin, bigger)
+        bigger, begun = less.more(other, begin)
         if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
             new = fit(bigger, begun, data, estimate.weights)
         else:
@@ -148,7 +146,4 @@ def mirrored(term: Term, values: tuple[float, ...], data: Data) -> tuple[float, 
 
 def _effect(now: Fit, term: Term, data: Data, estimate: Estimate) -> Floats:
     """(n,) whitened change that the term makes at its fitted values; the rate's rows with it."""
-    smaller = now.model.without(term)
-    known = dict(zip(now.model.terms, now.theta.terms, strict=True))
-    theta = replace(now.theta, terms=tuple(known[t] for t in smaller.terms))
-    return estimate.weights.whiten(*change_of((smaller, theta), (now.model, now.theta), data, estimate.weights))
+    return estimate.weights.whiten(*change_of(now.less(term), (now.model, now.theta), data, estimate.weights))

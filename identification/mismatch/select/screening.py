@@ -15,8 +15,9 @@ import numpy as np
 
 from identification.estimation.singular_values import thin_svd
 from identification.estimation.tails import normal_sf
-from identification.mismatch.estimate.fitting import Fit, extended, raw, residual_of, ticks_told
-from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.estimate.fitting import Fit, raw, residual_of, ticks_told
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.jumps import likeliest_jumps
 from identification.mismatch.select.ringing import likeliest_rings
 from identification.physics.term import Term
@@ -38,8 +39,6 @@ TICKS = (-1, 1, 2, 3)
 """Delays that are tried."""
 SLOW_TICK = 0.5
 """s: a command that changes no faster does not tick on."""
-SHIFT = -3
-"""Where the nuisance shift stands in Theta.vector."""
 LEAST_DIRECTION = 1e-6
 """Share of a direction that must remain when the present model is projected out."""
 
@@ -121,11 +120,10 @@ def _likeliest_delay(
 ) -> tuple[float, ...]:
     """The delay that leaves least: ticks that come again and again make a valley at each of them, and the shape of what
     a delay changes does not tell one from the next, its size does."""
-    bigger = fit.model.plus(term)
 
     def left(delay: float) -> float:
-        theta = replace(extended(fit.theta, fit.model, term, (delay,), bigger), shift=0.0)
-        residual = residual_of(bigger, theta, data, weights)
+        bigger, theta = fit.more(term, (delay,))
+        residual = residual_of(bigger, replace(theta, shift=0.0), data, weights)
         return float(residual @ residual)
 
     likely = sorted({delay for (delay,) in trials}, key=left)[:VALLEYS]
@@ -156,9 +154,8 @@ def directions(
     ticks: list[list[Floats]] = [[] for _ in base_ticks]
     for term in terms:
         first = term.parameters(data.scale)[0]
-        bigger = fit.model.plus(term)
         for trial in _trials(term, fit, data, weights, basis) if trials is None else trials:
-            theta = extended(fit.theta, fit.model, term, trial, bigger)
+            bigger, theta = fit.more(term, trial)
             new_thrust, new_rate = raw(bigger, theta, data, with_rate=with_rate)
             for i, (new, base) in enumerate(zip(new_thrust, base_thrust, strict=True)):
                 thrust[i].append(new - base)
@@ -180,7 +177,7 @@ def directions(
     before = lengths(columns)
     columns -= basis @ ((basis.T @ columns) * ~late)
     if late.any():
-        own = orthogonal_basis(fit.jacobian[:, np.flatnonzero(fit.free) != fit.free.size + SHIFT])
+        own = orthogonal_basis(fit.jacobian[:, np.flatnonzero(fit.free) != fit.layout.shift])
         columns[:, late] -= own @ (own.T @ columns[:, late])
     return _unit(Directions(tuple(used), tuple(values), tuple(sided), columns, np.empty(0)), before)
 

@@ -6,13 +6,12 @@ until it is more than this share of the change. Else every real recording would 
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch.estimate.fitting import Fit, change_of
-from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.screening import orthogonal_basis
 from identification.recording import Floats
 
@@ -27,20 +26,17 @@ def corrections(fitted: Fit, data: Data, weights: Weights) -> list[Floats]:
     n = fitted.residual.size if weights.rate or weights.ticks else data.size
     basis = orthogonal_basis(fitted.jacobian[:n, ~_of_terms(fitted)])
     out = []
-    known = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))
     for term in fitted.model.terms:
-        smaller = fitted.model.without(term)
-        theta = replace(fitted.theta, terms=tuple(known[t] for t in smaller.terms))
-        change = weights.whiten(*change_of((smaller, theta), (fitted.model, fitted.theta), data, weights))
+        change = weights.whiten(*change_of(fitted.less(term), (fitted.model, fitted.theta), data, weights))
         out.append(change - basis @ (basis.T @ change))
     return out
 
 
 def _of_terms(fitted: Fit) -> NDArray[np.bool_]:
     """(p,) which columns of the Jacobian are parameters of terms."""
-    many = sum(len(values) for values in fitted.theta.terms)
-    index = np.arange(fitted.free.size)
-    return ((index > 0) & (index <= many))[fitted.free]
+    of_terms = np.zeros(fitted.free.size, dtype=bool)
+    of_terms[fitted.layout.of_terms] = True
+    return of_terms[fitted.free]
 
 
 def allowed(changes: list[Floats], columns: Floats, share: float = NEXT_TERM) -> Floats:

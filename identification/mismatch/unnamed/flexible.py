@@ -15,10 +15,10 @@ import numpy as np
 
 from identification.flexible_terms.flexible import Flexible
 from identification.mismatch.estimate.estimate import Estimate, refresh
-from identification.mismatch.estimate.fitting import extended, fit
+from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.locate.pulses import Pulses
 from identification.mismatch.locate.residual_structure_test import ALARM, residual_structure
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.unnamed.flexible_kinds import UNITS
 from identification.mismatch.unnamed.flexible_knots import FlexibleCandidate, best_of, best_over
@@ -103,10 +103,7 @@ def _anew(whole: Estimate, terms: Sequence[Flexible], data: Data) -> tuple[Estim
     """Knots chosen again with all rows, one term after the other."""
     final = []
     for term in terms:
-        smaller = whole.fit.model.without(term)
-        known = dict(zip(whole.fit.model.terms, whole.fit.theta.terms, strict=True))
-        theta = replace(whole.fit.theta, terms=tuple(known[t] for t in smaller.terms))
-        less = replace(whole, fit=fit(smaller, theta, data, whole.weights))
+        less = replace(whole, fit=fit(*whole.fit.less(term), data, whole.weights))
         found = best_of([term], less, data)
         if found is None or found.term == term:
             final.append(term)
@@ -120,10 +117,7 @@ def _bases(begin: Estimate, part: Data, unearned: Sequence[Term]) -> list[Estima
     """The model without what was unearned, and as it is."""
     if not unearned:
         return [begin]
-    model, theta = begin.fit.model, begin.fit.theta
-    kept = tuple(v for t, v in zip(model.terms, theta.terms, strict=True) if t not in unearned)
-    smaller = replace(model, terms=tuple(t for t in model.terms if t not in unearned))
-    less = fit(smaller, replace(theta, terms=kept), part, begin.weights)
+    less = fit(*begin.fit.less(*unearned), part, begin.weights)
     return [replace(begin, fit=less), begin]
 
 
@@ -215,6 +209,5 @@ def _added(estimate: Estimate, part: Data, candidate: FlexibleCandidate) -> tupl
 
 
 def _joined(estimate: Estimate, part: Data, candidate: FlexibleCandidate) -> Estimate:
-    bigger = estimate.fit.model.plus(candidate.term)
-    theta = extended(estimate.fit.theta, estimate.fit.model, candidate.term, candidate.start, bigger)
+    bigger, theta = estimate.fit.more(candidate.term, candidate.start)
     return replace(estimate, fit=fit(bigger, theta, part, estimate.weights, FIT_STEPS))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from identification.flexible_terms.flexible import Flexible, Multiplier
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.select.covariates import FOLLOWED, LOADS
 
 UNITS = {**dict(FOLLOWED), "torque": "N.m"}

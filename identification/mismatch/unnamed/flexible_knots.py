@@ -11,7 +11,9 @@ from identification.flexible_terms.flexible import Flexible, Multiplier, lately,
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.locate.pulses import Pulses
-from identification.mismatch.model.model import Data, Weights, predict
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.predictor import predict
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.jumps import likeliest_jumps
 from identification.mismatch.select.screening import orthogonal_basis
 from identification.mismatch.unnamed.flexible_kinds import shapes_over
@@ -104,8 +106,9 @@ def _beside(instants: Sequence[float], over: Floats) -> list[tuple[float, float]
 def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], list[Floats]]:
     """Per run at its thrust rows: the covariate (n,), and what each multiplier makes of 1 (n, multipliers)."""
     over, columns = [], []
-    for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
-        F, x = predict(fitted.model, fitted.theta, h, data.scale, i)
+    for run, r, tare in zip(data.runs, data.rows, fitted.theta.tares, strict=True):
+        h = run.history
+        F, x = predict(fitted.model, fitted.theta, run, data.scale, tare)
         before = h.previous
         made: dict[Multiplier, Floats] = {
             "force": np.ones_like(F),
@@ -118,7 +121,7 @@ def seen_at(shape: Flexible, fitted: Fit, data: Data) -> tuple[list[Floats], lis
         }
         if "late" in shape.times:
             made["late"] = lately(F, h.dt, shape.memory)
-        over.append(shape.over(h, x, data.scale)[r])
+        over.append(shape.over(run, x, data.scale)[r])
         columns.append(np.column_stack([made[m][r] for m in shape.times]))
     return over, columns
 

@@ -11,7 +11,8 @@ from identification.flexible_terms.flexible import WORDS, Flexible, Multiplier
 from identification.mismatch.diagnosis import FlexibleShape, HeldOutRmse, Remainder, Spline
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, raw
-from identification.mismatch.model.model import Data, Weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.name.naming import Named
 from identification.mismatch.unnamed.flexible import Extended
 from identification.mismatch.unnamed.flexible_knots import seen_at
@@ -36,13 +37,7 @@ def shapes_of(extended: Extended, data: Data) -> tuple[FlexibleShape, ...]:
 
 def shape_of(term: Flexible, fitted: Fit, data: Data, weights: Weights) -> FlexibleShape:
     """Coefficients, curves and binned measurements of one flexible term of a fit."""
-    at = 1
-    for other, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
-        if other == term:
-            break
-        at += len(values)
-    theta = dict(zip(fitted.model.terms, fitted.theta.terms, strict=True))[term]
-    inside = slice(at, at + len(theta))
+    theta, inside = fitted.values[term], fitted.layout.of(term)
     covariance = np.nan_to_num(fitted.cov[inside, inside])
     std = np.sqrt(np.diag(covariance))
     known = term.parameters(data.scale)
@@ -98,9 +93,7 @@ def _values(
 def _measured(term: Flexible, fitted: Fit, data: Data, weights: Weights) -> tuple[Floats, Floats, Floats]:
     """Middles of the bins (b,), and generalised least squares of the residual without the term there: values and
     standard errors (multipliers, b)."""
-    smaller = fitted.model.without(term)
-    kept = tuple(v for t, v in zip(fitted.model.terms, fitted.theta.terms, strict=True) if t != term)
-    theta = replace(fitted.theta, terms=kept)
+    smaller, theta = fitted.less(term)
     less = replace(fitted, model=smaller, theta=theta)
     over, columns = seen_at(term, less, data)
     thrust, _ = raw(smaller, theta, data, with_rate=False)
@@ -176,13 +169,9 @@ def with_held(held: HeldOut, extended: Extended | None) -> HeldOutRmse:
 
 def refitted_names(named: Sequence[Named], final: Estimate) -> list[Named]:
     """Terms whose names were earned with their values in the final model."""
-    places, at = {}, 1
-    for term, values in zip(final.fit.model.terms, final.fit.theta.terms, strict=True):
-        places[term] = (values, slice(at, at + len(values)))
-        at += len(values)
-    std = final.fit.std
+    values, at, std = final.fit.values, final.fit.layout, final.fit.std
     return [
-        replace(n, theta=places[n.term][0], std=tuple(map(float, std[places[n.term][1]]))) if n.term in places else n
+        replace(n, theta=values[n.term], std=tuple(map(float, std[at.of(n.term)]))) if n.term in values else n
         for n in named
     ]
 

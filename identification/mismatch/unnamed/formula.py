@@ -29,8 +29,10 @@ from identification.flexible_terms.formula import (
 from identification.flexible_terms.formula import times as multiplied
 from identification.mismatch.diagnosis import FormulaFound
 from identification.mismatch.estimate.estimate import Estimate
-from identification.mismatch.estimate.fitting import Fit, extended, fit
-from identification.mismatch.model.model import Data, Theta, Weights, predict
+from identification.mismatch.estimate.fitting import Fit, fit
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.predictor import predict
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.screening import orthogonal_basis
 from identification.mismatch.unnamed.flexible import Extended
 from identification.mismatch.unnamed.flexible_knots import best_over
@@ -125,19 +127,15 @@ def without_flexible(found: Extended, data: Data) -> Estimate:
 
 
 def _with(term: Formula, estimate: Estimate, data: Data) -> Estimate:
-    bigger = estimate.fit.model.plus(term)
-    zeros = (0.0,) * len(term.monomials)
-    theta: Theta = extended(estimate.fit.theta, estimate.fit.model, term, zeros, bigger)
+    bigger, theta = estimate.fit.more(term, (0.0,) * len(term.monomials))
     return replace(estimate, fit=fit(bigger, theta, data, estimate.weights))
 
 
 def _fitted_shapes(found: Extended, estimate: Estimate, data: Data) -> Fit:
     """The flexible terms beside the same model, on the same rows."""
-    known = dict(zip(found.estimate.fit.model.terms, found.estimate.fit.theta.terms, strict=True))
     fitted = estimate.fit
     for term in found.terms:
-        bigger = fitted.model.plus(term)
-        fitted = fit(bigger, extended(fitted.theta, fitted.model, term, known[term], bigger), data, estimate.weights)
+        fitted = fit(*fitted.more(term, found.estimate.fit.values[term]), data, estimate.weights)
     return fitted
 
 
@@ -185,8 +183,9 @@ def _grid(estimate: Estimate, data: Data) -> _Grid | None:
     sizes = {q: float(max(np.max(np.abs(v)) for v in values)) for q, values in known.items()}
     found = [Monomial(powers, m) for powers in monomials_of(list(known)) for m in TIMES]
     raw = []
-    for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
-        F, _ = predict(estimate.fit.model, estimate.fit.theta, h, data.scale, i)
+    now = estimate.fit
+    for i, (run, r, tare) in enumerate(zip(data.runs, data.rows, now.theta.tares, strict=True)):
+        F, _ = predict(now.model, now.theta, run, data.scale, tare)
         unit = {q: values[i][r] / sizes[q] for q, values in known.items()}
         raw.append(np.column_stack([_column(m, unit, F[r]) for m in found]))
     n = data.size
@@ -247,11 +246,11 @@ def _plainness(found: tuple[Monomial, ...]) -> tuple[bool, int, int, int, int]:
 def halves(term: Formula, estimate: Estimate, data: Data) -> float:
     """p-value of the same coefficients in the first and the second half of each run."""
     n, q = data.size, len(term.monomials)
-    smaller = estimate.fit.model.without(term)
-    theta = _less(term, estimate.fit)
+    smaller, theta = estimate.fit.less(term)
     first, second = [], []
-    for i, (h, r) in enumerate(zip(data.histories, data.rows, strict=True)):
-        F, _ = predict(smaller, theta, h, data.scale, i)
+    for run, r, tare in zip(data.runs, data.rows, theta.tares, strict=True):
+        h = run.history
+        F, _ = predict(smaller, theta, run, data.scale, tare)
         sizes = dict(term.sizes)
         unit = {name: quantity(name, h)[r] / size for name, size in sizes.items()}
         columns = np.column_stack([_column(m, unit, F[r]) for m in term.monomials])
@@ -267,11 +266,6 @@ def halves(term: Formula, estimate: Estimate, data: Data) -> float:
     Q = orthogonal_basis(Q - C @ (C.T @ Q))
     score = Q.T @ estimate.fit.residual[:n]
     return float(chi2_sf(float(score @ score), Q.shape[1])) if Q.shape[1] else 1.0
-
-
-def _less(term: Formula, fitted: Fit) -> Theta:
-    kept = tuple(v for t, v in zip(fitted.model.terms, fitted.theta.terms, strict=True) if t != term)
-    return replace(fitted.theta, terms=kept)
 
 
 def _left_over(term: Formula, estimate: Estimate, data: Data, flexible: Sequence[Flexible]) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.flexible_terms.formula import CHANNELS, Formula, Monomial, driver_symbol
 from identification.mismatch.estimate.fitting import Fit
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.value import Value
 from identification.recording import Floats
 
@@ -67,12 +67,7 @@ def _with_error(value: float, std: float) -> str:
 
 
 def _coefficients(term: Formula, fitted: Fit) -> tuple[Floats, Floats]:
-    at = 1
-    for other, values in zip(fitted.model.terms, fitted.theta.terms, strict=True):
-        if other == term:
-            break
-        at += len(values)
-    inside = slice(at, at + len(values))
+    values, inside = fitted.values[term], fitted.layout.of(term)
     return np.array(values), np.nan_to_num(fitted.cov[inside, inside])
 
 

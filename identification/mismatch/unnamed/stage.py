@@ -12,12 +12,12 @@ from identification.mismatch.estimate.estimate import Estimate, refresh
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.locate.residual_structure_test import ALARM, ResidualStructure, residual_structure
 from identification.mismatch.locate.stage import Located
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.select.forward_selection import STATIC, Selected
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import refitted_names, shared
-from identification.mismatch.validate.prediction import predicting, predicts, without_terms
+from identification.mismatch.validate.prediction import predicting, predicts
 from identification.mismatch.validate.stage import Validated
 from identification.physics.term import Term
 from identification.run_history.history import History
@@ -74,7 +74,7 @@ def _located(
     """What is left without the terms whose names were not earned: they are no physics, and would hide its place."""
     if not unearned:
         return after, left
-    bare = replace(after, fit=fit(*without_terms(after, [n.term for n in unearned]), data, after.weights))
+    bare = replace(after, fit=fit(*after.fit.less(*(n.term for n in unearned)), data, after.weights))
     seen = residual_structure(bare.fit, data, after.weights, rng)
     return (bare, seen) if seen.p_value < ALARM else (after, left)
 
@@ -97,7 +97,7 @@ def _with_values(
     named = refitted_names([n for n in earned if n.term not in alone], after)
     known = intervals(after.fit, data, after.weights, [n.term for n in named])
     if free is not None and alone:
-        bare = refresh(*without_terms(before, free.dropped), data, None, None)  # what it leaves is noise to it
+        bare = refresh(*before.fit.less(*free.dropped), data, None, None)  # what it leaves is noise to it
         named += refitted_names([n for n in earned if n.term in alone], bare)
         known |= intervals(bare.fit, data, bare.weights, alone)
     return tuple(sorted(named, key=lambda n: -n.chi2_gain)), known

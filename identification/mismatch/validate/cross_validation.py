@@ -9,7 +9,8 @@ import numpy as np
 
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit
-from identification.mismatch.model.model import Data, weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.validate.held_out import HeldOut, by_blocks, least_noise, rmse, with_tares
 

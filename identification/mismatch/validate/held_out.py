@@ -10,7 +10,10 @@ from numpy.typing import NDArray
 
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit, raw
-from identification.mismatch.model.model import Data, Model, Theta, weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
 from identification.run_history.history import History
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.model.model import Data, Model, Theta
+from identification.mismatch.model.data import Data
 from identification.mismatch.select.baseline import baseline
 from identification.mismatch.validate.train_test_split import TrainTestSplit, better, train_test_split
 from identification.physics.term import Term
@@ -29,7 +28,7 @@ def worse_predicted(split: TrainTestSplit, terms: Collection[Term], *, same_run:
     """
     estimate, now = split.estimate, split.judge(split.estimate.fit)
     asked = [t for t in estimate.fit.model.terms if t in terms and (same_run or t.id not in EVENTS)]
-    less = {t: split.judge(fit(*without_terms(estimate, [t]), split.data, estimate.weights)) for t in asked}
+    less = {t: split.judge(fit(*estimate.fit.less(t), split.data, estimate.weights)) for t in asked}
     most = np.inf if same_run else now.rmse
     return tuple(t for t, score in less.items() if score.chi2 < now.chi2 - WORSE and score.rmse < most)
 
@@ -49,7 +48,7 @@ def predicting(
     """
     if not unearned:
         return after
-    smaller, theta = without_terms(after, unearned)
+    smaller, theta = after.fit.less(*unearned)
     bare = baseline(data, theta, terms, smaller)
     smaller_fit = train_test_split(bare, data, others).estimate.fit
     return after if better(split.judge(split.estimate.fit), split.judge(smaller_fit), 0) else bare
@@ -60,10 +59,3 @@ def predicts(estimate: Estimate, before: Estimate, data: Data, others: Sequence[
     split = train_test_split(estimate, data, others)
     plain = fit(before.fit.model, before.fit.theta, split.data, split.estimate.weights)
     return split.judge(split.estimate.fit).rmse < split.judge(plain).rmse
-
-
-def without_terms(estimate: Estimate, terms: Collection[Term]) -> tuple[Model, Theta]:
-    """The rest of the model, its values as they were."""
-    model, theta = estimate.fit.model, estimate.fit.theta
-    kept = tuple(v for t, v in zip(model.terms, theta.terms, strict=True) if t not in terms)
-    return replace(model, terms=tuple(t for t in model.terms if t not in terms)), replace(theta, terms=kept)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from identification.mismatch.estimate.estimate import Estimate
-from identification.mismatch.model.model import Data
+from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.validate.cross_validation import by_folds

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit
-from identification.mismatch.model.model import Data, weights
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.whitening import weights
 from identification.mismatch.validate.held_out import Score, blocks, judge_blocks, judge_runs, refitted
 from identification.run_history.history import History
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimation.singular_values import thin_svd
-from identification.mismatch.noise.covariance import Noise, Rows, Whitener
+from identification.mismatch.noise.covariance import Noise, Rows, Shapes, Whitener
 from identification.mismatch.noise.variances import fit_noise
 from identification.mismatch.vehicle.model import Known, Layout, known, predict
 from identification.mismatch.vehicle.motion import Motion
@@ -49,7 +49,8 @@ Weights = tuple[Whitener, ...]
 def weights(noise: Noise, data: Prepared, keep: Sequence[Floats] | None = None) -> Weights:
     """One whitening for each run, of the rows in `keep` alone where it is given."""
     kept = [run.rows if keep is None else _part(run.rows, keep[j]) for j, run in enumerate(data.runs)]
-    return tuple(Whitener(noise, rows, np.zeros(rows.time.size)) for rows in kept)
+    shapes = Shapes()
+    return tuple(Whitener(noise, rows, np.zeros(rows.time.size), shapes) for rows in kept)
 
 
 def _part(rows: Rows, keep: Floats) -> Rows:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
+from typing import Generic, TypeVar
 
-from identification.recording import Floats
+T = TypeVar("T")
 
 
-class LeastRecentlyUsed:
-    """Arrays by what they were made of; when there are more than `most`, the longest unused is forgotten.
+class LeastRecentlyUsed(Generic[T]):
+    """Values by what they were made of; when there are more than `most`, the longest unused is forgotten.
 
     >>> import numpy as np
     >>> kept, a = LeastRecentlyUsed(most=8), np.arange(3.0)
@@ -21,9 +22,9 @@ class LeastRecentlyUsed:
 
     def __init__(self, most: int) -> None:
         self.most = most
-        self._known: OrderedDict[Hashable, tuple[Floats, tuple[object, ...]]] = OrderedDict()
+        self._known: OrderedDict[Hashable, tuple[T, tuple[object, ...]]] = OrderedDict()
 
-    def __call__(self, key: Hashable, make: Callable[[], Floats], *of: object) -> Floats:
+    def __call__(self, key: Hashable, make: Callable[[], T], *of: object) -> T:
         """What `make` makes, of a `key` that is equal and of the very same objects `of`.
 
         They are kept too: as long as they are there, no other object has their address.

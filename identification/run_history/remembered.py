@@ -1,0 +1,91 @@
+"""A run with what was worked out of it lately: a fit asks for the same again and again.
+
+Each value depends on the run and on what is asked for, never on what was asked before, so that predictions do not
+depend on the order in which they are made. None of it is a part of the history, which stages hand on.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from math import exp, log
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.recording import Floats
+from identification.run_history.filters import lag, lag_ends
+from identification.run_history.history import History, Samples
+from identification.run_history.least_recently_used import LeastRecentlyUsed
+from identification.run_history.rate_gap import RateGap, rate_gap
+from identification.run_history.step_response_rows import TickRows, tick_rows
+
+Channel = Literal["thrust", "rate"]
+MOST_PREDICTIONS = 400
+"""Values behind the first terms of models: a fit moves one parameter at a time."""
+MOST_LEADS = 160
+"""What dynamics make of the ticks: those of all trials of a screening, twice."""
+MOST_LATELY = 12
+"""What the rates of the last few models make at the samples: most terms change none."""
+MOST_REFERENCES = 24
+"""Rotors from whose rates those of similar ones are sought."""
+REFERENCES = 8.0
+"""Of them to a factor e in each coefficient."""
+
+
+class RememberedRun:
+    """One run, read-only."""
+
+    def __init__(self, history: History) -> None:
+        self.history = history
+        self.predictions = LeastRecentlyUsed[Floats](MOST_PREDICTIONS)
+        self.leads = LeastRecentlyUsed[Floats](MOST_LEADS)
+        self.lately = LeastRecentlyUsed[Floats](MOST_LATELY)
+        self._references = LeastRecentlyUsed[Floats](MOST_REFERENCES)
+        self._since: dict[Channel, tuple[float, tuple[NDArray[np.intp], Floats]]] = {}
+
+    @cached_property
+    def step_responses(self) -> TickRows | None:
+        """What the ticks of the command tell within the intervals; None where they tell nothing."""
+        return tick_rows(self.history)
+
+    @cached_property
+    def rate_gap(self) -> RateGap | None:
+        """What takes the noise out of how far the measured rate is from a model."""
+        return rate_gap(self.history)
+
+    def followed(self, value: Floats, rotor: tuple[float, float]) -> Floats:
+        """(M,) means of the rate of a rotor that follows `value` (filters.lag)."""
+        h = self.history
+        near = self._reference("intervals", h.driver, h.dt, rotor)
+        return lag(value, h.dt, *rotor, float(value[0]), near)[1]
+
+    def rates_at_ticks(self, rotor: tuple[float, float] | None) -> Floats:
+        """(T,) rate of the rotor at each tick of the command; it was settled before the first."""
+        assert self.history.ticks is not None
+        when, value = self.history.ticks
+        if rotor is None:
+            return value
+        held, dt = value[:-1], np.diff(when)
+        end = lag_ends(held, dt, *rotor, float(value[0]), self._reference("ticks", held, dt, rotor))
+        return np.concatenate([value[:1], end])
+
+    def _reference(self, of: str, value: Floats, dt: Floats, rotor: tuple[float, float]) -> Floats | None:
+        """Ends of a similar rotor, from which those of `rotor` are a few steps; None where it is linear."""
+        if rotor[0] == 0 or not value.size:
+            return None
+        quadratic, linear = (exp(round(REFERENCES * log(c)) / REFERENCES) if c > 0 else 0.0 for c in rotor)
+        key = (of, quadratic, linear)
+        return self._references(key, lambda: lag_ends(value, dt, quadratic, linear, float(value[0])))
+
+    def samples(self, channel: Channel) -> Samples:
+        """Every sample of a channel that is in an interval."""
+        return self.history.thrust_samples if channel == "thrust" else self.history.rate_samples
+
+    def after_ticks(self, channel: Channel, delay: float) -> tuple[NDArray[np.intp], Floats]:
+        """(N,) of each sample the last tick that is `delay` s ago or longer, else the first, and s since then."""
+        known = self._since.get(channel)
+        if known is None or known[0] != delay:
+            assert self.history.ticks is not None
+            known = self._since[channel] = delay, self.samples(channel).after(self.history.ticks[0], delay)
+        return known[1]
