@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from rig.blind.design import ORACLE, STRENGTHS
-from rig.blind.elsewhere import read
-from rig.blind.figures import besides, confusion, goals, half_named, named_by_strength, open_world
+from rig.blind.metrics import besides, confusion, goals, half_named, named_by_strength, open_world
 from rig.blind.rates import Goal
+from rig.blind.score_file import read
 from rig.blind.scoring import Score
 
 ROOT = Path(__file__).parents[1]

@@ -7,12 +7,12 @@ from pathlib import Path
 
 import pytest
 
-from rig.campaign import run
-from rig.ledger import FILE_NAME, read
-from rig.messages import Request, Snapshot
-from rig.plan import FixedDwell, Plan, TareConfig
-from rig.recorder_messages import Close, Open
-from rig.shapes import Ramp, Sine
+from rig.campaign.plan import FixedDwell, Plan, TareConfig
+from rig.campaign.shapes import Ramp, Sine
+from rig.link.front_end_messages import Request, Snapshot
+from rig.link.recorder_messages import Close, Open
+from rig.recording.ledger import FILE_NAME, read
+from rig.stages.campaign import run
 from tests.rig.virtual_bench import PLAN, VirtualBench, flow_meter, starter, stop_input, virtual
 
 HOLDS = [step.index for step in PLAN if step.phase == "hold"]
@@ -517,7 +517,7 @@ def test_resumed_run_counts_its_attempts(tmp_path):
 
 
 def test_signal_at_any_instant_is_a_request(tmp_path):
-    from rig.controller import stop_on_signals
+    from rig.stages.controller import stop_on_signals
 
     with virtual(tmp_path) as world:
         handlers = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)}

@@ -14,20 +14,20 @@ import pytest
 from drivers.protocols import Channel, Sample, Stream
 from identification.physics.term import Scale
 from identification.twin import TERMS, Twin, TwinNoise, TwinTerm, names_of
-from rig.campaign import run
-from rig.config import WatchConfig
+from rig.campaign.config import WatchConfig
+from rig.campaign.loading import load_campaign
+from rig.campaign.plan import FixedDwell, Plan
+from rig.campaign.shapes import Levels
 from rig.errors import ConfigError, LinkError
-from rig.ledger import read
-from rig.link import Peer, pair
-from rig.loading import load_campaign
-from rig.messages import Request
-from rig.plan import FixedDwell, Plan
-from rig.recorder_messages import Close, Failed, Rows
-from rig.shapes import Levels
-from rig.twin import write_twin
-from rig.watch_link import WatchLink, run_of
-from rig.watch_messages import Mismatch, Watched, WatchedStream
-from rig.watcher import Watcher, settings_of
+from rig.link.front_end_messages import Request
+from rig.link.recorder_messages import Close, Failed, Rows
+from rig.link.sockets import Peer, pair
+from rig.link.watch_messages import Mismatch, Watched, WatchedStream
+from rig.recording.ledger import read
+from rig.stages.campaign import run
+from rig.twin.reading import write_twin
+from rig.watch.watch_link import WatchLink, run_of
+from rig.watch.watcher import Watcher, settings_of
 from tests.rig.virtual_bench import PLAN, VirtualBench, starter, virtual
 
 LEVELS = (6.0, -6.0, 9.0, -9.0) * 6

@@ -8,9 +8,9 @@ import pytest
 from click.testing import CliRunner
 from rich.console import Console
 
-from rig.check import check_campaign, check_command, print_report
 from rig.cli import main
 from rig.errors import RigError
+from rig.operate.check import check_campaign, check_command, print_report
 
 WRONG = Path(__file__).parent / "wrong"
 EXAMPLES = [p for p in sorted(WRONG.glob("*.toml")) if not p.stem.endswith("_bench") and p.stem != "right"]

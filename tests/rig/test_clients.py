@@ -4,10 +4,10 @@ from contextlib import contextmanager
 
 import pytest
 
-from rig.clients import MAX_CLIENTS, Clients
-from rig.link import connect, listen
-from rig.messages import Request, Snapshot
-from rig.recorder_messages import Ready
+from rig.link.clients import MAX_CLIENTS, Clients
+from rig.link.front_end_messages import Request, Snapshot
+from rig.link.recorder_messages import Ready
+from rig.link.sockets import connect, listen
 
 
 def snapshot(text: str = "") -> Snapshot:

@@ -6,11 +6,11 @@ import pytest
 
 from drivers.can_bus import Frame
 from drivers.transcript import read_transcript
-from rig.bench import build
+from rig.campaign.bench import build
+from rig.campaign.loading import load_bench, load_campaign
+from rig.campaign.plan import FixedDwell, SteadyDwell
+from rig.campaign.shapes import Interleaved, Ramp
 from rig.errors import ConfigError
-from rig.loading import load_bench, load_campaign
-from rig.plan import FixedDwell, SteadyDwell
-from rig.shapes import Interleaved, Ramp
 
 ROOT = Path(__file__).parents[2]
 WRONG = Path(__file__).parent / "wrong"

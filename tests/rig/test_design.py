@@ -9,20 +9,20 @@ import pytest
 
 from identification.experiment_design.run_order import Course, Slow, schedule
 from identification.experiment_design.thrust_design import Noise, Terms
-from rig.check import check_campaign
+from rig.campaign.loading import load_campaign
+from rig.campaign.plan import Plan, TareConfig
+from rig.campaign.plan_file import Template
+from rig.campaign.shapes import Interleaved
 from rig.cli import main
-from rig.design import design, plan_of
-from rig.design_ask import Options, prepare
-from rig.design_levels import THOROUGH, Ask, mean_heat
-from rig.design_noise import read_noise
-from rig.design_plain import judge, means_of, plain_plans
-from rig.design_plan import choose, without_checks
-from rig.design_text import budget, design_json, design_text, lack_of_fit_dof, table
+from rig.design.ask import Options, prepare
+from rig.design.baselines import judge, means_of, plain_plans
+from rig.design.command import design, plan_of
+from rig.design.noise import read_noise
+from rig.design.optimal_levels import THOROUGH, Ask, mean_heat
+from rig.design.plan import choose, without_checks
+from rig.design.text import budget, design_json, design_text, lack_of_fit_dof, table
 from rig.errors import PlanError, RecordingError
-from rig.loading import load_campaign
-from rig.plan import Plan, TareConfig
-from rig.plan_file import Template
-from rig.shapes import Interleaved
+from rig.operate.check import check_campaign
 
 RIGHT = Path(__file__).parent / "wrong" / "right.toml"
 BENCH = Path(__file__).parent / "wrong" / "right_bench.toml"

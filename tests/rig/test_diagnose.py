@@ -14,11 +14,11 @@ from click.testing import CliRunner, Result
 from report_reading import open_fonts
 
 from rig.cli import rig
-from rig.diagnose_text import diagnosis_text
+from rig.diagnose.text import diagnosis_text
 from rig.errors import TwinError
 from rig.hdf5 import load
-from rig.simulate import Asked, simulated, timed
-from rig.twin import read_twin, twin_json, write_twin
+from rig.twin.reading import read_twin, twin_json, write_twin
+from rig.twin.simulate import Asked, simulated, timed
 
 ROOT = Path(__file__).parents[2]
 RIGHT = Path(__file__).parent / "wrong" / "right.toml"
@@ -204,7 +204,7 @@ def test_a_campaign_is_predicted_with_its_steps(dead, folder):
 
 
 def test_ramps_and_sines_of_a_plan_become_rows():
-    from rig.plan import Step
+    from rig.campaign.plan import Step
 
     plan = [Step(0, "ramp", 2.0, 1.0, 1.0), Step(1, "sine", 0.0, 2.0, 2.0, amplitude=3.0, frequency=0.5)]
     rows, steps, end = timed(plan, 0.1)
@@ -257,7 +257,7 @@ def test_compare_writes_and_holds_out_as_diagnose_does(simulation, dead, folder,
 
 def test_compare_draws_each_effect_by_itself(simulation, dead):
     from identification.mismatch.compare.reported_runs import runs_of
-    from rig.compare import compare_files
+    from rig.diagnose.compare import compare_files
 
     found = compare_files(simulation, dead[0])
     (one,) = runs_of(found.real, [found.recording])

@@ -12,8 +12,8 @@ from report_reading import open_fonts
 
 from identification.recording import Recording
 from rig.cli import rig
-from rig.diagnose_vehicle import VehicleFiles, setup_of
-from rig.importer import import_plain
+from rig.diagnose.vehicle import VehicleFiles, setup_of
+from rig.importing.command import import_plain
 
 INSTALLATION = """
 [vehicle]

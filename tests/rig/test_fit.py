@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from rig.errors import RecordingError
-from rig.fit import fit_command, fit_files
+from rig.fit.command import fit_command, fit_files
 
 LEVELS = (0.0, 6.0, -6.0, 12.0, -12.0, 0.0, 18.0, -18.0, 0.0)
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from rig.fit import fit_command
+from rig.fit.command import fit_command
 
 LEVELS = (0.0, 6.0, -6.0, 12.0, -12.0, 0.0, 18.0, -18.0, 0.0)
 

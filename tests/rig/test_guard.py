@@ -7,8 +7,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.protocols import Channel, LinkHealth, Stream
-from rig.config import LimitConfig
-from rig.guard import Allowances, Latest, Recorder, Trip, Vitals, Watch, allowances, check, watches
+from rig.campaign.config import LimitConfig
+from rig.safety.guard import Allowances, Latest, Recorder, Trip, Vitals, Watch, allowances, check, watches
 
 CELL = Stream("load_cell", "mt_sics", (Channel("thrust", "thrust", "N"), Channel("stable", None, "1")), 1 / 92)
 FLOW = Stream("flow", "nortek", (Channel("flow_speed", "flow_speed", "m/s"),), 0.25)

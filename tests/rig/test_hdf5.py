@@ -9,7 +9,7 @@ import pytest
 
 from rig.errors import RecordingError
 from rig.hdf5 import RecordingFile, load, recover
-from rig.recorder_messages import ChannelSpec, EventRow, Rows, StepRow, StreamSpec
+from rig.link.recorder_messages import ChannelSpec, EventRow, Rows, StepRow, StreamSpec
 
 CELL = StreamSpec(
     "load_cell",

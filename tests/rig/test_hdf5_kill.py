@@ -13,7 +13,7 @@ import sys
 import numpy as np
 from pathlib import Path
 from rig.hdf5 import RecordingFile
-from rig.recorder_messages import ChannelSpec, EventRow, Rows, StepRow, StreamSpec
+from rig.link.recorder_messages import ChannelSpec, EventRow, Rows, StepRow, StreamSpec
 
 streams = [StreamSpec(f"s{i}", "x", tuple(ChannelSpec(f"c{j}", "thrust", "N") for j in range(4))) for i in range(3)]
 file = RecordingFile(Path(sys.argv[1]), {"recording_id": "id", "thruster": "T"}, streams, 0)

@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 from rig.errors import RecordingError
 from rig.hdf5 import load
-from rig.recover import recover_command
+from rig.recording.recover import recover_command
 
 
 def left_open(path, fill):

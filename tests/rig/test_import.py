@@ -6,7 +6,7 @@ from click.testing import CliRunner
 
 from rig.errors import ConfigError, RecordingError
 from rig.hdf5 import load
-from rig.importer import import_command, import_file
+from rig.importing.command import import_command, import_file
 from rig.importing.mapping import build_map, read_map, shipped
 
 PLAIN = {

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from rig.hdf5 import load
-from rig.importer import import_file
+from rig.importing.command import import_file
 from rig.importing.mapping import read_map
 
 REAL = Path(__file__).parents[2].parent / "shared" / "recordings"

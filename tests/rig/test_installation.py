@@ -7,8 +7,8 @@ import pytest
 from vehicle_files import LAY_OUT, fit_of, write
 
 from rig.errors import ConfigError
-from rig.installation import load_installation
-from rig.vehicle_thrusters import installed, read_fits
+from rig.vehicle.installation import load_installation
+from rig.vehicle.thrusters import installed, read_fits
 
 BARE = "[thrusters]\nT1 = { surge = 1.0 }\nT2 = { surge = 1.0 }\n"
 

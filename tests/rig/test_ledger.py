@@ -6,8 +6,8 @@ import os
 import pytest
 
 from rig.errors import RecordingError
-from rig.ledger import FILE_NAME, Ledger, attempts, finished_runs, read
-from rig.line_writer import CAPACITY, LineWriter
+from rig.recording.ledger import FILE_NAME, Ledger, attempts, finished_runs, read
+from rig.recording.line_writer import CAPACITY, LineWriter
 
 
 def test_facts_come_back_in_order(tmp_path):

@@ -14,9 +14,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.errors import LinkError
-from rig.link import MAX_PATH, Overrun, Peer, accept, connect, encode, listen, pair, remove, socket_path
-from rig.messages import Check, Point, Request, Snapshot
-from rig.recorder_messages import Ack, ChannelSpec, EventRow, Open, Rows, StreamSpec
+from rig.link.front_end_messages import Check, Point, Request, Snapshot
+from rig.link.recorder_messages import Ack, ChannelSpec, EventRow, Open, Rows, StreamSpec
+from rig.link.sockets import MAX_PATH, Overrun, Peer, accept, connect, encode, listen, pair, remove, socket_path
 
 
 def two_peers(bound=2**20):
@@ -44,7 +44,10 @@ def snapshot(thrust=1.0):
 
 
 def test_the_controllers_side_never_loads_hdf5():
-    code = "import sys, rig.link, rig.recorder_messages, rig.importer, rig.recover; print('h5py' in sys.modules)"
+    code = (
+        "import sys, rig.link.sockets, rig.link.recorder_messages, rig.importing.command, rig.recording.recover;"
+        "print('h5py' in sys.modules)"
+    )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
 
 

@@ -11,9 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from rig.loop import Decision, Inputs
-from rig.messages import Request
-from rig.recorder_messages import Rows
+from rig.control.loop import Decision, Inputs
+from rig.link.front_end_messages import Request
+from rig.link.recorder_messages import Rows
 from tests.rig.virtual_bench import virtual
 
 RESULTS = Path(__file__).parents[2] / "build"

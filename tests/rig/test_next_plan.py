@@ -9,13 +9,13 @@ import pytest
 
 from identification.mismatch.diagnosis import Diagnosis, HeldOutRmse, NextExperiment, PlanStep, Rmse
 from identification.recording import Recording
-from rig.answer_files import Wanted
-from rig.check import check_campaign
+from rig.campaign.loading import load_campaign
 from rig.cli import main
-from rig.diagnose import tell
+from rig.diagnose.command import tell
+from rig.diagnose.next_plan import asked, limits_of, write_next
+from rig.diagnose.outputs import Wanted
 from rig.errors import ConfigError, PlanError
-from rig.loading import load_campaign
-from rig.next_plan import asked, limits_of, write_next
+from rig.operate.check import check_campaign
 
 RIGHT = Path(__file__).parent / "wrong" / "right.toml"
 STEPS = (PlanStep(0.0, 3.0), PlanStep(15.0, 1.0), PlanStep(-15.0, 4.0), PlanStep(0.0, 3.0))

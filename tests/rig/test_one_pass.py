@@ -1,4 +1,4 @@
-"""`rig.one_pass`: the same numbers as a fit in memory, from files read once and in blocks."""
+"""`rig.fit.one_pass`: the same numbers as a fit in memory, from files read once and in blocks."""
 
 import json
 import tracemalloc
@@ -12,10 +12,10 @@ from click.testing import CliRunner
 from identification.recording import Channel
 from identification.thruster.thrust_data import voltage_at
 from rig.errors import RecordingError
-from rig.fit import fit_command
+from rig.fit.command import fit_command
+from rig.fit.one_pass import fit_one_pass, thrust_rows
+from rig.fit.one_pass_text import one_pass_json, one_pass_text
 from rig.hdf5 import blocks, load
-from rig.one_pass import fit_one_pass, thrust_rows
-from rig.one_pass_text import one_pass_json, one_pass_text
 
 GAIN = '{"gain_std": 0.0005}'
 

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from rig.campaign.plan import FixedDwell, Plan, SteadyDwell, TareConfig
+from rig.campaign.shapes import Interleaved, Levels, Ramp, RandomOrder, Sine, Staircase
 from rig.errors import PlanError
-from rig.plan import FixedDwell, Plan, SteadyDwell, TareConfig
-from rig.shapes import Interleaved, Levels, Ramp, RandomOrder, Sine, Staircase
 
 DWELL = FixedDwell(2.0)
 

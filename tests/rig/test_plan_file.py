@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from rig.check import check_campaign
-from rig.config import WatchConfig
+from rig.campaign.config import WatchConfig
+from rig.campaign.loading import load_campaign
+from rig.campaign.plan_file import Level, template_of, write_campaign, write_sine
 from rig.errors import ConfigError, PlanError
-from rig.loading import load_campaign
-from rig.plan_file import Level, template_of, write_campaign, write_sine
+from rig.operate.check import check_campaign
 
 RIGHT = Path(__file__).parent / "wrong" / "right.toml"
 

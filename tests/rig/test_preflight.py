@@ -3,9 +3,10 @@
 import pytest
 
 from drivers.protocols import Channel, Sample, Stream, Watchdog
-from rig.config import LimitConfig
-from rig.messages import Reading
-from rig.preflight import (
+from rig.campaign.config import LimitConfig
+from rig.control.readings import Readings
+from rig.link.front_end_messages import Reading
+from rig.stages.preflight import (
     device_checks,
     flow_check,
     limit_checks,
@@ -14,7 +15,6 @@ from rig.preflight import (
     stop_input_check,
     watchdog_check,
 )
-from rig.readings import Readings
 
 CELL = Stream("cell", "virtual", (Channel("thrust", "thrust", "N"), Channel("stable", None, "1")), 0.01)
 

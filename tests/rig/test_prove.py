@@ -17,20 +17,20 @@ from click.testing import CliRunner
 from report_reading import open_fonts
 
 from identification.mismatch.compare.simulation import Prediction
-from rig.blind import answering, elsewhere
+from rig.blind import answering, score_file
 from rig.blind.answering import answered
 from rig.blind.collecting import Collected, Known, collected, not_good
+from rig.blind.command import _counted, designed, interruptible, prove_command
 from rig.blind.design import Job, Order, design, matches
-from rig.blind.figures import confusion, goals, half, half_named, tables, twins, worst
-from rig.blind.lanes import STOPPING, BrokenOff, Child, Ended, Lane, Overdue, carry_out, concealable
-from rig.blind.meaning import SAME, true_values
+from rig.blind.metrics import confusion, goals, half, half_named, tables, twins, worst
 from rig.blind.places import PLACES
 from rig.blind.rates import Goal, Rate, of_rate
+from rig.blind.report.page import proof_page
+from rig.blind.same_parameters import SAME, true_values
 from rig.blind.scoring import Near, Score, scored
 from rig.blind.store import ProofError, Store, version_of_diagnosis
-from rig.prove import _counted, designed, interruptible, prove_command
+from rig.blind.workers import STOPPING, BrokenOff, Child, Ended, Lane, Overdue, carry_out, concealable
 from rig.report.page import html
-from rig.report.proof import proof_page
 from sim_devices.concealed.sealing import conceal
 from sim_devices.tables import WorldError
 
@@ -404,9 +404,9 @@ def test_scores_of_another_machine_come_back_as_they_were(tmp_path):
     jobs = {order.id: job for job in design(WORLD, CATALOGUE, 2) for order in job.orders}
     known = [Known(s, "abc", jobs[s.order.id].digest) for s in whole_proof(2)]
     for name in ("scores.jsonl", "scores.jsonl.gz"):
-        elsewhere.write(tmp_path / name, [*known, *known])
-        assert elsewhere.read(tmp_path / name) == sorted(known, key=lambda each: each.score.order.id)
-    assert elsewhere.read(tmp_path / "none.jsonl") == []
+        score_file.write(tmp_path / name, [*known, *known])
+        assert score_file.read(tmp_path / name) == sorted(known, key=lambda each: each.score.order.id)
+    assert score_file.read(tmp_path / "none.jsonl") == []
 
 
 def test_scores_of_another_version_or_design_are_asked_again():
@@ -415,11 +415,11 @@ def test_scores_of_another_version_or_design_are_asked_again():
     score = Score(asked, ("asymmetry",), "explained")
     told = [Known(score, "abc", one.digest), Known(score, "old", one.digest)]
     known = {asked.id: told[0]}
-    assert elsewhere.usable(told, jobs, "abc") == elsewhere.usable(told, jobs, "abc", others=True) == known
-    assert elsewhere.usable(told, jobs, "new") == {}
-    assert set(elsewhere.usable(told, jobs, "new", others=True)) == {asked.id}
-    assert elsewhere.usable(told, [replace(one, spec={}), other], "abc") == {}
-    assert {o.id for job in elsewhere.unanswered(jobs, known) for o in job.orders} == {
+    assert score_file.usable(told, jobs, "abc") == score_file.usable(told, jobs, "abc", others=True) == known
+    assert score_file.usable(told, jobs, "new") == {}
+    assert set(score_file.usable(told, jobs, "new", others=True)) == {asked.id}
+    assert score_file.usable(told, [replace(one, spec={}), other], "abc") == {}
+    assert {o.id for job in score_file.unanswered(jobs, known) for o in job.orders} == {
         o.id for job in jobs for o in job.orders
     } - {asked.id}
 
@@ -450,30 +450,30 @@ def test_what_a_file_of_scores_holds_is_counted_and_not_asked(tmp_path):
     score = Score(job.orders[0], ("heating",), "explained", named=("heating",))
     older = Score(Order("plain/dead_band/0"), ("dead_band",), "adequate")
     file = tmp_path / "scores.jsonl.gz"
-    elsewhere.write(file, [Known(score, version_of_diagnosis(), job.digest), Known(older, "old", "0")])
+    score_file.write(file, [Known(score, version_of_diagnosis(), job.digest), Known(older, "old", "0")])
     words = ["--only", "plain/heating/0", "--seeds", "1", "--store", str(tmp_path / "s"), "--scores", str(file)]
     done = CliRunner().invoke(prove_command, words)
     assert done.exit_code == 0, done.output
     assert "1 answers, 0 of them crashed, refused or overdue; 0 still to come" in done.output
     assert not (tmp_path / "s").exists(), "nothing was asked"
-    assert {k.score.order.id for k in elsewhere.read(file)} == {"plain/heating/0", "plain/dead_band/0"}
+    assert {k.score.order.id for k in score_file.read(file)} == {"plain/heating/0", "plain/dead_band/0"}
 
 
 def test_scores_that_another_proof_wrote_meanwhile_are_kept(tmp_path, monkeypatch):
     file = tmp_path / "scores.jsonl"
     theirs = Known(Score(Order("clean/white/7"), (), "adequate"), "abc", "0")
-    monkeypatch.setattr("rig.prove.run", lambda *_, **__: elsewhere.write(file, [theirs]))
+    monkeypatch.setattr("rig.blind.command.run", lambda *_, **__: score_file.write(file, [theirs]))
     words = ["--only", "plain/heating/0", "--seeds", "1", "--store", str(tmp_path / "s"), "--scores", str(file)]
     assert CliRunner().invoke(prove_command, words).exit_code == 0
-    assert elsewhere.read(file) == [theirs]
+    assert score_file.read(file) == [theirs]
 
 
 def test_failures_that_the_file_of_scores_tells_are_asked_again(tmp_path, monkeypatch):
     file, names, asked = tmp_path / "scores.jsonl", ["plain/heating/0", "plain/asymmetry/0"], []
     jobs = designed(1, names)
     scores = [Score(job.orders[0], ("asymmetry",), "explained", (job.id.split("/")[1],)) for job in jobs]
-    elsewhere.write(file, [Known(s, "old", job.digest) for s, job in zip(scores, jobs, strict=True)])
-    monkeypatch.setattr("rig.prove.run", lambda _, jobs, *__, **___: asked.extend(job.id for job in jobs))
+    score_file.write(file, [Known(s, "old", job.digest) for s, job in zip(scores, jobs, strict=True)])
+    monkeypatch.setattr("rig.blind.command.run", lambda _, jobs, *__, **___: asked.extend(job.id for job in jobs))
     words = ["--failures", "--seeds", "1", "--store", str(tmp_path / "s"), "--scores", str(file)]
     done = CliRunner().invoke(prove_command, [*words, *(word for name in names for word in ("--only", name))])
     assert done.exit_code == 0, done.output
@@ -493,8 +493,8 @@ def test_a_newer_score_from_elsewhere_counts_before_an_older_answer_of_the_store
         found = collected(store, [job], {order.id: newer}, version)
         assert [s.said for s in found.scores] == [said]
     file = tmp_path / "scores.jsonl"
-    elsewhere.write(file, [newer, *collected(store, [job]).known])
-    assert {k.version for k in elsewhere.read(file)} == {"new", "old"}, "neither is lost"
+    score_file.write(file, [newer, *collected(store, [job]).known])
+    assert {k.version for k in score_file.read(file)} == {"new", "old"}, "neither is lost"
 
 
 def test_what_is_broken_off_is_no_answer(tmp_path):
@@ -594,7 +594,7 @@ def test_one_proof_at_a_time_works_in_a_store(tmp_path):
 
 
 def test_one_case_is_made_anew_whatever_world_made_it_before(tmp_path, monkeypatch):
-    monkeypatch.setattr("rig.prove.STORE", tmp_path / "prove")
+    monkeypatch.setattr("rig.blind.command.STORE", tmp_path / "prove")
     store, (job,) = Store(tmp_path / "prove-case"), designed(1, ["plain/heating/0"])
     job = replace(job, orders=job.orders[:1])
     seal = store.root / "sealed" / f"{job.token}.json"
@@ -602,8 +602,8 @@ def test_one_case_is_made_anew_whatever_world_made_it_before(tmp_path, monkeypat
     seal.write_text(json.dumps({"asked": {**job.asked(), "world": "another"}}), encoding="utf-8")
     store.put(job, job.orders[0], answer("adequate"))
     pending = []
-    monkeypatch.setattr("rig.prove.run", lambda store, jobs, *_, **__: pending.extend(map(store.pending, jobs)))
-    monkeypatch.setattr("rig.prove._told", lambda *_, **__: "told")
+    monkeypatch.setattr("rig.blind.command.run", lambda store, jobs, *_, **__: pending.extend(map(store.pending, jobs)))
+    monkeypatch.setattr("rig.blind.command._told", lambda *_, **__: "told")
     done = CliRunner().invoke(prove_command, ["--case", "plain/heating/0"])
     assert (done.exit_code, done.output, pending) == (0, "told\n", [job.orders])
 

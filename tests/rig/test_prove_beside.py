@@ -27,11 +27,11 @@ from rig.blind.beside import (
     write,
 )
 from rig.blind.collecting import Collected, Known
-from rig.blind.figures import tables
+from rig.blind.command import prove_command
+from rig.blind.metrics import tables
+from rig.blind.report.page import proof_page
 from rig.blind.store import ProofError
-from rig.prove import prove_command
 from rig.report.page import html
-from rig.report.proof import proof_page
 
 ROOT = Path(__file__).parents[2]
 METHODS = (

@@ -13,8 +13,7 @@ import numpy as np
 import pytest
 
 from rig.hdf5 import load, recover
-from rig.link import Peer, pair
-from rig.recorder_messages import (
+from rig.link.recorder_messages import (
     Ack,
     ChannelSpec,
     Close,
@@ -27,6 +26,7 @@ from rig.recorder_messages import (
     StepRow,
     StreamSpec,
 )
+from rig.link.sockets import Peer, pair
 
 STREAMS = tuple(
     StreamSpec(name, "sim", (ChannelSpec("thrust", "thrust", "N"), ChannelSpec("raw", None, "1", integer=True)))
@@ -38,7 +38,7 @@ PATIENCE = 30.0
 
 def start(fd, **options):
     return subprocess.Popen(
-        [sys.executable, "-m", "rig.recorder", "--fd", str(fd)],
+        [sys.executable, "-m", "rig.recording.recorder", "--fd", str(fd)],
         pass_fds=(fd,),
         stdin=subprocess.DEVNULL,
         stderr=subprocess.PIPE,

@@ -27,10 +27,10 @@ from identification.mismatch.prepare.preparing import history_of
 from identification.physics.term import Scale
 from identification.recording import Channel, Recording
 from identification.twin import Source, Twin, TwinNoise, TwinTerm
-from rig.diagnose_text import diagnosis_text
-from rig.report.diagnosis import diagnosis_page, write
-from rig.report.look import svg
+from rig.diagnose.report.page import diagnosis_page, write
+from rig.diagnose.text import diagnosis_text
 from rig.report.page import html
+from rig.report.style import svg
 
 LEVELS = np.array([0.0, 8.0, -8.0, 2.0, 16.0, -16.0, -2.0, 0.0])
 HOLD, RATE = 5.0, 20.0

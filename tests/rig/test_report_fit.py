@@ -8,15 +8,15 @@ from report_reading import open_fonts, read
 from test_fit import write
 
 from identification.recording import Channel, Recording, Step
-from rig.fit import fit_command
-from rig.fit_answer import fit_recordings
-from rig.fit_comparison import changed
-from rig.fit_json import answer_json
-from rig.report.fit import fit_page
-from rig.report.look import svg
-from rig.report.normal import normal_order
+from rig.fit.answer import fit_recordings
+from rig.fit.as_json import answer_json
+from rig.fit.command import fit_command
+from rig.fit.comparison import changed
+from rig.fit.report.page import fit_page
+from rig.report.normal_plot import normal_order
 from rig.report.page import html
 from rig.report.provenance import Source, sha256
+from rig.report.style import svg
 
 LEVELS = (0.0, 5.0, -5.0, 10.0, -10.0, 15.0, -15.0, 0.0)
 NAME = "T<1> & 'co'"

@@ -2,12 +2,12 @@ import numpy as np
 import pytest
 from report_reading import open_fonts, read
 
-from rig.report.figures import Curve, Group, Interval, NormalOrder, fit_band, forest, normal_plot, residuals
-from rig.report.figures import singular_values as lollipops
-from rig.report.figures_mismatch import Grid, Panel, Region, before_after, grid_of, residual_map, signature, spectrum
-from rig.report.figures_vehicle import Simulated, drag_curve, inertia_line, simulated_trial
-from rig.report.look import PALETTE, Plot, drawable, labels, standalone, svg
+from rig.report.mismatch_figures import Grid, Panel, Region, before_after, grid_of, residual_map, signature, spectrum
 from rig.report.page import Page, Picture, Remark, Section, Sentences, Table, html, write
+from rig.report.regression_figures import Curve, Group, Interval, NormalOrder, fit_band, forest, normal_plot, residuals
+from rig.report.regression_figures import singular_values as lollipops
+from rig.report.style import PALETTE, Plot, drawable, labels, standalone, svg
+from rig.vehicle.report.figures import Simulated, drag_curve, inertia_line, simulated_trial
 
 NASTY = "T1 <script>alert('x')</script> & \"$x$\" _y"
 X = np.linspace(-2.0, 2.0, 9)

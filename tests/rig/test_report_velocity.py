@@ -5,9 +5,9 @@ import pytest
 from report_reading import open_fonts, read
 
 from identification.velocity.velocity import Window, derivative
-from rig.report.look import svg
 from rig.report.page import html
-from rig.report.velocity import draw_velocity, velocity_example, velocity_page
+from rig.report.style import svg
+from rig.vehicle.report.velocity import draw_velocity, velocity_example, velocity_page
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -6,14 +6,14 @@ from dataclasses import replace
 
 import pytest
 
-from rig.arming import file_facts
+from rig.campaign.config import MountConfig
 from rig.cli import main
-from rig.config import MountConfig
 from rig.errors import ConfigError, RecordingError, RigError
-from rig.ledger import Ledger
-from rig.resume import remainder, require_unchanged
-from rig.run import require_mountable
-from rig.runs import Run, live_runs, register
+from rig.link.live_runs import Run, live_runs, register
+from rig.operate.resume import remainder, require_unchanged
+from rig.operate.run import require_mountable
+from rig.recording.ledger import Ledger
+from rig.stages.arming import file_facts
 from tests.rig.virtual_bench import bench_config, campaign_config
 
 

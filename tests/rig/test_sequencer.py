@@ -11,14 +11,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.recording import Step as Row
+from rig.campaign.plan import FixedDwell, Plan, SteadyDwell, Step, TareConfig
+from rig.campaign.shapes import Interleaved, Levels, Ramp, Sine, Staircase
 from rig.errors import PlanError
-from rig.guard import Trip
-from rig.messages import LogLine, Point, Request
-from rig.plan import FixedDwell, Plan, SteadyDwell, Step, TareConfig
-from rig.proof import ProofSettings
-from rig.sequencer import Sequencer
-from rig.shapes import Interleaved, Levels, Ramp, Sine, Staircase
-from rig.ticks import Output, Settings, Tick
+from rig.link.front_end_messages import LogLine, Point, Request
+from rig.safety.guard import Trip
+from rig.safety.watchdog_proof import ProofSettings
+from rig.sequence.sequencer import Sequencer
+from rig.sequence.ticks import Output, Settings, Tick
 
 PERIOD = 0.02
 SLEW = 12.0

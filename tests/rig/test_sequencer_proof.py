@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_sequencer import FIXED, PERIOD, PROOF, SHORT, World, run
 
-from rig.proof import Proof, Proved, Refused
+from rig.safety.watchdog_proof import Proof, Proved, Refused
 
 SETTINGS = replace(FIXED, proof=PROOF)
 

@@ -7,11 +7,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_sequencer import FIXED, PERIOD, PROOF, SHORT, SLEW, TRIP, Ran, World, asks, in_state, run
 
-from rig.messages import Request
-from rig.plan import FixedDwell, Plan, TareConfig
-from rig.sequencer import Sequencer
-from rig.shapes import Ramp, Sine
-from rig.ticks import Tick
+from rig.campaign.plan import FixedDwell, Plan, TareConfig
+from rig.campaign.shapes import Ramp, Sine
+from rig.link.front_end_messages import Request
+from rig.sequence.sequencer import Sequencer
+from rig.sequence.ticks import Tick
 
 PROVED = replace(FIXED, proof=PROOF)
 UNDISTURBED = run(SHORT, PROVED)

@@ -7,13 +7,13 @@ import click
 import numpy as np
 import pytest
 
-from rig.answer_files import Wanted
+from rig.campaign.loading import load_campaign
 from rig.cli import main
+from rig.diagnose.outputs import Wanted
 from rig.errors import ConfigError, RigError
 from rig.hdf5 import RecordingFile
-from rig.loading import load_campaign
-from rig.recorder_messages import ChannelSpec, Rows, StreamSpec
-from rig.settle import Settling, _leave, bench_alone, by_command, fixed_cost
+from rig.link.recorder_messages import ChannelSpec, Rows, StreamSpec
+from rig.operate.settle import Settling, _leave, bench_alone, by_command, fixed_cost
 
 RIGHT = Path(__file__).parent / "wrong" / "right.toml"
 BENCH = Path(__file__).parents[2] / "benches" / "simulated" / "bench.toml"

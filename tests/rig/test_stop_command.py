@@ -18,9 +18,9 @@ PEER = SimpleNamespace(send=lambda request: None, close=lambda: None)
     ],
 )
 def test_a_stop_that_nothing_confirms_is_no_success(monkeypatch, capsys, last, status, said):
-    monkeypatch.setattr("rig.run.find_run", lambda folder: SimpleNamespace(socket="s"))
-    monkeypatch.setattr("rig.run.connect", lambda path, name: PEER)
-    monkeypatch.setattr("rig.run.Headless", lambda peer: SimpleNamespace(follow=lambda start: last))
+    monkeypatch.setattr("rig.operate.run.find_run", lambda folder: SimpleNamespace(socket="s"))
+    monkeypatch.setattr("rig.operate.run.connect", lambda path, name: PEER)
+    monkeypatch.setattr("rig.operate.run.Headless", lambda peer: SimpleNamespace(follow=lambda start: last))
     assert main(["stop"]) == status
     out, err = capsys.readouterr()
     assert said in (err if status else out)

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 from vehicle_files import LAY_OUT, documents, fit_of, write
 
-from rig.vehicle import vehicle_command
+from rig.vehicle.command import vehicle_command
 
 ETA = {"eta_hull": 0.7, "eta_pair": 0.85}
 
