@@ -20,7 +20,7 @@ import numpy as np
 from identification.vehicle.replay import Replay
 from rig.importing.command import import_file
 from rig.importing.mapping import read_map
-from rig.vehicle.command import VehicleAnswer, identify_files
+from rig.vehicle.answer import VehicleAnswer, identify_files
 from rig.vehicle.text import answer_text
 
 EXAMPLES = Path(__file__).resolve().parent

@@ -142,3 +142,12 @@ class CampaignConfig:
     prove_watchdog: bool = True
     flow_speed: float | None = None
     """m/s that the campaign is meant for; the operator sets it. None: whatever it is."""
+
+
+def twin_path(pattern: str, thruster: str) -> str:
+    """`{thruster}` in the path stands for the thruster under test.
+
+    >>> twin_path("twins/{thruster}.json", "T3")
+    'twins/T3.json'
+    """
+    return pattern.replace("{thruster}", thruster)

@@ -18,12 +18,12 @@ from rig.campaign.config import (
     LimitConfig,
     MountConfig,
     WatchConfig,
+    twin_path,
 )
+from rig.campaign.limits import guarded_channels
 from rig.campaign.plan import Dwell, FixedDwell, Plan, SteadyDwell, TareConfig
 from rig.campaign.shapes import SHAPES, Shape
 from rig.errors import ConfigError
-from rig.link.watch_messages import twin_path
-from rig.safety.guard import watches
 from rig.toml_tables import Table, construct, decode, joined, read_toml, refuse_unknown, table_at, typed, values
 
 T = TypeVar("T")
@@ -218,6 +218,6 @@ def _require_devices(bench: BenchConfig) -> None:
     if all(channel.quantity != "thrust" for channel in force):
         raise ConfigError(f"{path}: bench.force names {bench.force!r}, which measures no thrust; name a force sensor")
     try:
-        watches(bench.limits, streams)
+        guarded_channels(bench.limits, streams)
     except ValueError as error:
         raise ConfigError(f"{path}: [limits]: {error}") from None

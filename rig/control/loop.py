@@ -17,6 +17,7 @@ from typing import Protocol
 from drivers.errors import LinkError
 from drivers.protocols import MotorController, Sample
 from rig.campaign.bench import COMMAND_STREAM, Bench
+from rig.campaign.limits import guarded_channels
 from rig.control.readings import Readings
 from rig.link.clients import Clients
 from rig.link.front_end_messages import Request
@@ -121,19 +122,19 @@ class Loop:
         self.rotation_channel = rotation_channel(self.bench)
         essential = [self.thrust_channel] + ([self.rotation_channel] if self.rotation_channel else [])
         streams = self.readings.streams.values()
-        self.watched = guard.watches(config.limits, streams, essential, self.thrust_channel)
+        self.guarded_channels = guarded_channels(config.limits, streams, essential, self.thrust_channel)
         self.allowed = guard.allowances(config.loop_rate)
-        self.readings.watch_sameness(w.channel for w in self.watched if w.max_frozen is not None)
+        self.readings.watch_sameness(c.channel for c in self.guarded_channels if c.max_frozen is not None)
 
-    def watch(self) -> None:
+    def begin_guarding(self) -> None:
         """From now on the guard judges every tick."""
         now = self.now
         self.guarded, self.guarded_since = True, now
-        watched = {self.readings.place[watch.channel][0] for watch in self.watched}
+        judged = {self.readings.place[one.channel][0] for one in self.guarded_channels}
         self._paces = tuple(
             (stream.name, Pace(stream.name, device, stream.period_s, now))
             for device, stream in self.bench.streams()
-            if stream.name in watched
+            if stream.name in judged
         )
         self._counted = dict(self.readings.rows)
 
@@ -207,9 +208,9 @@ class Loop:
         trouble = self.recorder.trouble(now) or self.ledger.error
         if trouble:
             return Trip(trouble, "recorder", now)
-        newest = {watch.channel: self.readings.newest(watch.channel) for watch in self.watched}
+        newest = {one.channel: self.readings.newest(one.channel) for one in self.guarded_channels}
         vitals = self._vitals(now)
-        trip = guard.check(self.watched, newest, vitals, self.allowed)
+        trip = guard.check(self.guarded_channels, newest, vitals, self.allowed)
         return trip or self._pace(vitals)
 
     def _pace(self, vitals: Vitals) -> Trip | None:

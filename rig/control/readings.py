@@ -11,8 +11,9 @@ from typing import Literal
 
 from drivers.protocols import Sample, Stream
 from rig.campaign.config import LimitConfig
+from rig.campaign.limits import GuardedChannel, guarded_channels
 from rig.link.front_end_messages import Reading
-from rig.safety.guard import Allowances, Latest, Vitals, Watch, assess, watches
+from rig.safety.guard import Allowances, Latest, Vitals, assess
 
 RATE_WINDOW = 64
 """Rows per stream over which its real rate is measured."""
@@ -53,7 +54,7 @@ class Readings:
     arrivals: dict[str, deque[int]] = field(default_factory=dict)
     rows: dict[str, int] = field(default_factory=dict)
     """Rows so far per stream."""
-    shown: Mapping[str, Watch] = field(init=False)
+    shown: Mapping[str, GuardedChannel] = field(init=False)
     place: Mapping[str, tuple[str, int, str]] = field(init=False)
     """Channel -> stream, column, quantity."""
     sameness: dict[str, Sameness] = field(default_factory=dict)
@@ -66,7 +67,7 @@ class Readings:
             for column, channel in enumerate(stream.channels)
         }
         measured = [name for name, (_, _, quantity) in self.place.items() if quantity]
-        self.shown = {watch.channel: watch for watch in watches(self.limits, self.streams.values(), measured)}
+        self.shown = {one.channel: one for one in guarded_channels(self.limits, self.streams.values(), measured)}
 
     def watch_sameness(self, channels: Iterable[str]) -> None:
         """From now on keep how long these have stood still."""
@@ -113,13 +114,15 @@ class Readings:
 
     def view(self, now: float) -> tuple[Reading, ...]:
         """Every channel that has a quantity or a limit; `now` in s."""
-        return tuple(self._reading(watch, now) for watch in self.shown.values())
+        return tuple(self._reading(guarded, now) for guarded in self.shown.values())
 
-    def _reading(self, watch: Watch, now: float) -> Reading:
-        quantity = self.place[watch.channel][2]
-        newest = self.newest(watch.channel)
-        trip = assess(watch, newest, Vitals(now, now), Allowances(grace=0.0))
+    def _reading(self, guarded: GuardedChannel, now: float) -> Reading:
+        quantity = self.place[guarded.channel][2]
+        newest = self.newest(guarded.channel)
+        trip = assess(guarded, newest, Vitals(now, now), Allowances(grace=0.0))
         state: ReadingState = "none" if newest is None else _STATES[trip.source] if trip else "ok"
         value = None if newest is None or isnan(newest.value) else newest.value
         age = None if newest is None else max(now - newest.time, 0.0)
-        return Reading(watch.channel, quantity, watch.unit, value, age, watch.min, watch.max, watch.max_age, state)
+        return Reading(
+            guarded.channel, quantity, guarded.unit, value, age, guarded.min, guarded.max, guarded.max_age, state
+        )

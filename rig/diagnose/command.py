@@ -79,7 +79,8 @@ def diagnose_files(
     `limits`: of the next experiment. `wanted`: what is to be written of the answer; what cannot be is refused before
     anything is computed. Raises RecordingError or ConfigError for what cannot be used, TwinError for such a twin.
     """
-    from rig.twin.reading import read_twin, stamped
+    from rig.twin.reading import read_twin
+    from rig.twin.writing import stamped
 
     files, held = recordings_in(paths), recordings_in(holdout) if holdout else []
     refuse_both(files, held)
@@ -133,7 +134,7 @@ def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = ())
     from rig.diagnose.text import diagnosis_text
 
     if wanted.save_twin is not None and found.twin is not None:
-        from rig.twin.reading import write_twin
+        from rig.twin.writing import write_twin
 
         write_twin(found.twin, wanted.save_twin)
     if wanted.report is not None:

@@ -28,7 +28,7 @@ def compare_files(
     """
     from identification.mismatch.comparison import compare
     from identification.mismatch.prepare.preparing import Refusal
-    from rig.twin.reading import stamped
+    from rig.twin.writing import stamped
 
     held = recordings_in(holdout, "rig compare") if holdout else []
     refuse_both([sim, real], held)

@@ -50,12 +50,3 @@ class Mismatch:
     size: float
     """N."""
     e_value: float
-
-
-def twin_path(pattern: str, thruster: str) -> str:
-    """`{thruster}` in the path stands for the thruster under test.
-
-    >>> twin_path("twins/{thruster}.json", "T3")
-    'twins/T3.json'
-    """
-    return pattern.replace("{thruster}", thruster)

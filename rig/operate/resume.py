@@ -17,8 +17,7 @@ from rig.campaign.config import CampaignConfig
 from rig.errors import ConfigError, LinkError, RecordingError, RigError
 from rig.link.live_runs import live_runs
 from rig.operate.run import console_screen, follow, progress_bar, require_mountable, start_controller
-from rig.recording.ledger import Fact, finished_runs, read
-from rig.stages.arming import file_facts
+from rig.recording.ledger import Fact, file_facts, finished_runs, read
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from rig.campaign.config import CampaignConfig
 from rig.errors import RecordingError
 from rig.recording.line_writer import LineWriter
 
@@ -73,3 +75,18 @@ def finished_runs(facts: Sequence[Fact]) -> dict[str, str]:
 def attempts(facts: Sequence[Fact], thruster: str) -> int:
     """How often a run of that thruster was begun."""
     return sum(fact["fact"] == "run_start" and fact["thruster"] == thruster for fact in facts)
+
+
+def file_facts(campaign: CampaignConfig) -> dict[str, str]:
+    """Both files, verbatim and by their hash: what a resumed campaign must find unchanged."""
+    return {
+        "campaign_file": str(campaign.path.resolve()),
+        "campaign_sha256": _sha256(campaign.text),
+        "bench_sha256": _sha256(campaign.bench.text),
+        "campaign_toml": campaign.text,
+        "bench_toml": campaign.bench.text,
+    }
+
+
+def _sha256(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()

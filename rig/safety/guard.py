@@ -11,15 +11,13 @@ from dataclasses import dataclass
 from math import isnan
 from typing import Literal, NamedTuple
 
-from drivers.protocols import LinkHealth, Stream
-from rig.campaign.config import LimitConfig
+from drivers.protocols import LinkHealth
+from rig.campaign.limits import GuardedChannel
 
 Source = Literal[
     "limit", "emergency_stop", "nan", "stale", "frozen", "rate", "corrupt", "late", "link", "recorder", "lease"
 ]
 
-MIN_AGE = 0.2
-"""s, shortest default sample age (docs/reliability.md, promise 7: within max(3 sample periods, 0.2 s))."""
 MIN_LATENESS = 0.25
 """s, shortest tolerated lateness of a loop tick."""
 LEAST_FROZEN = 2.0
@@ -44,21 +42,6 @@ class Trip:
     value: float | None = None
     limit: float | None = None
     kind: Literal["cut"] = "cut"
-
-
-@dataclass(frozen=True, slots=True)
-class Watch:
-    """One channel under guard, defaults resolved. Values in the channel's unit, `max_age` in s."""
-
-    channel: str
-    unit: str
-    max_age: float
-    min: float | None = None
-    max: float | None = None
-    max_frozen: float | None = None
-    """s; None: not judged. 0: by its earlier variation (`frozen_limit`)."""
-    stops: bool = False
-    """An emergency stop input: anything but 0 is pressed."""
 
 
 class Latest(NamedTuple):
@@ -118,107 +101,77 @@ def allowances(loop_rate: float) -> Allowances:
     return Allowances(lateness=max(5 / loop_rate, MIN_LATENESS))
 
 
-def watches(
-    limits: Iterable[LimitConfig], streams: Iterable[Stream], essential: Iterable[str] = (), thrust: str = ""
-) -> tuple[Watch, ...]:
-    """Resolve configured limits against the bench's streams; `essential` channels are watched for age and NaN anyway.
-    The `thrust` channel is watched for a frozen value as well, by its own earlier variation if nothing is configured;
-    an emergency stop input always, whatever is configured.
-
-    Channels are `<stream>.<channel>`. Raises ValueError naming a channel that no stream has.
-    """
-    channels = {f"{s.name}.{c.name}": (s, c) for s in streams for c in s.channels}
-    known = {name: (c.unit, max(3 * s.period_s, MIN_AGE)) for name, (s, c) in channels.items()}
-    stops = [name for name, (_, c) in channels.items() if c.quantity == "emergency_stop"]
-    wanted = {limit.channel: limit for limit in limits}
-    wanted = {channel: wanted.get(channel, LimitConfig(channel)) for channel in (*wanted, *essential, *stops)}
-    for channel in wanted:
-        if channel not in known:
-            raise ValueError(f"no device gives a channel {channel}; there are {', '.join(sorted(known))}")
-    learned = {thrust: 0.0}
-    return tuple(
-        Watch(
-            channel,
-            known[channel][0],
-            known[channel][1] if c.max_age is None else c.max_age,
-            c.min,
-            c.max,
-            learned.get(channel) if c.max_frozen is None else c.max_frozen,
-            channel in stops,
-        )
-        for channel, c in wanted.items()
-    )
-
-
 def check(
-    watched: Iterable[Watch], latest: Mapping[str, Latest | None], vitals: Vitals, allowed: Allowances
+    channels: Iterable[GuardedChannel], latest: Mapping[str, Latest | None], vitals: Vitals, allowed: Allowances
 ) -> Trip | None:
     """First reason to stop, or None. Limits come first: they name what happened to the bench, the rest to the rig."""
-    readings = (assess(watch, latest.get(watch.channel), vitals, allowed) for watch in watched)
+    readings = (assess(guarded, latest.get(guarded.channel), vitals, allowed) for guarded in channels)
     return next((trip for trip in readings if trip), None) or _rig_trip(vitals, allowed)
 
 
-def assess(watch: Watch, newest: Latest | None, vitals: Vitals, allowed: Allowances) -> Trip | None:
+def assess(guarded: GuardedChannel, newest: Latest | None, vitals: Vitals, allowed: Allowances) -> Trip | None:
     """What is wrong with one channel, or None."""
     if newest is None:
-        return _silent(watch, vitals, allowed)
+        return _silent(guarded, vitals, allowed)
     if isnan(newest.value):
-        cause = f"{watch.channel} is NaN: the device sent a row without a usable value"
-        return Trip(cause, "nan", vitals.now, watch.channel, newest.value)
-    if watch.stops and newest.value != 0.0:
-        cause = f"EMERGENCY STOP: {watch.channel} is {newest.value:g}, released is 0"
-        return Trip(cause, "emergency_stop", vitals.now, watch.channel, newest.value, 0.0)
+        cause = f"{guarded.channel} is NaN: the device sent a row without a usable value"
+        return Trip(cause, "nan", vitals.now, guarded.channel, newest.value)
+    if guarded.stops and newest.value != 0.0:
+        cause = f"EMERGENCY STOP: {guarded.channel} is {newest.value:g}, released is 0"
+        return Trip(cause, "emergency_stop", vitals.now, guarded.channel, newest.value, 0.0)
     return (
-        _outside(watch, newest.value, vitals.now) or _stale(watch, newest, vitals.now) or _frozen(watch, newest, vitals)
+        _outside(guarded, newest.value, vitals.now)
+        or _stale(guarded, newest, vitals.now)
+        or _frozen(guarded, newest, vitals)
     )
 
 
-def _silent(watch: Watch, vitals: Vitals, allowed: Allowances) -> Trip | None:
+def _silent(guarded: GuardedChannel, vitals: Vitals, allowed: Allowances) -> Trip | None:
     silence = vitals.now - vitals.started
     if silence <= allowed.grace:
         return None
-    cause = f"{watch.channel} gave no sample in {silence:.2f} s since the start, {allowed.grace:g} s are allowed"
-    return Trip(cause, "stale", vitals.now, watch.channel, limit=allowed.grace)
+    cause = f"{guarded.channel} gave no sample in {silence:.2f} s since the start, {allowed.grace:g} s are allowed"
+    return Trip(cause, "stale", vitals.now, guarded.channel, limit=allowed.grace)
 
 
-def _outside(watch: Watch, value: float, now: float) -> Trip | None:
-    low, high, unit = watch.min, watch.max, watch.unit
+def _outside(guarded: GuardedChannel, value: float, now: float) -> Trip | None:
+    low, high, unit = guarded.min, guarded.max, guarded.unit
     if high is not None and not value <= high:
-        cause = f"{watch.channel} is {value:.6g} {unit}, above its limit of {high:g} {unit}"
-        return Trip(cause, "limit", now, watch.channel, value, high)
+        cause = f"{guarded.channel} is {value:.6g} {unit}, above its limit of {high:g} {unit}"
+        return Trip(cause, "limit", now, guarded.channel, value, high)
     if low is not None and not value >= low:
-        cause = f"{watch.channel} is {value:.6g} {unit}, below its limit of {low:g} {unit}"
-        return Trip(cause, "limit", now, watch.channel, value, low)
+        cause = f"{guarded.channel} is {value:.6g} {unit}, below its limit of {low:g} {unit}"
+        return Trip(cause, "limit", now, guarded.channel, value, low)
     return None
 
 
-def _stale(watch: Watch, newest: Latest, now: float) -> Trip | None:
+def _stale(guarded: GuardedChannel, newest: Latest, now: float) -> Trip | None:
     age = now - newest.time
-    if age <= watch.max_age:
+    if age <= guarded.max_age:
         return None
-    cause = f"{watch.channel} is stale: its last sample is {age:.2f} s old, {watch.max_age:g} s are allowed"
-    return Trip(cause, "stale", now, watch.channel, newest.value, watch.max_age)
+    cause = f"{guarded.channel} is stale: its last sample is {age:.2f} s old, {guarded.max_age:g} s are allowed"
+    return Trip(cause, "stale", now, guarded.channel, newest.value, guarded.max_age)
 
 
-def frozen_limit(watch: Watch, longest: float | None) -> float:
+def frozen_limit(guarded: GuardedChannel, longest: float | None) -> float:
     """How long in s a driven channel may keep the very same value: as configured, or by its earlier variation."""
-    if watch.max_frozen:
-        return watch.max_frozen
+    if guarded.max_frozen:
+        return guarded.max_frozen
     return UNSEEN_FROZEN if longest is None else max(LEAST_FROZEN, FROZEN_TIMES * longest)
 
 
-def _frozen(watch: Watch, newest: Latest, vitals: Vitals) -> Trip | None:
+def _frozen(guarded: GuardedChannel, newest: Latest, vitals: Vitals) -> Trip | None:
     """Judged while the motor is driven only: water at rest may leave a coarse digit alone."""
-    if watch.max_frozen is None or not vitals.driven:
+    if guarded.max_frozen is None or not vitals.driven:
         return None
-    same, limit = min(newest.same, vitals.driven), frozen_limit(watch, newest.longest)
+    same, limit = min(newest.same, vitals.driven), frozen_limit(guarded, newest.longest)
     if same <= limit:
         return None
     cause = (
-        f"{watch.channel} is frozen: {newest.value:.6g} {watch.unit} without any change for {same:.1f} s of driving, "
-        f"{limit:.3g} s are allowed"
+        f"{guarded.channel} is frozen: {newest.value:.6g} {guarded.unit} without any change for {same:.1f} s of "
+        f"driving, {limit:.3g} s are allowed"
     )
-    return Trip(cause, "frozen", vitals.now, watch.channel, newest.value, limit)
+    return Trip(cause, "frozen", vitals.now, guarded.channel, newest.value, limit)
 
 
 def _rig_trip(vitals: Vitals, allowed: Allowances) -> Trip | None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections import deque
 from dataclasses import dataclass, field
 
-from rig.campaign.config import CampaignConfig
 from rig.control.event_log import Level
 from rig.control.readings import Readings
 from rig.errors import DeviceError, LinkError
 from rig.link.front_end_messages import Check
+from rig.recording.ledger import file_facts
 from rig.stages.preflight import all_checks, device_checks, flow_check
 from rig.stages.session import Session, Stopped
 
@@ -120,19 +119,4 @@ def _start(session: Session) -> None:
         identities=session.bench.identities,
         **file_facts(session.campaign),
     )
-    session.loop.watch()
-
-
-def file_facts(campaign: CampaignConfig) -> dict[str, str]:
-    """Both files, verbatim and by their hash: what a resumed campaign must find unchanged."""
-    return {
-        "campaign_file": str(campaign.path.resolve()),
-        "campaign_sha256": sha256(campaign.text),
-        "bench_sha256": sha256(campaign.bench.text),
-        "campaign_toml": campaign.text,
-        "bench_toml": campaign.bench.text,
-    }
-
-
-def sha256(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
+    session.loop.begin_guarding()

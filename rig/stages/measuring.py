@@ -105,7 +105,7 @@ def _close(session: Session, output: Output) -> None:
         session.proved = True
         text = f"watchdog proved in the run of {status.thruster}: at rest {output.time_to_zero_s:.2f} s after silence"
         session.say("info", text, of_bench=True)
-    loop.watch()
+    loop.begin_guarding()
 
 
 def judged(session: Session, output: Output) -> tuple[Outcome, str]:

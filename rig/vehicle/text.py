@@ -15,7 +15,7 @@ from identification.vehicle.inertia import InertiaFit
 from identification.vehicle.replay import Replay
 from identification.vehicle.report import Row, rows
 from identification.vehicle.steady_drag import DragFit
-from rig.vehicle.command import VehicleAnswer
+from rig.vehicle.answer import VehicleAnswer
 
 RAN_AWAY = "runs away: the drag that was identified is negative there"
 LEARNT = 0.5

@@ -15,11 +15,11 @@ import numpy as np
 
 from drivers.protocols import Sample, Stream
 from rig.campaign.bench import COMMAND_STREAM
-from rig.campaign.config import CampaignConfig
+from rig.campaign.config import CampaignConfig, twin_path
 from rig.errors import LinkError
 from rig.link.recorder_messages import Failed, Rows
 from rig.link.sockets import Overrun, Peer, pair
-from rig.link.watch_messages import Mismatch, Watched, WatchedStream, twin_path
+from rig.link.watch_messages import Mismatch, Watched, WatchedStream
 
 PERIOD = 0.25
 """s of rows sent at once: the control loop pays for four messages a second and not for hundreds."""

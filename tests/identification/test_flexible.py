@@ -25,7 +25,8 @@ from identification.run_history.splines import spline
 from rig.diagnose.report.page import diagnosis_page
 from rig.diagnose.text import diagnosis_text
 from rig.errors import TwinError
-from rig.twin.reading import read_twin, twin_json, write_twin
+from rig.twin.reading import read_twin
+from rig.twin.writing import twin_json, write_twin
 
 
 def diagnosed(*runs, **how):

@@ -25,7 +25,7 @@ from rig.link.sockets import Peer, pair
 from rig.link.watch_messages import Mismatch, Watched, WatchedStream
 from rig.recording.ledger import read
 from rig.stages.campaign import run
-from rig.twin.reading import write_twin
+from rig.twin.writing import write_twin
 from rig.watch.watch_link import WatchLink, run_of
 from rig.watch.watcher import Watcher, settings_of
 from tests.rig.virtual_bench import PLAN, VirtualBench, starter, virtual

@@ -17,8 +17,9 @@ from rig.cli import rig
 from rig.diagnose.text import diagnosis_text
 from rig.errors import TwinError
 from rig.hdf5 import load
-from rig.twin.reading import read_twin, twin_json, write_twin
+from rig.twin.reading import read_twin
 from rig.twin.simulate import Asked, simulated, timed
+from rig.twin.writing import twin_json, write_twin
 
 ROOT = Path(__file__).parents[2]
 RIGHT = Path(__file__).parent / "wrong" / "right.toml"

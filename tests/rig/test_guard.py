@@ -8,16 +8,17 @@ from hypothesis import strategies as st
 
 from drivers.protocols import Channel, LinkHealth, Stream
 from rig.campaign.config import LimitConfig
-from rig.safety.guard import Allowances, Latest, Recorder, Trip, Vitals, Watch, allowances, check, watches
+from rig.campaign.limits import GuardedChannel, guarded_channels
+from rig.safety.guard import Allowances, Latest, Recorder, Trip, Vitals, allowances, check
 
 CELL = Stream("load_cell", "mt_sics", (Channel("thrust", "thrust", "N"), Channel("stable", None, "1")), 1 / 92)
 FLOW = Stream("flow", "nortek", (Channel("flow_speed", "flow_speed", "m/s"),), 0.25)
-THRUST = Watch("load_cell.thrust", "N", 0.2, -300.0, 300.0)
+THRUST = GuardedChannel("load_cell.thrust", "N", 0.2, -300.0, 300.0)
 ALLOWED = Allowances()
 GOOD = LinkHealth(True, 1, 0, ())
 
 
-def ask(value: float = 1.0, at: float = 10.0, watch: Watch = THRUST, **vitals) -> Trip | None:
+def ask(value: float = 1.0, at: float = 10.0, watch: GuardedChannel = THRUST, **vitals) -> Trip | None:
     facts = {"now": 10.0, "started": 0.0} | vitals
     return check((watch,), {watch.channel: Latest(value, at)}, Vitals(**facts), ALLOWED)
 
@@ -38,7 +39,7 @@ def test_a_value_passes_only_inside_its_limits(value):
 
 @pytest.mark.parametrize("limits", [{"min": 0.0}, {"max": 0.0}, {"min": -inf, "max": inf}, {}])
 def test_nan_fails_every_limit(limits):
-    trip = ask(nan, watch=Watch("load_cell.thrust", "N", 0.2, **limits))
+    trip = ask(nan, watch=GuardedChannel("load_cell.thrust", "N", 0.2, **limits))
     assert trip is not None
     assert trip.source == "nan"
 
@@ -91,19 +92,19 @@ def test_the_bench_is_named_before_the_rig():
 
 def test_watches_take_their_defaults_from_the_streams():
     limits = [LimitConfig("load_cell.thrust", max=5.0), LimitConfig("flow.flow_speed", max_age=9.0)]
-    found = watches(limits, (CELL, FLOW), essential=("load_cell.thrust", "load_cell.stable"))
+    found = guarded_channels(limits, (CELL, FLOW), essential=("load_cell.thrust", "load_cell.stable"))
     assert found == (
-        Watch("load_cell.thrust", "N", 0.2, None, 5.0),
-        Watch("flow.flow_speed", "m/s", 9.0),
-        Watch("load_cell.stable", "1", 0.2),
+        GuardedChannel("load_cell.thrust", "N", 0.2, None, 5.0),
+        GuardedChannel("flow.flow_speed", "m/s", 9.0),
+        GuardedChannel("load_cell.stable", "1", 0.2),
     )
-    assert watches([LimitConfig("flow.flow_speed")], (FLOW,))[0].max_age == 0.75  # three periods
+    assert guarded_channels([LimitConfig("flow.flow_speed")], (FLOW,))[0].max_age == 0.75  # three periods
 
 
 def test_an_emergency_stop_input_is_always_watched():
     stream = Stream("button", "line_stream", (Channel("emergency_stop", "emergency_stop", "1"),), 0.05)
     for limits in ([], [LimitConfig("button.emergency_stop", max=9.0)]):
-        (watch,) = watches(limits, (stream,))
+        (watch,) = guarded_channels(limits, (stream,))
         assert watch.stops
         assert check([watch], {watch.channel: Latest(0.0, 9.99)}, Vitals(10.0, 0.0), Allowances()) is None
         for value in (1.0, -1.0, 0.5):
@@ -116,7 +117,7 @@ def test_an_emergency_stop_input_is_always_watched():
 
 def test_unknown_channel_is_named():
     with pytest.raises(ValueError, match=r"no device gives a channel flow\.speed; there are flow\.flow_speed"):
-        watches([LimitConfig("flow.speed")], (FLOW,))
+        guarded_channels([LimitConfig("flow.speed")], (FLOW,))
 
 
 def test_lateness_follows_the_loop_rate():
@@ -124,7 +125,7 @@ def test_lateness_follows_the_loop_rate():
     assert allowances(10.0).lateness == 0.5
 
 
-FROZEN = Watch("load_cell.thrust", "N", 0.2, max_frozen=0.0)
+FROZEN = GuardedChannel("load_cell.thrust", "N", 0.2, max_frozen=0.0)
 
 
 @pytest.mark.parametrize(
@@ -138,9 +139,9 @@ FROZEN = Watch("load_cell.thrust", "N", 0.2, max_frozen=0.0)
         (FROZEN, 10.1, None, 20.0, True),
         (FROZEN, 60.0, 0.02, 0.0, False),  # at rest a sensor may stand still
         (FROZEN, 60.0, 0.02, 1.0, False),  # and what was at rest does not count
-        (Watch("load_cell.thrust", "N", 0.2, max_frozen=0.5), 0.6, 9.0, 5.0, True),
-        (Watch("load_cell.thrust", "N", 0.2, max_frozen=inf), 99.0, 0.02, 99.0, False),
-        (Watch("load_cell.thrust", "N", 0.2), 99.0, 0.02, 99.0, False),
+        (GuardedChannel("load_cell.thrust", "N", 0.2, max_frozen=0.5), 0.6, 9.0, 5.0, True),
+        (GuardedChannel("load_cell.thrust", "N", 0.2, max_frozen=inf), 99.0, 0.02, 99.0, False),
+        (GuardedChannel("load_cell.thrust", "N", 0.2), 99.0, 0.02, 99.0, False),
     ],
 )
 def test_frozen_value(watch, same, longest, driven, trips):
@@ -150,8 +151,8 @@ def test_frozen_value(watch, same, longest, driven, trips):
 
 
 def test_thrust_is_watched_for_being_frozen_unless_switched_off():
-    (thrust,) = watches([], (CELL,), ["load_cell.thrust"], "load_cell.thrust")
+    (thrust,) = guarded_channels([], (CELL,), ["load_cell.thrust"], "load_cell.thrust")
     assert thrust.max_frozen == 0.0
-    (thrust,) = watches([LimitConfig("load_cell.thrust", max_frozen=inf)], (CELL,), (), "load_cell.thrust")
+    (thrust,) = guarded_channels([LimitConfig("load_cell.thrust", max_frozen=inf)], (CELL,), (), "load_cell.thrust")
     assert thrust.max_frozen == inf
-    assert watches([], (CELL,), ["load_cell.stable"], "load_cell.thrust")[0].max_frozen is None
+    assert guarded_channels([], (CELL,), ["load_cell.stable"], "load_cell.thrust")[0].max_frozen is None

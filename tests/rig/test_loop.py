@@ -39,7 +39,7 @@ def driven(folder: Path, volts: float = 6.0, **options):
                 loop.tick(session.motor, decide)
 
         turn(0.2)
-        loop.watch()
+        loop.begin_guarding()
         turn(1.0)
         assert not trips
         yield world, turn, trips
@@ -61,7 +61,7 @@ def test_cut_off_latency(tmp_path, limit):
             loop.guarded = False
             for _ in range(40):
                 loop.tick(session.motor, decide)
-            loop.watch()
+            loop.begin_guarding()
             begin = world.clock.t_ns * 1e-9 + chance.uniform(0.1, 0.2)
 
             def inject(begun: list[float]) -> None:

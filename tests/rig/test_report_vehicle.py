@@ -12,7 +12,7 @@ from identification.vehicle.campaign import identify_vehicle
 from identification.vehicle.efficiency import Installation, Thruster
 from identification.vehicle.replay import Replay
 from rig.report.page import html
-from rig.vehicle.command import HeldOut, VehicleAnswer
+from rig.vehicle.answer import HeldOut, VehicleAnswer
 from rig.vehicle.report.page import vehicle_page
 from sim_devices.vehicle import romeo, run_trials
 from sim_devices.vehicle.campaign import sines, yaw_steady

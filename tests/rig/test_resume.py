@@ -12,8 +12,7 @@ from rig.errors import ConfigError, RecordingError, RigError
 from rig.link.live_runs import Run, live_runs, register
 from rig.operate.resume import remainder, require_unchanged
 from rig.operate.run import require_mountable
-from rig.recording.ledger import Ledger
-from rig.stages.arming import file_facts
+from rig.recording.ledger import Ledger, file_facts
 from tests.rig.virtual_bench import bench_config, campaign_config
 
 

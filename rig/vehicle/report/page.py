@@ -23,7 +23,7 @@ from rig.report.mismatch_figures import Panel, before_after
 from rig.report.page import Page, Picture, Remark, Section, Table, columns, sentences, write
 from rig.report.regression_figures import Curve, Group, Interval
 from rig.report.style import prose, unit_text
-from rig.vehicle.command import HeldOut, VehicleAnswer
+from rig.vehicle.answer import HeldOut, VehicleAnswer
 from rig.vehicle.report import figures
 from rig.vehicle.text import rms_of, unit_of_response
 
