@@ -205,9 +205,6 @@ class Loop:
             )
         if not self.unattended and self.clients.last_lease is not None and not self.clients.connected:
             return Trip("the operator is gone: the last front end has closed its connection", "lease", now)
-        trouble = self.recorder.trouble(now) or self.ledger.error
-        if trouble:
-            return Trip(trouble, "recorder", now)
         newest = {one.channel: self.readings.newest(one.channel) for one in self.guarded_channels}
         vitals = self._vitals(now)
         trip = guard.check(self.guarded_channels, newest, vitals, self.allowed)
@@ -225,7 +222,8 @@ class Loop:
         links = {name: instrument.health() for name, instrument in self.bench.instruments.items()}
         lease = None if self.unattended else self.clients.lease_age(now)
         driven = 0.0 if self.driven_since is None else now - self.driven_since
-        return Vitals(now, self.guarded_since, self.lateness, links, Recorder(alive=True), lease, driven)
+        recorder = Recorder(self.recorder.failed, self.recorder.silence(now), self.recorder.free_bytes)
+        return Vitals(now, self.guarded_since, self.lateness, links, recorder, self.ledger.error, lease, driven)
 
     def _send(self, motor: MotorController, decision: Decision, now: float) -> None:
         """The second way to stop is tried also when the first is refused."""

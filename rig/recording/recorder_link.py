@@ -17,12 +17,8 @@ from rig.errors import LinkError
 from rig.link.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Outcome, Ready, Rows, StepRow
 from rig.link.sockets import Overrun, Peer, pair
 
-ACK_TIMEOUT = 15.0
-"""s without a flush before the recorder counts as gone: above the 10 s stall of docs/reliability.md, promise 18."""
 SHUT_DOWN_TIMEOUT = 10.0
 """s for the recorder to close its file after the motor has been stopped."""
-RESERVE_BYTES = 64 * 2**20
-"""Free disk space below which the run ends in order (docs/reliability.md, promise 17)."""
 
 
 @dataclass
@@ -105,16 +101,14 @@ class RecorderLink:
         if self.peer.closed and not self.failed:
             self.failed = "the recorder process has ended"
 
-    def trouble(self, now: float) -> str | None:
-        """Why recording can't be trusted now, as a sentence; None while all is well."""
-        if self.failed:
-            return f"recorder: {self.failed}"
-        if self.ready and now - self.last_heard > ACK_TIMEOUT:
-            return f"recorder: nothing was flushed for {now - self.last_heard:.0f} s; its disk may be stuck"
-        if self.ready and self.last_ack is not None and self.last_ack.free_bytes < RESERVE_BYTES:
-            left = self.last_ack.free_bytes / 2**20
-            return f"recorder: only {left:.0f} MiB left on the disk; the run ends while the file can still be closed"
-        return None
+    def silence(self, now: float) -> float:
+        """S since the recorder was last heard of while it has a file open; 0 while it has none."""
+        return now - self.last_heard if self.ready else 0.0
+
+    @property
+    def free_bytes(self) -> int | None:
+        """On the disk of the open file at its last flush; None: no file is open, or nothing was flushed yet."""
+        return self.last_ack.free_bytes if self.ready and self.last_ack is not None else None
 
     def shut_down(self) -> None:
         """Let the link go: the recorder closes what is open and ends. Waits for that; a stuck disk is left alone."""

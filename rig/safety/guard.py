@@ -56,13 +56,14 @@ class Latest(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Recorder:
-    """What the controller knows of the recorder process."""
+    """What the controller knows of the recorder process, from the messages between them."""
 
-    alive: bool
-    age: float = 0.0
-    """s since its last sign of life."""
-    overrun: bool = False
-    """True: its queue was full and rows would be lost."""
+    failed: str = ""
+    """Why nothing is saved any more (it has ended, its queue is full, its disk refused); empty while it lives."""
+    silence: float = 0.0
+    """s since it was last heard of, while it has a file open; every flush is told."""
+    free_bytes: int | None = None
+    """On its disk at the last flush; None: no file is open, or none was flushed yet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,8 +77,9 @@ class Vitals:
     """s this tick is behind its schedule."""
     links: Mapping[str, LinkHealth] | None = None
     """By device name."""
-    recorder: Recorder | None = None
-    """None: nothing is recorded now."""
+    recorder: Recorder = Recorder()
+    ledger_error: str = ""
+    """Why facts are no longer written; empty while they are."""
     lease_age: float | None = None
     """s since an operator said `I am here`; None: unattended, no lease asked for."""
     driven: float = 0.0
@@ -86,12 +88,14 @@ class Vitals:
 
 @dataclass(frozen=True, slots=True)
 class Allowances:
-    """How long what may be late. All in s."""
+    """How long what may be late, in s; and how little disk there may be left."""
 
     lateness: float = MIN_LATENESS
     grace: float = 2.0
-    recorder_age: float = 12.0
+    recorder_silence: float = 15.0
     """A flush may block 10 s on a slow disk (docs/reliability.md, promise 18) while the queue holds the rows."""
+    free_bytes: int = 64 * 2**20
+    """Not s: disk space below which the run ends, while the file can still be closed (promise 17)."""
     lease_age: float = 2.0
     """Four leases missed at two a second."""
 
@@ -104,7 +108,13 @@ def allowances(loop_rate: float) -> Allowances:
 def check(
     channels: Iterable[GuardedChannel], latest: Mapping[str, Latest | None], vitals: Vitals, allowed: Allowances
 ) -> Trip | None:
-    """First reason to stop, or None. Limits come first: they name what happened to the bench, the rest to the rig."""
+    """First reason to stop, or None.
+
+    The records come first: a stale value or a late tick is passed over while nothing is driven, and must not hide that
+    nothing is saved. Then limits, which name what happened to the bench, then the rest of the rig.
+    """
+    if trip := _records_trip(vitals, allowed):
+        return trip
     readings = (assess(guarded, latest.get(guarded.channel), vitals, allowed) for guarded in channels)
     return next((trip for trip in readings if trip), None) or _rig_trip(vitals, allowed)
 
@@ -175,7 +185,7 @@ def _frozen(guarded: GuardedChannel, newest: Latest, vitals: Vitals) -> Trip | N
 
 
 def _rig_trip(vitals: Vitals, allowed: Allowances) -> Trip | None:
-    """Links, own lateness, recorder, operator, in this order."""
+    """Links, own lateness, operator, in this order."""
     now = vitals.now
     for name, link in (vitals.links or {}).items():
         if not link.alive:
@@ -183,8 +193,6 @@ def _rig_trip(vitals: Vitals, allowed: Allowances) -> Trip | None:
     if vitals.lateness > allowed.lateness:
         cause = f"the control loop is {vitals.lateness:.2f} s late, {allowed.lateness:g} s are allowed"
         return Trip(cause, "late", now, value=vitals.lateness, limit=allowed.lateness)
-    if vitals.recorder is not None and (trip := _recorder_trip(vitals.recorder, now, allowed)):
-        return trip
     if vitals.lease_age is not None and vitals.lease_age > allowed.lease_age:
         cause = (
             f"no operator was seen for {vitals.lease_age:.1f} s, {allowed.lease_age:g} s are allowed in an attended run"
@@ -193,12 +201,16 @@ def _rig_trip(vitals: Vitals, allowed: Allowances) -> Trip | None:
     return None
 
 
-def _recorder_trip(recorder: Recorder, now: float, allowed: Allowances) -> Trip | None:
-    if not recorder.alive:
-        return Trip("the recorder process is gone: nothing more would be saved", "recorder", now)
-    if recorder.overrun:
-        return Trip("recorder overrun: its queue is full and samples would be lost", "recorder", now)
-    if recorder.age > allowed.recorder_age:
-        cause = f"the recorder gave no sign of life for {recorder.age:.1f} s, {allowed.recorder_age:g} s are allowed"
-        return Trip(cause, "recorder", now, value=recorder.age, limit=allowed.recorder_age)
-    return None
+def _records_trip(vitals: Vitals, allowed: Allowances) -> Trip | None:
+    """Recorder, then ledger."""
+    recorder, now = vitals.recorder, vitals.now
+    if recorder.failed:
+        return Trip(f"recorder: {recorder.failed}", "recorder", now)
+    if recorder.silence > allowed.recorder_silence:
+        cause = f"recorder: nothing was flushed for {recorder.silence:.0f} s; its disk may be stuck"
+        return Trip(cause, "recorder", now, value=recorder.silence, limit=allowed.recorder_silence)
+    if recorder.free_bytes is not None and recorder.free_bytes < allowed.free_bytes:
+        left = recorder.free_bytes / 2**20
+        cause = f"recorder: only {left:.0f} MiB left on the disk; the run ends while the file can still be closed"
+        return Trip(cause, "recorder", now, value=recorder.free_bytes, limit=allowed.free_bytes)
+    return Trip(vitals.ledger_error, "recorder", now) if vitals.ledger_error else None

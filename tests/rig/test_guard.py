@@ -24,7 +24,7 @@ def ask(value: float = 1.0, at: float = 10.0, watch: GuardedChannel = THRUST, **
 
 
 def test_all_is_well():
-    recorder = Recorder(True, age=0.3)
+    recorder = Recorder(silence=0.3, free_bytes=2**30)
     assert ask(lateness=0.1, links={"motor": GOOD}, recorder=recorder, lease_age=0.5) is None
     assert ask(-300.0) is None
     assert ask(300.0) is None
@@ -73,9 +73,10 @@ def test_silence_is_allowed_for_the_grace_only():
         ({"links": {"motor": LinkHealth(False, 9, 0, (), "the cable was pulled")}}, "link", "the cable was pulled"),
         ({"links": {"cell": GOOD, "motor": LinkHealth(False, 9, 0, ())}}, "link", "to motor is gone: its reader"),
         ({"lateness": 0.3}, "late", "0.30 s late, 0.25 s are allowed"),
-        ({"recorder": Recorder(False)}, "recorder", "the recorder process is gone"),
-        ({"recorder": Recorder(True, overrun=True)}, "recorder", "recorder overrun"),
-        ({"recorder": Recorder(True, age=13.0)}, "recorder", "no sign of life for 13.0 s"),
+        ({"recorder": Recorder("the recorder process has ended")}, "recorder", "recorder: the recorder process has"),
+        ({"recorder": Recorder(silence=16.0)}, "recorder", "nothing was flushed for 16 s"),
+        ({"recorder": Recorder(free_bytes=2**20)}, "recorder", "only 1 MiB left"),
+        ({"ledger_error": "campaign.jsonl: the disk is full"}, "recorder", "campaign.jsonl: the disk is full"),
         ({"lease_age": 2.5}, "lease", "no operator was seen for 2.5 s"),
         ({"lease_age": inf}, "lease", "no operator"),
     ],
@@ -88,6 +89,16 @@ def test_the_rig_itself_is_guarded(vitals, source, text):
 
 def test_the_bench_is_named_before_the_rig():
     assert ask(400.0, lateness=1.0).source == "limit"
+
+
+def test_nothing_hides_that_nothing_is_saved():
+    gone = Recorder("the recorder process has ended")
+    assert ask(at=1.0).source == "stale"
+    assert ask(at=1.0, lateness=1.0, recorder=gone).source == "recorder"
+
+
+def test_a_recorder_that_is_slow_is_no_reason_to_stop():
+    assert ask(recorder=Recorder(silence=14.9, free_bytes=ALLOWED.free_bytes)) is None
 
 
 def test_watches_take_their_defaults_from_the_streams():

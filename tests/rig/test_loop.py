@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import random
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from itertools import pairwise
 from pathlib import Path
@@ -155,6 +156,29 @@ def test_dead_link_trips(tmp_path):
         world.cell.error = "the cable was pulled"
         turn(1.0)
         assert (trips[0][1], "the cable was pulled" in trips[0][2]) == ("link", True)
+
+
+def test_a_dead_recorder_trips(tmp_path):
+    with driven(tmp_path) as (world, turn, trips):
+        begun = world.clock.t_ns * 1e-9
+        world.recorder.peer.close()
+        turn(1.0)
+        assert trips[0][1:] == ("recorder", "recorder: the recorder process has ended")
+        assert trips[0][0] - begun <= 2 * world.session.loop.period_ns * 1e-9
+        assert world.motor.sent[-1][1] == 0.0
+
+
+def test_a_recorder_that_falls_silent_trips_by_what_the_guard_allows(tmp_path):
+    with driven(tmp_path) as (world, turn, trips):
+        loop, recorder = world.session.loop, world.session.recorder
+        loop.allowed = replace(loop.allowed, recorder_silence=3.0)
+        world.recorder.deaf, recorder.ready, recorder.last_heard = True, True, loop.now
+        turn(2.9)
+        assert not trips
+        turn(0.2)
+        assert trips[0][1:] == ("recorder", "recorder: nothing was flushed for 3 s; its disk may be stuck")
+        assert world.motor.sent[-1][1] == 0.0
+        recorder.ready = False
 
 
 def test_late_tick_trips_before_anything_is_driven(tmp_path):
