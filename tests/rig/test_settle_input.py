@@ -13,7 +13,9 @@ from rig.diagnose.outputs import Wanted
 from rig.errors import ConfigError, RigError
 from rig.hdf5 import RecordingFile
 from rig.link.recorder_messages import ChannelSpec, Rows, StreamSpec
-from rig.operate.settle import Settling, _leave, bench_alone, by_command, fixed_cost
+from rig.operate.flow_setting import by_command
+from rig.operate.sequential_experiment import SequentialExperiment, bench_alone, fixed_cost
+from rig.operate.settle import _leave
 
 RIGHT = Path(__file__).parent / "wrong" / "right.toml"
 BENCH = Path(__file__).parents[2] / "benches" / "simulated" / "bench.toml"
@@ -66,10 +68,10 @@ def test_an_answer_that_cannot_be_written_is_refused_before_anything_turns(recor
 
 
 def test_an_answer_that_could_not_be_written_is_one_sentence(doubtful, tmp_path):
-    settling, _, _ = doubtful
-    Rounds(settling, 0.0, fails=RigError("the guard tripped"))
+    experiment, _, _ = doubtful
+    Rounds(experiment, 0.0, fails=RigError("the guard tripped"))
     with pytest.raises(RigError, match=r"the answer can't be written: .*absent"):
-        _leave(settling, *settling.settle(), Wanted(json_path=tmp_path / "absent" / "a.json"))
+        _leave(experiment, *experiment.run(), Wanted(json_path=tmp_path / "absent" / "a.json"))
 
 
 def test_a_thruster_that_the_campaign_does_not_have_is_refused(recording, tmp_path, capsys):
@@ -84,11 +86,11 @@ def test_levels_in_revolutions_cannot_be_run(recording, tmp_path, capsys):
 
 def test_an_experiment_that_does_not_fit_leaves_its_plan_and_moves_nothing(recording, tmp_path, capsys):
     folder = tmp_path / "out"
-    settling = Settling(load_campaign(RIGHT), folder, [recording()], budget=20.0)
+    experiment = SequentialExperiment(load_campaign(RIGHT), folder, [recording()], budget=20.0)
     folder.mkdir()
     said = []
-    settling.say = said.append
-    _, course, end = settling.settle()
+    experiment.say = said.append
+    _, course, end = experiment.run()
     assert (end.reason, course.rounds) == ("budget", ())
     assert said[0].startswith("first: ambiguous")
     plan = load_campaign(folder / "round-1.toml")
@@ -97,16 +99,16 @@ def test_an_experiment_that_does_not_fit_leaves_its_plan_and_moves_nothing(recor
 
 
 class Rounds:
-    """`Settling` with made-up rounds: what each wants of the flow, and what becomes of it."""
+    """`SequentialExperiment` with made-up rounds: what each wants of the flow, and what becomes of it."""
 
-    def __init__(self, settling, *flows, fails=None):
+    def __init__(self, experiment, *flows, fails=None):
         self.flows, self.fails, self.ran = list(flows), fails, []
-        settling._run = self.run
-        self.settling = settling
+        experiment._run = self.run
+        self.experiment = experiment
 
     def run(self, plans):
-        self.settling._flow_at(self.flows[len(self.ran)])
-        self.ran.append(self.settling.flow)
+        self.experiment._flow_at(self.flows[len(self.ran)])
+        self.ran.append(self.experiment.flow)
         if self.fails and len(self.ran) == len(self.flows):
             raise self.fails
         return []
@@ -116,17 +118,17 @@ class Rounds:
 def doubtful(recording, tmp_path):
     folder = tmp_path / "out"
     folder.mkdir()
-    settling = Settling(load_campaign(RIGHT), folder, [recording()], budget=3600.0)
-    settling.say = lambda text: said.append(text)
+    experiment = SequentialExperiment(load_campaign(RIGHT), folder, [recording()], budget=3600.0)
+    experiment.say = lambda text: said.append(text)
     said, speeds = [], []
-    settling.set_flow = speeds.append
-    return settling, speeds, said
+    experiment.set_flow = speeds.append
+    return experiment, speeds, said
 
 
 def test_the_water_is_still_for_a_sweep_that_says_nothing_of_it_and_at_the_end(doubtful):
-    settling, speeds, _ = doubtful
-    rounds = Rounds(settling, 0.5, 0.0)  # the same doubt after two rounds is an end
-    _, course, end = settling.settle()
+    experiment, speeds, _ = doubtful
+    rounds = Rounds(experiment, 0.5, 0.0)  # the same doubt after two rounds is an end
+    _, course, end = experiment.run()
     assert (end.reason, len(course.rounds)) == ("same_doubt", 2)
     assert rounds.ran == [0.5, 0.0]
     assert speeds == [0.5, 0.0]
@@ -142,9 +144,9 @@ def test_the_water_is_still_for_a_sweep_that_says_nothing_of_it_and_at_the_end(d
     ],
 )
 def test_the_water_is_brought_to_rest_whatever_ends_it(doubtful, trouble, told):
-    settling, speeds, _ = doubtful
-    Rounds(settling, 0.8, fails=trouble)
-    found, course, end = settling.settle()
+    experiment, speeds, _ = doubtful
+    Rounds(experiment, 0.8, fails=trouble)
+    found, course, end = experiment.run()
     assert (end.reason, found.verdict, course.rounds) == ("aborted", "ambiguous", ())
     assert told in end.says
     assert speeds == [0.8, 0.0]
@@ -155,16 +157,16 @@ def test_the_water_is_brought_to_rest_whatever_ends_it(doubtful, trouble, told):
     [(RigError("the pump does not answer"), "does not answer"), (KeyboardInterrupt(), "broken off")],
 )
 def test_a_flow_that_does_not_stop_is_said(doubtful, trouble, told):
-    settling, speeds, said = doubtful
+    experiment, speeds, said = doubtful
 
     def set_flow(speed):
         speeds.append(speed)
         if speed == 0.0:
             raise trouble
 
-    settling.set_flow = set_flow
-    Rounds(settling, 0.8, fails=RigError("the guard tripped"))
-    assert settling.settle()[2].reason == "aborted"
+    experiment.set_flow = set_flow
+    Rounds(experiment, 0.8, fails=RigError("the guard tripped"))
+    assert experiment.run()[2].reason == "aborted"
     assert speeds == [0.8, 0.0]
     assert said[-1].startswith("THE WATER MAY STILL FLOW")
     assert told in said[-1]
