@@ -7,6 +7,5 @@ refuses to open anything else of the store; the process that keeps the score joi
     design     what is asked: cells, jobs, orders, in an interleaved order (pure)
     store      the folder of the proof
     workers    pairs of processes, a time limit for each answer
-    scoring    one answer beside its truth (pure); places, same_parameters: what counts as right there
-    metrics    rates with intervals beside the goals (pure)
+    scoring    one answer beside its truth, rates with intervals beside the goals (pure)
 """

@@ -5,13 +5,14 @@ from __future__ import annotations
 import json
 import os
 import signal
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
+from rig.blind.progress import shown
 from rig.errors import RigError
 from rig.result_path import RESULT_FILE, require_different
 
@@ -19,14 +20,12 @@ if TYPE_CHECKING:
     from rig.blind.beside import Beside
     from rig.blind.collecting import Collected
     from rig.blind.design import Job
-    from rig.blind.scoring import Score
+    from rig.blind.scoring.score import Score
     from rig.blind.store import Store
 
 STORE = Path("build/prove")
 LONGEST = 86400.0
 """s that a diagnosis may be given."""
-EVERY = 25
-"""Jobs between two lines of a log file."""
 
 
 def designed(seeds: int, only: Sequence[str], draw: str = "") -> list[Job]:
@@ -74,32 +73,9 @@ def interruptible() -> Iterator[None]:
             signal.signal(s, handler)
 
 
-@contextmanager
-def shown(count: int) -> Iterator[Callable[[Job], None]]:
-    """A progress bar on a terminal, a line now and then score_file."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    console = Console(stderr=True)
-    done = 0
-
-    def tell(job: Job) -> None:
-        nonlocal done
-        done += 1
-        if console.is_terminal:
-            bar.update(task, advance=1, description=job.id)
-        elif done % EVERY == 0 or done == count:
-            click.echo(f"{done} of {count} cases", err=True)
-
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
-        task = bar.add_task("the world wakes", total=count)
-        yield tell
-
-
 def summary(found: Collected) -> str:
     """The goals, as a person reads them in a terminal."""
-    from rig.blind.metrics import besides, goals
+    from rig.blind.scoring.metrics import besides, goals
 
     sign = {"yes": "ok    ", "reached": "ok ?  ", "open": "open  ", "no": "MISSED", "": "      "}
     rows = [
@@ -118,7 +94,7 @@ def summary(found: Collected) -> str:
 
 def still_wrong(found: Collected) -> str:
     """What is not good, a line each: of cases that all had come out wrong, so no rates."""
-    from rig.blind.metrics import said
+    from rig.blind.scoring.tables import said
 
     rows = [json.dumps({k: v for k, v in said(s).items() if v}) for s in found.scores if not s.good]
     return "\n".join([*rows, f"{len(found.scores) - len(rows)} of {len(found.scores)} came out right this time"])
@@ -147,7 +123,7 @@ def leave(
 ) -> None:
     """Write figures and page where they are wanted. Raises OSError."""
     from rig.blind.beside import beside_json
-    from rig.blind.metrics import tables
+    from rig.blind.scoring.tables import tables
 
     figures = tables(found.scores, seeds, found.versions, found.undrawn, draw) | beside_json(beside)
     if json_path is not None:
@@ -175,7 +151,7 @@ def one_case(name: str, draw: str, limit: float, *, verbose: bool) -> str:
 
 def _counted(score: Score) -> str:
     """How the answer counts in its cell."""
-    from rig.blind.scoring import OPEN_CELLS
+    from rig.blind.scoring.score import OPEN_CELLS
 
     if score.order.cell in OPEN_CELLS:
         return f"outcome: {score.outcome}" + ("" if score.counted else " (not counted: a neighbour is too near)")
@@ -184,7 +160,7 @@ def _counted(score: Score) -> str:
 
 def _told(store: Store, job: Job, *, verbose: bool) -> str:
     from rig.blind.collecting import collected
-    from rig.blind.metrics import said
+    from rig.blind.scoring.tables import said
 
     truth = store.truth(job)
     assert truth is not None

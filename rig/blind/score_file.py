@@ -16,7 +16,7 @@ from typing import Any
 
 from rig.blind.collecting import Known
 from rig.blind.design import Job, Order
-from rig.blind.scoring import HeldOut, Interval, Near, Score
+from rig.blind.scoring.score import HeldOut, Interval, Near, Score
 from rig.blind.store import ProofError
 
 

@@ -22,12 +22,13 @@ from rig.blind.answering import answered
 from rig.blind.collecting import Collected, Known, collected, not_good
 from rig.blind.command import _counted, designed, interruptible, prove_command
 from rig.blind.design import Job, Order, design, matches
-from rig.blind.metrics import confusion, goals, half, half_named, tables, twins, worst
-from rig.blind.places import PLACES
-from rig.blind.rates import Goal, Rate, of_rate
 from rig.blind.report.page import proof_page
-from rig.blind.same_parameters import SAME, true_values
-from rig.blind.scoring import Near, Score, scored
+from rig.blind.scoring.metrics import goals, half, half_named
+from rig.blind.scoring.places import PLACES
+from rig.blind.scoring.rates import Goal, Rate, of_rate
+from rig.blind.scoring.same_parameters import SAME, true_values
+from rig.blind.scoring.score import Near, Score, scored
+from rig.blind.scoring.tables import confusion, tables, twins, worst
 from rig.blind.store import ProofError, Store, version_of_diagnosis
 from rig.blind.workers import STOPPING, BrokenOff, Child, Ended, Lane, Overdue, carry_out, concealable
 from rig.report.page import html

@@ -28,8 +28,8 @@ from rig.blind.beside import (
 )
 from rig.blind.collecting import Collected, Known
 from rig.blind.command import prove_command
-from rig.blind.metrics import tables
 from rig.blind.report.page import proof_page
+from rig.blind.scoring.tables import tables
 from rig.blind.store import ProofError
 from rig.report.page import html
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from rig.blind.beside import AtStrength, Beside, Found, Method, Peers, RealCase, RealRecordings
-from rig.blind.rates import Rate
 from rig.blind.report import figures
 from rig.blind.report.figures import Row
+from rig.blind.scoring.rates import Rate
 from rig.report.page import Picture, Remark, Section, Sentences, Table, columns
 
 

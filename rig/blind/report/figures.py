@@ -12,7 +12,7 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 from scipy.stats import norm
 
 from identification.recording import Floats
-from rig.blind.rates import Rate
+from rig.blind.scoring.rates import Rate
 from rig.report.style import DATA, GRID, INK, MODEL, MUTED, NARROW, OTHER, THIRD, Plot, labels, legend_above
 
 ROW = 0.27

@@ -9,13 +9,14 @@ from typing import Any
 from rig.blind.beside import Beside
 from rig.blind.collecting import Collected
 from rig.blind.design import STRENGTHS
-from rig.blind.metrics import besides, by_label, cell, confusion, counts, goals, instead
-from rig.blind.rates import Goal, rate
 from rig.blind.report import figures
 from rig.blind.report.beside import peers_section, real_section
 from rig.blind.report.figures import Row
 from rig.blind.report.sections import SIGNS, alarms_section, models_section, open_section, power_section
-from rig.blind.scoring import AS_RIVAL, Score
+from rig.blind.scoring.metrics import besides, by_label, cell, goals
+from rig.blind.scoring.rates import Goal, rate
+from rig.blind.scoring.score import AS_RIVAL, Score
+from rig.blind.scoring.tables import confusion, counts, instead
 from rig.report.page import Page, Picture, Remark, Section, Sentences, Table
 
 UNNAMED = (AS_RIVAL, "unexplained", "adequate", "failed")
@@ -26,7 +27,7 @@ MOST_SAID = 4
 
 
 def proof_page(found: Collected, tables: dict[str, Any], beside: Sequence[Beside] = ()) -> Page:
-    """`tables`: of rig.blind.metrics.tables; `beside`: what others find."""
+    """`tables`: of rig.blind.scoring.tables; `beside`: what others find."""
     scores, told = found.scores, goals(found.scores)
     parts = [
         _goals(told, besides(scores)),

@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from rig.blind.design import LADDER, ORACLE, WITHIN
-from rig.blind.metrics import by_label, counts, instead, named_by_strength, ratios
-from rig.blind.rates import Rate, rate
 from rig.blind.report import figures
 from rig.blind.report.figures import Row
-from rig.blind.scoring import LOCATED, TELLABLE, Score
+from rig.blind.scoring.metrics import by_label, named_by_strength, ratios
+from rig.blind.scoring.rates import Rate, rate
+from rig.blind.scoring.score import LOCATED, TELLABLE, Score
+from rig.blind.scoring.tables import counts, instead
 from rig.report.page import Picture, Section, Table
 
 SIGNS = {"yes": "✓ met", "reached": "✓ reached", "open": "? open", "no": "✗ missed"}

@@ -21,8 +21,8 @@ import numpy as np
 
 from identification.recording import Floats
 from rig.blind.design import Order
-from rig.blind.places import PLACES, UPSTREAM
-from rig.blind.same_parameters import true_values
+from rig.blind.scoring.places import PLACES, UPSTREAM
+from rig.blind.scoring.same_parameters import true_values
 
 Table = Mapping[str, Any]
 
