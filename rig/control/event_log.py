@@ -23,7 +23,7 @@ class Said(NamedTuple):
     text: str
 
 
-class Chronicle:
+class EventLog:
     """One campaign's. Times on the lines for people are s since the controller began, in the recording since its t0."""
 
     def __init__(self, status: Status, recorder: RecorderLink, log: LineWriter, begun_ns: int) -> None:

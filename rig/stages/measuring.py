@@ -33,7 +33,7 @@ def measure(session: Session) -> None:
     begin_watch(session, thruster, t0_ns)  # before the first row is recorded
     status.files.append(str(path))
     session.wait_for_recorder(lambda: session.recorder.ready, f"open {path}")
-    session.chronicle.begin(t0_ns)
+    session.event_log.begin(t0_ns)
     if attempt > 1:
         session.say("info", f"attempt {attempt} of {thruster}: the run is repeated from its first tare")
     session.ledger.write("run_start", thruster=thruster, recording=str(path), recording_t0_ns=t0_ns, attempt=attempt)
@@ -79,7 +79,7 @@ def _take(session: Session, output: Output, t0_ns: int, begun: float) -> None:
         session.measured.add((row.index, row.phase))
         session.ledger.write("step", thruster=status.thruster, index=row.index, phase=row.phase, t_end=end)
     for line in output.events:
-        session.chronicle.say(round((begun + line.time) * 1e9), line.level, line.text)
+        session.event_log.say(round((begun + line.time) * 1e9), line.level, line.text)
 
 
 def _close(session: Session, output: Output) -> None:
@@ -88,7 +88,7 @@ def _close(session: Session, output: Output) -> None:
     _last_words(session)
     end_watch(session)
     outcome, cause = judged(session, output)
-    session.chronicle.end()
+    session.event_log.end()
     recorder.close_file(outcome, cause)
     loop.end_recording()
     loop.guarded = False

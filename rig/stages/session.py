@@ -11,7 +11,7 @@ from typing import Literal
 from drivers.protocols import MotorController
 from rig.campaign.bench import Bench
 from rig.campaign.config import CampaignConfig
-from rig.control.event_log import Chronicle, Level
+from rig.control.event_log import EventLog, Level
 from rig.control.loop import IDLE, Clock, Decision, Inputs, Loop
 from rig.control.readings import Readings
 from rig.control.status import Status
@@ -51,7 +51,7 @@ class Session:
     recorder: RecorderLink
     ledger: Ledger
     log: LineWriter
-    chronicle: Chronicle
+    event_log: EventLog
     loop: Loop
     before: tuple[Fact, ...] = ()
     """Facts of an earlier part of this campaign, which is resumed."""
@@ -64,7 +64,7 @@ class Session:
     """(index, phase) of the steps of this run that were run to their end."""
 
     def say(self, level: Level, text: str, *, of_bench: bool = False) -> None:
-        self.chronicle.say(self.loop.clock.now_ns(), level, text, of_bench=of_bench)
+        self.event_log.say(self.loop.clock.now_ns(), level, text, of_bench=of_bench)
 
     def turn(self) -> tuple[Request, ...]:
         """One tick at zero volts; a stop request or a trip ends the campaign."""
@@ -188,7 +188,7 @@ def begin(
     readings = Readings({stream.name: stream for _, stream in bench.streams()}, campaign.bench.limits)
     begun_ns = clock.now_ns()
     status.begun = begun_ns * 1e-9
-    chronicle = Chronicle(status, recorder, log, begun_ns)
+    event_log = EventLog(status, recorder, log, begun_ns)
 
     def publish(now: float) -> None:
         since = loop.recording_since_ns
@@ -197,4 +197,4 @@ def begin(
             clients.publish(status.snapshot(now, time, loop.command, readings.view(now)))
 
     loop = Loop(bench, readings, recorder, ledger, clients, clock, campaign.unattended, publish, watch)
-    return Session(campaign, folder, status, bench, recorder, ledger, log, chronicle, loop, before)
+    return Session(campaign, folder, status, bench, recorder, ledger, log, event_log, loop, before)

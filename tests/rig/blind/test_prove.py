@@ -12,9 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from blind_scores import CATALOGUE, WORLD, answer, finding, order, truth, whole_proof
 from click.testing import CliRunner
-from report_reading import open_fonts
 
 from identification.mismatch.compare.simulation import Prediction
 from rig.blind import answering, score_file
@@ -34,6 +32,8 @@ from rig.blind.workers import STOPPING, BrokenOff, Child, Ended, Lane, Overdue, 
 from rig.report.page import html
 from sim_devices.concealed.sealing import conceal
 from sim_devices.tables import WorldError
+from tests.rig.blind_scores import CATALOGUE, WORLD, answer, finding, order, truth, whole_proof
+from tests.rig.report_reading import open_fonts
 
 
 @pytest.fixture(autouse=True, scope="module")

@@ -2,12 +2,12 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
-from report_reading import open_fonts, read
 
 from identification.velocity.velocity import Window, derivative
 from rig.report.page import html
 from rig.report.style import svg
 from rig.vehicle.report.velocity import draw_velocity, velocity_example, velocity_page
+from tests.rig.report_reading import open_fonts, read
 
 
 @pytest.fixture(scope="module", autouse=True)

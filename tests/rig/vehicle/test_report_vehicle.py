@@ -3,7 +3,6 @@ from math import cos, radians
 
 import numpy as np
 import pytest
-from report_reading import open_fonts, read
 
 from identification.estimation.maximum_likelihood import Gaussian, independent
 from identification.recording import Channel, Recording, Step
@@ -16,6 +15,7 @@ from rig.vehicle.answer import HeldOut, VehicleAnswer
 from rig.vehicle.report.page import vehicle_page
 from sim_devices.vehicle import romeo, run_trials
 from sim_devices.vehicle.campaign import sines, yaw_steady
+from tests.rig.report_reading import open_fonts, read
 
 
 @pytest.fixture(scope="module", autouse=True)

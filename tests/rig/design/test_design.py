@@ -24,8 +24,8 @@ from rig.design.text import budget, design_json, design_text, lack_of_fit_dof, t
 from rig.errors import PlanError, RecordingError
 from rig.operate.check import check_campaign
 
-RIGHT = Path(__file__).parent / "wrong" / "right.toml"
-BENCH = Path(__file__).parent / "wrong" / "right_bench.toml"
+RIGHT = Path(__file__).parents[1] / "wrong" / "right.toml"
+BENCH = Path(__file__).parents[1] / "wrong" / "right_bench.toml"
 COURSE = Course(12.0, 4, 1.0, 3.0, 0.8)
 GRID = np.linspace(-20.0, 20.0, 21)
 ASK = Ask(Terms(0.4), Noise(0.05, 0.001), GRID, 180.0, COURSE, slow=Slow(0.05), tries=100)

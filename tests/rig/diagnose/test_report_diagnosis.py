@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from report_reading import open_fonts, read
 
 from identification.flexible_terms.flexible import MULTIPLIERS, WORDS
 from identification.mismatch.answer.remainder import FlexibleShape, Spline
@@ -31,6 +30,7 @@ from rig.diagnose.report.page import diagnosis_page, write
 from rig.diagnose.text import diagnosis_text
 from rig.report.page import html
 from rig.report.style import svg
+from tests.rig.report_reading import open_fonts, read
 
 LEVELS = np.array([0.0, 8.0, -8.0, 2.0, 16.0, -16.0, -2.0, 0.0])
 HOLD, RATE = 5.0, 20.0

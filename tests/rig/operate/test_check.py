@@ -12,7 +12,7 @@ from rig.cli import main
 from rig.errors import RigError
 from rig.operate.check import check_campaign, check_command, print_report
 
-WRONG = Path(__file__).parent / "wrong"
+WRONG = Path(__file__).parents[1] / "wrong"
 EXAMPLES = [p for p in sorted(WRONG.glob("*.toml")) if not p.stem.endswith("_bench") and p.stem != "right"]
 
 

@@ -11,7 +11,7 @@ from rig.campaign.plan_file import Level, template_of, write_campaign, write_sin
 from rig.errors import ConfigError, PlanError
 from rig.operate.check import check_campaign
 
-RIGHT = Path(__file__).parent / "wrong" / "right.toml"
+RIGHT = Path(__file__).parents[1] / "wrong" / "right.toml"
 
 
 @dataclass

@@ -11,7 +11,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from report_reading import open_fonts
 
 from rig.cli import rig
 from rig.diagnose.text import diagnosis_text
@@ -20,9 +19,10 @@ from rig.hdf5 import load
 from rig.twin.reading import read_twin
 from rig.twin.simulate import Asked, simulated, timed
 from rig.twin.writing import twin_json, write_twin
+from tests.rig.report_reading import open_fonts
 
-ROOT = Path(__file__).parents[2]
-RIGHT = Path(__file__).parent / "wrong" / "right.toml"
+ROOT = Path(__file__).parents[3]
+RIGHT = Path(__file__).parents[1] / "wrong" / "right.toml"
 
 
 def example(name: str):

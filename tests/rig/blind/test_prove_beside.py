@@ -7,9 +7,7 @@ from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
-from blind_scores import whole_proof
 from click.testing import CliRunner
-from report_reading import open_fonts
 
 from identification.mismatch.diagnosis import Diagnosis, Finding, HeldOutRmse, RivalFinding, Rmse
 from rig.blind.beside import (
@@ -32,8 +30,10 @@ from rig.blind.report.page import proof_page
 from rig.blind.scoring.tables import tables
 from rig.blind.store import ProofError
 from rig.report.page import html
+from tests.rig.blind_scores import whole_proof
+from tests.rig.report_reading import open_fonts
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 METHODS = (
     Method(
         "rig diagnose",

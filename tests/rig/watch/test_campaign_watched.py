@@ -32,7 +32,7 @@ from tests.rig.virtual_bench import PLAN, VirtualBench, starter, virtual
 
 LEVELS = (6.0, -6.0, 9.0, -9.0) * 6
 WATCHED = Plan(Levels(LEVELS), FixedDwell(1.2, 0.2), slew=24.0, rest=0.3, tare=PLAN.tare, zero_every=4)
-PROJECT = Path(__file__).parents[2]
+PROJECT = Path(__file__).parents[3]
 
 
 @contextmanager

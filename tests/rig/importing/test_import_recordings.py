@@ -9,7 +9,7 @@ from rig.hdf5 import load
 from rig.importing.command import import_file
 from rig.importing.mapping import read_map
 
-REAL = Path(__file__).parents[2].parent / "shared" / "recordings"
+REAL = Path(__file__).parents[3].parent / "shared" / "recordings"
 LAYOUTS = {
     "rov_thruster_tank/Tach_RPM_Thrust_Data.csv": "tank_static_levels",
     "rov_thruster_tank/Fwd_Rvrs_Set*.csv": "tank_six_axis",

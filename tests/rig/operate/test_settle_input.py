@@ -17,8 +17,8 @@ from rig.operate.flow_setting import by_command
 from rig.operate.sequential_experiment import SequentialExperiment, bench_alone, fixed_cost
 from rig.operate.settle import _leave
 
-RIGHT = Path(__file__).parent / "wrong" / "right.toml"
-BENCH = Path(__file__).parents[2] / "benches" / "simulated" / "bench.toml"
+RIGHT = Path(__file__).parents[1] / "wrong" / "right.toml"
+BENCH = Path(__file__).parents[3] / "benches" / "simulated" / "bench.toml"
 
 
 @pytest.fixture

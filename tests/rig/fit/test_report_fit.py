@@ -4,7 +4,6 @@ import json
 import numpy as np
 import pytest
 from click.testing import CliRunner
-from report_reading import open_fonts, read
 from test_fit import write
 
 from identification.recording import Channel, Recording, Step
@@ -17,6 +16,7 @@ from rig.report.normal_plot import normal_order
 from rig.report.page import html
 from rig.report.provenance import Source, sha256
 from rig.report.style import svg
+from tests.rig.report_reading import open_fonts, read
 
 LEVELS = (0.0, 5.0, -5.0, 10.0, -10.0, 15.0, -15.0, 0.0)
 NAME = "T<1> & 'co'"

@@ -12,8 +12,8 @@ from rig.campaign.plan import FixedDwell, SteadyDwell
 from rig.campaign.shapes import Interleaved, Ramp
 from rig.errors import ConfigError
 
-ROOT = Path(__file__).parents[2]
-WRONG = Path(__file__).parent / "wrong"
+ROOT = Path(__file__).parents[3]
+WRONG = Path(__file__).parents[1] / "wrong"
 
 
 def test_simulated_bench():

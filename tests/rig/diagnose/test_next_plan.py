@@ -17,7 +17,7 @@ from rig.diagnose.outputs import Wanted
 from rig.errors import ConfigError, PlanError
 from rig.operate.check import check_campaign
 
-RIGHT = Path(__file__).parent / "wrong" / "right.toml"
+RIGHT = Path(__file__).parents[1] / "wrong" / "right.toml"
 STEPS = (PlanStep(0.0, 3.0), PlanStep(15.0, 1.0), PlanStep(-15.0, 4.0), PlanStep(0.0, 3.0))
 NEXT = NextExperiment("separates exponent from linear_term", STEPS, 0.96)
 FOUND = Diagnosis(

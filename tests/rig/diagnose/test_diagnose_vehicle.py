@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from click.testing import CliRunner, Result
-from report_reading import open_fonts
 
 from identification.recording import Recording
 from rig.cli import rig
 from rig.diagnose.vehicle import VehicleFiles, setup_of
 from rig.importing.command import import_plain
+from tests.rig.report_reading import open_fonts
 
 INSTALLATION = """
 [vehicle]
@@ -99,7 +99,7 @@ def test_text_json_and_page_of_a_vehicle(folder: Path) -> None:
     assert "Motion and residual" in page
 
 
-RIGHT = str(Path(__file__).parent / "wrong" / "right.toml")
+RIGHT = str(Path(__file__).parents[1] / "wrong" / "right.toml")
 BAD = {
     "mass": (("one.h5", "--mass", "-3"), "--mass -3: expected a number of kg above 0"),
     "std alone": (("one.h5", "--mass-std", "1"), "--mass-std needs --mass"),

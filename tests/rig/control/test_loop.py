@@ -17,7 +17,7 @@ from rig.link.front_end_messages import Request
 from rig.link.recorder_messages import Rows
 from tests.rig.virtual_bench import virtual
 
-RESULTS = Path(__file__).parents[2] / "build"
+RESULTS = Path(__file__).parents[3] / "build"
 
 
 @contextmanager

@@ -1,6 +1,5 @@
 import numpy as np
 import pytest
-from report_reading import open_fonts, read
 
 from rig.report.mismatch_figures import Grid, Panel, Region, before_after, grid_of, residual_map, signature, spectrum
 from rig.report.page import Page, Picture, Remark, Section, Sentences, Table, html, write
@@ -8,6 +7,7 @@ from rig.report.regression_figures import Curve, Group, Interval, NormalOrder, f
 from rig.report.regression_figures import singular_values as lollipops
 from rig.report.style import PALETTE, Plot, drawable, labels, standalone, svg
 from rig.vehicle.report.figures import Simulated, drag_curve, inertia_line, simulated_trial
+from tests.rig.report_reading import open_fonts, read
 
 NASTY = "T1 <script>alert('x')</script> & \"$x$\" _y"
 X = np.linspace(-2.0, 2.0, 9)

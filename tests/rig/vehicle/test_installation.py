@@ -4,11 +4,11 @@ import json
 
 import numpy as np
 import pytest
-from vehicle_files import LAY_OUT, fit_of, write
 
 from rig.errors import ConfigError
 from rig.vehicle.installation import load_installation
 from rig.vehicle.thrusters import installed, read_fits
+from tests.rig.vehicle_files import LAY_OUT, fit_of, write
 
 BARE = "[thrusters]\nT1 = { surge = 1.0 }\nT2 = { surge = 1.0 }\n"
 

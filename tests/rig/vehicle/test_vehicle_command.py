@@ -5,9 +5,9 @@ import json
 
 import pytest
 from click.testing import CliRunner
-from vehicle_files import LAY_OUT, documents, fit_of, write
 
 from rig.vehicle.command import vehicle_command
+from tests.rig.vehicle_files import LAY_OUT, documents, fit_of, write
 
 ETA = {"eta_hull": 0.7, "eta_pair": 0.85}
 
