@@ -18,13 +18,13 @@ from identification.experiment_design.thrust_design import Noise, Terms
 from identification.recording import Channel, Recording
 from identification.recording import Step as Row
 from identification.thruster.thrust import ThrustFit, fit_thrust
-from rig.design import plan_of
-from rig.design_levels import Ask
-from rig.design_plain import LEVELS, filling, judge
-from rig.design_plan import choose
-from rig.plan import Plan, TareConfig
-from rig.plan_file import Template
-from rig.shapes import Interleaved, Staircase
+from rig.campaign.plan import Plan, TareConfig
+from rig.campaign.plan_file import Template
+from rig.campaign.shapes import Interleaved, Staircase
+from rig.design.baselines import LEVELS, filling, judge
+from rig.design.command import plan_of
+from rig.design.optimal_levels import Ask
+from rig.design.plan import choose
 from sim_devices.world.headless import run
 from sim_devices.world.settings import WorldSettings, read_world
 

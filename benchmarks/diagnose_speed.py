@@ -107,7 +107,7 @@ def table(folder: Path, seeds: int) -> None:
 
 def profile(folder: Path) -> None:
     """Functions by their own time and with what they call, of one recording with two effects; then the imports."""
-    from rig.diagnose import diagnose_files
+    from rig.diagnose.command import diagnose_files
 
     path = folder / "profiled.h5"
     write_case(path, KINDS["two effects"][0], 0)
@@ -116,7 +116,13 @@ def profile(folder: Path) -> None:
     for order in ("tottime", "cumulative"):
         pstats.Stats(run).strip_dirs().sort_stats(order).print_stats(25)
     imports = subprocess.run(
-        [sys.executable, "-X", "importtime", "-c", "import rig.cli, rig.diagnose, identification.mismatch.pipeline"],
+        [
+            sys.executable,
+            "-X",
+            "importtime",
+            "-c",
+            "import rig.cli, rig.diagnose.command, identification.mismatch.pipeline",
+        ],
         capture_output=True,
         text=True,
         check=True,

@@ -20,7 +20,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from rig.hdf5 import load
-from rig.runs import Run
+from rig.link.live_runs import Run
 from tests.reliability.live import attach, live_bench
 
 FIGURES = re.compile(r"worst lateness ([\d.]+) ms, p99 ([\d.]+) ms, p50 ([\d.]+) ms of (\d+) ticks")

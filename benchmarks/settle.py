@@ -17,7 +17,7 @@ from time import process_time
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from identification.mismatch.next_experiment.sequential_experiment import Course, End, round_line
-from rig.diagnose_text import diagnosis_text
+from rig.diagnose.text import diagnosis_text
 from tests.concealed.ambiguous import Bench, drawn
 
 

@@ -26,7 +26,7 @@ import numpy as np
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import Refusal
-from rig.diagnose_text import diagnosis_text
+from rig.diagnose.text import diagnosis_text
 from sim_devices import concealed
 from sim_devices.world.effects.uncatalogued import UNCATALOGUED
 from tests.concealed.recordings import recordings

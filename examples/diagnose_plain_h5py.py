@@ -15,8 +15,8 @@ import h5py
 import numpy as np
 
 from identification.mismatch.diagnosis import Diagnosis
-from rig.diagnose import diagnose_files
-from rig.diagnose_text import diagnosis_text
+from rig.diagnose.command import diagnose_files
+from rig.diagnose.text import diagnosis_text
 
 
 def write(path: Path, start: np.ndarray, level: np.ndarray, time: np.ndarray, thrust: np.ndarray) -> None:

@@ -3,7 +3,7 @@
     python examples/real_diagnosis.py [FOLDER] [--whole] [--only NAME] [--reports FOLDER] [--json FILE]
 
 FOLDER holds the recordings in the folders of CASES; default: `../shared/recordings` beside the project. They are not
-part of the project: `origin` in `rig/maps/*.toml` says who published them. What
+part of the project: `origin` in `rig/importing/maps/*.toml` says who published them. What
 is done here is `rig import` and then `rig diagnose FILES [--holdout FILE...]`. Printed are verdict, statement and the
 error of what was not fitted: other runs where there are several, otherwise blocks of time (levels of a table).
 `--whole` prints all that `rig diagnose` says; `--json` writes what `rig prove --beside` shows.
@@ -23,11 +23,11 @@ from identification.mismatch.diagnosis import Diagnosis
 from rig.blind import beside
 from rig.blind.beside import RealRecordings, real_case, unanswered
 from rig.blind.store import version_of_diagnosis
-from rig.diagnose import diagnose_files
-from rig.diagnose_text import diagnosis_text
-from rig.importer import import_file
+from rig.diagnose.command import diagnose_files
+from rig.diagnose.report.page import write
+from rig.diagnose.text import diagnosis_text
+from rig.importing.command import import_file
 from rig.importing.mapping import read_map
-from rig.report.diagnosis import write
 
 HERE = Path(__file__).resolve().parents[2] / "shared" / "recordings"
 

@@ -3,7 +3,7 @@
     python examples/real_recordings.py [FOLDER]
 
 FOLDER holds the recordings in the folders of SOURCES; default: `../shared/recordings` beside the project. They are not
-part of the project: `origin` in `rig/maps/*.toml` says who published them.
+part of the project: `origin` in `rig/importing/maps/*.toml` says who published them.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ from identification.steady_state.points import voltage_channel
 from identification.thruster.thrust_data import voltage_at
 from identification.thruster.thrust_forms import Model
 from rig.errors import RecordingError
-from rig.fit import answer_text, fit_recordings
+from rig.fit.command import answer_text, fit_recordings
 from rig.hdf5 import load
-from rig.importer import import_file
+from rig.importing.command import import_file
 from rig.importing.mapping import read_map
 
 HERE = Path(__file__).resolve().parents[1].parent / "shared" / "recordings"

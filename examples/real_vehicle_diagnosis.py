@@ -3,7 +3,7 @@
     python examples/real_vehicle_diagnosis.py [FOLDER] [--whole] [--json FILE]
 
 FOLDER holds the recordings in `usv_lake` and `rov_depth`; default: `../shared/recordings` beside the project. They are
-not part of the project: `origin` in `rig/maps/*.toml` says who published them. What
+not part of the project: `origin` in `rig/importing/maps/*.toml` says who published them. What
 is done here is `rig import` and then `rig diagnose FILES --installation examples/usv_lake.toml`. Printed are verdict,
 statement and the error of runs that were not fitted; `--whole` prints all that `rig diagnose` says; `--json` writes
 what `rig prove --beside` shows.
@@ -21,10 +21,10 @@ from identification.mismatch.diagnosis import Diagnosis
 from rig.blind import beside
 from rig.blind.beside import RealRecordings, real_case, unanswered
 from rig.blind.store import version_of_diagnosis
-from rig.diagnose import diagnose_files
-from rig.diagnose_text import diagnosis_text
-from rig.diagnose_vehicle import VehicleFiles
-from rig.importer import import_file
+from rig.diagnose.command import diagnose_files
+from rig.diagnose.text import diagnosis_text
+from rig.diagnose.vehicle import VehicleFiles
+from rig.importing.command import import_file
 from rig.importing.mapping import read_map
 
 EXAMPLES = Path(__file__).resolve().parent

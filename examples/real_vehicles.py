@@ -3,7 +3,7 @@
     python examples/real_vehicles.py [FOLDER]
 
 FOLDER holds the recordings in `usv_lake` and `rov_depth`; default: `../shared/recordings` beside the project. They are
-not part of the project: `origin` in `rig/maps/*.toml` says who published them. What
+not part of the project: `origin` in `rig/importing/maps/*.toml` says who published them. What
 is done here file by file is `rig import` and then `rig vehicle --installation examples/usv_lake.toml`.
 """
 
@@ -18,10 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from identification.vehicle.replay import Replay
-from rig.importer import import_file
+from rig.importing.command import import_file
 from rig.importing.mapping import read_map
-from rig.vehicle import VehicleAnswer, identify_files
-from rig.vehicle_text import answer_text
+from rig.vehicle.answer import VehicleAnswer, identify_files
+from rig.vehicle.text import answer_text
 
 EXAMPLES = Path(__file__).resolve().parent
 HERE = EXAMPLES.parents[1] / "shared" / "recordings"

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from rig.report.page import write
-from rig.report.velocity import velocity_example, velocity_page
+from rig.vehicle.report.velocity import velocity_example, velocity_page
 
 HERE = Path(__file__).resolve().parents[1] / "recordings" / "thesis"
 SEED = 4

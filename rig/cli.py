@@ -24,25 +24,31 @@ class Entry(NamedTuple):
 
 
 COMMANDS: Final = {
-    "check": Entry("rig.check:check_command", "Check a campaign and its bench without opening a port."),
-    "run": Entry("rig.run:run_command", "Run a campaign on its bench: console, recording, table of the fits."),
+    "check": Entry("rig.operate.check:check_command", "Check a campaign and its bench without opening a port."),
+    "run": Entry("rig.operate.run:run_command", "Run a campaign on its bench: console, recording, table of the fits."),
     "resume": Entry(
-        "rig.resume:resume_command", "Go on with a campaign that was cut, at its first unfinished thruster."
+        "rig.operate.resume:resume_command", "Go on with a campaign that was cut, at its first unfinished thruster."
     ),
-    "console": Entry("rig.run:console_command", "Attach to a run that is going on."),
-    "stop": Entry("rig.run:stop_command", "Stop a run that is going on: zero volts now, close the recording."),
-    "design": Entry("rig.design:design_command", "Best levels, order and dwells for the time in the tunnel."),
-    "fit": Entry("rig.fit:fit_command", "Fit tau = C V|V| to recordings."),
-    "diagnose": Entry("rig.diagnose:diagnose_command", "Find, name and model the physics that C V|V| leaves out."),
-    "settle": Entry("rig.settle:settle_command", "Run the next experiment and diagnose again until one answer stands."),
-    "simulate": Entry("rig.simulate:simulate_command", "The run of a plan that a twin predicts, as a recording."),
-    "compare": Entry("rig.compare:compare_command", "What a simulation leaves out relative to the real run."),
-    "prove": Entry("rig.prove:prove_command", "Prove the diagnosis on recordings with concealed physics."),
+    "console": Entry("rig.operate.run:console_command", "Attach to a run that is going on."),
+    "stop": Entry("rig.operate.run:stop_command", "Stop a run that is going on: zero volts now, close the recording."),
+    "design": Entry("rig.design.command:design_command", "Best levels, order and dwells for the time in the tunnel."),
+    "fit": Entry("rig.fit.command:fit_command", "Fit tau = C V|V| to recordings."),
+    "diagnose": Entry(
+        "rig.diagnose.command:diagnose_command", "Find, name and model the physics that C V|V| leaves out."
+    ),
+    "settle": Entry(
+        "rig.operate.settle:settle_command", "Run the next experiment and diagnose again until one answer stands."
+    ),
+    "simulate": Entry("rig.twin.simulate:simulate_command", "The run of a plan that a twin predicts, as a recording."),
+    "compare": Entry("rig.diagnose.compare:compare_command", "What a simulation leaves out relative to the real run."),
+    "prove": Entry("rig.blind.command:prove_command", "Prove the diagnosis on recordings with concealed physics."),
     "vehicle": Entry(
-        "rig.vehicle:vehicle_command", "Identify drag, efficiency and inertia of a vehicle from its trials."
+        "rig.vehicle.command:vehicle_command", "Identify drag, efficiency and inertia of a vehicle from its trials."
     ),
-    "import": Entry("rig.importer:import_command", "Make a recording of another program's table or log."),
-    "recover": Entry("rig.recover:recover_command", "Copy a recording that was not closed in order into a plain file."),
+    "import": Entry("rig.importing.command:import_command", "Make a recording of another program's table or log."),
+    "recover": Entry(
+        "rig.recording.recover:recover_command", "Copy a recording that was not closed in order into a plain file."
+    ),
 }
 
 

@@ -14,16 +14,16 @@ import pytest
 from textual.binding import Binding
 
 from drivers import KINDS
-from rig.check import check_campaign
+from rig.campaign.config import BenchConfig, CampaignConfig, CanBusConfig, LimitConfig, MountConfig, WatchConfig
+from rig.campaign.loading import BENCH_ELSEWHERE, CAMPAIGN_ELSEWHERE, DWELLS, PLAN_ELSEWHERE
+from rig.campaign.plan import Plan, TareConfig
+from rig.campaign.shapes import SHAPES
 from rig.cli import main
-from rig.config import BenchConfig, CampaignConfig, CanBusConfig, LimitConfig, MountConfig, WatchConfig
 from rig.console.app import STOP_KEYS, ConsoleApp
 from rig.console.dialogs import LeaveDialog, NoteDialog
-from rig.console.tables import STATE_STYLES
-from rig.console.wording import STATE_WORDS
-from rig.loading import BENCH_ELSEWHERE, CAMPAIGN_ELSEWHERE, DWELLS, PLAN_ELSEWHERE
-from rig.plan import Plan, TareConfig
-from rig.shapes import SHAPES
+from rig.console.view_model.tables import STATE_STYLES
+from rig.console.view_model.wording import STATE_WORDS
+from rig.operate.check import check_campaign
 from sim_devices import __main__ as simulator
 from sim_devices import control, keller, mt_sics, nortek, vesc
 from sim_devices.settings import KEYS, CanBus, ScriptedFault, load
@@ -233,7 +233,7 @@ def test_the_examples_of_the_world_file_load(tmp_path: Path) -> None:
 def test_every_key_of_the_json() -> None:
     """The keys of all dictionaries that the modules write which make the JSON."""
     seen = words(text("json"))
-    for module in ("fit_json", "one_pass_text", "vehicle_text", "design_text", "design_inertia"):
+    for module in ("fit/as_json", "fit/one_pass_text", "vehicle/text", "design/text", "design/inertia"):
         tree = ast.parse((ROOT / "rig" / f"{module}.py").read_text(encoding="utf-8"))
         made = {
             key.value

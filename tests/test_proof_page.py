@@ -9,10 +9,11 @@ from pathlib import Path
 import pytest
 
 from rig.blind.design import ORACLE, STRENGTHS
-from rig.blind.elsewhere import read
-from rig.blind.figures import besides, confusion, goals, half_named, named_by_strength, open_world
-from rig.blind.rates import Goal
-from rig.blind.scoring import Score
+from rig.blind.score_file import read
+from rig.blind.scoring.metrics import besides, goals, half_named, named_by_strength
+from rig.blind.scoring.rates import Goal
+from rig.blind.scoring.score import Score
+from rig.blind.scoring.tables import confusion, open_world
 
 ROOT = Path(__file__).parents[1]
 WORDS = {"yes": "met", "reached": "reached", "open": "open", "no": "missed"}

@@ -29,7 +29,7 @@ THERMAL_TIME = 60.0
 
 @dataclass(frozen=True, slots=True)
 class Course:
-    """How a run goes beside its holds; see rig.plan.Plan. `slew` V/s, the others s."""
+    """How a run goes beside its holds; see rig.campaign.plan.Plan. `slew` V/s, the others s."""
 
     slew: float
     zero_every: int

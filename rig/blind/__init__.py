@@ -6,7 +6,6 @@ refuses to open anything else of the store; the process that keeps the score joi
 
     design     what is asked: cells, jobs, orders, in an interleaved order (pure)
     store      the folder of the proof
-    lanes      pairs of processes, a time limit for each answer
-    scoring    one answer beside its truth (pure); places, meaning: what counts as right there
-    figures    rates with intervals beside the goals (pure)
+    workers    pairs of processes, a time limit for each answer
+    scoring    one answer beside its truth, rates with intervals beside the goals (pure)
 """

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from rig.blind.design import LADDER, Job
-from rig.blind.scoring import Score, scored
+from rig.blind.scoring.score import Score, scored
 from rig.blind.store import Store
 
 

@@ -15,13 +15,13 @@ from textual.widgets import ContentSwitcher
 
 from rig.console.dialogs import LeaveDialog, Leaving, NoteDialog
 from rig.console.feed import Feed
-from rig.console.keys import key_line, page_of
 from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
 from rig.console.parting import Parting, begin, refused, settled
 from rig.console.plots import FitPlot, ResidualPlot, TimePlot
-from rig.console.view import View, absorb
+from rig.console.view_model.keys import key_line, page_of
+from rig.console.view_model.view import View, absorb
 from rig.errors import LinkError
-from rig.messages import Request, RequestKind
+from rig.link.front_end_messages import Request, RequestKind
 
 REDRAW: Final = 0.1
 """s between looks at the text: as often as snapshots come."""

@@ -11,8 +11,8 @@ from textual.screen import ModalScreen
 from textual.widgets import Button, Input, Static
 
 from rig.console.panels import Head
-from rig.console.view import View
-from rig.messages import Snapshot
+from rig.console.view_model.view import View
+from rig.link.front_end_messages import Snapshot
 
 Leaving = Literal["detach", "stop"]
 

@@ -7,8 +7,8 @@ from collections import deque
 from typing import Protocol
 
 from rig.errors import LinkError
-from rig.link import Peer
-from rig.messages import Request, Snapshot
+from rig.link.front_end_messages import Request, Snapshot
+from rig.link.sockets import Peer
 
 
 class Feed(Protocol):

@@ -12,11 +12,11 @@ from textual.containers import Horizontal, Vertical
 from textual.events import Resize
 from textual.widgets import RichLog, Static
 
-from rig.console import wording
-from rig.console.alarms import alarm
-from rig.console.tables import checks_table, readings_text, results_table, verdict_summary
-from rig.console.view import View
-from rig.messages import LogLine, Snapshot
+from rig.console.view_model import wording
+from rig.console.view_model.alarms import alarm
+from rig.console.view_model.tables import checks_table, readings_text, results_table, verdict_summary
+from rig.console.view_model.view import View
+from rig.link.front_end_messages import LogLine, Snapshot
 
 LOG_STYLES = {"info": "", "warning": "#f0c040", "trip": "bold #ff6070", "error": "bold #ff6070"}
 LOG_WORDS = {"info": "     ", "warning": "WARN ", "trip": "TRIP ", "error": "ERROR"}

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Final
 
 from rig.console.dialogs import Leaving
-from rig.console.view import View
-from rig.messages import LogLine
+from rig.console.view_model.view import View
+from rig.link.front_end_messages import LogLine
 
 SILENCE: Final = 0.5
 """s without a refusal after which a detach is taken as accepted: five snapshots."""

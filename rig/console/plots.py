@@ -9,10 +9,10 @@ from typing import Final
 from textual_plotext import PlotextPlot
 from textual_plotext.plot import Plot
 
-from rig.console.axes import reach, thin, ticks, to_row
-from rig.console.fit import RunningFit, in_words, running_fit, usable, v_abs_v
-from rig.console.view import TraceRow, View
-from rig.messages import Point
+from rig.console.view_model.axes import reach, thin, ticks, to_row
+from rig.console.view_model.running_fit import RunningFit, in_words, running_fit, usable, v_abs_v
+from rig.console.view_model.view import TraceRow, View
+from rig.link.front_end_messages import Point
 
 WINDOW: Final = 120.0
 """s of trace drawn: enough for a dozen holds, and short enough to see one settle."""

@@ -11,8 +11,8 @@ from types import FrameType
 
 from rig.console.app import ConsoleApp
 from rig.console.feed import Feed
-from rig.console.view import View
-from rig.messages import Snapshot
+from rig.console.view_model.view import View
+from rig.link.front_end_messages import Snapshot
 
 COMPLETED, NOT_COMPLETED = 0, 1
 LAST_WORD = 2

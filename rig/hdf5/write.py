@@ -27,7 +27,7 @@ from rig.hdf5.layout import (
     fixed,
     pieces,
 )
-from rig.recorder_messages import Attribute, ChannelSpec, EventRow, Rows, StepRow, StreamSpec
+from rig.link.recorder_messages import Attribute, ChannelSpec, EventRow, Rows, StepRow, StreamSpec
 
 SET_BY_WRITER: Final = ("format", "format_version", "complete", "outcome")
 

@@ -1,1 +1,1 @@
-"""Turning other programs' tables and logs into recordings, by a map that states every assumption."""
+"""From tables and logs of other programs to recordings, by a map that states every assumption: `rig import`."""

@@ -17,7 +17,7 @@ from rig.importing.clock import regular, wall_clock
 from rig.importing.expression import evaluate
 from rig.importing.mapping import ChannelMap, Column, ImportMap, StreamMap, Time
 from rig.importing.table import Refused, Table, header_value, read_table
-from rig.recorder_messages import ChannelSpec, StepRow, StreamSpec
+from rig.link.recorder_messages import ChannelSpec, StepRow, StreamSpec
 
 MAX_BAD_SHARE = 0.5
 """A file with more bad rows than this is of another layout than the map says."""

@@ -130,7 +130,7 @@ class ImportMap:
 
 def shipped() -> dict[str, Path]:
     """Maps that come with the program, by name."""
-    folder = Path(str(files("rig") / "maps"))
+    folder = Path(str(files("rig.importing") / "maps"))
     return {path.stem: path for path in sorted(folder.glob("*.toml"))}
 
 

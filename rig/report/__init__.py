@@ -1,1 +1,1 @@
-"""Figures and reports: reads what identification found, draws with matplotlib into files, never on a screen."""
+"""From arrays and sentences to one HTML page: its parts, its style, and the figures that several pages draw."""

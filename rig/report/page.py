@@ -21,7 +21,7 @@ from typing import Literal
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
-from rig.report.look import PALETTE, WIDE, Plot, svg
+from rig.report.style import PALETTE, WIDE, Plot, svg
 
 HERE = Path(__file__).parent
 Tone = Literal["", "good", "doubt", "bad"]

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from rig.errors import LinkError
-from rig.messages import Check, LogLine, Point, Progress, Reading, Request, RequestKind, Snapshot, State
+from rig.link.front_end_messages import Check, LogLine, Point, Progress, Reading, Request, RequestKind, Snapshot, State
 
 C = {"T1": 0.402, "T3": 0.387}
 """N/V^2"""

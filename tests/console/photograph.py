@@ -17,10 +17,10 @@ from textual.pilot import Pilot
 
 from rig.console.app import ConsoleApp
 from rig.console.feed import SocketFeed
-from rig.link import connect
-from rig.messages import Snapshot
-from rig.run import start_controller
-from rig.runs import Run
+from rig.link.front_end_messages import Snapshot
+from rig.link.live_runs import Run
+from rig.link.sockets import connect
+from rig.operate.run import start_controller
 from tests.reliability.live import PROJECT, live_bench
 
 from .scenes import settle, show

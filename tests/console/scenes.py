@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from textual.pilot import Pilot
 
 from rig.console.app import ConsoleApp
-from rig.messages import LogLine, Progress, Snapshot
+from rig.link.front_end_messages import LogLine, Progress, Snapshot
 
 from .feeds import CHECKS, LOG, ManualClock, PlayedFeed, campaign, running, snapshot
 

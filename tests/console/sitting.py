@@ -12,7 +12,7 @@ from textual.widget import Widget
 
 from rig.console.app import ConsoleApp
 from rig.console.panels import Panel
-from rig.messages import RequestKind, Snapshot
+from rig.link.front_end_messages import RequestKind, Snapshot
 
 from .feeds import ManualClock, PlayedFeed
 from .scenes import settle, show

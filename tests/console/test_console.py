@@ -8,7 +8,7 @@ import pytest
 
 from rig.console.dialogs import LeaveDialog
 from rig.console.panels import ChecksPanel, ProgressPanel, ReadingsPanel, ResultsPanel
-from rig.messages import LogLine, Request
+from rig.link.front_end_messages import LogLine, Request
 
 from .feeds import CHECKS, LOG, campaign, points, running, snapshot
 from .sitting import sitting

@@ -11,8 +11,8 @@ import pytest
 
 from rig.console.feed import SocketFeed
 from rig.errors import LinkError
-from rig.link import Peer
-from rig.messages import Request
+from rig.link.front_end_messages import Request
+from rig.link.sockets import Peer
 
 from .feeds import running, snapshot
 

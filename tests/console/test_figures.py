@@ -8,15 +8,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from rig.console import wording
-from rig.console.axes import reach, thin, ticks
 from rig.console.dialogs import what_leaving_is
-from rig.console.fit import in_words, running_fit, v_abs_v
-from rig.console.keys import key_line
 from rig.console.parting import begin, settled
 from rig.console.session import exit_status
-from rig.console.view import TRACE_KEPT, View, absorb
-from rig.messages import Reading
+from rig.console.view_model import wording
+from rig.console.view_model.axes import reach, thin, ticks
+from rig.console.view_model.keys import key_line
+from rig.console.view_model.running_fit import in_words, running_fit, v_abs_v
+from rig.console.view_model.view import TRACE_KEPT, View, absorb
+from rig.link.front_end_messages import Reading
 
 from .feeds import C, campaign, points, running, snapshot
 

@@ -16,10 +16,10 @@ import pytest
 from rich.console import Console
 
 from rig.cli import COMMANDS
-from rig.headless import Headless
-from rig.link import Peer, pair
-from rig.messages import LogLine, Progress, Request
-from rig.narration import Narration
+from rig.link.front_end_messages import LogLine, Progress, Request
+from rig.link.sockets import Peer, pair
+from rig.operate.headless import Headless
+from rig.operate.narration import Narration
 
 from .feeds import CHECKS, running, snapshot
 

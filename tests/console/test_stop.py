@@ -8,7 +8,7 @@ import pytest
 from textual.widgets import Input
 
 from rig.console.dialogs import LeaveDialog, NoteDialog
-from rig.messages import Request
+from rig.link.front_end_messages import Request
 
 from .feeds import campaign, running, snapshot
 from .scenes import settle

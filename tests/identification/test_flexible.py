@@ -24,10 +24,11 @@ from identification.recording import Channel
 from identification.run_history.history import History
 from identification.run_history.remembered import RememberedRun
 from identification.run_history.splines import spline
-from rig.diagnose_text import diagnosis_text
+from rig.diagnose.report.page import diagnosis_page
+from rig.diagnose.text import diagnosis_text
 from rig.errors import TwinError
-from rig.report.diagnosis import diagnosis_page
-from rig.twin import read_twin, twin_json, write_twin
+from rig.twin.reading import read_twin
+from rig.twin.writing import twin_json, write_twin
 
 
 def diagnosed(*runs, **how):

@@ -16,7 +16,7 @@ from identification.mismatch.select.forward_selection import available
 from identification.physics.torque_crosstalk import MeasuredTorque, TorqueCrosstalk
 from identification.recording import Channel
 from identification.run_history.remembered import RememberedRun
-from rig.report.rivals import told_apart
+from rig.diagnose.report.rivals import told_apart
 
 FULL = 3.0
 """N m at TOP; full thrust is 72 N."""

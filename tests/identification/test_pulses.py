@@ -14,7 +14,8 @@ from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.select.baseline import baseline, start
 from identification.recording import Channel
-from rig.twin import read_twin, write_twin
+from rig.twin.reading import read_twin
+from rig.twin.writing import write_twin
 from tests.identification.diagnosed_runs import run
 
 PERIOD, LENGTH, SHARE = 21.3, 3.2, 0.012

@@ -12,7 +12,8 @@ from identification.mismatch.periodic.rotor_angle import turned
 from identification.mismatch.pipeline import diagnose
 from identification.recording import Channel, Recording
 from identification.watching.known import expected_of
-from rig.twin import read_twin, twin_json, write_twin
+from rig.twin.reading import read_twin
+from rig.twin.writing import twin_json, write_twin
 
 SECONDS, HUM = 120.0, 7.3
 

@@ -17,7 +17,7 @@ from identification.mismatch.value import Value
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.heating import Heating
 from identification.recording import Channel
-from rig.diagnose_text import diagnosis_text
+from rig.diagnose.text import diagnosis_text
 
 
 def channel(quantity, unit, seconds, value, thruster=None):

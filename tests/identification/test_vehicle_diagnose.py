@@ -17,7 +17,7 @@ from identification.mismatch.vehicle.diagnose import diagnose_vehicle
 from identification.mismatch.vehicle.setup import Stated, VehicleSetup, straight_ahead
 from identification.recording import Channel, Recording
 from identification.vehicle.efficiency import Installation, Thruster
-from rig.diagnose_text import diagnosis_text
+from rig.diagnose.text import diagnosis_text
 from sim_devices.vehicle import Trial
 from tests.concealed.vehicles import DIVE, Case, case, levels_of, recordings, setup, surge_trials
 

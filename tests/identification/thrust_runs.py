@@ -86,7 +86,7 @@ def sine(C=0.4, tare=1.5, noise=white, sigma=0.3, amplitude=18.0, period=20.0, c
 
 def _need(path: Path) -> Path:
     if not path.exists():
-        pytest.skip(f"the real recordings are not here ({path.name}, see `origin` in rig/maps)")
+        pytest.skip(f"the real recordings are not here ({path.name}, see `origin` in rig/importing/maps)")
     return path
 
 

@@ -16,10 +16,10 @@ from pathlib import Path
 from typing import Any
 
 from rig.hdf5 import RecordingFile, load
-from rig.link import Peer, connect
-from rig.messages import Request, Snapshot
-from rig.run import start_controller
-from rig.runs import Run
+from rig.link.front_end_messages import Request, Snapshot
+from rig.link.live_runs import Run
+from rig.link.sockets import Peer, connect
+from rig.operate.run import start_controller
 
 PROJECT = Path(__file__).parents[2]
 WATCHDOG = 0.5

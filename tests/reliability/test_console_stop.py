@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from rig.hdf5 import load
-from rig.runs import Run
+from rig.link.live_runs import Run
 from tests.console.terminal import Terminal, on_terminal
 from tests.reliability.live import LiveBench, at_rest, live_bench, zero_after
 

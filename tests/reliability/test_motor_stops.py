@@ -10,9 +10,9 @@ from pathlib import Path
 import pytest
 
 from rig.hdf5 import load
-from rig.ledger import read
-from rig.link import connect
-from rig.messages import Request
+from rig.link.front_end_messages import Request
+from rig.link.sockets import connect
+from rig.recording.ledger import read
 from tests.reliability.live import (
     PATIENCE,
     SLACK,
@@ -32,7 +32,7 @@ pytestmark = [pytest.mark.reliability, pytest.mark.timeout(90)]
 
 def recorder_pid(controller: int) -> int:
     children = Path(f"/proc/{controller}/task/{controller}/children").read_text().split()
-    return next(int(pid) for pid in children if "rig.recorder" in Path(f"/proc/{pid}/cmdline").read_text())
+    return next(int(pid) for pid in children if "rig.recording.recorder" in Path(f"/proc/{pid}/cmdline").read_text())
 
 
 def the_recording(bench: LiveBench):

@@ -13,8 +13,8 @@ from pathlib import Path
 import pytest
 
 from rig.hdf5 import load
-from rig.ledger import read
-from rig.messages import Request
+from rig.link.front_end_messages import Request
+from rig.recording.ledger import read
 from tests.reliability.live import PROJECT, SLACK, TICK, WATCHDOG, at_rest, attach, kill_once, live_bench, turning
 
 pytestmark = [pytest.mark.reliability, pytest.mark.timeout(150)]

@@ -7,7 +7,7 @@ import pytest
 
 from rig.cli import main
 from rig.hdf5 import RecordingFile, load
-from rig.recorder_messages import ChannelSpec, Rows, StreamSpec
+from rig.link.recorder_messages import ChannelSpec, Rows, StreamSpec
 from tests.reliability.live import at_rest, live_bench
 
 C, HALF_WIDTH, NOISE = 0.412, 0.8, 0.5

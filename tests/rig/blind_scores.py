@@ -3,7 +3,7 @@
 import numpy as np
 
 from rig.blind.design import Kinds, Order, design
-from rig.blind.scoring import HeldOut, Interval, Near, Score
+from rig.blind.scoring.score import HeldOut, Interval, Near, Score
 
 WORLD = Kinds(
     effects=("dead_band", "heating", "asymmetry", "exponent", "time_skew", "gain_step", "fouling"),

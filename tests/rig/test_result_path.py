@@ -6,10 +6,10 @@ import h5py
 import pytest
 from click.testing import CliRunner
 
-from rig.answer_files import wanted_of
+from rig.blind.command import prove_command
 from rig.cli import main
+from rig.diagnose.outputs import wanted_of
 from rig.errors import ConfigError
-from rig.prove import prove_command
 from rig.result_path import RESULT
 
 OPTIONS = {

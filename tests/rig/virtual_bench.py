@@ -13,18 +13,18 @@ from pathlib import Path
 
 from drivers.errors import LinkError
 from drivers.protocols import Channel, LinkHealth, Sample, Stream, Watchdog
-from rig.bench import Bench
-from rig.clients import Clients
-from rig.config import BenchConfig, CampaignConfig, DeviceConfig, LimitConfig, MountConfig
-from rig.ledger import Fact, Ledger
-from rig.line_writer import LineWriter
-from rig.link import Message, Peer, connect, listen, pair
-from rig.messages import Request, Snapshot
-from rig.plan import FixedDwell, Plan, TareConfig
-from rig.recorder_link import RecorderLink
-from rig.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Ready, Rows, StepRow
-from rig.session import Session, begin
-from rig.shapes import Levels
+from rig.campaign.bench import Bench
+from rig.campaign.config import BenchConfig, CampaignConfig, DeviceConfig, LimitConfig, MountConfig
+from rig.campaign.plan import FixedDwell, Plan, TareConfig
+from rig.campaign.shapes import Levels
+from rig.link.clients import Clients
+from rig.link.front_end_messages import Request, Snapshot
+from rig.link.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Ready, Rows, StepRow
+from rig.link.sockets import Message, Peer, connect, listen, pair
+from rig.recording.ledger import Fact, Ledger
+from rig.recording.line_writer import LineWriter
+from rig.recording.recorder_link import RecorderLink
+from rig.stages.session import Session, begin
 
 LAG = 0.05
 """s, of the propeller."""

@@ -1,0 +1,1 @@
+"""From the scores of a blind proof to its page."""

@@ -1,0 +1,258 @@
+"""One answer beside its truth. Pure: tables as they are in the files, arrays of the other run.
+
+    right      each concealed effect is among the findings or their stated rivals; of a clean run: `adequate`
+    alone      the findings are exactly what was concealed and the verdict is `explained`
+    wrong      something is named, and of what was concealed nothing is among findings and rivals
+    extra      a finding is not what was concealed, whatever stands beside it
+
+Where the physics is outside the catalogue, or was taken out of it, the outcome counts: `located` (unexplained, in the
+right place), `located, named` (the same, and a name beside it, wrong as every name is there), `misplaced` (unexplained,
+elsewhere), `wrong name` (findings without `unexplained`), `missed` (adequate).
+A diagnosis that crashed, refused or ran out of time has failed: it is never right.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, Final
+
+import numpy as np
+
+from identification.recording import Floats
+from rig.blind.design import Order
+from rig.blind.scoring.places import PLACES, UPSTREAM
+from rig.blind.scoring.same_parameters import true_values
+
+Table = Mapping[str, Any]
+
+AS_RIVAL: Final = "among rivals"
+"""The answer of a confusion matrix where the truth is a stated rival of what was found."""
+OPEN_CELLS: Final = ("outside", "removed")
+LOCATED: Final = ("located", "located, named")
+TELLABLE: Final = 8.0
+"""sigma that the best neighbour must leave to an oracle, as much as a faint effect has."""
+
+
+@dataclass(frozen=True, slots=True)
+class Near:
+    """The nearest neighbour in the catalogue, and the sigma that it leaves of the effect."""
+
+    rival: str
+    left: float
+
+
+@dataclass(frozen=True, slots=True)
+class HeldOut:
+    """Errors in another run, one constant fitted to each."""
+
+    model: float
+    """RMS of measured less predicted, over that of the true model."""
+    baseline: float
+    """The same of the baseline."""
+    left: float
+    """RMS of the model's own error over that of the baseline's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Interval:
+    """A parameter that means the same in the world and in the catalogue."""
+
+    effect: str
+    parameter: str
+    z: float
+    """(estimate - truth) / stated standard error; infinite where none is stated."""
+    covers: bool
+    """Whether the truth is within the interval that was told."""
+
+
+@dataclass(frozen=True, slots=True)
+class Score:
+    """What one order came to."""
+
+    order: Order
+    truth: tuple[str, ...]
+    said: str
+    """The verdict, or what went wrong."""
+    named: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()
+    place: str = ""
+    resembles: tuple[str, ...] = ()
+    statement: str = ""
+    failed: bool = False
+    near: Near | None = None
+    held_out: HeldOut | None = None
+    intervals: tuple[Interval, ...] = ()
+    seconds: float = 0.0
+    case: str = ""
+    """What the recording was like, in words."""
+
+    @property
+    def right(self) -> bool:
+        if self.failed:
+            return False
+        return set(self.truth) <= {*self.named, *self.rivals} if self.truth else self.said == "adequate"
+
+    @property
+    def alone(self) -> bool:
+        wanted = "explained" if self.truth else "adequate"
+        return not self.failed and self.said == wanted and set(self.named) == set(self.truth)
+
+    @property
+    def wrong(self) -> bool:
+        return bool(self.named) and not set(self.truth) & {*self.named, *self.rivals}
+
+    @property
+    def extra(self) -> bool:
+        return bool(set(self.named) - set(self.truth))
+
+    @property
+    def rival_only(self) -> bool:
+        """Right, but something that was concealed is among the rivals alone."""
+        return self.right and not set(self.truth) <= set(self.named)
+
+    @property
+    def counted(self) -> bool:
+        """Whether an oracle tells this effect from its nearest neighbour as clearly as a faint effect from noise."""
+        return self.leaves(TELLABLE)
+
+    def leaves(self, sigma: float) -> bool:
+        """Whether the nearest neighbour leaves that much."""
+        return self.near is None or self.near.left >= sigma
+
+    @property
+    def outcome(self) -> str:
+        """Of the open world."""
+        if self.failed:
+            return "failed"
+        if self.said == "unexplained":
+            named = LOCATED[bool(self.named)]
+            return named if self.place in PLACES[self.truth[0]] else "misplaced"
+        return "wrong name" if self.named else "missed"
+
+    @property
+    def good(self) -> bool:
+        """As it should be, by the measure of its cell."""
+        if self.order.cell in OPEN_CELLS:
+            return self.outcome in LOCATED or not (self.counted or self.failed)
+        return self.right
+
+    @property
+    def answer(self) -> str:
+        """One word for a confusion matrix."""
+        if self.failed:
+            return "failed"
+        if self.right and self.truth:
+            return AS_RIVAL if self.rival_only else self.truth[0]
+        return self.named[0] if self.named else self.said
+
+
+def scored(
+    order: Order,
+    truth: Table,
+    answer: Table,
+    thrust: tuple[Floats, Floats] | None = None,
+    predicted: Mapping[str, Floats] | None = None,
+) -> Score:
+    """`thrust`: true and measured of the other run, `predicted`: by model and baseline; None where there is none."""
+    hidden, near = concealed(truth), nearest(order, truth)
+    if answer["error"]:
+        seconds = answer["seconds"]
+        return Score(order, hidden, answer["error"], failed=True, near=near, seconds=seconds, case=described(truth))
+    found = answer["diagnosis"]
+    findings, unexplained = found["findings"], found["unexplained"]
+    return Score(
+        order=order,
+        truth=hidden,
+        said=found["verdict"],
+        named=tuple(dict.fromkeys(f["effect"] for f in findings)),
+        rivals=tuple(dict.fromkeys(r for f in findings for r in f["rivals"])),
+        place=unexplained["where"]["quantity"] if unexplained else "",
+        resembles=tuple(unexplained["resembles"]) if unexplained else (),
+        statement=found["statement"],
+        near=near,
+        held_out=held_out(*thrust, predicted) if thrust and predicted else None,
+        intervals=intervals(findings, truth) if len(hidden) == 1 else (),
+        seconds=answer["seconds"],
+        case=described(truth),
+    )
+
+
+def concealed(truth: Table) -> tuple[str, ...]:
+    """Ids of what is hidden in a case."""
+    lie = ("channel_fault",) if truth["fault"] else ()
+    return (*(effect["effect"] for effect in truth["effects"]), *lie)
+
+
+def nearest(order: Order, truth: Table) -> Near | None:
+    """As the world measured it.
+
+    In the open world a measured rate explains what happens before the rotor without knowing what it is: 0 sigma left.
+    """
+    upstream = bool(truth["effects"]) and truth["effects"][0]["effect"] in UPSTREAM
+    if upstream and order.cell in OPEN_CELLS and "rotation_rate" in truth["channels"]:
+        return Near("rotation_coupling", 0.0)
+    twins = truth.get("twins")
+    return Near(twins[0]["rival"], twins[0]["left"]) if twins else None
+
+
+def described(truth: Table) -> str:
+    """Noise, sampling, plan, channels, and the effects with their parameters.
+
+    >>> effect = {"effect": "dead_band", "parameters": {"form": "jump", "half_width": 0.51234}}
+    >>> scale = {"voltage": 10.0, "thrust": 80.0, "duration": 400.2}
+    >>> seal = {"noise_kind": "white", "rate": 25.0, "plan": ["ramp"], "channels": ["current"], "scale": scale}
+    >>> described(seal | {"effects": [effect], "fault": None})
+    'white noise, 25 /s, ramp of 400 s, 10 V, 80 N, with current; dead_band: form jump, half_width 0.5123'
+    """
+    scale = truth["scale"]
+    with_channels = f", with {', '.join(truth['channels'])}" if truth["channels"] else ""
+    plan = f"{' and '.join(truth['plan'])} of {scale['duration']:.0f} s"
+    parts = [
+        f"{truth['noise_kind']} noise, {truth['rate']:.3g} /s, {plan}, "
+        f"{scale['voltage']:.3g} V, {scale['thrust']:.3g} N{with_channels}"
+    ]
+    for effect in truth["effects"]:
+        told = ", ".join(
+            f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in effect["parameters"].items()
+        )
+        parts.append(f"{effect['effect']}: {told}")
+    if truth["fault"]:
+        parts.append(", ".join(f"{k} {v}" for k, v in truth["fault"].items()))
+    return "; ".join(parts)
+
+
+def held_out(true: Floats, measured: Floats, predicted: Mapping[str, Floats]) -> HeldOut:
+    """Errors of the model and of the baseline, `model` and `baseline` (n,) N, in the other run.
+
+    >>> t = np.array([0.0, 1.0, 0.0, 1.0])
+    >>> found = held_out(t, t + [0.1, 0.1, -0.1, -0.1], {"model": t + 5.0, "baseline": 0.0 * t})
+    >>> round(found.model, 6), round(found.baseline, 3), found.left
+    (1.0, 5.099, 0.0)
+    """
+    noise = float(np.std(measured - true))
+    model, baseline = (predicted[name] for name in ("model", "baseline"))
+    own = float(np.std(baseline - true))
+    return HeldOut(
+        float(np.std(measured - model)) / noise,
+        float(np.std(measured - baseline)) / noise,
+        float(np.std(model - true)) / own if own > 0.0 else 0.0,
+    )
+
+
+def intervals(findings: list[Table], truth: Table) -> tuple[Interval, ...]:
+    """Of the right findings' parameters that mean the same on both sides."""
+    found = []
+    for finding in findings:
+        for name, value in true_values(finding["effect"], finding["form"], truth).items():
+            told = finding["parameters"].get(name)
+            if told is not None and told["value"] is not None:
+                std = told["std"] or 0.0
+                z = (told["value"] - value) / std if std > 0.0 else float("inf")
+                found.append(Interval(finding["effect"], name, z, _holds(told, value)))
+    return tuple(found)
+
+
+def _holds(told: Table, value: float) -> bool:
+    low, high = told["low"], told["high"]
+    return low is not None and high is not None and bool(low <= value <= high)

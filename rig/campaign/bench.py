@@ -1,0 +1,109 @@
+"""The configured devices as live objects: built without opening anything, opened one by one, closed in reverse."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from math import inf
+
+from drivers import KINDS
+from drivers.can_bus import CanBus
+from drivers.errors import DeviceError as DriverDeviceError
+from drivers.errors import LinkError as DriverLinkError
+from drivers.protocols import Instrument, MotorController, Sample, Stream
+from rig.campaign.config import BenchConfig, CanBusConfig
+from rig.errors import ConfigError, DeviceError, LinkError
+
+COMMAND_STREAM = "command"
+"""The rig's own stream: one row per change of the commanded voltage."""
+
+
+@dataclass(frozen=True)
+class Bench:
+    """All devices of a bench. `identities` fills while they open."""
+
+    config: BenchConfig
+    buses: Mapping[str, CanBus]
+    instruments: Mapping[str, Instrument]
+    identities: dict[str, str] = field(default_factory=dict)
+
+    @property
+    def motor(self) -> MotorController:
+        motor = self.instruments[self.config.motor]
+        if not isinstance(motor, MotorController):
+            raise ConfigError(
+                f"{self.config.path}: bench.motor is {self.config.motor!r}, which measures but can't turn a propeller:"
+                " name a motor controller"
+            )
+        return motor
+
+    def streams(self) -> Iterator[tuple[str, Stream]]:
+        """(device name, stream) of every device, in the order of the bench file."""
+        for name, instrument in self.instruments.items():
+            for stream in instrument.streams:
+                yield name, stream
+
+    def open_device(self, name: str) -> str:
+        """Open one device (and its bus, if it is the first on it); returns its identity."""
+        instrument = self.instruments[name]
+        try:
+            if KINDS[self.config.devices[name].kind].link == "can":
+                self.buses[self.config.devices[name].options.bus].open()
+            identity = instrument.open()
+        except DriverLinkError as error:
+            raise LinkError(_about(name, error)) from error
+        except DriverDeviceError as error:
+            raise DeviceError(_about(name, error)) from error
+        self.identities[name] = identity
+        return identity
+
+    def drain(self) -> list[Sample]:
+        return [sample for instrument in self.instruments.values() for sample in instrument.drain()]
+
+    def close(self) -> None:
+        for instrument in reversed(list(self.instruments.values())):
+            instrument.close()
+        for bus in self.buses.values():
+            bus.close()
+
+
+def build(config: BenchConfig) -> Bench:
+    """Construct the devices of a bench file; opens nothing. Raises ConfigError."""
+    buses = {name: _bus(name, bus, config) for name, bus in config.can.items()}
+    instruments: dict[str, Instrument] = {}
+    for name, device in config.devices.items():
+        kind = KINDS[device.kind]
+        if kind.link == "can":
+            instruments[name] = kind.build(name, device.options, buses[device.options.bus])
+        else:
+            instruments[name] = kind.build(name, device.options)
+    return Bench(config, buses, instruments)
+
+
+def thrust_bounds(config: BenchConfig) -> tuple[float, float]:
+    """N, lowest and highest thrust within the range of the force sensor and the limits of the bench file; infinite
+    where neither says."""
+    bounds = [(-inf, inf)]
+    for stream in build(config).instruments[config.force].streams:
+        for channel in (c for c in stream.channels if c.quantity == "thrust"):
+            bounds.append((_or(channel.range_min, -inf), _or(channel.range_max, inf)))
+            name = f"{stream.name}.{channel.name}"
+            bounds += [(_or(m.min, -inf), _or(m.max, inf)) for m in config.limits if m.channel == name]
+    return max(low for low, _ in bounds), min(high for _, high in bounds)
+
+
+def _or(end: float | None, otherwise: float) -> float:
+    return otherwise if end is None else end
+
+
+def _bus(name: str, bus: CanBusConfig, config: BenchConfig) -> CanBus:
+    try:
+        return CanBus(bus.interface, bus.channel, bus.bitrate, bus.capture)
+    except ValueError as error:
+        raise ConfigError(f"{config.path}: can.{name}: {error}") from None
+
+
+def _about(name: str, error: Exception) -> str:
+    """The driver's sentence, led by the device's name if it does not begin with it."""
+    text = str(error)
+    return text if text.startswith(f"{name}:") else f"{name}: {text}"

@@ -1,0 +1,255 @@
+"""Plans: frozen data whose iteration yields the steps of a run. Refused or timed before a motor turns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Literal, NamedTuple
+
+from rig.campaign.shapes import (
+    Hold,
+    Move,
+    Shape,
+    Sweep,
+    Wave,
+    ends,
+    require,
+    require_above_zero,
+    require_not_negative,
+    steepest,
+)
+
+Phase = Literal["tare", "ramp", "hold", "rest", "sine", "free"]
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """One step of a plan.
+
+    The command goes from the previous step's end value to `voltage` with the slew limit inside a `ramp` step of its
+    own; `hold`, `rest` and `tare` keep it. A `sine` step commands `voltage + amplitude * sin(2 pi frequency t)`, t from
+    its start.
+    """
+
+    index: int
+    phase: Phase
+    voltage: float
+    """V, constant part of the command at the end of the step."""
+    min_duration: float
+    """s. For a fixed dwell min_duration == max_duration."""
+    max_duration: float
+    """s. A hold until steady ends at the latest here, with verdict `not steady`."""
+    from_voltage: float = 0.0
+    """V at the start; differs from `voltage` in a ramp only."""
+    amplitude: float = 0.0
+    frequency: float = 0.0
+    settle: float = 0.0
+    """s after the start of a hold that is left out of its mean (at least; identification finds its own)."""
+    swept: bool = False
+    """True for a ramp that is itself the measurement: after a pause it is retaken from `from_voltage`."""
+
+    @property
+    def expected(self) -> float:
+        """Seconds this step takes by plan. A hold until steady: half way between its bounds; a tare: one attempt."""
+        return (self.min_duration + self.max_duration) / 2 if self.phase == "hold" else self.min_duration
+
+    @property
+    def peak(self) -> float:
+        """Largest |command| in V inside this step."""
+        return max(abs(self.from_voltage) if self.phase == "ramp" else 0.0, abs(self.voltage) + abs(self.amplitude))
+
+
+@dataclass(frozen=True, slots=True)
+class FixedDwell:
+    """Every hold lasts `duration` s; its first `settle` s are left out of the mean."""
+
+    duration: float
+    settle: float = 0.5
+
+    def __post_init__(self) -> None:
+        require_above_zero("dwell.duration", self.duration, "s")
+        require_not_negative("dwell.settle", self.settle, "s")
+        require(
+            self.settle < self.duration,
+            f"dwell.settle ({self.settle:g} s) must be shorter than dwell.duration ({self.duration:g} s)",
+        )
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Shortest and longest hold in s."""
+        return self.duration, self.duration
+
+
+@dataclass(frozen=True, slots=True)
+class SteadyDwell:
+    """A hold ends once standard error (N) and |drift| (N/s) are small: after `min` s, at `max` s at the latest."""
+
+    min: float
+    max: float
+    max_std_error: float
+    max_drift: float
+    settle: float = 0.5
+
+    def __post_init__(self) -> None:
+        require_above_zero("dwell.min", self.min, "s")
+        require_above_zero("dwell.max", self.max, "s")
+        require_above_zero("dwell.max_std_error", self.max_std_error, "N")
+        require_above_zero("dwell.max_drift", self.max_drift, "N/s")
+        require_not_negative("dwell.settle", self.settle, "s")
+        require(self.min <= self.max, f"dwell.min ({self.min:g} s) must not exceed dwell.max ({self.max:g} s)")
+        require(
+            self.settle < self.min, f"dwell.settle ({self.settle:g} s) must be shorter than dwell.min ({self.min:g} s)"
+        )
+
+    @property
+    def bounds(self) -> tuple[float, float]:
+        """Shortest and longest hold in s."""
+        return self.min, self.max
+
+
+Dwell = FixedDwell | SteadyDwell
+
+
+class Duration(NamedTuple):
+    """s. `worst`: every hold to its maximum, every tare to its last attempt, every rest to its end."""
+
+    expected: float
+    worst: float
+
+
+@dataclass(frozen=True, slots=True)
+class TareConfig:
+    """`[tare]`: rest measured before the sweep and at zero returns; refused when not stable. Raises PlanError."""
+
+    duration: float = 3.0
+    max_std_error: float = 0.05
+    """N"""
+    max_drift: float = 0.05
+    """N/s"""
+    attempts: int = 3
+
+    def __post_init__(self) -> None:
+        require_above_zero("duration", self.duration, "s")
+        require_above_zero("max_std_error", self.max_std_error, "N")
+        require_above_zero("max_drift", self.max_drift, "N/s")
+        require(self.attempts >= 1, f"attempts must be at least 1, but is {self.attempts}")
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """A shape with its pacing. Iterating yields the steps of one run: tare, ramps and measurements, zero returns, zero.
+
+    Each zero return is a ramp to 0, a rest of at least `rest` s until the propeller is at rest (at most
+    `rest + coast_time` s), and a tare. There is one after every `zero_every` units (0: none) and always one at the end.
+    Raises PlanError on impossible values.
+    """
+
+    shape: Shape
+    dwell: Dwell
+    slew: float
+    """V/s of the ramps between levels."""
+    repeats: int = 1
+    zero_every: int = 0
+    rest: float = 1.0
+    coast_time: float = 3.0
+    """s, longest wait for the propeller to come to rest in a zero return."""
+    tare: TareConfig = field(default_factory=TareConfig)
+
+    def __post_init__(self) -> None:
+        require_above_zero("slew", self.slew, "V/s")
+        require(self.repeats >= 1, f"repeats must be at least 1, but is {self.repeats}")
+        require(self.zero_every >= 0, f"zero_every must be at least 0 (0: no zero returns), but is {self.zero_every}")
+        require_not_negative("rest", self.rest, "s")
+        require_not_negative("coast_time", self.coast_time, "s")
+        for move in (move for unit in self.shape.units(1) for move in unit):
+            require(
+                steepest(move) <= self.slew * (1 + 1e-9),  # slack: float arithmetic only
+                f"{_said(move)} needs {steepest(move):.3g} V/s, but the plan's slew is {self.slew:g} V/s: "
+                "lower it or raise slew",
+            )
+            if isinstance(move, Hold) and move.duration is not None:
+                require(
+                    self.dwell.settle < move.duration,
+                    f"dwell.settle ({self.dwell.settle:g} s) must be shorter than each of durations, but one is "
+                    f"{move.duration:g} s",
+                )
+
+    def __iter__(self) -> Iterator[Step]:
+        return (replace(step, index=index) for index, step in enumerate(self._sequence()))
+
+    def _sequence(self) -> Iterator[Step]:
+        units = tuple(self.shape.units(self.repeats))
+        at = 0.0
+        yield self._tare_step()
+        for count, unit in enumerate(units, start=1):
+            for move in unit:
+                start, end = ends(move)
+                yield from self._travel(at, start)
+                yield self._measure(move)
+                at = end
+            if count == len(units) or (self.zero_every and count % self.zero_every == 0):
+                yield from self._zero_return(at)
+                at = 0.0
+
+    def _travel(self, start: float, end: float) -> Iterator[Step]:
+        if start != end:
+            seconds = abs(end - start) / self.slew
+            yield Step(0, "ramp", end, seconds, seconds, from_voltage=start)
+
+    def _measure(self, move: Move) -> Step:
+        match move:
+            case Hold(voltage, seconds):
+                bounds = self.dwell.bounds if seconds is None else (seconds, seconds)
+                return Step(0, "hold", voltage, *bounds, settle=self.dwell.settle)
+            case Sweep(start, end, rate):
+                seconds = abs(end - start) / rate
+                return Step(0, "ramp", end, seconds, seconds, from_voltage=start, swept=True)
+            case Wave(offset, amplitude, frequency, cycles):
+                seconds = cycles / frequency
+                return Step(0, "sine", offset, seconds, seconds, amplitude=amplitude, frequency=frequency)
+
+    def _zero_return(self, at: float) -> Iterator[Step]:
+        yield from self._travel(at, 0.0)
+        yield Step(0, "rest", 0.0, self.rest, self.rest + self.coast_time)
+        yield self._tare_step()
+
+    def _tare_step(self) -> Step:
+        return Step(0, "tare", 0.0, self.tare.duration, self.tare.duration * self.tare.attempts)
+
+    def duration(self) -> Duration:
+        """Expected and worst duration of one run in s, without the watchdog proof."""
+        steps = tuple(self)
+        return Duration(sum(s.expected for s in steps), sum(s.max_duration for s in steps))
+
+    def peak(self) -> float:
+        """Largest |command| in V."""
+        return max(step.peak for step in self)
+
+    def require_within(self, max_voltage: float, slew: float, whose: str) -> None:
+        """Raise PlanError when a step commands more than `max_voltage` V or the slew is over `slew` V/s of `whose`."""
+        for step in self:
+            require(
+                step.peak <= max_voltage,
+                f"step {step.index} ({step.phase}) commands {step.peak:g} V, but {whose} allows at most "
+                f"{max_voltage:g} V: lower the plan's levels",
+            )
+        require(
+            self.slew <= slew,
+            f"slew is {self.slew:g} V/s, but {whose} allows at most {slew:g} V/s: lower slew",
+        )
+
+
+def _said(move: Move) -> str:
+    match move:
+        case Wave(_, amplitude, frequency, _):
+            return f"a sine of {amplitude:g} V at {frequency:g} Hz"
+        case _:
+            return f"a sweep at {steepest(move):g} V/s"
+
+
+def require_steps(steps: tuple[Step, ...], max_voltage: float) -> None:
+    """Raise PlanError for no steps at all and for a command beyond `max_voltage` V."""
+    require(len(steps) > 0, "the plan has no steps: nothing would be measured")
+    for step in steps:
+        sentence = f"step {step.index} commands {step.peak:g} V, but at most {max_voltage:g} V are allowed"
+        require(step.peak <= max_voltage, sentence)

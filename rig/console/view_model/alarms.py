@@ -1,0 +1,85 @@
+"""The line that shouts: what the operator must know before anything else. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from rig.console.view_model.view import View
+from rig.console.view_model.wording import age
+from rig.link.front_end_messages import Snapshot
+
+Severity = Literal["none", "info", "warning", "danger"]
+
+
+@dataclass(frozen=True, slots=True)
+class Alarm:
+    """One sentence for the whole width of the screen."""
+
+    severity: Severity = "none"
+    text: str = ""
+
+
+def alarm(view: View) -> Alarm:
+    """The most urgent thing there is to say; `none` when all is well."""
+    snapshot = view.snapshot
+    if snapshot is not None and snapshot.stop_confirmed is False:
+        return Alarm("danger", f"STOP NOT CONFIRMED — {_rotation(snapshot)}. Cut the power: hardware emergency stop.")
+    if not view.connected:
+        return _disconnected(view)
+    if view.stop_failed:
+        return Alarm("danger", f"STOP NOT SENT — {view.stop_failed}. Cut the power: hardware emergency stop.")
+    if view.condition == "stale":
+        return Alarm("danger", f"NO FRESH DATA for {age(view.silence)} — the figures below are not the present.")
+    if snapshot is None:
+        return Alarm("info", "Waiting for the controller's first snapshot.")
+    return _running(view, snapshot)
+
+
+def _rotation(snapshot: Snapshot) -> str:
+    for reading in snapshot.readings:
+        if reading.quantity == "rotation_rate" and reading.value is not None:
+            return f"the propeller was last measured at {reading.value:.2f} {reading.unit}"
+    return "nothing measured says that the propeller is at rest"
+
+
+def _disconnected(view: View) -> Alarm:
+    last = f"figures are {age(view.silence)} old" if view.snapshot is not None else "no data ever came"
+    if view.snapshot is not None and view.snapshot.state == "done":
+        return _ended(view.snapshot)
+    return Alarm(
+        "danger",
+        f"DISCONNECTED — the controller is gone; {last}. {_unsure(view)}"
+        "The motor's own watchdog stops it; look at the propeller.",
+    )
+
+
+def _unsure(view: View) -> str:
+    if view.stop_failed:
+        return "Your STOP reached nobody. "
+    confirmed = view.snapshot is not None and view.snapshot.stop_confirmed
+    return "Your STOP was not confirmed. " if view.stop_asked is not None and not confirmed else ""
+
+
+def _running(view: View, snapshot: Snapshot) -> Alarm:
+    if view.stop_asked is not None and snapshot.state not in ("stopping", "done"):
+        return Alarm(
+            "warning", f"STOP SENT {age(view.now - view.stop_asked)} ago — the controller has not answered yet."
+        )
+    if snapshot.state == "stopping" and snapshot.stop_confirmed is None:
+        return Alarm("warning", "STOPPING — command is 0 V; waiting until the measured rotation is at rest.")
+    if snapshot.state == "done":
+        return _ended(snapshot)
+    if snapshot.state == "mount" and snapshot.mounted_by_hand:
+        return Alarm("warning", f"Put {snapshot.thruster} on the bench, then press F5. The motor turns after that.")
+    if snapshot.state == "paused":
+        return Alarm("warning", "PAUSED at 0 V — press r to resume; the step is taken again.")
+    wrong = [f"{r.channel} {r.state.upper()}" for r in snapshot.readings if r.state in ("stale", "limit")]
+    return Alarm("warning", "CHECK: " + ", ".join(wrong)) if wrong else Alarm()
+
+
+def _ended(snapshot: Snapshot) -> Alarm:
+    rest = " Propeller measured at rest." if snapshot.stop_confirmed else ""
+    if snapshot.outcome == "completed":
+        return Alarm("info", f"COMPLETED.{rest} Press d to leave.")
+    return Alarm("warning", f"{snapshot.outcome.upper() or 'ENDED'} — {snapshot.cause}{rest} Press d to leave.")

@@ -1,0 +1,42 @@
+"""Which page is shown, and which keys the bottom line offers. Pure."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from rig.console.view_model.view import View
+
+VIEW_KEYS = (("1", "main"), ("2", "V|V|"), ("3", "time"), ("4", "log"), ("5", "table"))
+
+
+def page_of(view: View, chosen: str) -> str:
+    """`preflight`, `live` or `results`: the operator's choice; before the start, `main` is the preflight list."""
+    if chosen == "results":
+        return "results"
+    before = view.snapshot is None or view.snapshot.state in ("connecting", "preflight")
+    return "preflight" if before and chosen == "main" else "live"
+
+
+def key_line(view: View) -> Text:
+    """The keys that mean something now."""
+    text = Text(no_wrap=True, overflow="ellipsis")
+    for key, does in (*_doing(view), *VIEW_KEYS):
+        text.append(f" {key} ", "bold #ffffff on #3a4a5a").append(f"{does} ")
+    return text
+
+
+def _doing(view: View) -> tuple[tuple[str, str], ...]:
+    snapshot = view.snapshot
+    if not view.connected or (snapshot is not None and snapshot.state == "done"):
+        return (("d", "leave"),)
+    leave = (("n", "note"), ("d", "detach"))
+    if snapshot is None or snapshot.state in ("connecting", "stopping", "run_done"):
+        return leave
+    if snapshot.state == "preflight":
+        return (("F5", "start"), *leave)
+    if snapshot.state == "mount":
+        return (("F5", "mounted"), *leave) if snapshot.mounted_by_hand else leave
+    if snapshot.state == "paused":
+        return (("r", "resume"), *leave)
+    skip = (("k", "skip"),) if snapshot.state in ("hold", "sine", "free") else ()
+    return (("p", "pause"), *skip, *leave)

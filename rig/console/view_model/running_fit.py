@@ -1,0 +1,78 @@
+"""The running fit of a sweep: thrust = C V|V| + tare from the holds finished so far, weighted by standard errors."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from identification.estimation.least_squares import Rows, estimate
+from rig.link.front_end_messages import Point
+
+
+@dataclass(frozen=True, slots=True)
+class RunningFit:
+    """What the holds so far say. A first look: the verdict over the whole recording is `rig fit`."""
+
+    C: float
+    """N/V^2"""
+    C_std: float
+    """N/V^2, one sigma, of the scatter of the points and not of the cell's calibration; inf for two points."""
+    tare: float
+    """N, left over after the tare that was subtracted."""
+    used: int
+    left_out: int
+    """Points without a usable standard error."""
+
+    def predict(self, v_abs_v: float) -> float:
+        """N at V|V| in V^2."""
+        return self.C * v_abs_v + self.tare
+
+
+def usable(point: Point) -> bool:
+    """A weight needs a finite, positive standard error."""
+    return math.isfinite(point.thrust) and math.isfinite(point.std_error) and point.std_error > 0.0
+
+
+def v_abs_v(point: Point) -> float:
+    """V|V| in V^2."""
+    return point.voltage * abs(point.voltage)
+
+
+@lru_cache(maxsize=16)
+def running_fit(points: tuple[Point, ...]) -> RunningFit | None:
+    """Weighted least squares of `estimation.least_squares`; None until two different values of V|V| have a point."""
+    chosen = [point for point in points if usable(point)]
+    x = np.array([v_abs_v(point) for point in chosen])
+    if len(np.unique(x)) < 2:
+        return None
+    rows = Rows(
+        np.column_stack([x, np.ones_like(x)]),
+        np.array([point.thrust for point in chosen]),
+        ("C", "tare"),
+        (slice(0, len(chosen)),),
+        np.array([point.std_error for point in chosen]),
+        np.full(len(chosen), np.inf),  # a snapshot does not carry the degrees of freedom behind a standard error
+    )
+    fit = estimate(rows).fit
+    std = float(fit.std[0]) if fit.dof > 0 else math.inf
+    return RunningFit(float(fit.theta[0]), std, float(fit.theta[1]), len(chosen), len(points) - len(chosen))
+
+
+def in_words(fit: RunningFit | None) -> str:
+    """`C = 0.4012 ± 0.0021 N/V² (n = 12)`, with the digits that its standard deviation allows."""
+    if fit is None:
+        return "no fit yet: two levels are needed"
+    if not math.isfinite(fit.C_std):
+        return f"C = {fit.C:.3g} N/V² (n = 2, spread not known yet)"
+    digits = decimals(fit.C_std)
+    return f"C = {fit.C:.{digits}f} ± {fit.C_std:.{digits}f} N/V² (n = {fit.used})"
+
+
+def decimals(std: float) -> int:
+    """Digits after the point that show two significant digits of a standard deviation."""
+    if not math.isfinite(std) or std <= 0.0:
+        return 4
+    return max(0, 1 - math.floor(math.log10(std)))

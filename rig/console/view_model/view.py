@@ -1,0 +1,84 @@
+"""What the console knows: a frozen view folded from snapshots. Pure; the clock is an argument."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Final, Literal
+
+from rig.link.front_end_messages import Point, Snapshot
+
+FRESH: Final = 0.5
+"""s; snapshots come ten times a second, so five in a row are missing when one is older than this."""
+TRACE_KEPT: Final = 600.0
+"""s of trace kept: as much as the controller sends on attaching."""
+
+TraceRow = tuple[float, float, float]
+Condition = Literal["waiting", "live", "stale", "disconnected"]
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """All that is drawn is a function of this."""
+
+    now: float = 0.0
+    """s, the console's clock."""
+    snapshot: Snapshot | None = None
+    """The newest one."""
+    received: float = 0.0
+    """s, when the newest snapshot came."""
+    connected: bool = True
+    points: Mapping[str, tuple[Point, ...]] = field(default_factory=dict)
+    """Finished holds of each thruster seen since this console attached, in order of appearance."""
+    trace: tuple[TraceRow, ...] = ()
+    """(s of the recording, V, N) of the running recording."""
+    stop_asked: float | None = None
+    """s, when the stop key was pressed; None: not yet."""
+    stop_failed: str = ""
+    """Why the stop could not be sent; empty: it was."""
+
+    @property
+    def silence(self) -> float:
+        """In s, since the newest snapshot; inf before the first."""
+        return self.now - self.received if self.snapshot is not None else float("inf")
+
+    @property
+    def condition(self) -> Condition:
+        """Whether what is shown may be taken for the present."""
+        if not self.connected:
+            return "disconnected"
+        if self.snapshot is None:
+            return "waiting"
+        return "live" if self.silence <= FRESH else "stale"
+
+
+def absorb(view: View, snapshot: Snapshot, now: float) -> View:
+    """The view after one more snapshot, received at `now` in s."""
+    return replace(
+        view,
+        now=now,
+        snapshot=snapshot,
+        received=now,
+        points=_with_points(view.points, snapshot),
+        trace=_with_trace(view, snapshot),
+    )
+
+
+def _with_points(known: Mapping[str, tuple[Point, ...]], snapshot: Snapshot) -> Mapping[str, tuple[Point, ...]]:
+    """`snapshot.points` is the whole list of its run, so it replaces; a run with none yet keeps what was."""
+    if not snapshot.points:
+        return known
+    thruster = snapshot.points[-1].thruster or snapshot.thruster
+    if known.get(thruster) == snapshot.points:
+        return known
+    return {**known, thruster: snapshot.points}
+
+
+def _with_trace(view: View, snapshot: Snapshot) -> tuple[TraceRow, ...]:
+    before = view.snapshot
+    same_run = before is not None and before.thruster == snapshot.thruster and before.files == snapshot.files
+    old = view.trace if same_run else ()
+    if not snapshot.trace:
+        return old
+    first, last = snapshot.trace[0][0], snapshot.trace[-1][0]
+    return tuple(row for row in old if last - TRACE_KEPT <= row[0] < first) + snapshot.trace

@@ -1,0 +1,281 @@
+"""The control loop: drain -> guard -> decide -> command -> publish. The only caller of MotorController.command.
+
+Every tick re-sends the present set-point, so the motor's own watchdog is fed by a fresh tick of this loop and by
+nothing else (docs/reliability.md, rule 3). What is to be commanded is decided by whoever runs the tick: idle stages or
+the sequencer.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from math import inf, nan
+from typing import Protocol
+
+from drivers.errors import LinkError
+from drivers.protocols import MotorController, Sample
+from rig.campaign.bench import COMMAND_STREAM, Bench
+from rig.campaign.limits import guarded_channels
+from rig.control.readings import Readings
+from rig.link.clients import Clients
+from rig.link.front_end_messages import Request
+from rig.recording.ledger import Ledger
+from rig.recording.recorder_link import RecorderLink
+from rig.safety import guard
+from rig.safety.guard import Recorder, Trip, Vitals
+from rig.safety.lateness import Lateness
+from rig.safety.pace import Pace
+from rig.watch.watch_link import WatchLink
+
+PUBLISH_PERIOD = 0.1
+"""s between snapshots to the front ends."""
+TRACE_PERIOD = 0.05
+"""s between rows of the live trace."""
+
+
+class Clock(Protocol):
+    """The machine's monotonic clock, or a test's."""
+
+    def now_ns(self) -> int: ...
+
+    def sleep_until_ns(self, t_ns: int) -> None: ...
+
+
+class MonotonicClock:
+    """CLOCK_MONOTONIC, the clock of every sample."""
+
+    def now_ns(self) -> int:
+        return time.monotonic_ns()
+
+    def sleep_until_ns(self, t_ns: int) -> None:
+        time.sleep(max(t_ns - time.monotonic_ns(), 0) * 1e-9)
+
+
+@dataclass(frozen=True, slots=True)
+class Inputs:
+    """What a tick has seen. Times in s on the monotonic clock."""
+
+    now: float
+    samples: tuple[Sample, ...]
+    requests: tuple[Request, ...]
+    trip: Trip | None
+    rotation: float | None
+    """rev/s, newest and fresh; None otherwise."""
+
+
+@dataclass(frozen=True, slots=True)
+class Decision:
+    """What to send in this tick: volts, or None for nothing; `release` uses the second way to stop as well."""
+
+    volts: float | None
+    release: bool = False
+
+
+IDLE = Decision(0.0)
+
+
+@dataclass
+class Loop:
+    """Runs ticks at the bench's rate. `guarded` says whether limits are judged: not before the preflight has passed."""
+
+    bench: Bench
+    readings: Readings
+    recorder: RecorderLink
+    ledger: Ledger
+    clients: Clients
+    clock: Clock
+    unattended: bool
+    publish: Callable[[float], None]
+    watcher: WatchLink | None = None
+    """Sees what is recorded; None: nobody watches."""
+    signals: deque[Request] = field(default_factory=deque)
+    """Requests that came by another way than a front end; a signal handler may append at any instant."""
+    guarded: bool = False
+    guarded_since: float = 0.0
+    recording_since_ns: int | None = None
+    """t = 0 of the open recording."""
+    command: float = 0.0
+    """V, last sent."""
+    lateness: float = 0.0
+    """s, of the running tick."""
+    late: Lateness = field(default_factory=Lateness)
+    """Of all ticks since the recording began."""
+    driven_since: float | None = None
+    """s, when the command last left 0 V; None: it is 0 V."""
+    has_driven: bool = False
+    _command_error: str = ""
+    _recorded_command: tuple[float | None] | None = None
+    """Last row of the command stream; (None,) while nothing is sent, which is recorded as NaN."""
+    _due_ns: int = 0
+    _published: float = -inf
+    _traced: float = -inf
+    _paces: tuple[tuple[str, Pace], ...] = ()
+    _counted: dict[str, int] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        config = self.bench.config
+        self.period_ns = round(1e9 / config.loop_rate)
+        force = self.bench.instruments[config.force].streams[0].name
+        self.thrust_channel = f"{force}.thrust"
+        self.rotation_channel = rotation_channel(self.bench)
+        essential = [self.thrust_channel] + ([self.rotation_channel] if self.rotation_channel else [])
+        streams = self.readings.streams.values()
+        self.guarded_channels = guarded_channels(config.limits, streams, essential, self.thrust_channel)
+        self.allowed = guard.allowances(config.loop_rate)
+        self.readings.watch_sameness(c.channel for c in self.guarded_channels if c.max_frozen is not None)
+
+    def begin_guarding(self) -> None:
+        """From now on the guard judges every tick."""
+        now = self.now
+        self.guarded, self.guarded_since = True, now
+        judged = {self.readings.place[one.channel][0] for one in self.guarded_channels}
+        self._paces = tuple(
+            (stream.name, Pace(stream.name, device, stream.period_s, now))
+            for device, stream in self.bench.streams()
+            if stream.name in judged
+        )
+        self._counted = dict(self.readings.rows)
+
+    @property
+    def now(self) -> float:
+        """Seconds on the monotonic clock."""
+        return self.clock.now_ns() * 1e-9
+
+    def tick(self, motor: MotorController | None, decide: Callable[[Inputs], Decision]) -> None:
+        """One turn. `motor` None: it is not open yet, nothing is commanded."""
+        now_ns = self._begin()
+        now = now_ns * 1e-9
+        samples = self.bench.drain()
+        self.readings.update(samples)
+        self.recorder.poll(now)
+        requests = self._requests(now)
+        trip = self._judge(now) if self.guarded else None
+        decision = decide(Inputs(now, tuple(samples), requests, trip, self.rotation(now)))
+        if motor is not None:
+            self._send(motor, decision, now)
+        self._record(samples, decision, now_ns)
+        self._show(now)
+        self.clock.sleep_until_ns(self._due_ns)
+
+    def zero(self, motor: MotorController) -> None:
+        """0 V by both ways, now, whatever else fails."""
+        self._send(motor, Decision(0.0, release=True), self.now)
+
+    def rotation(self, now: float) -> float | None:
+        """Newest rotation rate in rev/s, None when it is not measured, NaN or old."""
+        return None if self.rotation_channel is None else self.readings.fresh(self.rotation_channel, now)
+
+    def thrust_rows(self, samples: tuple[Sample, ...], since_ns: int) -> tuple[tuple[float, float], ...]:
+        """(s since `since_ns`, N) of the force device's rows, oldest first."""
+        stream, column, _ = self.readings.place[self.thrust_channel]
+        return tuple(
+            ((sample.t_ns - since_ns) * 1e-9, sample.values[column])
+            for sample in samples
+            if sample.stream == stream and sample.t_ns >= since_ns
+        )
+
+    def begin_recording(self, t0_ns: int) -> None:
+        self.recording_since_ns, self._recorded_command = t0_ns, None
+        self.late.clear()
+
+    def end_recording(self) -> None:
+        self.recording_since_ns = None
+
+    def _requests(self, now: float) -> tuple[Request, ...]:
+        """Taken one by one: a signal that comes meanwhile is in this tick or in the next, and never lost."""
+        requests = self.clients.poll(now)
+        while self.signals:
+            requests.append(self.signals.popleft())
+        return tuple(requests)
+
+    def _begin(self) -> int:
+        now_ns = self.clock.now_ns()
+        behind = now_ns - self._due_ns if self._due_ns else 0
+        self.lateness = max(behind, 0) * 1e-9
+        self.late.add(self.lateness)
+        self._due_ns = (self._due_ns if 0 <= behind < self.period_ns else now_ns) + self.period_ns
+        return now_ns
+
+    def _judge(self, now: float) -> Trip | None:
+        if self._command_error:
+            return Trip(
+                f"the motor did not take a command: {self._command_error}", "link", now, self.bench.config.motor
+            )
+        if not self.unattended and self.clients.last_lease is not None and not self.clients.connected:
+            return Trip("the operator is gone: the last front end has closed its connection", "lease", now)
+        newest = {one.channel: self.readings.newest(one.channel) for one in self.guarded_channels}
+        vitals = self._vitals(now)
+        trip = guard.check(self.guarded_channels, newest, vitals, self.allowed)
+        return trip or self._pace(vitals)
+
+    def _pace(self, vitals: Vitals) -> Trip | None:
+        trips = []
+        for stream, pace in self._paces:
+            rows = self.readings.rows.get(stream, 0)
+            trips.append(pace.advance(rows - self._counted.get(stream, 0), vitals))
+            self._counted[stream] = rows
+        return next((trip for trip in trips if trip), None)
+
+    def _vitals(self, now: float) -> Vitals:
+        links = {name: instrument.health() for name, instrument in self.bench.instruments.items()}
+        lease = None if self.unattended else self.clients.lease_age(now)
+        driven = 0.0 if self.driven_since is None else now - self.driven_since
+        recorder = Recorder(self.recorder.failed, self.recorder.silence(now), self.recorder.free_bytes)
+        return Vitals(now, self.guarded_since, self.lateness, links, recorder, self.ledger.error, lease, driven)
+
+    def _send(self, motor: MotorController, decision: Decision, now: float) -> None:
+        """The second way to stop is tried also when the first is refused."""
+        if decision.volts is not None:
+            self._note_command(decision.volts, now)
+            try:
+                motor.command(decision.volts)
+            except LinkError as error:
+                self._command_error = str(error)
+        if decision.release:
+            try:
+                motor.release()
+            except LinkError as error:
+                self._command_error = str(error)
+
+    def _note_command(self, volts: float, now: float) -> None:
+        self.command = volts
+        self.has_driven = self.has_driven or volts != 0.0
+        if volts == 0.0:
+            self.driven_since = None
+        elif self.driven_since is None:
+            self.driven_since = now
+
+    def _record(self, samples: list[Sample], decision: Decision, now_ns: int) -> None:
+        since = self.recording_since_ns
+        if since is None:
+            return
+        rows = [sample for sample in samples if sample.t_ns >= since]
+        if self._recorded_command != (decision.volts,):
+            self._recorded_command = (decision.volts,)
+            rows.append(Sample(COMMAND_STREAM, now_ns, (nan if decision.volts is None else decision.volts,)))
+        self.recorder.rows(rows)
+        if self.watcher is not None:
+            self.watcher.rows(rows, now_ns * 1e-9)
+
+    def _show(self, now: float) -> None:
+        since = self.recording_since_ns
+        thrust = self.readings.newest(self.thrust_channel)
+        if since is not None and thrust is not None and now - self._traced >= TRACE_PERIOD:
+            self._traced = now
+            self.clients.add_trace((now - since * 1e-9, self.command, thrust.value))
+        if now - self._published >= PUBLISH_PERIOD - self.period_ns * 0.5e-9:
+            self._published = now
+            self.publish(now)
+
+
+def rotation_channel(bench: Bench) -> str | None:
+    """The motor's own rotation rate if it has one, else the first on the bench."""
+    names = [
+        (device != bench.config.motor, f"{stream.name}.{channel.name}")
+        for device, stream in bench.streams()
+        for channel in stream.channels
+        if channel.quantity == "rotation_rate"
+    ]
+    return min(names)[1] if names else None

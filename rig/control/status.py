@@ -1,0 +1,102 @@
+"""What the controller shows: the facts of the campaign so far, turned into a Snapshot ten times a second."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+from typing import Literal
+
+from rig.campaign.config import CampaignConfig
+from rig.link.front_end_messages import Check, LogLine, Point, Progress, Reading, Snapshot, State
+from rig.sequence.ticks import Output
+
+LOG_LINES = 500
+"""Newest log lines that travel with every snapshot."""
+
+
+@dataclass
+class Status:
+    """Grows during the campaign; `snapshot` freezes it."""
+
+    campaign: CampaignConfig
+    thrusters: tuple[str, ...]
+    state: State = "connecting"
+    run: int = 0
+    checks: list[Check] = field(default_factory=list)
+    points: list[Point] = field(default_factory=list)
+    files: list[str] = field(default_factory=list)
+    log: deque[LogLine] = field(default_factory=lambda: deque(maxlen=LOG_LINES))
+    log_count: int = 0
+    outcome: Literal["", "running", "completed", "aborted", "tripped"] = ""
+    cause: str = ""
+    stop_confirmed: bool | None = None
+    mismatch: str = ""
+    """Of this thruster's run, as the watcher last said; empty: none."""
+    started: float | None = None
+    """s, when the operator started the campaign."""
+    output: Output | None = None
+    """Of the running sequencer."""
+    begun: float = 0.0
+    """s, when the controller began."""
+    sequence: int = 0
+    run_expected: float = field(init=False)
+    """s of one run by plan; reckoned once, a long plan has thousands of steps."""
+
+    def __post_init__(self) -> None:
+        self.run_expected = self.campaign.plan.duration().expected
+
+    @property
+    def thruster(self) -> str:
+        return self.thrusters[min(self.run, len(self.thrusters) - 1)]
+
+    def say(self, line: LogLine) -> None:
+        self.log.append(line)
+        self.log_count += 1
+
+    def snapshot(self, now: float, time: float, command: float, readings: tuple[Reading, ...]) -> Snapshot:
+        """`now` s monotonic, `time` s since the start of the recording, `command` V."""
+        self.sequence += 1
+        return Snapshot(
+            seq=self.sequence,
+            campaign=self.campaign.name,
+            state=self.state,
+            thruster=self.thruster,
+            command=command,
+            time=time,
+            readings=readings,
+            checks=tuple(self.checks),
+            points=tuple(self.points),
+            log=tuple(self.log),
+            log_count=self.log_count,
+            trace=(),
+            progress=self._progress(now),
+            files=tuple(self.files),
+            outcome=self.outcome,
+            cause=self.cause,
+            stop_confirmed=self.stop_confirmed,
+            attended=not self.campaign.unattended,
+            since_begin=now - self.begun,
+            mounted_by_hand=not self.campaign.bench.mount.command,
+            mismatch=self.mismatch,
+        )
+
+    def _progress(self, now: float) -> Progress | None:
+        if self.started is None:
+            return None
+        out = self.output
+        elapsed = now - self.started
+        left = len(self.thrusters) - self.run - (1 if out else 0)
+        eta = (out.remaining if out else 0.0) + max(left, 0) * self.run_expected
+        if self.state == "done":
+            eta = 0.0
+        return Progress(
+            step=out.step if out else 0,
+            steps=out.steps if out else 0,
+            step_elapsed=out.step_elapsed if out else 0.0,
+            step_expected=out.step_expected if out else 0.0,
+            run=self.run,
+            runs=len(self.thrusters),
+            elapsed=elapsed,
+            eta=eta,
+            fraction=elapsed / (elapsed + eta) if elapsed + eta > 0 else 0.0,
+        )

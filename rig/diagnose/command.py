@@ -1,0 +1,212 @@
+"""`rig diagnose FILE...`: what the model leaves out of these recordings, located, named, refitted and judged."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from importlib import import_module
+from itertools import chain
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from rig.diagnose.next_plan import write_next
+from rig.diagnose.outputs import PATH, Wanted, answer_options, holdout_option, seed_option, wanted_of
+from rig.diagnose.vehicle import VehicleFiles, diagnose_vehicle_files, is_vehicle, refuse_for_tunnel
+from rig.errors import RecordingError, RigError
+from rig.list_option import ListCommand
+
+if TYPE_CHECKING:  # numpy and scipy come up when a diagnosis is made, not for `rig diagnose --help`
+    from identification.mismatch.diagnosis import Diagnosis
+    from identification.mismatch.next_experiment.sweeps import Limits
+    from identification.recording import Recording
+    from identification.twin import Twin
+    from rig.campaign.config import CampaignConfig
+
+NO_VEHICLE = VehicleFiles()
+NOTHING = Wanted()
+WHAT = "expected one or more recordings (*.h5) of one thruster"
+
+
+def recordings_in(paths: Iterable[Path], who: str = "rig diagnose") -> list[Path]:
+    """The files meant by files and folders; a folder stands for its *.h5. Raises RecordingError."""
+    found = list(chain.from_iterable(_in(Path(path)) for path in paths))
+    if not found:
+        raise RecordingError(f"{who}: no recording was given; {WHAT}")
+    return found
+
+
+def _in(path: Path) -> list[Path]:
+    if not path.is_dir():
+        return [path]
+    found = sorted(path.glob("*.h5"))
+    if not found:
+        raise RecordingError(f"{path} is a folder without recordings; {WHAT}")
+    return found
+
+
+def read(paths: Iterable[Path]) -> list[Recording]:
+    """Raises RecordingError with one sentence for the first that cannot be read."""
+    from rig.hdf5 import load
+
+    return [load(path) for path in paths]
+
+
+def refuse_both(files: Iterable[Path], held: Iterable[Path]) -> None:
+    """Raises RecordingError for a file that is fitted and held out."""
+    fitted = {path.resolve() for path in files}
+    for path in held:
+        if path.resolve() in fitted:
+            raise RecordingError(f"{path} is both to be diagnosed and held out; hold out another recording")
+
+
+def diagnose_files(
+    paths: Iterable[Path],
+    holdout: Iterable[Path] = (),
+    seed: int = 0,
+    twin: Path | None = None,
+    *,
+    any_thruster: bool = False,
+    limits: Limits | None = None,
+    vehicle: VehicleFiles = NO_VEHICLE,
+    wanted: Wanted = NOTHING,
+) -> Diagnosis:
+    """The diagnosis of recordings of one thruster, against C V|V| or a twin; its own twin knows the files' hashes.
+
+    Of recordings of a vehicle, against its drag and its thrusters' models; `vehicle` says what is known of it.
+    `limits`: of the next experiment. `wanted`: what is to be written of the answer; what cannot be is refused before
+    anything is computed. Raises RecordingError or ConfigError for what cannot be used, TwinError for such a twin.
+    """
+    from rig.twin.reading import read_twin
+    from rig.twin.writing import stamped
+
+    files, held = recordings_in(paths), recordings_in(holdout) if holdout else []
+    refuse_both(files, held)
+    baseline = None if twin is None else read_twin(twin)
+    recordings = read(files)
+    wanted.refuse(recordings)
+    if is_vehicle(recordings):
+        _refuse_for_vehicle(files, twin, limits)
+        kept = dict(zip(held, read(held), strict=True))
+        return diagnose_vehicle_files(dict(zip(files, recordings, strict=True)), kept, seed, vehicle)
+    refuse_for_tunnel(vehicle)
+    if baseline is not None and any_thruster:
+        baseline = replace(baseline, thruster=recordings[0].thruster)
+    found = diagnosed(recordings, read(held), seed, baseline, limits)
+    by_id = {r.recording_id: path for r, path in zip(recordings, files, strict=True)}
+    return found if found.twin is None else replace(found, twin=stamped(found.twin, by_id))
+
+
+def _refuse_for_vehicle(files: Sequence[Path], twin: Path | None, limits: Limits | None) -> None:
+    if twin is not None:
+        raise RecordingError(f"--twin is of a thruster, and {files[0]} is a recording of a vehicle")
+    if limits is not None:
+        raise RecordingError(
+            f"--campaign and --budget are of an experiment on the bench, and {files[0]} is a recording of a vehicle"
+        )
+
+
+def diagnosed(
+    recordings: Sequence[Recording],
+    holdout: Sequence[Recording] = (),
+    seed: int = 0,
+    baseline: Twin | None = None,
+    limits: Limits | None = None,
+) -> Diagnosis:
+    """As identification has it, a refusal raised as RecordingError."""
+    from identification.mismatch.pipeline import diagnose
+    from identification.mismatch.prepare.preparing import Refusal
+
+    found = diagnose(recordings, holdout, seed, baseline, limits)
+    if isinstance(found, Refusal):
+        raise RecordingError(found.reason)
+    return found
+
+
+def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = ()) -> None:
+    """Twin, page, JSON and plan where they are wanted; text for a person unless the JSON goes to standard output.
+
+    `recordings`: those diagnosed; with them the page draws each effect by itself. Raises OSError, ConfigError.
+    """
+    from identification.mismatch.answer.as_json import diagnosis_json
+    from rig.diagnose.text import diagnosis_text
+
+    if wanted.save_twin is not None and found.twin is not None:
+        from rig.twin.writing import write_twin
+
+        write_twin(found.twin, wanted.save_twin)
+    if wanted.report is not None:
+        page = "rig.diagnose.report.page" if found.response == "thrust" else "rig.diagnose.report.vehicle"
+        import_module(page).write(found, wanted.report, recordings)  # matplotlib: only for a page
+    if wanted.json_path is not None:
+        text = json.dumps(diagnosis_json(found), indent=1, allow_nan=False)
+        if wanted.alone:
+            click.echo(text)
+        else:
+            wanted.json_path.write_text(text + "\n", encoding="utf-8")
+    if not wanted.alone:
+        click.echo(diagnosis_text(found))
+    if wanted.plan is not None and wanted.campaign is not None:
+        _plan(found, wanted.campaign, wanted.plan, err=wanted.alone)
+
+
+def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) -> None:
+    """The next experiment as a campaign, or why there is none."""
+    if found.next_experiment is None:
+        click.echo(f"no next experiment is needed, for no finding has a rival; {plan} was not written", err=True)
+    for file in write_next(found, campaign, plan):
+        click.echo(f"next experiment written to {file}; next: rig check {file}", err=err)
+
+
+@click.command("diagnose", cls=ListCommand)
+@click.argument("files", nargs=-1, required=True, type=PATH)
+@click.option("--twin", type=PATH, help="Diagnose against this twin instead of C V|V|.")
+@click.option("--any-thruster", is_flag=True, help="The twin may be of another thruster.")
+@holdout_option
+@answer_options
+@click.option("--thrusters", multiple=True, type=PATH, help="Vehicle: what `rig fit --json` wrote of its thrusters.")
+@click.option("--installation", type=PATH, help="Vehicle: which thruster sits where (TOML), as for `rig vehicle`.")
+@click.option(
+    "--mass", type=float, metavar="KG", help="Vehicle: its inertia on that axis, in the installation's place."
+)
+@click.option("--mass-std", type=float, default=0.0, metavar="KG", help="Standard deviation of --mass.  [default: 0]")
+@click.option("--axis", type=click.Choice(["surge", "sway", "heave", "yaw"]), help="Vehicle: only trials of this axis.")
+@seed_option
+def diagnose_command(
+    files: tuple[Path, ...],
+    twin: Path | None,
+    any_thruster: bool,
+    holdout: tuple[Path, ...],
+    thrusters: tuple[Path, ...],
+    installation: Path | None,
+    mass: float | None,
+    mass_std: float,
+    axis: str | None,
+    seed: int,
+    **outputs: Any,
+) -> None:
+    """Find the physics that C V|V| leaves out of recordings of one thruster; a folder stands for its *.h5.
+
+    Of recordings of a vehicle: what its drag and the models of its thrusters leave out.
+
+    Exit status 0 for every honest verdict, 2 for input that cannot be used (one sentence why).
+    """
+    try:
+        wanted = wanted_of(**outputs)
+        vehicle = VehicleFiles(thrusters, installation, mass, mass_std, axis or "")
+        found = diagnose_files(
+            files,
+            holdout,
+            seed,
+            twin,
+            any_thruster=any_thruster,
+            limits=wanted.limits,
+            vehicle=vehicle,
+            wanted=wanted,
+        )
+        tell(found, wanted, read(recordings_in(files)) if wanted.report is not None else ())
+    except (RigError, OSError) as error:
+        click.echo(f"rig diagnose: {error}", err=True)
+        raise SystemExit(2) from error

@@ -1,0 +1,1 @@
+"""From a diagnosis to its page: words and figures, for a thruster and for a vehicle."""

@@ -1,0 +1,1 @@
+"""From the answer of `rig fit` to its page."""

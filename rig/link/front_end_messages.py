@@ -1,0 +1,156 @@
+"""All that crosses between controller, recorder and front ends. Frozen; JSON on the wire (see `rig.link.sockets`)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+State = Literal[
+    "connecting",  # opening ports, identifying
+    "preflight",  # checks shown, waiting for the operator's start
+    "mount",  # waiting until the named thruster is on the bench
+    "proving",  # the motor's own watchdog is being proved
+    "tare",
+    "ramp",
+    "hold",
+    "rest",
+    "sine",
+    "free",
+    "paused",  # zero volts, waiting for resume
+    "stopping",  # command 0, waiting for measured rotation to end
+    "run_done",  # a recording was closed; next thruster follows
+    "done",  # the campaign has ended, however it ended: see outcome
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One line of the preflight list."""
+
+    name: str
+    verdict: Literal["waiting", "passed", "warning", "failed"]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """Latest value of one channel, with what the guard thinks of it."""
+
+    channel: str
+    """`<stream>.<channel>`, e.g. `load_cell.thrust`."""
+    quantity: str
+    unit: str
+    value: float | None
+    """None: nothing came yet, or the device gave NaN."""
+    age: float | None
+    """s since the row arrived; None: none came yet."""
+    low: float | None = None
+    high: float | None = None
+    max_age: float | None = None
+    state: Literal["ok", "stale", "limit", "none"] = "ok"
+
+
+@dataclass(frozen=True, slots=True)
+class Point:
+    """A finished hold: the mean thrust, tare subtracted, and its standard error honest under autocorrelation."""
+
+    step: int
+    voltage: float
+    """V commanded."""
+    thrust: float
+    """N, latest tare subtracted."""
+    std_error: float
+    """N."""
+    duration: float
+    steady: bool
+    """Verdict of the dwell: False = drift or standard error still above the threshold at the maximum dwell."""
+    thruster: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class LogLine:
+    time: float
+    """s since the controller began; in the recording's own events since its t0."""
+    level: Literal["info", "warning", "trip", "error"]
+    text: str
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    step: int
+    """0-based index of the running step in its plan."""
+    steps: int
+    step_elapsed: float
+    step_expected: float
+    """s; for a hold until steady the expectation, at most its maximum."""
+    run: int
+    """0-based index of the running thruster."""
+    runs: int
+    elapsed: float
+    """s since the campaign's start key."""
+    eta: float
+    """s to the end of the campaign, by plan."""
+    fraction: float
+    """0..1 of the campaign."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """The whole state a front end shows, 10 times a second. Lists that only grow (`points`, `log`) are sent whole,
+    so that a console attached late knows everything; `trace` is what came since the last snapshot of this client."""
+
+    seq: int
+    campaign: str
+    state: State
+    thruster: str
+    command: float
+    """V, as sent in this tick."""
+    time: float
+    """s since the start of the recording (0 outside one)."""
+    readings: tuple[Reading, ...]
+    checks: tuple[Check, ...]
+    points: tuple[Point, ...]
+    """Of this thruster's run."""
+    log: tuple[LogLine, ...]
+    """Newest 500 events of the campaign."""
+    log_count: int
+    """Events so far, including those that are no longer in `log`."""
+    trace: tuple[tuple[float, float, float], ...]
+    """(t, command V, thrust N raw) at <= 20 rows/s; on attaching: the last 10 minutes of this run."""
+    progress: Progress | None
+    files: tuple[str, ...]
+    """Recordings of this campaign so far, the running one last."""
+    outcome: Literal["", "running", "completed", "aborted", "tripped"] = ""
+    cause: str = ""
+    """Why it stopped, one sentence; empty while running or completed."""
+    stop_confirmed: bool | None = None
+    """After a stop: True = measured rest, False = STOP NOT CONFIRMED, None = not stopped or still waiting."""
+    attended: bool = True
+    """False: the campaign may go on with no front end connected (`unattended = true`)."""
+    clients: int = 0
+    since_begin: float = 0.0
+    """s since the controller began, the clock of `log`."""
+    mounted_by_hand: bool = False
+    """True: in the state `mount` an operator puts the thruster on the bench, then sends `mounted`. False: a command."""
+    mismatch: str = ""
+    """Where this run stopped fitting what it was, or its twin, in one line; empty: nowhere, as far as is seen."""
+
+
+RequestKind = Literal[
+    "start",  # begin the first run (preflight passed)
+    "mounted",  # the thruster asked for is on the bench
+    "stop",  # zero now, end the campaign, close the file
+    "pause",
+    "resume",
+    "skip",  # end the running hold now, keep its data
+    "note",  # operator's remark into the events
+    "detach",  # this client leaves on purpose; refused (log line) when attended and no other client is there
+    "lease",  # I am here (sent twice a second by a front end that attends)
+]
+
+
+@dataclass(frozen=True, slots=True)
+class Request:
+    kind: RequestKind
+    text: str = ""
+    """The note, or who asks for the stop (`console`, `headless`, `SIGTERM` ...)."""

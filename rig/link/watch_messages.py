@@ -1,0 +1,52 @@
+"""All that crosses between the controller and the watcher process, beside Rows and Failed of recorder_messages.
+
+One run: Watched, then Rows whose `stream` is an index into `Watched.streams`; a Mismatch may come at any time. The next
+Watched begins another run. Failed: this run is not watched, or not any more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class WatchedStream:
+    """Rows that share one clock."""
+
+    name: str
+    columns: tuple[tuple[int, str], ...]
+    """(column of the rows, quantity) of what is looked at."""
+
+
+@dataclass(frozen=True, slots=True)
+class Watched:
+    """A run begins."""
+
+    thruster: str
+    t0_ns: int
+    """`time.monotonic_ns()` of t = 0."""
+    streams: tuple[WatchedStream, ...]
+    highest: float
+    """V, the largest |command| of the plan."""
+    false_alarms_per_hour: float
+    twin: str = ""
+    """Path; empty: the static curve is learnt from the run itself."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mismatch:
+    """The run no longer fits what it was, or the twin. Times in s of the recording."""
+
+    t0_ns: int
+    """Of the run: it may be over when this comes."""
+    thruster: str
+    time: float
+    began: float
+    place: str
+    headline: str
+    """For one line of a screen."""
+    statement: str
+    """A sentence a person can act on."""
+    size: float
+    """N."""
+    e_value: float

@@ -1,0 +1,191 @@
+"""rig check: everything that can be known wrong about a campaign before anything is opened, and what it will take."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+from rich.console import Console
+from rich.table import Table
+
+from drivers.protocols import Channel, Instrument, MotorController
+from rig.campaign.bench import build
+from rig.campaign.config import BenchConfig, CampaignConfig
+from rig.campaign.loading import load_campaign
+from rig.campaign.plan import Duration, FixedDwell, Step
+from rig.campaign.shapes import Levels
+from rig.errors import ConfigError, PlanError
+from rig.sequence.sequencer import settings_for
+from rig.sequence.steady import LEAST_SAMPLES
+
+
+@dataclass(frozen=True, slots=True)
+class CheckReport:
+    """A campaign that may run, and what it will take. Durations in s."""
+
+    campaign: CampaignConfig
+    steps: tuple[Step, ...]
+    run: Duration
+    """One thruster, watchdog proof included."""
+    total: Duration
+    """All thrusters; `worst` adds the longest mounting."""
+    peak_voltage: float
+    """V"""
+    peak_thrust: float | None
+    """N, expected_C V^2; None: the campaign gives no expected_C and the peak thrust was not checked."""
+
+
+def check_campaign(path: Path) -> CheckReport:
+    """Load and check a campaign; opens nothing. Raises ConfigError or PlanError: one sentence with file and key."""
+    campaign = load_campaign(path)
+    bench = build(campaign.bench)
+    _require_ports(campaign.bench)
+    _require_watchdog(campaign.bench, bench.motor)
+    _require_voltages(campaign, bench.motor)
+    force = bench.instruments[campaign.bench.force]
+    thrust = _require_thrust(campaign, force)
+    _require_samples(campaign, force)
+    proof = settings_for(campaign, "").proof
+    proving = Duration(proof.expected, proof.worst) if proof else Duration(0.0, 0.0)
+    plan, runs = campaign.plan.duration(), len(campaign.thrusters)
+    run = Duration(plan.expected + proving.expected, plan.worst + proving.worst + campaign.bench.coast_time)
+    total = Duration(runs * run.expected, runs * (run.worst + campaign.bench.mount.timeout))
+    return CheckReport(campaign, tuple(campaign.plan), run, total, campaign.plan.peak(), thrust)
+
+
+def _ports(bench: BenchConfig) -> Iterator[tuple[str, str]]:
+    """(key, port) of everything that is to be opened."""
+    for name, bus in bench.can.items():
+        yield f"can.{name}.channel", bus.channel
+    for name, device in bench.devices.items():
+        port = getattr(device.options, "port", "")
+        yield f"devices.{name}.port", port
+
+
+def _require_ports(bench: BenchConfig) -> None:
+    """A port that is a path must exist; a URL or a plain name (COM3, can0) is left to the opening."""
+    for key, port in _ports(bench):
+        if "/" in port and "://" not in port and not Path(port).exists():
+            raise ConfigError(
+                f"{bench.path}: {key} is {port}, but there is no such port: connect it or correct the key"
+            )
+
+
+def _require_watchdog(bench: BenchConfig, motor: MotorController) -> None:
+    timeout, key = motor.watchdog.timeout_s, f"devices.{bench.motor}"
+    if timeout is None:
+        raise ConfigError(f"{bench.path}: {key} has no command timeout of its own, or none that is known: refused")
+    if timeout > bench.watchdog_limit:
+        raise ConfigError(
+            f"{bench.path}: {key} stops {timeout:g} s after the last command, but bench.watchdog_limit allows "
+            f"{bench.watchdog_limit:g} s: shorten the device's timeout"
+        )
+    if 2 / bench.loop_rate > timeout:  # one command may be late without the motor being let go
+        raise ConfigError(
+            f"{bench.path}: bench.loop_rate is {bench.loop_rate:g} Hz, but {key} stops {timeout:g} s after the last "
+            f"command: at least {2 / timeout:g} Hz are needed"
+        )
+
+
+def _require_voltages(campaign: CampaignConfig, motor: MotorController) -> None:
+    bench, plan = campaign.bench, campaign.plan
+    try:
+        plan.require_within(motor.max_voltage, bench.slew, f"the motor controller {bench.motor!r}")
+        plan.require_within(bench.max_voltage, bench.slew, "the bench (bench.max_voltage, bench.slew)")
+    except PlanError as error:
+        raise PlanError(f"{campaign.path}: [plan]: {error}") from None
+    if campaign.prove_watchdog and bench.proof_voltage > motor.max_voltage:
+        raise ConfigError(
+            f"{bench.path}: bench.proof_voltage is {bench.proof_voltage:g} V, but the motor controller {bench.motor!r} "
+            f"gives at most {motor.max_voltage:g} V"
+        )
+
+
+def _thrust_channel(force: Instrument) -> tuple[str, Channel, float]:
+    """(`<stream>.<channel>`, channel, rows/s) of the first thrust channel; the loader has made sure there is one."""
+    found = ((s, c) for s in force.streams for c in s.channels if c.quantity == "thrust")
+    stream, channel = next(found)
+    return f"{stream.name}.{channel.name}", channel, 1 / stream.period_s
+
+
+def _require_thrust(campaign: CampaignConfig, force: Instrument) -> float | None:
+    """Expected peak thrust in N, inside the cell's range and its limits on each side that the plan goes to."""
+    if campaign.expected_C is None:
+        return None
+    name, channel, _ = _thrust_channel(force)
+    bounds = [("the load cell's range", channel.range_min, channel.range_max)]
+    bounds += [(f'limits."{name}"', limit.min, limit.max) for limit in campaign.bench.limits if limit.channel == name]
+    highest = max(step.voltage + abs(step.amplitude) for step in campaign.plan)
+    lowest = min(step.voltage - abs(step.amplitude) for step in campaign.plan)
+    for volts in (highest, lowest):
+        thrust = campaign.expected_C * volts * abs(volts)
+        for whose, low, high in bounds:
+            bound = high if volts > 0 else low
+            if volts and bound is not None and abs(bound) < abs(thrust):
+                raise PlanError(
+                    f"{campaign.path}: [plan]: {volts:g} V is expected to give {thrust:.4g} N (expected_C V|V|), but "
+                    f"{whose} ends at {bound:g} N: lower the plan's levels"
+                )
+    return campaign.expected_C * campaign.plan.peak() ** 2
+
+
+def _require_samples(campaign: CampaignConfig, force: Instrument) -> None:
+    """The shortest hold and the tare must give enough samples to know the error of their mean."""
+    rate = _thrust_channel(force)[2]
+    windows = [("tare.duration", campaign.tare.duration)]
+    holds = [step.min_duration - step.settle for step in campaign.plan if step.phase == "hold"]
+    if holds:
+        dwell, shape = campaign.plan.dwell, campaign.plan.shape
+        own = isinstance(shape, Levels) and shape.durations
+        key = "durations" if own else "dwell.duration" if isinstance(dwell, FixedDwell) else "dwell.min"
+        windows.append((f"plan.{key} less settle", min(holds)))
+    for key, seconds in windows:
+        if seconds * rate < LEAST_SAMPLES:
+            raise PlanError(
+                f"{campaign.path}: {key} is {seconds:g} s, in which {campaign.bench.force!r} gives "
+                f"{seconds * rate:.0f} samples at {rate:g}/s, but {LEAST_SAMPLES} are needed: make it longer"
+            )
+
+
+def _clock(seconds: float) -> str:
+    minutes, rest = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+
+
+def print_report(report: CheckReport, console: Console) -> None:
+    """Steps, durations, peaks."""
+    campaign = report.campaign
+    table = Table("step", "phase", "from V", "to V", "expected s", "at most s", title=f"{campaign.name}: one run")
+    for step in report.steps:
+        to = f"{step.voltage:.2f}" + (f" ± {step.amplitude:g} at {step.frequency:g} Hz" if step.amplitude else "")
+        start = step.from_voltage if step.phase == "ramp" else step.voltage
+        times = (f"{step.expected:.1f}", f"{step.max_duration:.1f}")
+        table.add_row(str(step.index), step.phase, f"{start:.2f}", to, *times)
+    console.print(table)
+    console.print(f"bench          {campaign.bench.name}", markup=False)
+    console.print(f"thrusters      {', '.join(campaign.thrusters)}", markup=False)
+    if campaign.flow_speed is not None:
+        console.print(f"flow speed     {campaign.flow_speed:g} m/s, to be set by hand; the preflight compares")
+    console.print(f"one run        {_clock(report.run.expected)} expected, {_clock(report.run.worst)} at worst")
+    console.print(f"campaign       {_clock(report.total.expected)} expected, {_clock(report.total.worst)} at worst")
+    console.print(f"peak voltage   {report.peak_voltage:g} V")
+    if report.peak_thrust is None:
+        console.print("peak thrust    not checked: the campaign gives no expected_C")
+    else:
+        console.print(f"peak thrust    {report.peak_thrust:.4g} N expected, from expected_C")
+    if not campaign.prove_watchdog:
+        console.print(
+            "watchdog       not proved (prove_watchdog = false): what the motor controller does is not measured"
+        )
+    console.print("The campaign may run. Nothing was opened.")
+
+
+@click.command("check")
+@click.argument("campaign", type=click.Path(path_type=Path))
+def check_command(campaign: Path) -> int:
+    """Check CAMPAIGN and its bench without opening a port: steps, durations, peaks, and every limit."""
+    print_report(check_campaign(campaign), Console())
+    return 0

@@ -1,0 +1,234 @@
+"""rig run, console and stop: start a controller process, attach a front end, and say what came of it."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from rig.errors import LinkError, RigError
+from rig.link.front_end_messages import Request, Snapshot
+from rig.link.live_runs import Run, find_run, live_runs
+from rig.link.sockets import Peer, connect
+from rig.operate.headless import Headless, check_alive, operator_terminal
+
+if TYPE_CHECKING:
+    from rig.campaign.config import CampaignConfig
+
+START_TIMEOUT = 15.0
+"""s for a controller process to open its socket (imports included)."""
+END_TIMEOUT = 15.0
+"""s for a controller process to close its files and end after `done`."""
+SOCKET_NAME = "controller.sock"
+LOG_NAME = "controller.log"
+
+
+@click.command("run")
+@click.argument("campaign", type=click.Path(path_type=Path))
+@click.option(
+    "--headless", is_flag=True, help="A progress bar instead of the console; starts when the preflight passed."
+)
+@click.option(
+    "--output", type=click.Path(path_type=Path), help="Folder for the campaign's folder (default: the campaign's)."
+)
+@click.option("--thruster", "thrusters", multiple=True, help="Only this thruster of the campaign; may be repeated.")
+def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: tuple[str, ...]) -> int:
+    """Run CAMPAIGN on its bench: console, recording, table of the fits."""
+    config = require_runnable(campaign, thrusters, headless=headless)
+    if not headless and not sys.stdout.isatty():
+        raise RigError("rig run opens the console, which needs a terminal; use --headless where there is none")
+    front = progress_bar(start=True) if headless else console_screen()
+    return run_campaign(campaign, campaign_folder(output or config.output, config.name), thrusters, front)
+
+
+def require_runnable(campaign: Path, thrusters: tuple[str, ...], *, headless: bool) -> CampaignConfig:
+    """The campaign, checked as `rig check` does, and that somebody can mount the thrusters. Raises RigError."""
+    from rig.operate.check import check_campaign  # a second of scipy that `rig stop` does not need
+
+    config = check_campaign(campaign).campaign
+    unknown = [name for name in thrusters if name not in config.thrusters]
+    if unknown:
+        raise RigError(
+            f"{campaign}: --thruster {unknown[0]} is not in the campaign; it has {', '.join(config.thrusters)}"
+        )
+    require_mountable(config, thrusters or config.thrusters, headless=headless)
+    return config
+
+
+def require_mountable(config: CampaignConfig, thrusters: Sequence[str], *, headless: bool) -> None:
+    """Raises RigError where nobody could put the next thruster on the bench."""
+    if headless and not config.bench.mount.command and len(thrusters) > 1 and not sys.stdin.isatty():
+        raise RigError(
+            f"{config.path}: {len(thrusters)} thrusters, and nobody at this terminal to put the next one on the bench; "
+            "give the bench a [mount] command or run one thruster at a time with --thruster"
+        )
+
+
+def run_campaign(campaign: Path, folder: Path, thrusters: tuple[str, ...], front: FrontEnd) -> int:
+    """Start a controller in `folder` and attend it to its end; the exit status."""
+    run, process = start_controller(campaign, folder, thrusters)
+    try:
+        return follow(run, front)
+    finally:
+        process.poll()  # one that has ended leaves nothing behind: more runs may follow in this process
+
+
+@click.command("console")
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+@click.option("--headless", is_flag=True, help="Follow with a progress bar instead.")
+def console_command(folder: Path | None, headless: bool) -> int:
+    """Attach to a run that is going on: the one in FOLDER, or the only one on this machine."""
+    if not headless and not sys.stdout.isatty():
+        raise RigError("rig console needs a terminal; use --headless where there is none")
+    front = progress_bar(start=False) if headless else console_screen()
+    return follow(find_run(folder), front)
+
+
+@click.command("stop")
+@click.argument("folder", required=False, type=click.Path(path_type=Path))
+def stop_command(folder: Path | None) -> int:
+    """Stop a run that is going on: zero volts now, close the recording."""
+    peer = connect(Path(find_run(folder).socket), "the controller")
+    peer.send(Request("stop", "rig stop"))
+    last = Headless(peer).follow(start=False)
+    peer.close()
+    if last is None or last.stop_confirmed is False:
+        click.echo("rig: STOP NOT CONFIRMED by a measurement: look at the propeller, cut the supply", err=True)
+        return 1
+    click.echo(f"stopped; {last.cause or 'the run had already ended'}")
+    return 0
+
+
+def campaign_folder(output: Path, name: str) -> Path:
+    """A new folder for one campaign: `<output>/<name>-<local date and time>`."""
+    slug = re.sub(r"[^a-z0-9]+", "-", name.lower()).strip("-") or "campaign"
+    folder = output / f"{slug}-{datetime.now().astimezone():%Y%m%d-%H%M%S}"
+    try:
+        folder.mkdir(parents=True)
+    except OSError as error:
+        raise RigError(f"{folder}: the campaign's folder can't be made: {error.strerror}") from error
+    return folder.resolve()
+
+
+def start_controller(campaign: Path, folder: Path, thrusters: Sequence[str]) -> tuple[Run, subprocess.Popen[bytes]]:
+    """Start the controller process in a session of its own; returns once it listens. It outlives us if it may."""
+    with (folder / LOG_NAME).open("ab") as log:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "rig.stages.controller", str(campaign.resolve()), str(folder), *thrusters],
+            stdin=subprocess.DEVNULL,
+            stdout=log,
+            stderr=log,
+            start_new_session=True,
+        )
+    try:
+        return _listening(process, folder), process
+    except BaseException:  # Ctrl+C while it starts: nobody would ever attach to it
+        process.terminate()
+        raise
+
+
+def _listening(process: subprocess.Popen[bytes], folder: Path) -> Run:
+    """The run, once its controller has announced it."""
+    deadline = time.monotonic() + START_TIMEOUT
+    while time.monotonic() < deadline:
+        run = next((run for run in live_runs() if run.pid == process.pid), None)
+        if run is not None:
+            return run
+        try:
+            process.wait(0.05)
+        except subprocess.TimeoutExpired:
+            continue
+        raise LinkError(f"the controller ended at once: {_last_words(folder)}")
+    raise LinkError(f"the controller did not open its socket within {START_TIMEOUT:g} s; see {folder / LOG_NAME}")
+
+
+@dataclass(frozen=True, slots=True)
+class Left:
+    """How a front end ended."""
+
+    last: Snapshot | None
+    """The newest snapshot that came; None: none ever did."""
+    detached: bool = False
+    """The operator left on purpose, and the run goes on."""
+    signal: int = 0
+    """The signal that ended it; 0: none did."""
+
+
+FrontEnd = Callable[[Peer, str], Left]
+"""Takes the link and the command line that attaches once more."""
+
+
+def follow(run: Run, front: FrontEnd) -> int:
+    """Attach a front end until it ends or detaches; then the table, where the files are, and the exit status."""
+    peer = connect(Path(run.socket), "the controller")
+    again = f"rig console {run.folder}"
+    try:
+        left = front(peer, again)
+    finally:
+        peer.close()
+    if left.signal:
+        return 128 + left.signal
+    if left.detached:
+        click.echo(f"the run goes on in {run.folder}; attach again with: {again}")
+        return 0
+    _await_end(run.pid)
+    return _conclude(check_alive(left.last), Path(run.folder))
+
+
+def progress_bar(*, start: bool) -> FrontEnd:
+    """Nobody can detach here; `start` starts the run when the preflight has passed."""
+    return lambda peer, _: Left(Headless(peer, terminal=operator_terminal()).follow(start))
+
+
+def console_screen() -> FrontEnd:
+    """Imported before a controller is started: Ctrl+C in that second leaves nothing behind."""
+    from rig.console import SocketFeed, attend
+
+    def front(peer: Peer, again: str) -> Left:
+        sitting = attend(SocketFeed(peer), again=again)
+        return Left(sitting.last, sitting.detached, max(sitting.status - 128, 0))
+
+    return front
+
+
+def _conclude(last: Snapshot, folder: Path) -> int:
+    from rig.operate.summary import print_summary  # scipy and h5py: only now, and not for `rig stop`
+
+    print_summary([Path(file) for file in last.files], folder)
+    outcome = last.outcome if last.state == "done" else "aborted"
+    if outcome == "completed":
+        return 0
+    cause = last.cause or f"the controller is gone; see {folder / LOG_NAME}"
+    click.echo(f"rig: the campaign ended {outcome}: {cause}", err=True)
+    if last.stop_confirmed is False:
+        click.echo("rig: STOP NOT CONFIRMED by a measurement: look at the propeller, cut the supply", err=True)
+    return 1
+
+
+def _await_end(pid: int) -> None:
+    deadline = time.monotonic() + END_TIMEOUT
+    while _exists(pid) and time.monotonic() < deadline:
+        time.sleep(0.05)
+
+
+def _exists(pid: int) -> bool:
+    """Is the process there and not a zombie of ours?"""
+    try:
+        done, _ = os.waitpid(pid, os.WNOHANG)
+    except ChildProcessError:
+        done = 0
+    return not done and any(run.pid == pid for run in live_runs())
+
+
+def _last_words(folder: Path) -> str:
+    lines = (folder / LOG_NAME).read_text(encoding="utf-8", errors="replace").strip().splitlines()
+    return lines[-1].removeprefix("rig: ") if lines else "it said nothing"

@@ -1,0 +1,113 @@
+"""What goes into and comes out of the sequencer in one tick of the control loop."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal, NamedTuple
+
+from identification.recording import Step as StepRow
+from identification.steady_state.steady import SteadyMonitor
+from rig.campaign.config import BenchConfig, CampaignConfig
+from rig.campaign.plan import SteadyDwell, TareConfig
+from rig.link.front_end_messages import LogLine, Point, Request, State
+from rig.safety.guard import MIN_LATENESS, Trip
+from rig.safety.watchdog_proof import ProofSettings
+from rig.sequence.steady import SteadyEstimator
+
+Outcome = Literal["running", "completed", "aborted", "tripped"]
+
+
+@dataclass(frozen=True, slots=True)
+class Settings:
+    """All that the sequencer must know of bench and campaign."""
+
+    thruster: str
+    max_voltage: float
+    """V; a step beyond it is refused at construction."""
+    slew: float
+    """V/s of every ramp that is no measurement."""
+    rest_rate: float
+    """rev/s"""
+    coast_time: float
+    """s"""
+    tare: TareConfig
+    lapse: float
+    """s between two ticks from which on the command is 0 and the run ends."""
+    max_std_error: float | None = None
+    """N, of a hold until steady; None: the dwell is fixed."""
+    max_drift: float | None = None
+    """N/s"""
+    proof: ProofSettings | None = None
+    """None: the watchdog is not proved in this run."""
+    estimator: Callable[[], SteadyEstimator] = SteadyMonitor
+    """Makes an empty estimator."""
+
+
+@dataclass(frozen=True, slots=True)
+class Tick:
+    """One look at the bench. Times in s since the start of the run, never running backwards."""
+
+    time: float
+    thrust: tuple[tuple[float, float], ...] = ()
+    """(s, N) rows since the last tick, raw (no tare subtracted)."""
+    rotation: float | None = None
+    """rev/s, newest; None: none, or none that is fresh."""
+    trip: Trip | None = None
+    requests: tuple[Request, ...] = ()
+    """`stop`, `pause`, `resume`, `skip` are obeyed, others are ignored."""
+
+
+class Output(NamedTuple):
+    """What to do now, and what is finished. One a tick, hence a tuple: quicker to make than a frozen dataclass."""
+
+    volts: float | None
+    """Command to send; None: send nothing (the watchdog is being proved)."""
+    state: State
+    step: int
+    """Index of the running step."""
+    steps: int
+    step_elapsed: float
+    step_expected: float
+    remaining: float
+    """s to the end of the run, by plan."""
+    release: bool = False
+    """True: the motor still turns after a stop, use MotorController.release() as well."""
+    points: tuple[Point, ...] = ()
+    """Holds that were finished in this tick."""
+    rows: tuple[StepRow, ...] = ()
+    """Steps that were finished in this tick, as really run, for `/steps`."""
+    events: tuple[LogLine, ...] = ()
+    tare: float | None = None
+    """N, latest accepted tare; None before the first."""
+    time_to_zero_s: float | None = None
+    """s, result of the watchdog proof."""
+    outcome: Outcome = "running"
+    """Leaves `running` when the stop begins; `done` says when it is over."""
+    cause: str = ""
+    stop_confirmed: bool | None = None
+    """Measured: True at rest, False STOP NOT CONFIRMED, None not known yet."""
+    done: bool = False
+
+
+def settings_for(campaign: CampaignConfig, thruster: str) -> Settings:
+    """Settings of one thruster's run."""
+    bench, plan = campaign.bench, campaign.plan
+    steady = plan.dwell if isinstance(plan.dwell, SteadyDwell) else None
+    slew = min(plan.slew, bench.slew)
+    return Settings(
+        thruster=thruster,
+        max_voltage=bench.max_voltage,
+        slew=slew,
+        rest_rate=bench.rest_rate,
+        coast_time=bench.coast_time,
+        tare=campaign.tare,
+        lapse=max(5 / bench.loop_rate, MIN_LATENESS) + 1 / bench.loop_rate,
+        max_std_error=steady.max_std_error if steady else None,
+        max_drift=steady.max_drift if steady else None,
+        proof=proof_settings(bench, slew) if campaign.prove_watchdog else None,
+    )
+
+
+def proof_settings(bench: BenchConfig, slew: float) -> ProofSettings:
+    return ProofSettings(bench.proof_voltage, slew, bench.rest_rate, bench.watchdog_limit, bench.coast_time)

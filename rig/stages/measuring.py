@@ -1,0 +1,154 @@
+"""One run of one thruster into one file: open it, run the sequencer until the propeller's rest is known, close it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Set
+from dataclasses import replace
+
+from rig.campaign.plan import Step
+from rig.control.loop import Decision, Inputs
+from rig.link.recorder_messages import Outcome, StepRow
+from rig.recording.ledger import attempts
+from rig.recording.recorder_link import recording_path
+from rig.sequence.sequencer import Sequencer
+from rig.sequence.ticks import Output, Tick, settings_for
+from rig.stages.recording_header import opening
+from rig.stages.session import Session, Stopped
+from rig.stages.watching import begin_watch, end_watch, hear_watch
+
+
+def measure(session: Session) -> None:
+    """Raises Stopped when the run did not complete, LinkError when the recorder fails."""
+    status, loop = session.status, session.loop
+    thruster = status.thruster
+    status.outcome, status.cause, status.stop_confirmed = "running", "", None
+    session.measured.clear()
+    path = recording_path(session.folder, thruster)
+    attempt = attempts(session.before, thruster) + 1
+    t0_ns = loop.clock.now_ns()
+    request = opening(session.campaign, session.bench, thruster, path, t0_ns, attempt)
+    session.recorder.open(request, loop.now)
+    loop.clients.clear_trace()
+    loop.begin_recording(t0_ns)
+    begin_watch(session, thruster, t0_ns)  # before the first row is recorded
+    status.files.append(str(path))
+    session.wait_for_recorder(lambda: session.recorder.ready, f"open {path}")
+    session.event_log.begin(t0_ns)
+    if attempt > 1:
+        session.say("info", f"attempt {attempt} of {thruster}: the run is repeated from its first tare")
+    session.ledger.write("run_start", thruster=thruster, recording=str(path), recording_t0_ns=t0_ns, attempt=attempt)
+    settings = settings_for(session.campaign, thruster)
+    if session.proved:
+        settings = replace(settings, proof=None)  # the motor controller is the one that was proved in an earlier run
+    _close(session, sequence(session, Sequencer(session.campaign.plan, settings), t0_ns))
+
+
+def sequence(session: Session, sequencer: Sequencer, t0_ns: int) -> Output:
+    """Ticks until the sequencer is done, also through a stop until the propeller's rest is known."""
+    loop, status = session.loop, session.status
+    begun = loop.now
+    begun_ns = round(begun * 1e9)
+
+    def decide(inputs: Inputs) -> Decision:
+        since_begun = inputs.now - begun
+        thrust = loop.thrust_rows(inputs.samples, begun_ns)
+        trip = replace(inputs.trip, time=since_begun) if inputs.trip else None
+        output = sequencer.advance(Tick(since_begun, thrust, inputs.rotation, trip, inputs.requests))
+        _take(session, output, t0_ns, begun)
+        hear_watch(session)
+        session.note(inputs.requests)
+        return Decision(output.volts, output.release)
+
+    status.output = None
+    while status.output is None or not status.output.done:
+        loop.tick(session.motor, decide)
+    return status.output
+
+
+def _take(session: Session, output: Output, t0_ns: int, begun: float) -> None:
+    """Show and record what the sequencer finished in this tick; its times are s since `begun`."""
+    status, offset = session.status, begun - t0_ns * 1e-9
+    status.output, status.state = output, output.state
+    if output.outcome in ("aborted", "tripped"):
+        status.outcome, status.cause = output.outcome, output.cause
+    status.stop_confirmed = output.stop_confirmed
+    status.points.extend(output.points)
+    for row in output.rows:
+        start, end = row.t_start + offset, row.t_end + offset
+        session.recorder.step(StepRow(row.index, row.phase, row.command_voltage, start, end))
+        session.measured.add((row.index, row.phase))
+        session.ledger.write("step", thruster=status.thruster, index=row.index, phase=row.phase, t_end=end)
+    for line in output.events:
+        session.event_log.say(round((begun + line.time) * 1e9), line.level, line.text)
+
+
+def _close(session: Session, output: Output) -> None:
+    """Close the file in order and tell the ledger; a run that did not complete ends the campaign."""
+    status, recorder, loop = session.status, session.recorder, session.loop
+    _last_words(session)
+    end_watch(session)
+    outcome, cause = judged(session, output)
+    session.event_log.end()
+    recorder.close_file(outcome, cause)
+    loop.end_recording()
+    loop.guarded = False
+    session.wait_for_recorder(lambda: recorder.closed is not None or bool(recorder.failed), "close the file")
+    if recorder.failed and outcome == "completed":
+        outcome, cause = "aborted", f"recorder: {recorder.failed}"
+    session.ledger.write(
+        "run_end", thruster=status.thruster, outcome=outcome, cause=cause, recording=status.files[-1],
+        sha256=recorder.closed.sha256 if recorder.closed else "", time_to_zero_s=output.time_to_zero_s,
+    )  # fmt: skip
+    if outcome != "completed":
+        raise Stopped(outcome, cause)
+    if output.time_to_zero_s is not None:
+        session.proved = True
+        text = f"watchdog proved in the run of {status.thruster}: at rest {output.time_to_zero_s:.2f} s after silence"
+        session.say("info", text, of_bench=True)
+    loop.begin_guarding()
+
+
+def judged(session: Session, output: Output) -> tuple[Outcome, str]:
+    """Outcome and cause of a run that is over. Completed is only what measured every step and came to rest."""
+    if output.outcome in ("aborted", "tripped"):
+        return output.outcome, output.cause
+    missing = missing_steps(session.campaign.plan, session.measured, {point.step for point in session.status.points})
+    if missing:
+        return "aborted", f"the plan is not measured whole: step {missing[0].index} ({missing[0].phase}) has no data"
+    if not output.stop_confirmed:
+        return "tripped", "STOP NOT CONFIRMED at the end of the run: nothing is mounted on a propeller that may turn"
+    return "completed", ""
+
+
+def missing_steps(plan: Iterable[Step], measured: Set[tuple[int, str]], points: Set[int]) -> list[Step]:
+    """Steps that a run which says it is completed has not measured (docs/reliability.md, promise 27).
+
+    A hold needs its point; a tare, sine or swept ramp needs to have run to its end. A later tare that was not stable
+    leaves the one before in use: that it was tried is enough.
+    """
+    steps = list(plan)
+    first = next((step.index for step in steps if step.phase == "tare"), None)
+
+    def ran(step: Step) -> bool:
+        tried = step.phase == "tare" and step.index != first and (step.index, "free") in measured
+        return tried or (step.index, step.phase) in measured
+
+    return [
+        step
+        for step in steps
+        if (step.phase == "hold" and step.index not in points)
+        or ((step.phase in ("tare", "sine") or step.swept) and not ran(step))
+    ]
+
+
+def _last_words(session: Session) -> None:
+    """What an analyst should know of the wires and of the loop, at the end of the file."""
+    for name, instrument in session.bench.instruments.items():
+        health = instrument.health()
+        if health.bad:
+            first = "; ".join(health.first_bad)
+            text = f"{name}: {health.bad} of {health.received} frames could not be understood, first: {first}"
+            session.say("warning", text)
+        if health.dropped:
+            session.say("warning", f"{name}: {health.dropped} frames were lost: the loop did not take them in time")
+    session.say("info", f"control loop: {session.loop.late}")

@@ -1,0 +1,123 @@
+"""Front ends over a real socket: leases, requests, who is dropped, and what a late one is given."""
+
+from contextlib import contextmanager
+
+import pytest
+
+from rig.link.clients import MAX_CLIENTS, Clients
+from rig.link.front_end_messages import Request, Snapshot
+from rig.link.recorder_messages import Ready
+from rig.link.sockets import connect, listen
+
+
+def snapshot(text: str = "") -> Snapshot:
+    return Snapshot(1, "c", "hold", "T1", 0.0, 0.0, (), (), (), (), 0, (), None, (), cause=text)
+
+
+@contextmanager
+def listening(folder):
+    clients = Clients(listen(folder / "s.sock"))
+    peers = []
+
+    def front():
+        peers.append(connect(folder / "s.sock", "the controller"))
+        return peers[-1]
+
+    try:
+        yield clients, front
+    finally:
+        for peer in peers:
+            peer.close()
+        if clients.listener.fileno() >= 0:
+            clients.close()
+
+
+def test_a_lease_is_counted_and_not_passed_on(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        peer = front()
+        assert clients.lease_age(5.0) == 0.0
+        for request in (Request("note", "a"), Request("lease"), Request("pause")):
+            peer.send(request)
+        assert [request.kind for request in clients.poll(5.0)] == ["note", "pause"]
+        assert clients.lease_age(6.5) == 1.5
+
+
+def test_who_starts_attends(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        front().send(Request("start"))
+        assert [request.kind for request in clients.poll(5.0)] == ["start"]
+        assert clients.last_lease == 5.0
+
+
+def test_closed_or_confused_front_ends_are_dropped_and_what_they_said_is_kept(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        gone, confused = front(), front()
+        gone.send(Request("stop", "last words"))
+        gone.close()
+        confused.send(Request("note", "x"))
+        confused.send(Ready("I am a recorder"))
+        assert {request.text for request in clients.poll(0.0)} == {"last words", "x"}
+        assert clients.connected == []
+
+
+def test_garbage_is_dropped(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        front()._socket.sendall(b"GET / HTTP/1.1\r\n\r\n")
+        assert clients.poll(0.0) == []
+        assert clients.connected == []
+
+
+def test_nobody_beyond_the_limit(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        peers = [front() for _ in range(MAX_CLIENTS + 1)]
+        clients.poll(0.0)
+        assert len(clients.connected) == MAX_CLIENTS
+        peers[-1].receive()
+        assert peers[-1].closed
+
+
+def test_who_does_not_read_is_dropped_and_the_others_hear_everything(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        front()
+        clients.poll(0.0)
+        reader = front()
+        clients.poll(0.0)
+        heard = 0
+        for _ in range(40):
+            clients.publish(snapshot("x" * 2**18))
+            clients.poll(0.0)
+            heard += len(reader.receive())
+        assert len(clients.connected) == 1
+        while len(new := reader.receive()) or clients.connected[0].peer.waiting:
+            heard += len(new)
+            clients.poll(0.0)
+        assert heard == 40
+
+
+def test_trace_for_the_late_and_only_news_for_the_rest(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        early = front()
+        clients.poll(0.0)
+        clients.add_trace((0.0, 1.0, 2.0))
+        clients.publish(snapshot())
+        late = front()
+        clients.poll(0.0)
+        clients.add_trace((0.1, 1.0, 2.0))
+        clients.publish(snapshot())
+        assert [len(s.trace) for s in early.receive()] == [1, 1]
+        assert [len(s.trace) for s in late.receive()] == [2]
+        clients.clear_trace()
+        clients.publish(snapshot())
+        assert early.receive()[0].trace == ()
+
+
+def test_closing_takes_the_socket_file_away(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        peer = front()
+        clients.poll(0.0)
+        clients.close()
+        assert not (tmp_path / "s.sock").exists()
+        peer.receive()
+        assert peer.closed
+        with pytest.raises(Exception, match="does not answer"):
+            connect(tmp_path / "s.sock", "the controller")

@@ -1,0 +1,283 @@
+"""The recorder process as the controller meets it: over its link, with a real process at the other end."""
+
+import contextlib
+import hashlib
+import select
+import signal
+import socket
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from rig.hdf5 import load, recover
+from rig.link.recorder_messages import (
+    Ack,
+    ChannelSpec,
+    Close,
+    Closed,
+    EventRow,
+    Failed,
+    Open,
+    Ready,
+    Rows,
+    StepRow,
+    StreamSpec,
+)
+from rig.link.sockets import Peer, pair
+
+STREAMS = tuple(
+    StreamSpec(name, "sim", (ChannelSpec("thrust", "thrust", "N"), ChannelSpec("raw", None, "1", integer=True)))
+    for name in ("cell_a", "cell_b")
+)
+PATIENCE = 30.0
+"""s until a test gives up waiting for a message."""
+
+
+def start(fd, **options):
+    return subprocess.Popen(
+        [sys.executable, "-m", "rig.recording.recorder", "--fd", str(fd)],
+        pass_fds=(fd,),
+        stdin=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        start_new_session=True,
+        **options,
+    )
+
+
+@contextlib.contextmanager
+def recorder(**options):
+    ours, theirs = pair("recorder")
+    process = start(theirs.fileno(), **options)
+    theirs.close()
+    try:
+        yield ours, process
+    finally:
+        ours.close()
+        try:
+            process.wait(PATIENCE)
+        finally:
+            process.kill()
+            process.wait()
+            process.stderr.close()
+
+
+def until(peer, kind):
+    """Messages up to the first of a kind."""
+    got = []
+    end = time.monotonic() + PATIENCE
+    while not any(isinstance(message, kind) for message in got):
+        assert time.monotonic() < end, f"no {kind} came; got {got[-3:]}"
+        assert not peer.closed, f"the recorder ended; got {got[-3:]}"
+        select.select([peer], [peer] if peer.waiting else [], [], 1.0)
+        peer.flush()
+        got += peer.receive()
+    return got
+
+
+def rows(stream, first, n):
+    index = np.arange(first, first + n)
+    return Rows(stream, index * 1_000_000, np.column_stack([index * 0.5, index]).astype(float))
+
+
+def opened(peer, path, **more):
+    peer.send(Open(str(path), 0, STREAMS, {"recording_id": path.stem, "thruster": "T1"}, **more))
+    until(peer, Ready)
+
+
+def ended(peer):
+    """Drain to the end of file: the recorder has ended."""
+    end = time.monotonic() + PATIENCE
+    got = []
+    while not peer.closed:
+        assert time.monotonic() < end
+        select.select([peer], [], [], 1.0)
+        got += peer.receive()
+    return got
+
+
+def test_two_files_one_after_another(tmp_path):
+    with recorder() as (peer, process):
+        for name in ("a", "b"):
+            path = tmp_path / f"{name}.h5"
+            opened(peer, path)
+            for first in range(0, 1000, 100):
+                peer.send(rows(0, first, 100))
+            peer.send(rows(1, 0, 10))
+            peer.send(StepRow(0, "hold", 2.0, 0.0, 1.0))
+            peer.send(EventRow(0.5, "info", "tare 1 N"))
+            ack = [message for message in until(peer, Ack) if isinstance(message, Ack)][-1]
+            assert ack.rows == (1000, 10)
+            assert ack.free_bytes > 0
+            peer.send(Close("completed"))
+            closed = until(peer, Closed)[-1]
+            assert closed == Closed(str(path), hashlib.sha256(path.read_bytes()).hexdigest())
+            recording = load(path)
+            assert recording.complete
+            assert recording.recording_id == name
+            assert np.array_equal(recording.channels[0].value, np.arange(1000) * 0.5)
+            assert recording.channels[0].time[-1] == pytest.approx(0.999)
+            assert (len(recording.steps), len(recording.events)) == (1, 1)
+        peer.close()
+        assert process.wait(PATIENCE) == 0
+
+
+def test_a_controller_that_dies_leaves_a_file_closed_in_order(tmp_path):
+    path = tmp_path / "r.h5"
+    with recorder() as (peer, process):
+        opened(peer, path)
+        for first in range(0, 5000, 100):
+            peer.send(rows(0, first, 100))
+        while peer.waiting:
+            select.select([], [peer], [], 1.0)
+            peer.flush()
+        peer.close()
+        assert process.wait(PATIENCE) == 0
+    recording = load(path)
+    assert recording.attributes["opened_as"] == "plain"
+    assert recording.channels[0].value.size == 5000
+    assert (recording.complete, recording.outcome) == (True, "aborted")
+    assert recording.cause == "controller process ended without closing the recording"
+    assert recording.events[-1].level == "error"
+
+
+def test_a_message_cut_off_by_the_end_is_said(tmp_path):
+    path = tmp_path / "r.h5"
+    ours, theirs = socket.socketpair()
+    process = start(theirs.fileno())
+    theirs.close()
+    peer = Peer(ours.dup(), "recorder")
+    opened(peer, path)
+    ours.setblocking(True)
+    ours.sendall(b"\xff\x00\x00\x00\x20half a frame")
+    ours.close(), peer.close()
+    assert process.wait(PATIENCE) == 0
+    process.stderr.close()
+    assert "17 bytes of it came and are lost" in load(path).events[0].text
+
+
+def test_signals_of_the_terminal_do_not_end_it(tmp_path):
+    with recorder() as (peer, process):
+        opened(peer, tmp_path / "r.h5")
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP) * 5:
+            process.send_signal(number)
+            peer.send(rows(0, 0, 1))
+        until(peer, Ack)
+        peer.send(Close("completed"))
+        until(peer, Closed)
+
+
+def test_a_file_that_cannot_be_made_fails_and_the_next_can(tmp_path):
+    with recorder() as (peer, _):
+        (tmp_path / "there.h5").write_text("mine")
+        for path, more, says in (
+            (tmp_path / "there.h5", {}, "cannot create"),
+            (tmp_path / "no" / "r.h5", {}, "is not a folder"),
+            (tmp_path / "huge.h5", {"expected_bytes": 2**60}, "MiB free; the plan needs"),
+        ):
+            peer.send(Open(str(path), 0, STREAMS, **more))
+            assert says in until(peer, Failed)[-1].text
+        assert (tmp_path / "there.h5").read_text() == "mine"
+        opened(peer, tmp_path / "r.h5")
+        peer.send(Close("completed"))
+        until(peer, Closed)
+
+
+@pytest.mark.parametrize(
+    ("message", "says"),
+    [
+        (Ready("x"), "a Ready, which a recorder does not take"),
+        (Rows(9, np.array([1]), np.array([[1.0, 2.0]])), "stream 9 of 2"),
+        (Open("/x.h5", 0, STREAMS), "close that first"),
+    ],
+)
+def test_orders_that_make_no_sense_close_the_file_and_end(tmp_path, message, says):
+    path = tmp_path / "r.h5"
+    with recorder() as (peer, process):
+        opened(peer, path)
+        peer.send(rows(0, 0, 5))
+        peer.send(message)
+        assert says in ended(peer)[-1].text
+        assert process.wait(PATIENCE) == 3
+    recording = load(path)
+    assert recording.outcome == "aborted"
+    assert says in recording.cause
+    assert recording.channels[0].value.size == 5
+
+
+def test_rows_without_a_file_end_it():
+    with recorder() as (peer, process):
+        peer.send(rows(0, 0, 1))
+        assert "while no recording was open" in ended(peer)[-1].text
+        assert process.wait(PATIENCE) == 3
+
+
+def limit_file_size():
+    import resource
+
+    resource.setrlimit(resource.RLIMIT_FSIZE, (200_000, 200_000))
+
+
+def test_a_full_disk_says_so_and_keeps_what_was_flushed(tmp_path):
+    path = tmp_path / "r.h5"
+    with recorder(preexec_fn=limit_file_size) as (peer, process):
+        opened(peer, path)
+        acks, got, first = [], [], 0
+        end = time.monotonic() + PATIENCE
+        while not peer.closed:
+            assert time.monotonic() < end
+            peer.send(rows(0, first, 500))
+            first += 500
+            select.select([peer], [], [], 0.1)
+            got += peer.receive()
+        acks = [message for message in got if isinstance(message, Ack)]
+        assert isinstance(got[-1], Failed)
+        assert process.wait(PATIENCE) == 3
+    recording = load(path)
+    value = recording.channels[0].value
+    assert value.size >= acks[-1].rows[0] > 0
+    assert np.array_equal(value, np.arange(value.size) * 0.5)
+
+
+@pytest.mark.reliability
+def test_kill_at_any_instant_leaves_every_flushed_row(tmp_path):
+    """Promise 15: 24 kills at random instants, among them during writing, flushing and closing."""
+    rng = np.random.default_rng(20)
+    for trial in range(24):
+        path = tmp_path / f"{trial}.h5"
+        with recorder() as (peer, process):
+            opened(peer, path)
+            deadline = time.monotonic() + rng.uniform(0.0, 1.0)
+            closing = trial % 4 == 3
+            acked, first = (0, 0), 0
+            while time.monotonic() < deadline:
+                for stream in (0, 1):
+                    peer.send(rows(stream, first, 20))
+                first += 20
+                select.select([peer], [], [], 0.002)
+                acked = ([m.rows for m in peer.receive() if isinstance(m, Ack)] or [acked])[-1]
+            if closing:
+                peer.send(Close("completed"))
+                select.select([peer], [], [], rng.uniform(0.0, 0.03))
+            process.kill()
+            process.wait()
+            acked = ([m.rows for m in peer.receive() if isinstance(m, Ack)] or [acked])[-1]
+        check_killed(path, acked, tmp_path / f"{trial}-copy.h5")
+
+
+def check_killed(path, acked, copy):
+    recording = load(path)
+    for stream, flushed in zip(("cell_a", "cell_b"), acked, strict=True):
+        thrust, raw = (channel for channel in recording.channels if channel.stream == stream)
+        n = thrust.value.size
+        assert n >= flushed
+        assert np.array_equal(thrust.value, np.arange(n) * 0.5)  # no wrong sample, none twice
+        assert np.array_equal(raw.value, np.arange(n))
+        assert np.allclose(thrust.time, np.arange(n) * 1e-3)
+    if recording.attributes["opened_as"] == "swmr":
+        recover(path, copy)
+        copied = load(copy)
+        assert copied.attributes["opened_as"] == "plain"
+        assert [c.value.size for c in copied.channels] == [c.value.size for c in recording.channels]

@@ -1,0 +1,170 @@
+"""Stop, trip, pause, resume, skip and lapse: at any instant, in any order."""
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from test_sequencer import FIXED, PERIOD, PROOF, SHORT, SLEW, TRIP, Ran, World, asks, in_state, run
+
+from rig.campaign.plan import FixedDwell, Plan, TareConfig
+from rig.campaign.shapes import Ramp, Sine
+from rig.link.front_end_messages import Request
+from rig.sequence.sequencer import Sequencer
+from rig.sequence.ticks import Tick
+
+PROVED = replace(FIXED, proof=PROOF)
+UNDISTURBED = run(SHORT, PROVED)
+HOLDS = [s.voltage for s in SHORT if s.phase == "hold"]
+
+
+def slew_kept(ran: Ran) -> bool:
+    """Never faster than the slew, except to 0 V. While nothing is sent the command counts as unchanged."""
+    commands, last = [], 0.0
+    for output in ran.outputs:
+        commands.append((last, last if output.volts is None else output.volts))
+        last = commands[-1][1]
+    return all(b == 0.0 or abs(b - a) <= SLEW * PERIOD + 1e-6 for a, b in commands)
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.integers(0, len(UNDISTURBED.outputs) - 30), st.sampled_from(["trip", "stop", "both"]))
+def test_every_trip_and_stop_ends_at_zero_at_once_and_stays(number, how):
+    more = {"trip": TRIP} if how != "stop" else {}
+    ran = run(SHORT, PROVED, at={number: more | (asks("stop") if how != "trip" else {})})
+    assert all(output.volts == 0.0 for output in ran.outputs[number:])
+    assert ran.last.done
+    assert ran.last.stop_confirmed is True
+    assert ran.last.outcome == ("aborted" if how == "stop" else "tripped")
+    assert ran.last.cause == ("stopped by the operator" if how == "stop" else TRIP.cause)
+    assert ran.outputs[number].outcome == ran.last.outcome
+
+
+KINDS = st.sampled_from(["pause", "resume", "skip", "note"])
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.dictionaries(st.integers(0, 1500), st.lists(KINDS, min_size=1, max_size=3), max_size=12), st.booleans())
+def test_every_interleaving_ends_with_all_steps_done_or_stopped(requests, stop):
+    at = {number: asks(*kinds) for number, kinds in requests.items()}
+    at |= {number: asks("resume") for number in range(1501, 1510)}
+    if stop:
+        at[1400] = asks("stop")
+    ran = run(SHORT, PROVED, at=at, ticks=8000)
+    assert ran.last.done
+    assert slew_kept(ran)
+    whole = [r.command_voltage for r in ran.rows if r.phase == "hold"]
+    if ran.last.outcome == "completed":
+        assert whole == HOLDS
+    else:
+        assert ran.last.outcome == "aborted"
+        assert whole == HOLDS[: len(whole)]
+    paused = [o.volts for o in ran.outputs if o.state == "paused"]
+    assert set(paused) <= {0.0}
+
+
+@pytest.mark.parametrize("state", ["proving", "tare", "ramp", "hold", "rest"])
+def test_pause_in_every_state_retakes_the_step(state):
+    number = in_state(UNDISTURBED, state)
+    ran = run(SHORT, PROVED, at={number: asks("pause"), number + 50: asks("resume")})
+    assert ran.outputs[number].state == "paused"
+    assert ran.outputs[number].volts == 0.0
+    assert [p.voltage for p in ran.points] == HOLDS
+    assert ran.last.outcome == "completed"
+    assert slew_kept(ran)
+
+
+def test_hold_cut_by_a_pause_is_free_and_the_wait_is_rest():
+    number = in_state(UNDISTURBED, "hold")
+    ran = run(SHORT, PROVED, at={number: asks("pause"), number + 50: asks("resume")})
+    index = next(o.step for o in UNDISTURBED.outputs if o.state == "hold")
+    assert [r.phase for r in ran.rows if r.index == index] == ["free", "rest", "ramp", "hold"]
+
+
+@pytest.mark.parametrize(
+    ("plan", "state"),
+    [(Plan(Sine(5.0, (0.2,), 1), FixedDwell(1.0), slew=SLEW, tare=TareConfig(1.0)), "sine"),
+     (Plan(Ramp(6.0, 2.0), FixedDwell(1.0), slew=SLEW, tare=TareConfig(1.0)), "ramp")],
+)  # fmt: skip
+def test_sine_and_sweep_are_retaken_from_their_start(plan, state):
+    number = in_state(run(plan, FIXED), state, skip=200)
+    ran = run(plan, FIXED, at={number: asks("pause"), number + 50: asks("resume")})
+    assert ran.last.outcome == "completed"
+    after = [o for o in ran.outputs[number + 50 :] if o.state == state]
+    if state == "sine":
+        assert len(after) * PERIOD == pytest.approx(5.0, abs=3 * PERIOD)
+    else:  # 4 s into the sweep: from +6 V on the way to -6 V, so +6 V is approached anew
+        assert max(o.volts for o in after) == 6.0
+    assert slew_kept(ran)
+
+
+def test_skip_ends_a_hold_now_and_keeps_its_data():
+    number = in_state(UNDISTURBED, "hold", skip=40)
+    ran = run(SHORT, PROVED, at={number: asks("skip")})
+    assert ran.points[0].duration < 0.9
+    assert [p.voltage for p in ran.points] == HOLDS
+    assert ran.said("ended early")
+
+
+def test_skip_means_nothing_elsewhere_and_says_so():
+    ran = run(SHORT, FIXED, at={3: asks("skip"), 4: asks("resume")})
+    assert ran.said("skip ignored: it means nothing in state tare")
+    assert ran.said("resume ignored")
+
+
+def test_lapse_of_the_loop_trips_and_commands_zero():
+    sequencer, world = Sequencer(SHORT, FIXED), World()
+    while (output := sequencer.advance(world.tick())).state != "hold":
+        world.step(output.volts)
+    output = sequencer.advance(Tick(world.time + 0.5, (), world.rotation))
+    assert output.volts == 0.0
+    assert output.outcome == "tripped"
+    assert "no tick for 0.50 s" in output.cause
+
+
+def test_lapse_while_paused_is_no_reason_to_end():
+    sequencer = Sequencer(SHORT, FIXED)
+    sequencer.advance(Tick(0.0, (), 0.0))
+    sequencer.advance(Tick(0.02, (), 0.0, requests=(Request("pause"),)))
+    assert sequencer.advance(Tick(5.0, (), 0.0)).state == "paused"
+    assert sequencer.advance(Tick(5.02, (), 0.0, trip=TRIP)).outcome == "tripped"
+
+
+def test_stop_that_is_ignored_is_released_and_not_confirmed():
+    number = in_state(UNDISTURBED, "hold")
+    world = World()
+    sequencer, outputs = Sequencer(SHORT, PROVED), []
+    for i in range(number + 300):
+        world.runs_away = i >= number
+        outputs.append(sequencer.advance(world.tick(**(asks("stop") if i == number else {}))))
+        world.step(outputs[-1].volts)
+    assert outputs[-1].done
+    assert outputs[-1].stop_confirmed is False
+    assert outputs[number + 10].release is False
+    assert outputs[number + 80].release is True  # half the coast time of 3 s is over
+    assert any("STOP NOT CONFIRMED" in e.text for o in outputs for e in o.events)
+    assert {o.volts for o in outputs[number:]} == {0.0}
+
+
+def test_unknown_rotation_confirms_nothing():
+    ran = run(SHORT, FIXED, World(blind=True), at={100: {"requests": (Request("stop", "SIGTERM"),)}})
+    assert ran.last.stop_confirmed is False
+    assert ran.last.cause == "stopped by SIGTERM"
+    assert ran.said("the rotation rate is unknown")
+
+
+def test_trip_while_stopping_is_told_once_and_changes_nothing():
+    at = {100: asks("stop")} | {i: {"trip": TRIP} for i in range(103, 107)}
+    ran = run(SHORT, FIXED, at=at)
+    assert ran.last.outcome == "aborted"
+    assert [e.text for e in ran.events].count(f"while stopping: {TRIP.cause}") == 1
+
+
+def test_after_the_end_nothing_moves_any_more():
+    sequencer, world = Sequencer(SHORT, FIXED), World()
+    while not (output := sequencer.advance(world.tick())).done:
+        world.step(output.volts)
+    for kind in ("resume", "skip", "pause", "stop"):
+        world.step(0.0)
+        output = sequencer.advance(world.tick(**asks(kind), trip=TRIP))
+        assert (output.volts, output.state, output.outcome, output.events) == (0.0, "run_done", "completed", ())
