@@ -61,7 +61,7 @@ FOLLOWS_LAW = Threshold(
 UNIT_FACTOR_NEAR = Threshold(
     0.03,
     unit="share of the factor",
-    reason="A factor so near to one between units is that of these units: calibrations are within three per cent.",
+    reason="A factor so near to one between units is that of these units: a calibration may be off by some per cent.",
 )
 SCALE_FACTOR = Threshold(
     3.0,
@@ -92,8 +92,8 @@ UNSIGNED_SLOPES = Threshold(
     0.3,
     unit="ratio of the slopes on both sides",
     reason=(
-        "A channel without sign goes the same way on both sides of the driver, at least by this much on the "
-        "lesser; asymmetry is never so large."
+        "A channel without sign goes the same way on both sides of the driver, and on the lesser at least by "
+        "this much: less is the offset of a channel rather than a lost sign."
     ),
 )
 STRANGE_TO_LAW = Threshold(

@@ -28,8 +28,8 @@ MODEL_TERMS = Count(
     6,
     unit="terms",
     reason=(
-        "No recording of some minutes determines more effects than half a dozen beside C and the tares: what "
-        "is still left then has no name."
+        "More than half a dozen effects beside C and the tares are not asked of one recording: what is still "
+        "left then has no name."
     ),
 )
 HIDDEN_SIGMA = Threshold(
