@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.diagnosis import Finding, Mismatch, RivalFinding
 from identification.mismatch.periodic.periodic_disturbances import Line
-from identification.mismatch.select.rivals import NEAR
 from identification.mismatch.value import Value, Where
 from identification.twin import Twin, TwinLine
 
@@ -62,7 +62,7 @@ def line_finding(line: Line) -> Finding:
 
 def _rivals(line: Line) -> Iterable[RivalFinding]:
     """The other kind has as many parameters, so BIC is worse by what chi-square is."""
-    if line.rival is not None and (loss := line.gain - line.rival.gain) < NEAR:
+    if line.rival is not None and (loss := line.gain - line.rival.gain) < policy.select.RIVAL_STATED_BIC:
         yield RivalFinding(EFFECT, line.rival.kind, line_values(twin_line(line.rival)), loss, line.rival.statement)
 
 

@@ -10,8 +10,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.mismatch.noise.covariance import Noise, Rows, Shapes
 from identification.mismatch import policy
+from identification.mismatch.noise.covariance import Noise, Rows, Shapes
 from identification.mismatch.noise.restricted_likelihood import Likelihood, LinAlgError, Response, likelihood
 from identification.recording import Floats
 
