@@ -2,13 +2,14 @@
 
     python benchmarks/hidden_gains.py [N [EFFECT [SIGMA]]]    # 8 recordings of each kind of noise, zero_drift, 8
 
-The search tries a term that no screening finds by estimating term and noise together (`mismatch.search._hidden`), and
-believes it from a gain in deviance on; those prices (STEADY, OFFSET_PRICE, HIDDEN_PRICE) were set by this table. On
-clean recordings every term that would be tried is told by the largest gains it reached; then the gains of EFFECT where
-an oracle sees it at SIGMA. `asked` is the median of what the search asks of it.
+The search tries a term that no screening finds by estimating term and noise together (`forward_selection._hidden`), and
+believes it from a gain in deviance on; those prices (STEADY_TERM_FALSE_ALARM, HIDDEN_OFFSET_PRICE and HIDDEN_TERM_PRICE
+of policy.select) were set by this table. On clean recordings every term that would be tried is told by the largest
+gains it reached; then the gains of EFFECT where an oracle sees it at SIGMA. `asked` is the median of what the search
+asks of it.
 
-Zero and gain that wander over the run are told from noise in the same way, by a p-value (`slow_change.ALARM`): the
-smallest on the clean recordings, and where EFFECT is concealed and in no catalogue.
+Zero and gain that wander over the run are told from noise in the same way, by a p-value (SLOW_CHANGE_FALSE_ALARM of
+policy.locate): the smallest on the clean recordings, and where EFFECT is concealed and in no catalogue.
 """
 
 from __future__ import annotations
@@ -27,9 +28,10 @@ from statistics import median
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, refresh
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.locate.slow_change import ALARM, slow_changes
+from identification.mismatch.locate.slow_change import slow_changes
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model
 from identification.mismatch.prepare.preparing import Refusal
@@ -78,8 +80,9 @@ def seen(case: concealed.Case, *without: str) -> Seen:
     terms = search.available(data, without)
     estimate = baseline(data, theta, terms, Model())
     found = directions(estimate.fit, data, estimate.weights, terms)
-    spared = allowed(corrections(estimate.fit, data, estimate.weights), found.columns)
-    judged = screen(estimate.fit, found, np.random.default_rng(0), search.ALARM, spared)
+    changes = corrections(estimate.fit, data, estimate.weights)
+    spared = allowed(changes, found.columns, policy.select.NEXT_TERM_SHAPE_ERROR)
+    judged = screen(estimate.fit, found, np.random.default_rng(0), spared)
     if judged.largest > judged.threshold:
         return Seen()
     return Seen(tuple(_tried(estimate, judged, data)), tuple(p for p, _ in slow_changes(estimate, data)))
@@ -140,11 +143,13 @@ def main(count: int = 8, effect: str = "zero_drift", sigma: float = 8.0) -> None
     told = sum(g.gain > g.asked for g in mine)
     print(f"\n{effect} at {sigma:g} sigma in {drawn} recordings: {len(mine)} left to be told from noise, of which")
     print(f"{told} gain what is asked; gains {' '.join(f'{g.gain:.1f}' for g in mine)}")
-    print(f"\n{'slow changes':<30}{'recordings':>10}{f'p < {ALARM:g}':>12}   smallest")
+    print(f"\n{'slow changes':<30}{'recordings':>10}{f'p < {policy.locate.SLOW_CHANGE_FALSE_ALARM:g}':>12}   smallest")
     for what, each in (("clean", slow), (f"{effect}, in no catalogue", unknown)):
         least = sorted(min(p) for p in each)
         smallest = " ".join(f"{p:.1g}" for p in least[:SHOWN])
-        print(f"{what:<30}{len(each):>10}{sum(p < ALARM for p in least):>12}   {smallest}")
+        print(
+            f"{what:<30}{len(each):>10}{sum(p < policy.locate.SLOW_CHANGE_FALSE_ALARM for p in least):>12}   {smallest}"
+        )
 
 
 if __name__ == "__main__":

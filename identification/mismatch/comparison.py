@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch import policy
 from identification.mismatch.compare.simulation import Drive, held, others_of, simulate
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.next_experiment.sweeps import Limits
@@ -22,17 +23,6 @@ from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import DRIVERS, Refusal
 from identification.recording import Channel, Floats, Recording
 from identification.twin import Twin
-
-DIFFERENT = 0.02
-"""Share of the largest driver above which two commands differ."""
-MOST_DIFFERENT = 0.02
-"""Share of the time in which they may."""
-BRIEF = 0.1
-"""s: a difference shorter than this is a matter of clocks."""
-NOISY = 0.3
-"""Of the real noise: a simulation with more than that is not subtracted sample by sample where it is well described."""
-LEAST_COVERED = 0.9
-"""Share of the real thrust samples that the simulation must cover."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -149,15 +139,15 @@ def _disagreement(simulation: Recording, real: Recording) -> Refusal | None:
     assert thrust is not None
     assert sim_thrust is not None
     inside = (thrust.time >= sim_thrust.time[0]) & (thrust.time <= sim_thrust.time[-1])
-    if np.mean(inside) < LEAST_COVERED:
+    if np.mean(inside) < policy.compare.SIMULATION_COVERS:
         return Refusal(
             f"the simulation {_name(simulation)} ends after {sim_thrust.time[-1] - sim_thrust.time[0]:.4g} s, the "
             f"recording {_name(real)} after {thrust.time[-1] - thrust.time[0]:.4g} s; simulate the whole run"
         )
     grid = np.arange(max(thrust.time[0], sim_thrust.time[0]), min(thrust.time[-1], sim_thrust.time[-1]), 0.02)
     given, done = held(_drive(a), grid), held(_drive(b), grid)
-    far = np.abs(given - done) > DIFFERENT * max(float(np.max(np.abs(done))), 1e-300)
-    if np.mean(far) <= MOST_DIFFERENT:
+    far = np.abs(given - done) > policy.compare.COMMANDS_DIFFER * max(float(np.max(np.abs(done))), 1e-300)
+    if np.mean(far) <= policy.compare.COMMANDS_DIFFER_TIME:
         return None
     at = int(np.flatnonzero(far)[_long(far)])
     unit = "rev/s" if b.quantity == "rotation_rate" else "V"
@@ -173,7 +163,7 @@ def _long(far: NDArray[np.bool_]) -> int:
     index = np.flatnonzero(far)
     breaks = np.flatnonzero(np.diff(index, prepend=-10) > 1)
     lengths = np.diff(np.append(breaks, index.size)) * 0.02
-    good = np.flatnonzero(lengths > BRIEF)
+    good = np.flatnonzero(lengths > policy.compare.CLOCKS_DIFFER)
     return int(breaks[good[0]]) if good.size else 0
 
 
@@ -207,7 +197,7 @@ def _beyond(simulation: Recording, twin: Twin, known: Diagnosis, real: Recording
     assert thrust is not None
     assert measured is not None
     assert driver is not None
-    if known.unexplained is None and sample_noise(thrust) > NOISY * sample_noise(measured):
+    if known.unexplained is None and sample_noise(thrust) > policy.compare.NOISY_SIMULATION * sample_noise(measured):
         return np.zeros(measured.time.size)
     good = np.isfinite(thrust.value)
     drive = replace(_drive(driver), others=others_of(simulation))

@@ -6,12 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+from identification.mismatch import policy
 from identification.mismatch.value import Value, Where
 from identification.recording import Floats
 from identification.twin import Twin
 
-WHITE = 0.01
-"""p-value of whiteness below which what remains is called not white."""
 NOT_WHITE = (
     "intervals and p-values rest on the noise model, which does not describe all of it: they may be surer than they "
     "should"
@@ -246,7 +245,7 @@ class Diagnosis:
     @property
     def white(self) -> bool:
         """Whether the whitened residual is white, as far as its correlations tell."""
-        return self.whiteness_p >= WHITE
+        return self.whiteness_p >= policy.answer.WHITE_P
 
     @property
     def verdict(self) -> VerdictName:

@@ -3,11 +3,12 @@
 import numpy as np
 import pytest
 
+from identification.mismatch import policy
 from identification.mismatch.locate.residual_structure_test import residual_structure
 from identification.mismatch.model.model import Model
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.select.baseline import baseline, start
-from identification.mismatch.select.jumps import APART, TRIED, likeliest_jumps
+from identification.mismatch.select.jumps import TRIED, likeliest_jumps
 from identification.mismatch.select.screening import orthogonal_basis
 from tests.identification.diagnosed_runs import run
 
@@ -43,9 +44,9 @@ def test_the_likeliest_are_those_of_all_steps_one_by_one(jumped):
     score = brute(data, state, basis, when)
     assert found[0] == pytest.approx(when[np.argmax(score)])
     assert found[0] == pytest.approx(truth, abs=0.3)
-    far = score[np.abs(when - found[0]) > APART * data.scale.duration]
+    far = score[np.abs(when - found[0]) > policy.select.JUMPS_APART * data.scale.duration]
     assert brute(data, state, basis, np.array(found[1:2]))[0] == pytest.approx(far.max(), rel=0.02)
-    assert np.min(np.diff(np.sort(found))) > APART * data.scale.duration
+    assert np.min(np.diff(np.sort(found))) > policy.select.JUMPS_APART * data.scale.duration
 
 
 @pytest.mark.parametrize("jumped", [(101.9, 1.5, "wanders")], indirect=True)

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.mismatch import policy
 from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.locate.pulses import likeliest_pulses
-from identification.mismatch.locate.residual_structure_test import PLAIN_P
 from identification.mismatch.model.model import Model
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import history_of
@@ -38,7 +38,7 @@ def losses():
 def test_period_length_and_share_are_found(losses):
     data, state = begun(losses)
     found = likeliest_pulses(state.fit, data, state.weights)
-    assert found.p_value < PLAIN_P
+    assert found.p_value < policy.locate.PLAIN_STRUCTURE_P
     assert found.period == pytest.approx(PERIOD, abs=0.2)
     assert found.length == pytest.approx(LENGTH, abs=0.6)
     assert found.share == pytest.approx(-SHARE, rel=0.25)
@@ -59,7 +59,7 @@ def test_a_gain_that_is_restless_everywhere_has_none():
     """Turbulence, in proportion to the thrust, of a few seconds."""
     steps = np.random.default_rng(2).standard_normal(400)
     data, state = begun(run(lambda t, _V, F: F * (1 + 0.01 * steps[(t / 1.5).astype(int)]), seconds=300.0))
-    assert likeliest_pulses(state.fit, data, state.weights).p_value > PLAIN_P
+    assert likeliest_pulses(state.fit, data, state.weights).p_value > policy.locate.PLAIN_STRUCTURE_P
 
 
 def test_they_are_located_in_time_and_followed_by_a_spline_that_begins_anew(losses, tmp_path):

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from identification.mismatch import policy
 from identification.mismatch.answer.verdict import decided
 from identification.mismatch.diagnosis import (
     Diagnosis,
@@ -16,7 +17,6 @@ from identification.mismatch.diagnosis import (
     Rmse,
 )
 from identification.mismatch.next_experiment.sequential_experiment import (
-    LEAST,
     Course,
     End,
     allowance,
@@ -119,7 +119,7 @@ def test_what_no_term_carries_is_an_end_unless_a_sweep_is_proposed():
 def test_a_sweep_is_given_half_of_what_is_left_while_there_is_plenty():
     assert allowance(1200.0, 40.0) == 580.0
     assert allowance(500.0, 40.0) == 460.0
-    assert allowance(10.0, 40.0) == LEAST
+    assert allowance(10.0, 40.0) == policy.next_experiment.SHORTEST_SWEEP
 
 
 def test_the_way_is_in_the_json(course):

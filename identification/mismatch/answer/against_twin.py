@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.estimation.tails import normal_sf
 from identification.flexible_terms.flexible import Flexible
+from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.diagnosis import Finding
 from identification.mismatch.estimate.estimate import Estimate
@@ -18,12 +19,6 @@ from identification.mismatch.model.model import acting
 from identification.mismatch.value import Value
 from identification.recording import Recording
 from identification.twin import Source, Twin, TwinNoise, TwinTerm, names_of
-
-ALARM = 0.01
-"""False-alarm rate of a changed thrust constant."""
-ONE_CONSTANT = 0.02
-"""Relative: where another effect was found, C may move by this much with what that effect refers to (a highest bus
-voltage, say), and is no finding of its own."""
 
 
 def with_twin(
@@ -37,7 +32,7 @@ def with_twin(
     C = draft.model["C"]
     findings = tuple(_relative(f, before, known) for f in draft.findings)
     changed = changed_constant(before, estimate, known, C.unit)
-    if changed is not None and findings and abs(C.value / before.C - 1) < ONE_CONSTANT:
+    if changed is not None and findings and abs(C.value / before.C - 1) < policy.answer.CONSTANT_MOVED:
         draft = replace(draft, notes=(*draft.notes, f"{changed.statement} Part of what was found may be in it."))
     elif changed is not None:
         findings = (*findings, changed)
@@ -80,7 +75,7 @@ def given_values(twin: Twin) -> dict[str, Value]:
 
 
 def changed_constant(twin: Twin, estimate: Estimate, known: str, unit: str) -> Finding | None:
-    """The thrust constant is no longer the twin's, at ALARM."""
+    """The thrust constant is no longer the twin's, at CHANGED_CONSTANT_FALSE_ALARM."""
     value, std = estimate.fit.theta.C, float(estimate.fit.std[0])
     was, was_std = twin.C, float(np.sqrt(twin.covariance[0][0]))
     both = float(np.hypot(std, was_std))
@@ -88,7 +83,7 @@ def changed_constant(twin: Twin, estimate: Estimate, known: str, unit: str) -> F
         return None
     z = (value - was) / both
     p = max(2 * float(normal_sf(abs(z))), 1e-300)
-    if p >= ALARM:
+    if p >= policy.answer.CHANGED_CONSTANT_FALSE_ALARM:
         return None
     share = 100 * (value - was) / abs(was)
     says = f"Thrust constant: {value:.4g} {unit} where {known} has {was:.4g} ({share:+.2g} %, {abs(z):.0f} sigma)."

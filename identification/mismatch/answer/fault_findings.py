@@ -13,7 +13,7 @@ from identification.mismatch.faults.channel_faults import Fault
 from identification.mismatch.value import Value
 
 LEAST_P = 1e-300
-"""A p-value is told no smaller."""
+"""Smallest p-value that is written: 0 has no logarithm for those who draw it."""
 
 
 def fault_finding(fault: Fault) -> Finding:

@@ -7,23 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.diagnosis import Finding, Mismatch, RivalFinding
 from identification.mismatch.periodic.periodic_disturbances import Line
-from identification.mismatch.select.rivals import NEAR
 from identification.mismatch.value import Value, Where
 from identification.twin import Twin, TwinLine
 
 EFFECT = "periodic_disturbance"
 LEAST_P = 1e-300
-SAME_PLACE = 4.0
-"""Standard errors within which two frequencies, or two ratios, are one."""
-SCALE = 0.01
-"""Relative: how well one run's turns are those of another."""
-GRID = 0.002
-"""Relative: the mains are kept within it nearly always (ENTSO-E)."""
-CHANGED = 3.3
-"""Standard errors by which an amplitude must have changed to be a finding."""
+"""Smallest p-value that is written: 0 has no logarithm for those who draw it."""
 
 
 def twin_line(line: Line) -> TwinLine:
@@ -62,7 +55,7 @@ def line_finding(line: Line) -> Finding:
 
 def _rivals(line: Line) -> Iterable[RivalFinding]:
     """The other kind has as many parameters, so BIC is worse by what chi-square is."""
-    if line.rival is not None and (loss := line.gain - line.rival.gain) < NEAR:
+    if line.rival is not None and (loss := line.gain - line.rival.gain) < policy.select.RIVAL_STATED_BIC:
         yield RivalFinding(EFFECT, line.rival.kind, line_values(twin_line(line.rival)), loss, line.rival.statement)
 
 
@@ -122,19 +115,21 @@ def _known_as(line: Line, known: Sequence[TwinLine]) -> int | None:
     for j, other in enumerate(known):
         if line.ratio is None and other.ratio is None:
             std = float(np.hypot(line.frequency_std, other.frequency_std))
-            near = max(SAME_PLACE * std, resolution, GRID * other.frequency)
+            near = max(policy.answer.LINE_KNOWN_SIGMA * std, resolution, policy.periodic.MAINS_WANDER * other.frequency)
             if abs(line.frequency - other.frequency) < near:
                 return j
         elif line.ratio is not None and other.ratio is not None and line.unit == other.turns:
             std = float(np.hypot(line.ratio_std or 0.0, other.ratio_std))
-            if abs(line.ratio - other.ratio) < max(SAME_PLACE * std, SCALE * other.ratio):
+            if abs(line.ratio - other.ratio) < max(
+                policy.answer.LINE_KNOWN_SIGMA * std, policy.answer.LINE_KNOWN_RATIO * other.ratio
+            ):
                 return j
     return None
 
 
 def _changed(line: Line, known: TwinLine) -> bool:
     std = float(np.hypot(line.amplitude_std, known.amplitude_std))
-    return abs(line.amplitude - known.amplitude) > CHANGED * std
+    return abs(line.amplitude - known.amplitude) > policy.answer.LINE_CHANGED_SIGMA * std
 
 
 def _beside_known(line: Line, known: Sequence[TwinLine], origin: str) -> Finding:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from identification.mismatch import policy
 from identification.mismatch.diagnosis import Remainder
 from identification.mismatch.locate.places import says, where_of
-from identification.mismatch.locate.residual_structure_test import ALARM
 from identification.mismatch.model.data import Data
 from identification.mismatch.unnamed.flexible import foremost
 from identification.mismatch.unnamed.flexible_shape import with_flexible
@@ -20,8 +20,8 @@ def remainder_of(completed: Completed, data: Data, unseen: Sequence[History]) ->
         return None
     left, bare, unearned, flexible = completed.left, completed.bare, completed.unearned, completed.flexible
     quantity = flexible.terms[0].quantity if flexible is not None else foremost_covariate(left, unearned, data)
-    if flexible is None and left.p_value < ALARM:
-        clear = [g.covariate.quantity for g in left.groups if g.p_value < ALARM]
+    if flexible is None and left.p_value < policy.locate.RESIDUAL_FALSE_ALARM:
+        clear = [g.covariate.quantity for g in left.groups if g.p_value < policy.locate.RESIDUAL_FALSE_ALARM]
         quantity = foremost(bare, data, clear or [quantity], left.pulses)
     judged = next((g for g in left.groups if g.covariate.quantity == quantity), left.groups[0])
     where, share, table = where_of(judged, bare.fit, data, bare.weights)

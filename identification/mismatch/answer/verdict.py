@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from identification.mismatch import policy
 from identification.mismatch.diagnosis import (
     Adequate,
     Ambiguous,
@@ -12,7 +13,6 @@ from identification.mismatch.diagnosis import (
     Unexplained,
     Verdict,
 )
-from identification.mismatch.select.rivals import EQUAL
 
 
 def decided(findings: tuple[Finding, ...], remainder: Remainder | None, experiment: NextExperiment | None) -> Verdict:
@@ -21,6 +21,6 @@ def decided(findings: tuple[Finding, ...], remainder: Remainder | None, experime
         return Unexplained(findings, remainder, experiment)
     if not findings:
         return Adequate()
-    if any(rival.bic_loss < EQUAL for finding in findings for rival in finding.rivals):
+    if any(rival.bic_loss < policy.select.RIVALS_EQUAL_BIC for finding in findings for rival in finding.rivals):
         return Ambiguous(findings, experiment)
     return Explained(findings)

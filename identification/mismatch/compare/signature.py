@@ -14,6 +14,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch import policy
 from identification.mismatch.compare.reported_runs import Run
 from identification.mismatch.diagnosis import Finding
 from identification.recording import Floats
@@ -50,10 +51,9 @@ SHAPES: Mapping[str, Kind] = {"driver": "force", "time_since_step": "step", "dir
 LEVELS = 24
 """So many values of a covariate, at most, are levels with a bin each."""
 BINS = {"time": 24, "time_since_step": 12, "time_since_reversal": 12}
+"""Bins of the covariates in time: as many as a picture shows."""
 MOST = 20
 """Bins of any other covariate."""
-SMALL = 0.02
-"""Share of the largest change or thrust below which a row tells nothing of a share."""
 CORRELATED = 0.9
 """Largest correlation of neighbouring rows that error bars are made for."""
 
@@ -130,7 +130,11 @@ def _weight(run: Run, kind: Kind) -> Floats:
             return run.covariates["direction_of_change"]
         case _:
             size = run.force if kind == "gain" else run.step
-            out: Floats = np.where(np.abs(size) > SMALL * float(np.max(np.abs(run.force), initial=0.0)), size, 0.0)
+            out: Floats = np.where(
+                np.abs(size) > policy.compare.SIGNATURE_THRUST * float(np.max(np.abs(run.force), initial=0.0)),
+                size,
+                0.0,
+            )
             return out
 
 

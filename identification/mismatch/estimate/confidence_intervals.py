@@ -28,13 +28,15 @@ NEAR = 0.15
 NARROW = 0.1
 """Of the distance to an end: a bracket as narrow as this ends where chi-square has risen."""
 MOST_LOOKS = 16
-"""At chi-square, for one end."""
+"""At chi-square, for one end: a bracket halves each time, so that sixteen are precise."""
 GROWTH = 1.5, 8.0
 """Least and most factor by which the distance grows until chi-square has risen."""
 LEAST_STEP = 0.03
 """Of the step of a slope: standard errors below it are the slope of a stair."""
 REFITS = 6
+"""Steps of the other parameters at one value of the profiled one: they begin near."""
 SHORTER = 0.3
+"""Of a step that foretold too much: how much of it is tried next."""
 FITTED = 0.2
 """Fall of chi-square at which the other parameters are as good as fitted."""
 AS_FORETOLD = 0.7

@@ -20,6 +20,7 @@ from identification.recording import Floats
 from identification.run_history.splines import spline
 
 MOST_NODES = 17
+"""Nodes of the smooth curve beside which the noise of a table is judged: as many as covariates have hats."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimation.singular_values import thin_svd
+from identification.mismatch import policy
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model, extended, parameters, reduced
 from identification.mismatch.model.parameters import Layout, Theta
@@ -20,17 +21,14 @@ from identification.recording import Floats
 from identification.run_history.filters import delayed, reconstructed
 
 MOST_STEPS = 25
+"""Steps of Levenberg and Marquardt: what needs more goes along a valley that tells nothing."""
 MOST_TRIES = 8
 """Dampings tried for one step."""
 LEAST_REACH = 0.05
 """sigma: a parameter that changes less within its bounds is left where it is."""
 SLOW_FALLS = 3.0
 """Further falls of the last size that a fit may be short of what is hoped for."""
-PRESSED = 2.5
-"""Sigmas by which a parameter asks to go beyond its bound."""
 DELAYING = frozenset({"motor_lag", "time_skew", "stand_resonance", "inflow_dynamics"})
-MUCH = 0.2
-"""Of the most that clocks may differ by."""
 CLOSE = 1e-4
 """Fall of chi-square at which a fit has ended; a difference of 1 is one sigma."""
 
@@ -221,7 +219,9 @@ def fit(
     if shift == 0:
         return found
     alike = replace(found.theta, shift=0.0, rate_shift=0.0)
-    doubtful = shift > MUCH * data.most_shift > 0 and any(term.id in DELAYING for term in model.terms)
+    doubtful = shift > policy.estimate.DOUBTFUL_CLOCK_SHIFT * data.most_shift > 0 and any(
+        term.id in DELAYING for term in model.terms
+    )
     if not doubtful:
         left = residual_of(model, alike, data, weights)
         if not float(left @ left) < found.chi2:
@@ -292,7 +292,10 @@ def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:
     inner = [end for p, end in zip(known, ended, strict=True) if p.neutral is None]
     if (inner and all(inner)) or any(e and p.neutral is not None for p, e in zip(known, ended, strict=True)):
         return True
-    return any(e and abs(_push(begin + j, fitted, data, weights)) > PRESSED for j, e in enumerate(ended))
+    return any(
+        e and abs(_push(begin + j, fitted, data, weights)) > policy.estimate.PRESSED_AT_BOUND_SIGMA
+        for j, e in enumerate(ended)
+    )
 
 
 def _ends(p: Parameter, value: float) -> bool:

@@ -8,23 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch import policy
 from identification.mismatch.faults.cells import Cells, explained, fitted, own, shapes
 from identification.mismatch.value import Value
 from identification.recording import Channel, Floats, Recording
 
-MISSING_SHARE = 0.01
-"""Of the rows: a few bad frames are no fault."""
-LEADING = 0.1
-"""Share of the rows before the first number that is allowed: a device that takes time to wake."""
 FOLLOWERS = ("thrust", "rotation_rate", "current", "torque", "motor_voltage")
 """What must move when the command does."""
-LEAST_ROWS = 10
-LEAST_SHARE = 0.02
-"""Of the run."""
-MOVED = 0.25
-"""Of the channel's own range: by so much it should have moved, on the inner side of an end of its range."""
-OFTEN = 0.1
-"""Share of the stretch in which it should have been elsewhere."""
 
 
 def missing(recording: Recording) -> Iterator[tuple[str, str, dict[str, Value]]]:
@@ -38,9 +28,9 @@ def missing(recording: Recording) -> Iterator[tuple[str, str, dict[str, Value]]]
         if not good.size:
             yield quantity, f"{quantity} holds no number at all.", {"share": Value(1.0, 0.0, "1")}
             continue
-        late = bad[good[0] :] if good[0] <= LEADING * bad.size else bad
+        late = bad[good[0] :] if good[0] <= policy.faults.LEADING_GAP * bad.size else bad
         share = float(np.mean(late))
-        if share <= MISSING_SHARE or np.count_nonzero(late) < 3:
+        if share <= policy.faults.MISSING_SHARE or np.count_nonzero(late) < 3:
             continue
         values = {"share": Value(share, 0.0, "1")}
         ends = np.flatnonzero(np.diff(np.concatenate([[0], bad.astype(int), [0]])))
@@ -75,7 +65,7 @@ def stuck(recording: Recording, cells: Cells) -> Iterator[tuple[str, Stuck]]:
     """Channels that repeat one value while what drives them moves."""
     for quantity in FOLLOWERS:
         channel = own(recording, quantity)
-        if channel is None or quantity == cells.driver_quantity or channel.time.size < LEAST_ROWS:
+        if channel is None or quantity == cells.driver_quantity or channel.time.size < policy.faults.STUCK_ROWS:
             continue
         found = _stuck(channel, cells)
         if found is not None:
@@ -85,12 +75,12 @@ def stuck(recording: Recording, cells: Cells) -> Iterator[tuple[str, Stuck]]:
 def _stuck(channel: Channel, cells: Cells) -> Stuck | None:
     good = np.isfinite(channel.value)
     time, value = channel.time[good], channel.value[good]
-    if value.size < LEAST_ROWS:
+    if value.size < policy.faults.STUCK_ROWS:
         return None
     low, high = _longest(value)
     rows = high - low
     share = (time[high - 1] - time[low]) / max(time[-1] - time[0], 1e-9)
-    if rows < LEAST_ROWS or share < LEAST_SHARE:
+    if rows < policy.faults.STUCK_ROWS or share < policy.faults.STUCK_SHARE:
         return None
     start, end, at = float(time[low]), float(time[high - 1]), float(value[low])
     inside = (cells.time >= start) & (cells.time <= end)
@@ -121,12 +111,12 @@ def _should_move(
     At an end of its range only values on the inner side count: a clipped channel stands still there, and is right.
     """
     x = cells.driver[inside]
-    if x.size < 4 or np.ptp(x) < MOVED:
+    if x.size < 4 or np.ptp(x) < policy.faults.STUCK_MOVEMENT:
         return False
     if whole:
         return True
     y = np.where(inside, np.nan, cells.values.get(str(channel.quantity), np.nan))
-    if np.count_nonzero(np.isfinite(y)) < LEAST_ROWS:
+    if np.count_nonzero(np.isfinite(y)) < policy.faults.STUCK_ROWS:
         return False
     law, free = _law(cells, y)
     if law is None:
@@ -138,17 +128,17 @@ def _should_move(
     edge = 1e-6 * float(np.ptp(value))
     above = at < float(value.max()) - edge  # it could have been higher
     below = at > float(value.min()) + edge
-    wrong = ((off > MOVED) & above) | ((off < -MOVED) & below)
-    return bool(np.mean(wrong & reached) > OFTEN)
+    wrong = ((off > policy.faults.STUCK_MOVEMENT) & above) | ((off < -policy.faults.STUCK_MOVEMENT) & below)
+    return bool(np.mean(wrong & reached) > policy.faults.STUCK_ELSEWHERE)
 
 
 def _law(cells: Cells, y: Floats) -> tuple[Floats | None, bool]:
     """Columns of what the channel follows, and whether it holds beyond the levels seen (a law of one shape does)."""
     known = shapes(cells.driver)
     for name in ("linear", "quadratic"):
-        if explained(known[name], y) > 0.95:
+        if explained(known[name], y) > policy.faults.STUCK_LAW:
             return known[name], True
     for name in ("odd", "even"):
-        if explained(known[name], y) > 0.5:
+        if explained(known[name], y) > policy.faults.ODD_LAW:
             return known[name], False
     return None, False

@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimation.tails import student_sf
+from identification.mismatch import policy
 from identification.recording import Channel, Floats, Recording
 
 DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
 MOST_CELLS = 1500
-LEAST_CELLS = 8
+"""Cells of one run: enough for any plan's levels, and a change of scale within a run is looked for at each."""
 BLOCKS = 16
 """Stretches of a run over which a figure must hold: noise is correlated within them, hardly between them."""
-TURNING = 0.15
-"""Share of the largest driver above which a level counts as driven."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +31,7 @@ class Cells:
     size: float
     """The largest |driver|."""
     values: Mapping[str, Floats]
-    """quantity -> mean in each cell, of channels with at least LEAST_CELLS of them."""
+    """quantity -> mean in each cell, of channels with at least CHANNEL_CELLS of them."""
 
     @property
     def block(self) -> NDArray[np.intp]:
@@ -42,8 +41,8 @@ class Cells:
     @property
     def both_ways(self) -> bool:
         x = self.driver
-        least = min(np.count_nonzero(x > TURNING), np.count_nonzero(x < -TURNING))
-        return bool(least >= max(3, 0.05 * x.size))
+        least = min(np.count_nonzero(x > policy.faults.DRIVEN_LEVEL), np.count_nonzero(x < -policy.faults.DRIVEN_LEVEL))
+        return bool(least >= max(3, policy.faults.BOTH_WAYS_SHARE * x.size))
 
 
 def own(recording: Recording, quantity: str) -> Channel | None:
@@ -59,9 +58,13 @@ def cells_of(recording: Recording, skip: Mapping[str, tuple[float, float]] | Non
     thrust = own(recording, "thrust")
     if driver is None:
         return None
-    clock = thrust if thrust is not None and np.count_nonzero(np.isfinite(thrust.value)) >= LEAST_CELLS else driver
+    clock = (
+        thrust
+        if thrust is not None and np.count_nonzero(np.isfinite(thrust.value)) >= policy.faults.CHANNEL_CELLS
+        else driver
+    )
     edges = _edges(clock, driver)
-    if edges.size <= LEAST_CELLS:
+    if edges.size <= policy.faults.CHANNEL_CELLS:
         return None
     quantity = str(driver.quantity)
     x = _held_mean(driver, edges) if quantity == "command_voltage" else _means(driver, edges, None)
@@ -74,7 +77,7 @@ def cells_of(recording: Recording, skip: Mapping[str, tuple[float, float]] | Non
         channel = own(recording, q)
         if channel is not None and channel is not driver:
             mean = _means(channel, edges, (skip or {}).get(q))
-            if np.count_nonzero(np.isfinite(mean)) >= LEAST_CELLS:
+            if np.count_nonzero(np.isfinite(mean)) >= policy.faults.CHANNEL_CELLS:
                 values[q] = mean
     return Cells(recording, quantity, 0.5 * (edges[1:] + edges[:-1]), x / size, size, values)
 
@@ -88,7 +91,7 @@ def _edges(clock: Channel, driver: Channel) -> Floats:
     """At most MOST_CELLS cells, of one sample at least, from the first row of the driver to the last of the clock."""
     t = np.unique(clock.time[np.isfinite(clock.value)])
     t = t[t >= driver.time[0] - 1e-9]
-    if t.size < LEAST_CELLS:
+    if t.size < policy.faults.CHANNEL_CELLS:
         return np.empty(0)
     if t.size <= MOST_CELLS:
         between = 0.5 * (t[1:] + t[:-1])
@@ -151,7 +154,7 @@ def fitted(columns: Floats, y: Floats) -> tuple[Floats, Floats]:
 def explained(columns: Floats, y: Floats) -> float:
     """R^2."""
     good = np.isfinite(y)
-    if np.count_nonzero(good) < LEAST_CELLS:
+    if np.count_nonzero(good) < policy.faults.CHANNEL_CELLS:
         return 0.0
     _, left = fitted(columns, y)
     total = float(np.var(y[good]))

@@ -17,6 +17,7 @@ from typing import Literal
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.faults.bad_values import Stuck, missing, stuck
 from identification.mismatch.faults.cells import Cells, cells_of, own
 from identification.mismatch.faults.driver_laws import (
@@ -31,8 +32,6 @@ from identification.mismatch.value import Value
 from identification.recording import Channel, Recording
 
 Kind = Literal["swapped", "rescaled", "reversed", "frozen", "unsigned", "nan"]
-ALARM = 1e-3
-"""Of one test of one channel; see fault_tests for what must hold besides."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,24 +55,27 @@ class Fault:
         return self.kind != "nan"
 
 
-def find_faults(recordings: Sequence[Recording], *, alarm: float = ALARM) -> tuple[Fault, ...]:
+def find_faults(recordings: Sequence[Recording]) -> tuple[Fault, ...]:
     """Every fault of every recording of one thruster, in order of recording; empty for vehicles."""
     out: list[Fault] = []
     gains: list[tuple[Cells, set[str]]] = []
     for recording in recordings:
         if recording.kind == "vehicle":
             continue
-        found, cells = _of_one(recording, alarm)
+        found, cells = _of_one(recording)
         out += found
         if cells is not None:
             gains.append((cells, {f.channel for f in found} | {f.other for f in found}))
     if len(gains) > 1:
         for cells, q, says, values in between_runs(gains):
-            out.append(Fault(cells.recording.recording_id, q, "rescaled", says, alarm, values))
+            out.append(
+                Fault(cells.recording.recording_id, q, "rescaled", says, policy.faults.CHANNEL_FALSE_ALARM, values)
+            )
     return tuple(out)
 
 
-def _of_one(recording: Recording, alarm: float) -> tuple[list[Fault], Cells | None]:
+def _of_one(recording: Recording) -> tuple[list[Fault], Cells | None]:
+    alarm = policy.faults.CHANNEL_FALSE_ALARM
     name = recording.recording_id
     out = [Fault(name, q, "nan", says, 0.0, values) for q, says, values in missing(recording)]
     first = cells_of(recording)

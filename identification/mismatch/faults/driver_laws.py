@@ -12,6 +12,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from identification.estimation.tails import student_sf
+from identification.mismatch import policy
 from identification.mismatch.faults.cells import (
     BLOCKS,
     Cells,
@@ -25,8 +26,6 @@ from identification.recording import Floats
 
 LINEAR = ("rotation_rate", "motor_voltage")
 SQUARE = ("thrust", "current", "torque")
-FOLLOWS = 0.9
-"""R^2 of a channel that follows a law."""
 FACTORS: Mapping[float, str] = {
     60.0: "per minute for per second",
     2 * np.pi: "rad for turns",
@@ -38,21 +37,6 @@ FACTORS: Mapping[float, str] = {
     10.0: "a digit",
     2.0: "a factor of two",
 }
-NAMED = 0.03
-"""Relative nearness to a named factor."""
-UNNAMED = 3.0
-"""A factor beyond this, or below its inverse, is no physics of a thruster even without a name."""
-LEAST_NAMED = 1.7
-STEADY = 0.1
-"""PriorPredictionFactor of the factor over the blocks after the change, relative to its logarithm."""
-BLURRED = 3
-"""Cells on either side of a change that are not used: they may hold rows of both sides."""
-FASTEST_TURN = 1000.0
-"""rev/s: more than any propeller does; rev/min are likely."""
-UNSIGNED_SHARE = 0.3
-"""Least ratio of the slopes on both sides."""
-LEAST = 8
-"""Cells with a value."""
 
 Scaled = tuple[str, str, float, dict[str, Value]]
 
@@ -60,7 +44,7 @@ Scaled = tuple[str, str, float, dict[str, Value]]
 def impossible(cells: Cells) -> Iterator[Scaled]:
     """Units that the size of a channel gives away."""
     rate = cells.values.get("rotation_rate")
-    if rate is not None and np.nanmax(np.abs(rate)) > FASTEST_TURN:
+    if rate is not None and np.nanmax(np.abs(rate)) > policy.faults.FASTEST_ROTATION:
         says = f"rotation_rate reaches {np.nanmax(np.abs(rate)):.4g} rev/s; these are turns per minute (60)."
         yield "rotation_rate", says, 0.0, {"factor": Value(60.0, 0.0, "1")}
     if cells.driver_quantity != "command_voltage":
@@ -73,7 +57,13 @@ def impossible(cells: Cells) -> Iterator[Scaled]:
             ratio = abs(float(fitted(shapes(cells.driver)["linear"], y)[0][1])) / cells.size
         else:
             ratio = float(np.nanmedian(np.abs(y))) / cells.size
-        factor = 1000.0 if ratio > 300 else 0.001 if 0 < ratio < 0.01 else 0.0
+        factor = (
+            1000.0
+            if ratio > policy.faults.MILLIVOLTS_RATIO
+            else 0.001
+            if 0 < ratio < policy.faults.KILOVOLTS_RATIO
+            else 0.0
+        )
         if factor:
             says = f"{q} is {ratio:.3g} times the command: {'milli' if factor > 1 else 'kilo'}volts, not volts."
             yield q, says, 0.0, {"factor": Value(factor, 0.0, "1")}
@@ -83,7 +73,7 @@ def named_factor(factor: float) -> tuple[float, str]:
     """The factor of a unit near it and what that is; the factor itself and "" without one."""
     for known, what in FACTORS.items():
         for exact in (known, 1 / known):
-            if abs(factor / exact - 1) < NAMED:
+            if abs(factor / exact - 1) < policy.faults.UNIT_FACTOR_NEAR:
                 return exact, what
     return factor, ""
 
@@ -92,7 +82,9 @@ def _telling(factor: float) -> bool:
     if not factor > 0:
         return False
     size = max(factor, 1 / factor)
-    return size > UNNAMED or (size > LEAST_NAMED and bool(named_factor(factor)[1]))
+    return size > policy.faults.SCALE_FACTOR or (
+        size > policy.faults.NAMED_SCALE_FACTOR and bool(named_factor(factor)[1])
+    )
 
 
 def midway(cells: Cells) -> Iterator[Scaled]:
@@ -120,12 +112,15 @@ def _change(cells: Cells, y: Floats) -> tuple[float, float, float, float] | None
     at = _split(X, v)
     if at is None:
         return None
-    before, after = slice(0, at - BLURRED), slice(at + BLURRED, good.size)
-    if min(explained(X[before], v[before]), explained(X[after], v[after])) < FOLLOWS:
+    before, after = (
+        slice(0, at - policy.faults.SCALE_CHANGE_CELLS),
+        slice(at + policy.faults.SCALE_CHANGE_CELLS, good.size),
+    )
+    if min(explained(X[before], v[before]), explained(X[after], v[after])) < policy.faults.FOLLOWS_LAW:
         return None
     inner = np.abs(cells.driver[good]) <= np.max(np.abs(cells.driver[good][before])) + 0.02
     law = X @ np.linalg.lstsq(X[before], v[before], rcond=None)[0]
-    late = np.flatnonzero(inner & (np.arange(good.size) >= at + BLURRED))
+    late = np.flatnonzero(inner & (np.arange(good.size) >= at + policy.faults.SCALE_CHANGE_CELLS))
     if late.size < BLOCKS or not np.any(law[late]):
         return None
     blocks = [b for b in np.array_split(late, 8) if np.ptp(law[b]) > 0.05 * np.ptp(law)]
@@ -134,7 +129,7 @@ def _change(cells: Cells, y: Floats) -> tuple[float, float, float, float] | None
         return None
     logs = np.log(factors)
     middle, spread = float(np.median(logs)), float(np.std(logs, ddof=1))
-    if not _telling(float(np.exp(middle))) or spread > STEADY * abs(middle):
+    if not _telling(float(np.exp(middle))) or spread > policy.faults.SCALE_SCATTER * abs(middle):
         return None
     error = spread / np.sqrt(logs.size)
     p = float(2 * student_sf(abs(middle) / max(error, 1e-12), logs.size - 1))
@@ -181,9 +176,9 @@ def unsigned(cells: Cells) -> Iterator[tuple[str, str, float]]:
         columns = shapes(cells.driver)["linear_sides" if q in LINEAR else "sides"]
         right, _, p_right = gain(cells, columns, y, 1)
         left, _, p_left = gain(cells, columns, y, 2)
-        if right * left >= 0 or min(abs(right), abs(left)) < UNSIGNED_SHARE * max(abs(right), abs(left)):
+        if right * left >= 0 or min(abs(right), abs(left)) < policy.faults.UNSIGNED_SLOPES * max(abs(right), abs(left)):
             continue
-        if explained(shapes(cells.driver)["even"], y) < 0.7 or q == "torque":
+        if explained(shapes(cells.driver)["even"], y) < policy.faults.EVEN_LAW or q == "torque":
             continue
         says = (
             f"{q} has no sign: it goes {'up' if right > 0 else 'down'} whichever way the {cells.driver_quantity} goes."
@@ -197,7 +192,12 @@ def reversed_channels(cells: Cells, done: set[str]) -> Iterator[Scaled]:
     slopes: dict[str, tuple[float, float, float]] = {}
     for q in ("thrust", "rotation_rate", "motor_voltage", "current"):
         y = cells.values.get(q)
-        if y is None or q in done or np.count_nonzero(np.isfinite(y)) < LEAST or explained(x["odd"], y) < 0.5:
+        if (
+            y is None
+            or q in done
+            or np.count_nonzero(np.isfinite(y)) < policy.faults.CHANNEL_CELLS
+            or explained(x["odd"], y) < policy.faults.ODD_LAW
+        ):
             continue
         slopes[q] = gain(cells, x["linear" if q in LINEAR else "quadratic"], y, 1)
     wrong = {q: s for q, s in slopes.items() if s[0] < 0}
@@ -218,7 +218,7 @@ def between_runs(runs: Sequence[tuple[Cells, set[str]]]) -> Iterator[tuple[Cells
         for cells, lying in runs:
             y = cells.values.get(q)
             columns = shapes(cells.driver)["linear" if q in LINEAR else "quadratic"]
-            if y is not None and q not in lying and explained(columns, y) > FOLLOWS:
+            if y is not None and q not in lying and explained(columns, y) > policy.faults.FOLLOWS_LAW:
                 slope, error, _ = gain(cells, columns, y, 1)
                 found.append((cells, slope / cells.size ** (1 if q in LINEAR else 2), error / abs(slope)))
         logs = np.log(np.abs([f[1] for f in found])) if len(found) > 1 else np.empty(0)
@@ -226,7 +226,7 @@ def between_runs(runs: Sequence[tuple[Cells, set[str]]]) -> Iterator[tuple[Cells
             others = np.delete(logs, i)
             factor = float(np.exp(logs[i] - np.median(others)))
             alone = logs.size > 2 or i == 1  # of two runs nobody knows which: the later one is named
-            if alone and np.ptp(others) < 0.3 and _telling(factor):
+            if alone and np.ptp(others) < policy.faults.OTHER_RUNS_AGREE and _telling(factor):
                 _, what = named_factor(factor)
                 says = f"{q} is {factor:.4g} times that of the other {'runs' if logs.size > 2 else 'run'}"
                 says += f" ({what})." if what else "."

@@ -6,10 +6,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.diagnosis import Mismatch
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit
-from identification.mismatch.locate.residual_structure_test import ALARM, CovariateTest, residual_structure
+from identification.mismatch.locate.residual_structure_test import CovariateTest, residual_structure
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.whitening import Weights
@@ -20,10 +21,6 @@ from identification.mismatch.select.screening import lengths
 from identification.mismatch.value import Where
 from identification.recording import Floats
 
-MOST_PLACES = 3
-"""Places that an answer tells of."""
-CLEAR = 1e-3
-"""p-value of a place below which it is told beside the clearest one."""
 ROUNDING = 1e-9
 """Of a covariate's reach: such an edge is 0."""
 
@@ -49,17 +46,17 @@ def places_of(found: Selected, after: Estimate, rng: np.random.Generator, *, pul
     """
     before, data = found.before.fit, found.data
     seen = residual_structure(before, data, found.before.weights, rng, pulsing=pulsing)
-    if seen.p_value >= ALARM and not after.fit.model.terms:
+    if seen.p_value >= policy.locate.RESIDUAL_FALSE_ALARM and not after.fit.model.terms:
         return ()
     same = replace(before.theta, C=after.fit.theta.C, tares=after.fit.theta.tares, shift=after.fit.theta.shift)
     bare = replace(before, theta=same)
-    clear = [g for i, g in enumerate(seen.groups) if i == 0 or g.p_value <= CLEAR]
+    clear = [g for i, g in enumerate(seen.groups) if i == 0 or g.p_value <= policy.locate.PLACE_P]
     own = {q for term in after.fit.model.terms for c in term.covariates for q in (DRIVERS if c in STATIC else (c,))}
     places = [
         _mismatch(g, bare, data, after.weights) for g in sorted(clear, key=lambda g: g.covariate.quantity not in own)
     ]
     told = [place for place, whole in places if not whole] or [place for place, _ in places]
-    return tuple(told[:MOST_PLACES])
+    return tuple(told[: policy.locate.PLACES_TOLD])
 
 
 def _mismatch(judged: CovariateTest, bare: Fit, data: Data, weights: Weights) -> tuple[Mismatch, bool]:
@@ -139,14 +136,14 @@ def _bins(covariate: Floats) -> Floats:
 
 
 def _stretch(edges: Floats, power: Floats) -> tuple[float, float, float]:
-    """The shortest run of bins that holds 70 % of the power, or the whole."""
+    """The shortest run of bins that holds PLACE_SHARE of the power, or the whole."""
     total = float(power.sum())
     if total <= 0:
         return float(edges[0]), float(edges[-1]), 0.0
     best = (0, power.size)
     cumulative = np.concatenate([[0.0], np.cumsum(power)])
     for i in range(power.size):
-        j = int(np.searchsorted(cumulative, cumulative[i] + 0.7 * total))
+        j = int(np.searchsorted(cumulative, cumulative[i] + policy.locate.PLACE_SHARE * total))
         if j <= power.size and edges[j] - edges[i] < edges[best[1]] - edges[best[0]]:
             best = (i, j)
     share = float((cumulative[best[1]] - cumulative[best[0]]) / total)

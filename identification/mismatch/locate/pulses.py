@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.tails import normal_sf
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import forces
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
@@ -26,9 +27,6 @@ SHORTEST, LONGEST = 3.0, 0.2
 """Periods: so many lengths, and this share of the run."""
 PARTS = 4
 """Of a length, between the beginnings of two windows."""
-LEAST_PULSES = 4
-FEW_ROWS = 60
-"""With fewer a run has no pulses."""
 SIZED = 24
 """Windows of each length whose sigmas are worked out."""
 TRIED = 8
@@ -36,8 +34,7 @@ TRIED = 8
 OFTENER = (1, 2, 3, 4)
 """Times as often as looked likeliest: every second pulse is a train too."""
 PHASES = 12
-IN_STEP = 0.5
-"""Share of the variance of the force, its size or its sign that the phase explains where a plan repeats itself."""
+"""Bins of a period, in which the plan's own repetition is looked for: finer than the widest pulse."""
 ROUNDS = 7
 """In which period, beginning and length are moved by ever smaller steps."""
 
@@ -134,7 +131,7 @@ def _runs(fitted: Fit, data: Data, weights: Weights, residual: Floats | None) ->
 
 
 def _of_run(run: _Run) -> Pulses | None:
-    if run.time.size < FEW_ROWS or not np.any(run.force):
+    if run.time.size < policy.locate.PULSE_ROWS or not np.any(run.force):
         return None
     rough = [_of_length(run, run.duration / share) for share in LENGTHS]
     best = max((p for _, found in rough for p in found), key=lambda p: abs(p.sigmas), default=None)
@@ -180,7 +177,7 @@ def _of_length(run: _Run, length: float) -> tuple[int, list[Pulses]]:
         index = np.minimum(index, at.size - 1)
         total, expected = (score[index] * there).sum(axis=1), (size[index] * there).sum(axis=1)
         sigmas = np.abs(total) / np.sqrt(np.maximum(expected, 1e-6 * size.max()))
-        sigmas[there.sum(axis=1) < LEAST_PULSES] = 0.0
+        sigmas[there.sum(axis=1) < policy.locate.PULSES] = 0.0
         likely = int(np.argmax(sigmas))
         looked_at += sigmas.size
         found.append((float(sigmas[likely]), period, float(at[likely])))
@@ -209,7 +206,7 @@ def _repeated(run: _Run, period: float) -> bool:
     rows = np.maximum(np.bincount(phase, minlength=PHASES), 1)
     for force in (run.force, np.abs(run.force), np.sign(run.force)):
         mean = np.bincount(phase, weights=force, minlength=PHASES) / rows
-        if float(np.var(mean[phase])) > IN_STEP * float(np.var(force)):
+        if float(np.var(mean[phase])) > policy.locate.PLAN_IN_STEP * float(np.var(force)):
             return True
     return False
 

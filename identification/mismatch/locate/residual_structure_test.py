@@ -13,22 +13,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
+from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.locate.pulses import Pulses, likeliest_pulses
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.covariates import Covariate, covariates
-from identification.mismatch.select.jumps import APART, TRIED, jumps
+from identification.mismatch.select.jumps import TRIED, jumps
 from identification.mismatch.select.screening import normal_scores, orthogonal_basis, quiet, surrogate_scores
 from identification.mismatch.select.shape_error import allowed_in, corrections
 from identification.recording import Floats
-
-ALARM = 0.004
-"""False-alarm rate of what is left, family-wise: with the search for effects and for lines some 1 % of a diagnosis."""
-FAR = 4.0
-"""Sigmas beyond which a row counts no more: one outlier is no structure."""
-PLAIN_P = 1e-7
-"""Of one group: what is plainly no noise, whatever its kind."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +61,7 @@ def residual_structure(
     found = tuple(looked_at) if looked_at is not None else covariates(fit, data)
     n = data.size
     basis = orthogonal_basis(fit.jacobian[:n])
-    residual = np.clip(fit.residual[:n], -FAR, FAR)
+    residual = np.clip(fit.residual[:n], -policy.locate.OUTLIER_SIGMA, policy.locate.OUTLIER_SIGMA)
     changes = corrections(fit, data, Weights(weights.thrust))
     groups, spans = [], []
     for c in found:
@@ -90,7 +84,11 @@ def residual_structure(
     pulses = None
     at = next((i for i, g in enumerate(groups) if g.covariate.quantity == "time"), None)
     if at is not None and pulsing:
-        others = [(Q, g) for Q, g in zip(spans, groups, strict=True) if g is not groups[at] and g.p_value < PLAIN_P]
+        others = [
+            (Q, g)
+            for Q, g in zip(spans, groups, strict=True)
+            if g is not groups[at] and g.p_value < policy.locate.PLAIN_STRUCTURE_P
+        ]
         pulses = _pulses(fit, residual, data, weights, others)
         if pulses is not None:
             groups[at] = min(groups[at], _of_pulses(groups[at].covariate, pulses, residual), key=lambda g: g.p_value)
@@ -107,7 +105,7 @@ def _family(
     """P-value of the smallest p-value of all groups, by draws of the residual over their spans (n, q)."""
     every = np.column_stack(spans)
     clean = quiet(residual, every)
-    plain = [Q for Q, g in zip(spans, groups, strict=True) if g.p_value < PLAIN_P]
+    plain = [Q for Q, g in zip(spans, groups, strict=True) if g.p_value < policy.locate.PLAIN_STRUCTURE_P]
     if plain:  # a structure of many small parts would be in the draws, and hide itself
         known = orthogonal_basis(np.column_stack(plain))
         clean = clean - known @ (known.T @ clean)
@@ -139,7 +137,7 @@ def _jump(time: Covariate, fit: Fit, residual: Floats, data: Data, weights: Weig
     """
     when, score = jumps(residual, data, weights, basis)
     known = [v[1] for t, v in fit.values.items() if t.id == "zero_offset"]
-    new = np.all([np.abs(when - at) > APART * data.scale.duration for at in known], axis=0)
+    new = np.all([np.abs(when - at) > policy.select.JUMPS_APART * data.scale.duration for at in known], axis=0)
     when, score = (when[new], score[new]) if known else (when, score)
     if not score.size:
         return CovariateTest(time, 0.0, 1, 1.0, 0.0)
@@ -147,7 +145,7 @@ def _jump(time: Covariate, fit: Fit, residual: Floats, data: Data, weights: Weig
     p = TRIED * _tail(stat, 1, 0.0)
     told = replace(time, what=f"{time.what}; the reading jumps at {when[0]:.4g} s")
     share = max(stat - 1, 0.0) / max(float(residual @ residual), 1e-300)
-    return CovariateTest(told, stat, 1, p if p < PLAIN_P else 1.0, share)
+    return CovariateTest(told, stat, 1, p if p < policy.locate.PLAIN_STRUCTURE_P else 1.0, share)
 
 
 def _pulses(
@@ -159,15 +157,15 @@ def _pulses(
     not these for them: a plan that repeats itself makes pulses of anything.
     """
     found = likeliest_pulses(fit, data, weights, residual)
-    if found is None or found.p_value > PLAIN_P:
+    if found is None or found.p_value > policy.locate.PLAIN_STRUCTURE_P:
         return None
     rest = residual - found.column * (found.column @ residual)
-    if any(_tail(float(np.sum((Q.T @ rest) ** 2)), g.dof, 0.0) < PLAIN_P for Q, g in others):
+    if any(_tail(float(np.sum((Q.T @ rest) ** 2)), g.dof, 0.0) < policy.locate.PLAIN_STRUCTURE_P for Q, g in others):
         return None
     if others:
         known = orthogonal_basis(np.column_stack([Q for Q, _ in others]))
         beyond = likeliest_pulses(fit, data, weights, residual - known @ (known.T @ residual))
-        if beyond is None or beyond.p_value > PLAIN_P:
+        if beyond is None or beyond.p_value > policy.locate.PLAIN_STRUCTURE_P:
             return None
     return found
 

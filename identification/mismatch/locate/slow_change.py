@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.estimation.tails import chi2_sf
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, forces, refresh
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
@@ -20,15 +21,13 @@ from identification.recording import Floats
 
 SLOW, QUICK = 2, 16
 """Degrees of the polynomials over time. Those of the zero are slow: what wanders quicker is noise by any other name."""
-ALARM = 1e-5
-"""Of one kind of change: the likelihood ratio of noise models is no exact chi-square (benchmarks/hidden_gains.py)."""
 
 
 def beside_slow_change(estimate: Estimate, data: Data) -> Estimate | None:
     """The same model with its noise estimated beside such a change; None where noise explains the residual as well."""
     if any(h.static for h in data.histories):
         return None
-    found = [(p, beside) for p, beside in slow_changes(estimate, data) if p < ALARM]
+    found = [(p, beside) for p, beside in slow_changes(estimate, data) if p < policy.locate.SLOW_CHANGE_FALSE_ALARM]
     return min(found, key=lambda each: each[0])[1] if found else None
 
 

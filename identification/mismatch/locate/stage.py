@@ -7,19 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate
-from identification.mismatch.locate.residual_structure_test import ALARM, ResidualStructure, residual_structure
+from identification.mismatch.locate.residual_structure_test import ResidualStructure, residual_structure
 from identification.mismatch.locate.slow_change import beside_slow_change
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.whiteness import whiteness
 from identification.mismatch.select.forward_selection import Selected
-from identification.mismatch.select.shape_error import SHAPE_ERROR, corrections
-
-COLOURED = 1e-25
-"""p-value of whiteness below which no noise is blamed; 1/f noise alone was seen to reach 1e-21."""
-UNCARRIED = 6.0
-"""Sigmas of a direction of the last screening that no term made anything of: it is left, whatever its shape."""
+from identification.mismatch.select.shape_error import corrections
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -33,17 +29,17 @@ class Located:
     @property
     def structured(self) -> bool:
         """Whether more than noise is left."""
-        return self.left.p_value < ALARM
+        return self.left.p_value < policy.locate.RESIDUAL_FALSE_ALARM
 
 
 def run(selected: Selected, rng: np.random.Generator) -> Located:
     """Structure over any covariate; else what the last screening could not carry; else a slow change."""
     data, after = selected.data, selected.after
     left = _with_colour(residual_structure(after.fit, data, after.weights, rng), after, data)
-    if left.p_value < ALARM or not left.groups:
+    if left.p_value < policy.locate.RESIDUAL_FALSE_ALARM or not left.groups:
         return Located(after, left)
     last = selected.last
-    if last is not None and last.largest > max(last.threshold, UNCARRIED):
+    if last is not None and last.largest > max(last.threshold, policy.locate.UNCARRIED_SIGMA):
         best = last.directions.terms[int(np.argmax(last.z))]
         worse = replace(left, p_value=min(last.p_value, left.p_value))
         return Located(after, _foremost_over(worse, best.covariates))
@@ -61,9 +57,13 @@ def _foremost_over(left: ResidualStructure, quantities: Collection[str]) -> Resi
 def _with_colour(left: ResidualStructure, after: Estimate, data: Data) -> ResidualStructure:
     """What is left counts as structure too when it is far from white, and more than the terms' shapes may leave."""
     colour = whiteness(after.fit.residual, [r.size for r in data.rows])
-    if not after.fit.model.terms or colour > COLOURED or left.p_value < ALARM:
+    if (
+        not after.fit.model.terms
+        or colour > policy.locate.COLOURED_RESIDUAL_P
+        or left.p_value < policy.locate.RESIDUAL_FALSE_ALARM
+    ):
         return left
     changes = corrections(after.fit, data, Weights(after.weights.thrust))
-    spared = SHAPE_ERROR**2 * float(sum(change @ change for change in changes))
+    spared = policy.select.SHAPE_ERROR**2 * float(sum(change @ change for change in changes))
     excess = float(after.fit.residual[: data.size] @ after.fit.residual[: data.size]) - data.size
     return replace(left, p_value=colour) if excess > spared else left

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.physics.command_saturation import CommandSaturation
@@ -20,11 +21,6 @@ from identification.run_history.history import History
 from identification.run_history.remembered import Channel, RememberedRun
 from identification.run_history.sub_interval_dynamics import Passed
 from identification.run_history.sub_interval_leads import curvature, each_lead, lead
-
-LONGEST_TICK = 0.2
-"""s: what is written more seldom are steps."""
-LEAST_DELAY = 0.02
-"""Of a tick: a shorter delay leaves what the driver does within its ticks where it was."""
 
 
 def delay_of(model: Model, theta: Theta) -> float:
@@ -98,12 +94,12 @@ def shown(model: Model, theta: Theta, history: History, F: Floats, x: Floats, ta
 
 
 def _is_late(late: float, history: History) -> bool:
-    return abs(late) >= LEAST_DELAY * history.tick
+    return abs(late) >= policy.model.TICK_DELAY * history.tick
 
 
 def _changes(passed: Passed, history: History) -> bool:
     """Whether dynamics change what the ticks do."""
-    return passed != Passed() and history.ticks is not None and history.tick <= LONGEST_TICK
+    return passed != Passed() and history.ticks is not None and history.tick <= policy.model.TICK_INTERVAL
 
 
 def _remembered(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:

@@ -10,6 +10,7 @@ from itertools import combinations
 import numpy as np
 
 from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, fit_without
 from identification.mismatch.estimate.fitting import Fit, at_bound
 from identification.mismatch.locate.residual_structure_test import ResidualStructure
@@ -19,28 +20,10 @@ from identification.mismatch.model.whitening import Weights
 from identification.mismatch.prepare.preparing import DRIVERS
 from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import STATIC, Rival, SwapTest, static_curve
-from identification.mismatch.select.rivals import NEAR, swaps
+from identification.mismatch.select.rivals import swaps
 from identification.mismatch.select.screening import orthogonal_basis
 from identification.physics.term import Term
 from identification.recording import Floats
-
-SAME = 0.1
-"""Parts of a run whose parameters differ by less count as the same."""
-ONE_SIDED = 0.1
-"""Of the size of what a term does: with less of it on one side there is nothing to compare."""
-OWN_SHARE = 0.01
-"""Of what a term explains: less than this left over its own covariate is the textbook's fault, not the name's."""
-INCONSTANT = 1e-3
-"""p-value, after all tests of a term, below which its parameter is not the same everywhere."""
-OWN_COVARIATE = 1e-4
-"""p-value of what is left over a term's own covariate below which its name is not earned."""
-CANCELLED = 0.15
-"""Of what each of two terms does alone: less together, and neither is seen."""
-MANY_SHAPES = 3
-REPAIR = 0.1
-"""Of what two shapes on one static curve explain together: what adds less than this to the other repairs it."""
-ALIKE = 0.7
-"""Of the same: where each explains more than this alone, either could be the one that is repaired."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +38,7 @@ class Named:
     p_value: float
     probability: float
     rivals: tuple[Rival, ...]
-    """Other effects within NEAR, best first."""
+    """Other effects within RIVAL_STATED_BIC, best first."""
     failed_checks: tuple[str, ...]
     """Why the name is not earned; empty when it is."""
 
@@ -89,15 +72,19 @@ def failed_checks(estimate: Estimate, term: Term, data: Data, many: int) -> tupl
     whole = float(np.linalg.norm(weights.whiten(change, [])))
     for what, masks in splits.items():
         column = weights.whiten([c * m for c, m in zip(change, masks, strict=True)], [])
-        if not ONE_SIDED < float(np.linalg.norm(column)) / max(whole, 1e-300) < 1 - ONE_SIDED**2:
+        if (
+            not policy.name.PART_SIZE
+            < float(np.linalg.norm(column)) / max(whole, 1e-300)
+            < 1 - policy.name.PART_SIZE**2
+        ):
             continue
         rest = column - basis @ (basis.T @ column)
         size = float(np.linalg.norm(rest))
-        if size < 1e-3 * float(np.linalg.norm(column)) or size < 0.3:
+        if size < 1e-3 * float(np.linalg.norm(column)) or size < policy.name.PART_SIGMA:
             continue
         score = float(rest @ estimate.fit.residual[:n]) / size
-        p = float(noncentral_chi2_sf(score**2, 1, (SAME * size) ** 2))
-        if p * len(splits) * many < INCONSTANT:
+        p = float(noncentral_chi2_sf(score**2, 1, (policy.name.PART_DIFFERENCE * size) ** 2))
+        if p * len(splits) * many < policy.name.INCONSTANT_P:
             out.append(f"its parameter is not the same {what} ({abs(score) / size * 100:.0f} % apart)")
     return tuple(out)
 
@@ -118,7 +105,7 @@ def _cancelled(now: Fit, term: Term, change: list[Floats], data: Data) -> list[T
             both = np.concatenate(_raw_effect(now, (term, other), data))
             alone = np.concatenate(_raw_effect(now, (other,), data))
             least = min(float(np.linalg.norm(np.concatenate(change))), float(np.linalg.norm(alone)))
-            if float(np.linalg.norm(both)) < CANCELLED * least:
+            if float(np.linalg.norm(both)) < policy.name.CANCELLED_SHARE * least:
                 found.append(other)
     return found
 
@@ -152,7 +139,10 @@ def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[
         neither = fit_without(replace(estimate, fit=less[one]), other, data).chi2
         together = neither - estimate.fit.chi2
         adds = [less[term].chi2 - estimate.fit.chi2 for term in (one, other)]
-        if min(adds) < REPAIR * together and max(adds) < (1 - ALIKE) * together:
+        if (
+            min(adds) < policy.name.REPAIR_SHARE * together
+            and max(adds) < (1 - policy.name.REPAIRED_ALONE_SHARE) * together
+        ):
             share = 100 * (1 - max(adds) / together)
             for term, beside in ((one, other), (other, one)):
                 told = f"{beside.id} alone explains nearly the same ({share:.0f} % of what both do), and neither all"
@@ -175,7 +165,9 @@ def name(
     for term, values in estimate.fit.values.items():
         less, others = stands[term]
         gain = less.chi2 - estimate.fit.chi2
-        close = [r for r in others if min(r.bic_loss, r.aic_loss) < NEAR and r.term.id != term.id]
+        close = [
+            r for r in others if min(r.bic_loss, r.aic_loss) < policy.select.RIVAL_STATED_BIC and r.term.id != term.id
+        ]
         unique: dict[str, Rival] = {}
         for r in close:
             unique.setdefault(r.term.id, r)
@@ -203,16 +195,24 @@ def with_joint_checks(named: Sequence[Named], left: ResidualStructure | None, *,
     curve can be made of enough of them. `measured`: the rate, as a response.
     """
     shapes = Counter(static_curve(n.term, measured=measured) for n in named)
-    clear = {g.covariate.quantity: g for g in left.groups if g.p_value < OWN_COVARIATE} if left is not None else {}
+    clear = (
+        {g.covariate.quantity: g for g in left.groups if g.p_value < policy.name.OWN_COVARIATE_P}
+        if left is not None
+        else {}
+    )
     out = []
     for n in named:
         more: list[str] = []
         names = {d for c in n.term.covariates for d in (DRIVERS if c in STATIC else (c,))}
-        own = [q for q, g in clear.items() if q in names and g.statistic - g.dof > OWN_SHARE * n.chi2_gain]
+        own = [
+            q
+            for q, g in clear.items()
+            if q in names and g.statistic - g.dof > policy.name.OWN_COVARIATE_SHARE * n.chi2_gain
+        ]
         if own:
             more.append(f"more is left over its own covariate, {own[0]}")
         curve = static_curve(n.term, measured=measured)
-        if curve and shapes[curve] >= MANY_SHAPES:
+        if curve and shapes[curve] >= policy.name.CURVE_OF_ANY_SHAPE_TERMS:
             more.append(f"{shapes[curve]} shapes on one static curve make any curve")
         out.append(replace(n, failed_checks=(*n.failed_checks, *more)))
     return tuple(out)

@@ -3,7 +3,7 @@
 Candidate pieces (`sweeps`) are foreseen under every rival with its fitted values. What a rival's own parameters, C and
 the zero can follow, jointly with the data in hand, does not count. Pieces are taken greedily by what they tell per
 second, until the probability that the BIC decides rightly between any two that can be told apart, whichever is true, is
-GOOD or the budget is spent; then pieces that are not needed are left out again.
+SWEEP_DECIDES or the budget is spent; then pieces that are not needed are left out again.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from itertools import permutations
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.diagnosis import NextExperiment, PlanStep
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit
@@ -28,26 +29,14 @@ from identification.mismatch.next_experiment.predicted_response import (
     stretches,
 )
 from identification.mismatch.next_experiment.sweeps import REST, SHORT, Block, Limits, blocks, put_together
-from identification.mismatch.select.rivals import EQUAL
 from identification.recording import Floats
 
-GOOD = 0.95
-"""Probability of a right decision at which a sweep is long enough."""
-FAIR = 0.5
-"""Below this a pair is said to be hardly told apart."""
-ALIKE = 4.0
-"""Expected chi-square apart, when the budget is spread evenly over all pieces, below which two rivals stay alike."""
-PLAIN = 18.0
-"""Expected chi-square apart at which the probability of a right decision is about GOOD."""
-IDLE = 0.01
-"""Of what can be gained: when the whole time that is left would give less, the sweep ends."""
-MOST_LONGER = 12.0
-"""Times the budget: a sweep that would have to be longer than this is none."""
 MOST_RIVALS = 4
+"""Rivals between which one sweep is designed, the nearest first: pairs grow as their square."""
 MOST_SHORTENED = 4
 """Blocks without which a sweep is tried."""
 TARGETS = (30.0, 60.0, 120.0, 400.0)
-"""Expected chi-square between two rivals that is aimed at: raised while the probability is not GOOD."""
+"""Expected chi-square between two rivals that is aimed at: raised while the probability is not SWEEP_DECIDES."""
 BEYOND: Mapping[str, tuple[tuple[str, str], ...]] = {
     "torque_crosstalk": (("torque", "the torque channel"), ("", "dead weights on the cell")),
     "load_cell_nonlinearity": (("", "dead weights on the cell"),),
@@ -159,16 +148,16 @@ class _Tried:
         self.seconds = np.array([block.seconds for block in every])
         self.pairs = list(permutations(range(len(contest.fits)), 2))
         even = self._pairwise(self.parts.evenly(budget / float(self.seconds.sum())))[0]
-        self.decisive = np.array([0 in pair for pair in self.pairs]) | (even > ALIKE)
+        self.decisive = np.array([0 in pair for pair in self.pairs]) | (even > policy.next_experiment.RIVALS_STAY_ALIKE)
 
     def answer(self) -> NextExperiment:
         chosen: list[int] = []
         for target in TARGETS:
             chosen = self._grown(chosen, target)
             worst, at = self._judged(chosen)
-            if worst >= GOOD or self._left(chosen) < self.seconds.min():
+            if worst >= policy.next_experiment.SWEEP_DECIDES or self._left(chosen) < self.seconds.min():
                 break
-        if worst >= GOOD:
+        if worst >= policy.next_experiment.SWEEP_DECIDES:
             chosen = self._shortened(chosen)
             worst, at = self._judged(chosen)
         held = "command_voltage" if self.driver_unit == "V" else "rotation_rate"
@@ -193,7 +182,7 @@ class _Tried:
             each = self._pairwise(self.parts if total is None else self.parts + total)
             gains = np.where(self.seconds <= self._left(chosen), (_utility(each, target) - now) / self.seconds, -1.0)
             best = int(np.argmax(gains))
-            if chosen and (gains[best] <= 0 or gains[best] * self._left(chosen) < IDLE):
+            if chosen and (gains[best] <= 0 or gains[best] * self._left(chosen) < policy.next_experiment.SWEEP_GAIN):
                 break
             chosen.append(best)
             total = self.parts[best] if total is None else total + self.parts[best]
@@ -225,12 +214,12 @@ class _Tried:
         return self.bench.outlook(self.contest.fits, stretches(self._steps(chosen)))[0]
 
     def _needed(self, true: int, wrong: int, views: Sequence[PredictedResponse]) -> float:
-        """Chi-square that the sweep has to add for the wrong model to be EQUAL worse."""
+        """Chi-square that the sweep has to add for the wrong model to be RIVALS_EQUAL_BIC worse."""
         n = self.contest.fits[0].residual.size
         sizes = [int(fit.free.sum()) for fit in self.contest.fits]
         grown = np.log(n + views[0].value.size) - np.log(max(n, 2))
         known = self.contest.losses[wrong] - self.contest.losses[true] + (sizes[wrong] - sizes[true]) * grown
-        return float(EQUAL - known)
+        return float(policy.select.RIVALS_EQUAL_BIC - known)
 
     def _shortened(self, chosen: Sequence[int]) -> list[int]:
         """Without the blocks that are not needed, the longest tried first."""
@@ -238,7 +227,7 @@ class _Tried:
         for k in sorted(set(chosen), key=lambda k: -self.seconds[k])[:MOST_SHORTENED]:
             rest = list(chosen)
             rest.remove(k)
-            if rest and self._judged(rest)[0] >= GOOD:
+            if rest and self._judged(rest)[0] >= policy.next_experiment.SWEEP_DECIDES:
                 chosen = rest
         return chosen
 
@@ -259,10 +248,12 @@ class _Tried:
         apart = distances(pieces(views, np.zeros(views[0].value.size, dtype=np.intp), 1))[0]
         seconds = ending(self._steps(chosen), self.bench.slew)[-1]
         out = []
-        for a, b in sorted({(min(pair), max(pair)) for pair, p in at.items() if p < FAIR}):
+        for a, b in sorted(
+            {(min(pair), max(pair)) for pair, p in at.items() if p < policy.next_experiment.PAIR_HARDLY_TOLD}
+        ):
             one, other = self.contest.names[a], self.contest.names[b]
-            longer = seconds * PLAIN / max(min(apart[a, b], apart[b, a]), 1e-9)
-            if longer <= MOST_LONGER * self.budget:
+            longer = seconds * policy.next_experiment.PAIR_DECIDED_CHI2 / max(min(apart[a, b], apart[b, a]), 1e-9)
+            if longer <= policy.next_experiment.LONGEST_SWEEP * self.budget:
                 takes = f"about {max(longer, seconds) / 60:.0f} min of such a sweep"
             else:
                 takes = f"no sweep within these limits, but {_other_means(one, other, self.recorded)}"

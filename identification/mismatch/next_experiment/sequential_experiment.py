@@ -10,16 +10,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Literal
 
+from identification.mismatch import policy
 from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment, VerdictName
 from identification.mismatch.next_experiment.sweeps import BUDGET
-from identification.mismatch.select.rivals import EQUAL
-
-PATIENCE = 2
-"""Rounds that one doubt may survive: a third of the same kind would not settle it either."""
-HOPELESS = 0.05
-"""Expected power below which a sweep is not worth the water: the doubt needs other means."""
-LEAST = 20.0
-"""s: no sweep is shorter, so no diagnosis is asked for a shorter one."""
 
 Doubt = frozenset[frozenset[str]]
 """Sets of effects that are equally good answers; beside them the place that nothing explains."""
@@ -101,7 +94,7 @@ def belief(found: Diagnosis) -> Belief:
 
 def _equals(found: Finding) -> list[str]:
     """Rivals that do as well."""
-    return [rival.effect for rival in found.rivals if rival.bic_loss < EQUAL]
+    return [rival.effect for rival in found.rivals if rival.bic_loss < policy.select.RIVALS_EQUAL_BIC]
 
 
 def _says(found: Diagnosis) -> str:
@@ -120,9 +113,10 @@ def next_step(course: Course, needs: float) -> NextExperiment | End:
         if now.verdict == "unexplained":
             return End("unexplained", f"{now.says}; no sweep is known that would tell what it is")
         return End("settled", f"one answer stands: {now.says}")
-    if _survived(course) >= PATIENCE:
-        return End("same_doubt", f"{now.says}: the same doubt survived {PATIENCE} rounds; {now.experiment.why}")
-    if now.experiment.expected_power < HOPELESS:
+    if _survived(course) >= policy.next_experiment.SAME_DOUBT_ROUNDS:
+        survived = f"the same doubt survived {policy.next_experiment.SAME_DOUBT_ROUNDS} rounds"
+        return End("same_doubt", f"{now.says}: {survived}; {now.experiment.why}")
+    if now.experiment.expected_power < policy.next_experiment.HOPELESS_POWER:
         return End("hopeless", f"{now.says}: no sweep tells them apart; {now.experiment.why}")
     if needs > left:
         return End("budget", f"{now.says}: the next experiment takes {needs:.0f} s, but {max(left, 0):.0f} s are left")
@@ -144,7 +138,7 @@ def allowance(left: float, overhead: float) -> float:
     Half of what is left, as long as a second sweep of the usual length fits into the other half.
     """
     room = left - overhead
-    return max(room if room <= 2 * BUDGET else room / 2, LEAST)
+    return max(room if room <= 2 * BUDGET else room / 2, policy.next_experiment.SHORTEST_SWEEP)
 
 
 def opening_line(course: Course) -> str:

@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.noise.covariance import Noise, Rows, Shapes
 from identification.mismatch.noise.restricted_likelihood import Likelihood, LinAlgError, Response, likelihood
 from identification.recording import Floats
@@ -17,12 +18,13 @@ from identification.recording import Floats
 SCALE_STEP = 8.0
 """Ratio of neighbouring time scales."""
 MOST_SCALES = 4
-FEW_ROWS = 100
-"""With fewer rows the noise is taken as white."""
+"""Time scales of slow noise: each is a state of every row, and costs time in proportion."""
 LEAST_SHARE = 1e-12
 """Variances are kept above this share of the residual's."""
 MOST_STEPS = 30
+"""Steps of the search for variances, at most: it ends by ENDED."""
 MOST_TRIES = 6
+"""Dampings tried for one step of it."""
 ENDED = 1e-3
 """Fall of half the restricted deviance at which the search for variances ends."""
 NEARLY = 1e-2
@@ -30,8 +32,8 @@ NEARLY = 1e-2
 
 
 def longest_scale(runs: Sequence[Rows]) -> float:
-    """s: a quarter of the longest run. What is slower is a drift, and no noise."""
-    return 0.25 * max(float(r.time[-1] - r.time[0]) for r in runs)
+    """s: LONGEST_NOISE_SCALE of the longest run. What is slower is a drift, and no noise."""
+    return policy.noise.LONGEST_NOISE_SCALE * max(float(r.time[-1] - r.time[0]) for r in runs)
 
 
 def time_scales(runs: Sequence[Rows]) -> tuple[float, ...]:
@@ -86,7 +88,7 @@ def fit_noise(
     total = np.concatenate(residuals)
     variance = float(np.mean(total**2)) or 1.0
     weight = np.concatenate([r.count for r in runs])
-    if total.size < FEW_ROWS:
+    if total.size < policy.noise.COLOURED_NOISE_ROWS:
         X = np.concatenate(columns) * np.sqrt(weight)[:, None]
         y = total * np.sqrt(weight)
         left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0] if X.shape[1] else y

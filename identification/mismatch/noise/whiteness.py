@@ -7,12 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.estimation.tails import chi2_sf
+from identification.mismatch import policy
 from identification.recording import Floats
 
 LAGS = 20
 """Rows apart, at most, whose correlation is looked at; a fifth of a short run."""
-OUTLIER = 4.0
-"""Sigmas at which a row is clipped: one outlier is no correlation."""
 
 
 def whiteness(residual: Floats, sizes: Sequence[int]) -> float:
@@ -24,7 +23,7 @@ def whiteness(residual: Floats, sizes: Sequence[int]) -> float:
     statistic, dof = 0.0, 0
     for part in np.split(residual[: ends[-1]], ends[:-1]):
         n, lags = part.size, min(LAGS, part.size // 5)
-        e = np.clip(part - part.mean(), -OUTLIER, OUTLIER)
+        e = np.clip(part - part.mean(), -policy.locate.OUTLIER_SIGMA, policy.locate.OUTLIER_SIGMA)
         power = float(e @ e)
         for k in range(1, lags + 1):
             statistic += n * (n + 2) * (float(e[k:] @ e[:-k]) / power) ** 2 / (n - k) if power > 0 else 0.0

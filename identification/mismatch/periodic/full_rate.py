@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
@@ -20,10 +21,6 @@ from identification.run_history.history import History
 
 STEADY = 10.0
 """s of the blocks over which a measured rate is compared with the model's."""
-FEW_BLOCKS = 10
-"""Fewer tell nothing of a rate."""
-MUCH = 4.0
-"""Standard deviations of a mean over the blocks beyond which a rate wanders."""
 
 
 def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
@@ -59,7 +56,10 @@ def _rate_follows(fitted: Fit, data: Data) -> bool:
         size = np.bincount(block, turned_more**2)
         blocks.append(np.bincount(block, turned_more)[size > 0] ** 2 / size[size > 0])
     found = np.concatenate(blocks)
-    return bool(found.size >= FEW_BLOCKS and found.mean() < 1.0 + MUCH * np.sqrt(2.0 / found.size))
+    return bool(
+        found.size >= policy.periodic.RATE_BLOCKS
+        and found.mean() < 1.0 + policy.periodic.RATE_WANDERS_SIGMA * np.sqrt(2.0 / found.size)
+    )
 
 
 def _blocks(history: History) -> NDArray[np.intp]:

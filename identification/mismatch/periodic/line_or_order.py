@@ -7,13 +7,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.periodic.order_tracking import RotorOrder
 from identification.mismatch.periodic.spectrum import Series, clipped
 from identification.mismatch.periodic.steady_segments import speed_of
 from identification.recording import Floats
 
-TURNING = 0.05
-"""Share of the highest speed beyond which the rotor turns."""
 SPEEDS = 100
 """Classes of speed, of which the one with most samples is the usual one."""
 
@@ -52,7 +51,7 @@ def _while_turning(runs: Sequence[Series]) -> tuple[list[tuple[Floats, Floats]],
     """(turns, residual) of each run while it turns, and the usual speed in turns per s."""
     speeds = [speed_of(r) for r in runs]
     top = max(float(s.max()) for s in speeds)
-    masks = [s > TURNING * top for s in speeds]
+    masks = [s > policy.periodic.TURNING_SPEED * top for s in speeds]
     cut = [
         (r.turns[m], clipped(r.residual)[m])
         for r, m in zip(runs, masks, strict=True)

@@ -10,15 +10,15 @@ from __future__ import annotations
 import numpy as np
 
 from identification.estimation.tails import chi2_sf
+from identification.mismatch import policy
 from identification.recording import Floats
 
 ROUND = 32
 """Independent frequencies on either side."""
 BLOCKS = 512
 """Sums in time from which the transform near the peak is made."""
-NARROWEST = 1.0
-"""Half width of a noise peak in units of 1/T: what is narrower behaves as a line over the run."""
 WIDTHS = (1.0, 3.0, 10.0)
+"""Half widths in 1/T from which the fit of a noise peak begins."""
 
 
 def peak_p_value(time: Floats, residual: Floats, f: float) -> float:
@@ -59,7 +59,7 @@ def _best(power: Floats) -> tuple[float, float]:
     from scipy.optimize import minimize  # a quarter of a second, and few recordings come here
 
     base = float(np.log(floor))
-    low = np.array([base - 7, -6, base - 12, -6, np.log(NARROWEST)])
+    low = np.array([base - 7, -6, base - 12, -6, np.log(policy.periodic.LINE_WIDTH)])
     high = np.array([base + 7, 6, np.log(top + floor) + 3, 6, np.log(2 * ROUND)])
     bounds = list(zip(low.tolist(), high.tolist(), strict=True))
     found = []

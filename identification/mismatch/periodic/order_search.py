@@ -15,24 +15,17 @@ import numpy as np
 from scipy.fft import next_fast_len
 
 from identification.estimation.tails import chi2_sf, gamma_median, gamma_sf
+from identification.mismatch import policy
 from identification.mismatch.periodic.spectrum import CELLS, OVERSAMPLING, family_wise, transform
 from identification.mismatch.periodic.steady_segments import SteadySegment
 from identification.recording import Floats
 
-HIGHEST = 400.0
-"""Hz at the highest speed: blade pass of the fastest thrusters, with their harmonics."""
-LOWEST = 1.0
-"""Hz at the highest speed."""
 LASTING = (np.inf, 60.0)
 """s for which a phase may last."""
 SPEEDS = 12
 """Groups of speed: no single one of them may carry a line that is locked to the rotor."""
 ORDERS = 12
-"""Whole ratios that are looked at."""
-STEADY = 0.05
-"""Share of its speed by which a stretch may become faster or slower and is neither."""
-UNEVEN = 1e-3
-"""Probability below which a wave is not the same at all speeds: what a plan repeats is no wave, nor a model's error."""
+"""Whole ratios that are a family of their own: blades, bolts and bearings come in such numbers."""
 AROUND = 5
 """Ratios round the best one over which it may have its best without one group of speed."""
 
@@ -73,11 +66,11 @@ def most_significant(parts: Sequence[SteadySegment], top: float) -> OrderCandida
 
 
 def _grid(longest: float, top: float) -> _Grid:
-    highest = HIGHEST / top
+    highest = policy.periodic.HIGHEST_ORDER / top
     cell = 1.0 / (CELLS * highest)
     length = next_fast_len(OVERSAMPLING * (int(longest / cell) + 2), real=True)
     step = 1.0 / (length * cell)
-    keep = slice(int(np.ceil(LOWEST / top / step)), int(highest / step))
+    keep = slice(int(np.ceil(policy.periodic.LOWEST_ORDER / top / step)), int(highest / step))
     return _Grid(cell, length, np.arange(keep.start, keep.stop, dtype=np.float64) * step, keep, longest)
 
 
@@ -131,13 +124,13 @@ def _even(pieces: Sequence[Sequence[tuple[SteadySegment, int]]], ratio: float) -
     n = np.zeros(sums.shape)
     for i, piece in enumerate(pieces):
         for p, g in piece:
-            sums[i, 3 * g + p.trend(STEADY)] += p.wave(ratio)
-            n[i, 3 * g + p.trend(STEADY)] += p.time.size
+            sums[i, 3 * g + p.trend(policy.periodic.STEADY_SPEED)] += p.wave(ratio)
+            n[i, 3 * g + p.trend(policy.periodic.STEADY_SPEED)] += p.time.size
     used = n > 0
     each = float(np.sum(np.abs(sums[used]) ** 2 / n[used]))
     lost = each - float(np.sum(np.abs(sums.sum(axis=1)) ** 2 / n.sum(axis=1)))
     freedom = np.count_nonzero(used) - len(pieces)  # none: one speed in each piece, and nothing to compare
-    if freedom and chi2_sf(2 * lost, 2.0 * freedom) < UNEVEN:
+    if freedom and chi2_sf(2 * lost, 2.0 * freedom) < policy.periodic.UNEVEN_WAVE_P:
         return 1.0
     by_speed, size = (x.reshape(len(pieces), -1, 3).sum(axis=2) for x in (sums, n))
     there = size.any(axis=0)

@@ -13,23 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimation.tails import chi2_sf
+from identification.mismatch import policy
 from identification.mismatch.periodic.order_search import LASTING, OrderCandidate, most_significant
 from identification.mismatch.periodic.spectrum import Series
 from identification.mismatch.periodic.steady_segments import SteadySegment, speed_of, stretches
 from identification.recording import Floats
 
-ODD = 0.02
-"""Of the false-alarm rate: what is left to waves that do not come a whole number of times a turn."""
-WHOLE = 0.003
-"""Relative: how well the scale of a measured rate is known."""
-LEAST_GAIN = 25.0
-"""In chi-square."""
 TRIED = np.linspace(-1.0, 1.0, 41)
 """Ratios near a candidate, in its reach."""
 BESIDE = (-7, -6, -5, -4, 4, 5, 6, 7)
 """Independent ratios of a stretch beside a line."""
-COHERENT = 0.01
-"""Probability below which what fewer phases lose of the power is no noise."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -114,10 +107,12 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float, *, in_turns: b
     if len(parts) < 2:
         return None
     candidate = most_significant(parts, top)
-    if not candidate.p_value < (alarm if not in_turns or _is_whole(candidate) else ODD * alarm):
+    if not candidate.p_value < (
+        alarm if not in_turns or _is_whole(candidate) else policy.periodic.ODD_ORDER_SHARE * alarm
+    ):
         return None
     found = _fitted(parts, candidate)
-    if not found.gain > LEAST_GAIN:
+    if not found.gain > policy.periodic.LOCKED_LINE_GAIN:
         return None
     # a loud line was part of its own noise
     loud = [wave_of(found.parts, i, r.time, 2 * np.pi * found.ratio * r.turns) for i, r in runs if r.turns is not None]
@@ -125,7 +120,9 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float, *, in_turns: b
 
 
 def _is_whole(candidate: OrderCandidate) -> bool:
-    return abs(candidate.ratio - max(round(candidate.ratio), 1)) < max(candidate.reach, WHOLE * candidate.ratio)
+    return abs(candidate.ratio - max(round(candidate.ratio), 1)) < max(
+        candidate.reach, policy.periodic.WHOLE_ORDER_NEAR * candidate.ratio
+    )
 
 
 def _fitted(parts: Sequence[SteadySegment], candidate: OrderCandidate) -> RotorOrder:
@@ -136,7 +133,9 @@ def _fitted(parts: Sequence[SteadySegment], candidate: OrderCandidate) -> RotorO
         fewer = _joined(parts, noise, finest.ratio, candidate.reach, _pieces_of(parts, seconds))
         # an angle that slips takes amplitude from waves of one phase
         lost, phases = max(finest.gain - fewer.gain, 0.0), finest.weights.size - fewer.weights.size
-        if fewer.earned > LEAST_GAIN and (phases == 0 or chi2_sf(lost, 2 * phases) > COHERENT):
+        if fewer.earned > policy.periodic.LOCKED_LINE_GAIN and (
+            phases == 0 or chi2_sf(lost, 2 * phases) > policy.periodic.COHERENT_PHASE_P
+        ):
             waves = fewer
             break
     return _told(parts, waves, candidate.p_value)

@@ -15,6 +15,7 @@ from typing import Literal
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.periodic.line_or_order import as_turning
 from identification.mismatch.periodic.line_width import peak_p_value
 from identification.mismatch.periodic.order_tracking import Part, RotorOrder, find_locked, wave_of
@@ -32,24 +33,12 @@ from identification.mismatch.periodic.spectrum import (
 from identification.mismatch.periodic.steady_segments import speed_of
 from identification.recording import Floats
 
-ALARM = 0.005
-"""Family-wise false-alarm rate: half of what a diagnosis is allowed, the search for effects has its own."""
-LOCKED = 0.2
-"""Of that for lines locked to the rotor, whose noise differs from stretch to stretch: those that matter are far beyond
-it, and of 300 clean recordings four had one at 0.0002 to 0.003."""
-MOST_LINES = 4
-LOWEST = 1.0
-"""Hz: below this a residual is full of steps that are repeated, not of lines."""
-PERIODS = 10
-"""Least number of periods in a run."""
-LEAST_SAMPLES = 100
 TRIED = 6
 """Peaks that are looked at before a spectrum holds no line."""
 MAINS = (50.0, 60.0)
 """Hz; IEC 60038 systems."""
 HARMONICS = (1, 2, 3, 4, 5)
-EQUAL = 10.0
-"""Gain in chi-square by which fixed and rotor-locked lines are told apart."""
+"""Of the mains that are told by name: rectifiers make the lower ones."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,23 +82,16 @@ class Line:
         return wave_of(self.parts, run, time, angle)
 
 
-def find_lines(
-    runs: Sequence[Series],
-    *,
-    alarm: float = ALARM,
-    lowest: float = LOWEST,
-    turns_unit: Literal["rev", "V s"] = "rev",
-    most: int = MOST_LINES,
-) -> tuple[Line, ...]:
+def find_lines(runs: Sequence[Series], *, turns_unit: Literal["rev", "V s"] = "rev") -> tuple[Line, ...]:
     """Every line in the residuals of one thruster's runs, the most significant first.
 
     `Series.turns`: see `turned`. Rotor-locked lines are searched where all runs have them; where the rotor stands
-    still they are silent. Runs of fewer than LEAST_SAMPLES samples are left out.
+    still they are silent. Runs of fewer than LINE_SAMPLES samples are left out.
     """
     left = [finite(r) for r in runs]
     found: list[Line] = []
-    while len(found) < most:
-        best = _best(left, alarm, lowest, turns_unit)
+    while len(found) < policy.periodic.LINES:
+        best = _best(left, turns_unit)
         if best is None:
             break
         found.append(_placed(best, left))
@@ -132,33 +114,39 @@ def _placed(line: Line, runs: Sequence[Series]) -> Line:
     return replace(line, band=(max(float(low) - resolution, 0.0), float(high) + resolution), power=power)
 
 
-def _best(runs: Sequence[Series], alarm: float, lowest: float, unit: Literal["rev", "V s"]) -> Line | None:
-    long = [(i, r) for i, r in enumerate(runs) if r.time.size >= LEAST_SAMPLES]
+def _best(runs: Sequence[Series], unit: Literal["rev", "V s"]) -> Line | None:
+    alarm = policy.periodic.LINE_FALSE_ALARM
+    long = [(i, r) for i, r in enumerate(runs) if r.time.size >= policy.periodic.LINE_SAMPLES]
     if not long:
         return None
-    fixed = _fixed(long, alarm, lowest)
+    fixed = _fixed(long)
     locked = None
     if all(r.turns is not None for _, r in long):
-        found = find_locked(long, LOCKED * alarm, in_turns=unit == "rev")
+        found = find_locked(long, policy.periodic.LOCKED_LINE_SHARE * alarm, in_turns=unit == "rev")
         locked = None if found is None else _locked(found, unit)
     if fixed is not None and locked is None and all(r.turns is not None for _, r in long):
         turning = as_turning(long, fixed.frequency, fixed.amplitude_std, fixed.p_value)
-        locked = None if turning is None or fixed.gain - turning.gain > EQUAL else _locked(turning, unit)
+        locked = (
+            None
+            if turning is None or fixed.gain - turning.gain > policy.periodic.LINE_KINDS_CHI2
+            else _locked(turning, unit)
+        )
     if fixed is None or locked is None:
         return fixed or locked
     better, other = (fixed, locked) if fixed.gain >= locked.gain else (locked, fixed)
-    return replace(better, rival=other) if better.gain - other.gain < EQUAL else better
+    return replace(better, rival=other) if better.gain - other.gain < policy.periodic.LINE_KINDS_CHI2 else better
 
 
-def _fixed(runs: Sequence[tuple[int, Series]], alarm: float, lowest: float) -> Line | None:
+def _fixed(runs: Sequence[tuple[int, Series]]) -> Line | None:
     """The most significant line of one frequency."""
+    alarm = policy.periodic.LINE_FALSE_ALARM
     spacings = [spacing_of(r.time) for _, r in runs]
     spacing, even = min(s for s, _ in spacings), all(e for _, e in spacings) and len({s for s, _ in spacings}) == 1
     spans = [float(r.time[-1] - r.time[0]) for _, r in runs]
     spectra = [spectrum_of(r, max(spans), spacing, even=even) for _, r in runs]
     step = spectra[0].step
     ratio = np.mean([s.power / s.noise for s in spectra], axis=0)
-    first = int(np.ceil(max(lowest, PERIODS / max(spans)) / step))
+    first = int(np.ceil(max(policy.periodic.LOWEST_LINE, policy.periodic.LINE_PERIODS / max(spans)) / step))
     ratio[:first] = 0.0
     trials = float(np.sum([np.sqrt(4 * np.pi * np.var(r.time)) for _, r in runs])) * (0.5 / spacing)
     for _ in range(TRIED):
@@ -235,7 +223,7 @@ def alias_of_mains(f: float, spacing: float, within: float) -> float | None:
         for harmonic in HARMONICS:
             true = mains * harmonic
             seen = abs(true - rate * round(true / rate))
-            if abs(seen - f) < within + 0.002 * true:  # grid frequency is kept within 0.2 % nearly always (ENTSO-E)
+            if abs(seen - f) < within + policy.periodic.MAINS_WANDER * true:
                 return true
     return None
 
@@ -253,7 +241,11 @@ def _fixed_says(f: float, amplitude: float, spacing: float) -> str:
 def _locked(found: RotorOrder, unit: Literal["rev", "V s"]) -> Line:
     per = "turn" if unit == "rev" else "V s of the driver"
     near = round(found.ratio)
-    blades = unit == "rev" and near >= 1 and abs(found.ratio - near) < max(0.02, 4 * found.ratio_std)
+    blades = (
+        unit == "rev"
+        and near >= 1
+        and abs(found.ratio - near) < max(policy.periodic.BLADE_RATIO_NEAR, 4 * found.ratio_std)
+    )
     says = f"Periodic disturbance of {found.amplitude:.3g} N locked to the rotor, {found.ratio:.4g} periods per {per}"
     says += f" (blade pass of {near} blades, or the {near}. order of the shaft)" if blades and near > 1 else ""
     says += ": silent at rest."

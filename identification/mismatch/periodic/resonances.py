@@ -12,48 +12,36 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.fft import rfft
 
+from identification.mismatch import policy
 from identification.mismatch.periodic.spectrum import Series, averaged, clipped, finite, spacing_of
 from identification.recording import Floats
 
 MOST_BANDS = 2
-LOWEST = 0.5
-"""Hz: slower noise is what the exponential scales of the noise model are for."""
-LEAST_SAMPLES = 400
+"""Peaks of one averaged spectrum that are looked at, the clearest first."""
 AVERAGES = (12, 40, 120, 400)
 """Stretches of a run over which spectra are averaged."""
 SURROUNDINGS = 1.7
 """Factor of frequency on either side whose median is the background."""
-STANDS_OUT = 6.0
-"""Standard errors by which a peak must stand above the background."""
-LEAST_EXCESS = 0.5
-"""Of the background: smaller peaks do no harm."""
-LEAST_GAIN = 40.0
-"""In twice the log likelihood, for a peak of three parameters."""
-LEAST_WIDTH = 2.0
-"""Half width in units of 1/T: what is narrower is a line, see `lines`."""
-QUALITIES = (0.7, 200.0)
 KNOTS = 120
 """Frequencies at which the background is taken."""
 POINTS = 300
 """Averaged powers in one fit."""
 
 
-def find_bands(
-    runs: Sequence[Series], most: int = MOST_BANDS, lowest: float = LOWEST
-) -> tuple[tuple[float, float], ...]:
-    """(frequency in Hz, quality) of at most `most` broad peaks of noise, the strongest first.
+def find_bands(runs: Sequence[Series]) -> tuple[tuple[float, float], ...]:
+    """(frequency in Hz, quality) of at most NOISE_BANDS broad peaks of noise, the strongest first.
 
     Take lines out first (`lines.find_lines`), and leave out samples just after steps (NaN).
     """
-    usable = [r for r in map(finite, runs) if r.time.size >= LEAST_SAMPLES]
+    usable = [r for r in map(finite, runs) if r.time.size >= policy.periodic.BAND_SAMPLES]
     if not usable:
         return ()
     grids = [_grid(r) for r in usable]
     found: list[tuple[float, float]] = []
     for f, width in _candidates(grids):
-        if len(found) == most:
+        if len(found) == policy.periodic.NOISE_BANDS:
             break
-        if f < lowest:
+        if f < policy.periodic.LOWEST_BAND:
             continue
         fitted = _fitted(grids, f, width)
         if fitted is not None and all(abs(np.log(fitted[0] / g)) > 1.0 / q + 0.1 for g, q in found):
@@ -91,7 +79,7 @@ def _candidates(grids: Sequence[tuple[Floats, float]]) -> list[tuple[float, floa
         score = np.where(number >= 12, excess / error, 0.0)
         for _ in range(MOST_BANDS):
             i = int(np.argmax(score))
-            if score[i] < STANDS_OUT or excess[i] < LEAST_EXCESS:
+            if score[i] < policy.periodic.BAND_SIGMA or excess[i] < policy.periodic.BAND_EXCESS:
                 break
             half = density > background[i] * (1 + 0.5 * excess[i])
             left = i - int(np.argmin(half[i::-1]))
@@ -150,8 +138,9 @@ def _fitted(grids: Sequence[tuple[Floats, float]], f0: float, width: float) -> t
         best = now if best is None or now.fun < best.fun else best
     assert best is not None
     half = float(np.exp(best.x[4]))
-    if plain.fun - best.fun < LEAST_GAIN or half < LEAST_WIDTH * finest:
+    if plain.fun - best.fun < policy.periodic.BAND_GAIN or half < policy.periodic.BAND_WIDTH * finest:
         return None
     centre = float(best.x[3])
     quality = centre / (2 * half)
-    return (centre, quality) if QUALITIES[0] <= quality <= QUALITIES[1] else None
+    low, high = policy.periodic.LOWEST_BAND_QUALITY, policy.periodic.HIGHEST_BAND_QUALITY
+    return (centre, quality) if low <= quality <= high else None

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
 from identification.estimation.tails import fisher_sf
+from identification.mismatch import policy
 from identification.recording import Floats
 
 OVERSAMPLING = 2
@@ -25,8 +26,6 @@ NEAR, FAR = 24, 96
 """Independent neighbours whose median is the noise: the higher of both is taken, so that slopes and peaks count."""
 MEDIAN_WORTH = 0.48
 """Relative efficiency of the median of exponential variates: (ln 2)^2."""
-CLIP = 5.0
-"""Robust standard deviations beyond which a residual is cut: a few bad samples are no line."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,10 +60,12 @@ def finite(series: Series) -> Series:
 
 
 def clipped(residual: Floats) -> Floats:
-    """Without its median, cut at CLIP robust standard deviations."""
+    """Without its median, cut at SPECTRUM_CLIP robust standard deviations."""
     left = residual - np.median(residual)
     size = 1.4826 * float(np.median(np.abs(left)))
-    out: Floats = np.clip(left, -CLIP * size, CLIP * size) if size > 0 else left
+    out: Floats = (
+        np.clip(left, -policy.periodic.SPECTRUM_CLIP * size, policy.periodic.SPECTRUM_CLIP * size) if size > 0 else left
+    )
     return out
 
 

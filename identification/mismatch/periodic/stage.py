@@ -12,6 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.periodic.full_rate import scale_std_of, series_of, with_scale
@@ -20,13 +21,6 @@ from identification.mismatch.periodic.resonances import find_bands
 from identification.mismatch.periodic.spectrum import Series
 from identification.recording import Floats
 from identification.run_history.history import History
-
-UNSETTLED = 0.4
-"""s after a step in which a residual is no noise."""
-MOST_BANDS = 1
-"""Broad peaks that the noise may have."""
-FEW_SAMPLES = 400
-"""Of a run; fewer have no spectrum to speak of."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -49,10 +43,10 @@ class Cleaned:
 def run(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned:
     """Lines and bands of what this fit leaves; `originals`: the runs from which lines are taken."""
     series = series_of(fitted, data)
-    if all(s.time.size < FEW_SAMPLES for s in series):
+    if all(s.time.size < policy.periodic.FULL_RATE_SAMPLES for s in series):
         return Cleaned((), (), tuple(originals))
     lines = _lines(fitted, data, series)
-    bands = find_bands(_still(series, lines, data), most=MOST_BANDS)
+    bands = find_bands(_still(series, lines, data))
     histories = tuple(
         _without(h, [line.at(s.time, s.turns, i) for line in lines])
         for i, (h, s) in enumerate(zip(originals, series, strict=True))
@@ -77,7 +71,7 @@ def _still(series: Sequence[Series], lines: Sequence[Line], data: Data) -> list[
         left = s.residual.copy()
         for line in lines:
             left -= line.at(s.time, s.turns, i)
-        left[h.since_step[_interval(h, s.time)] < UNSETTLED] = np.nan
+        left[h.since_step[_interval(h, s.time)] < policy.periodic.UNSETTLED] = np.nan
         out.append(replace(s, residual=left))
     return out
 

@@ -10,21 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 
+from identification.mismatch import policy
 from identification.mismatch.periodic.spectrum import Series, averaged, clipped, smoothed, spacing_of
 from identification.recording import Floats
 
-SLOWEST = 1.0
-"""Hz: what is slower in a stretch (or its alias) is no line."""
 SMOOTH = 0.25
 """s, standard deviation of the Gauss mean that is taken off: what a model leaves is slow, and has aliases too."""
 LONGEST = 8.0
 """s of one stretch."""
-LEAST = 24
-"""Samples of a stretch."""
-TURNING = 0.1
-"""Share of the highest speed below which the rotor counts as at rest."""
-JUMP = 0.04
-"""Share of the highest speed: a change between samples that begins a new stretch."""
 QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)
 """Of the speeds of a stretch, over which the noise is averaged."""
 
@@ -41,7 +34,7 @@ class Colour:
         self._grid, noise = np.zeros((2, int(self._index[-1]) + 1))
         self._grid[self._index] = quick(series, series.residual)
         noise[self._index] = quick(series, series.residual - line)
-        segment = min(max(int(LONGEST / spacing), LEAST), noise.size)
+        segment = min(max(int(LONGEST / spacing), policy.periodic.STRETCH_SAMPLES), noise.size)
         self._rate = 1.0 / spacing
         self._f, density = averaged(noise, self._rate, segment)
         density[0] = density[min(1, density.size - 1)]
@@ -72,7 +65,7 @@ class Colour:
         for speed in speeds.tolist():
             seen = self.seen(z, speed)
             expected += np.interp(seen, self._f, self._density)
-            usual &= seen > SLOWEST
+            usual &= seen > policy.periodic.SLOWEST_STRETCH_WAVE
         ratio = power / expected
         middle = float(np.median(ratio[usual])) / np.log(2) if usual.any() else 0.0
         out: Floats = np.where(usual, ratio / middle, 1.0) if middle > 0 else np.ones_like(ratio)
@@ -137,13 +130,17 @@ def stretches(runs: Sequence[tuple[int, Series]], top: float, lines: Sequence[Fl
         value, white = quick(r, r.residual), colour.whitened()
         for low, high in pairwise(_edges(r.time, speed, top)):
             s = slice(low, high)
-            if high - low >= LEAST and speed[s].mean() > TURNING * top and np.any(value[s]):
+            if (
+                high - low >= policy.periodic.STRETCH_SAMPLES
+                and speed[s].mean() > policy.periodic.STRETCH_TURNING * top
+                and np.any(value[s])
+            ):
                 speeds = np.quantile(speed[s], QUANTILES)
                 yield SteadySegment(i, r.time[s], r.turns[s], value[s], white[s], speeds, colour)
 
 
 def _edges(time: Floats, speed: Floats, top: float) -> list[int]:
     piece = np.floor((time - time[0]) / LONGEST)
-    new: NDArray[np.bool_] = (np.abs(np.diff(speed)) > JUMP * top) | (np.diff(piece) > 0)
-    new |= np.diff(speed > TURNING * top)
+    new: NDArray[np.bool_] = (np.abs(np.diff(speed)) > policy.periodic.STRETCH_SPEED_JUMP * top) | (np.diff(piece) > 0)
+    new |= np.diff(speed > policy.periodic.STRETCH_TURNING * top)
     return [0, *(np.flatnonzero(new) + 1).tolist(), speed.size]

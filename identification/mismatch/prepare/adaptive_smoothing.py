@@ -10,29 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch import policy
 from identification.recording import Floats
 
 REACHES = (2, 4, 8, 16, 32, 64, 128, 256)
 """Samples on either side that are averaged."""
-AGREES = 2.5
-"""Standard deviations by which what longer and shorter reaches make of a sample may differ (Lepski); the last but one
-that agrees is used, for the last is as wrong as may be."""
 TWICE = 1.8
 """Variance of a straight line fitted twice, by that of one fitted once."""
-KINKED = 4.0
-"""Times the usual variance: beside a kink few samples agree, and what they make of it is as good as one."""
-KINK = 2.5
-"""Standard deviations by which the lines on both sides may miss each other."""
-BENT = 3.5
-"""Standard deviations of a second difference."""
 LATER = (1.0, 0.75, 0.5, 0.25)
 """Parts of what lies between two jumps that may stand still: a rotor takes its time."""
-FEW = 8
-"""Samples that tell that a level stands still."""
-STILL = 2.5
-"""Standard deviations: slope and correlation of neighbours of a level that stands still."""
-SPREAD = 3.0
-"""The same of its variance."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,7 +56,10 @@ def smoothed(time: Floats, value: Floats, jumps: NDArray[np.bool_], noise: float
     index = np.arange(value.size)
     begin, end = first[level], (first + size)[level]
     out, least = value.copy(), np.ones(value.size)
-    low, high = value - AGREES * noise, value + AGREES * noise
+    low, high = (
+        value - policy.prepare.SMOOTHING_AGREES_SIGMA * noise,
+        value + policy.prepare.SMOOTHING_AGREES_SIGMA * noise,
+    )
     agree = np.ones(value.size, dtype=bool)
     shorter, its_share = value, least
     for reach in REACHES:
@@ -78,13 +67,13 @@ def smoothed(time: Floats, value: Floats, jumps: NDArray[np.bool_], noise: float
         agree &= _no_kink(time, value, *window, noise)
         line, share = _line(time, value, *window)
         line, share = line + _line(time, value - line, *window)[0], np.minimum(TWICE * share, 1.0)
-        error = AGREES * noise * np.sqrt(share)
+        error = policy.prepare.SMOOTHING_AGREES_SIGMA * noise * np.sqrt(share)
         low, high = np.maximum(low, line - error), np.minimum(high, line + error)
         agree &= low <= high
         better = agree & (its_share < least)
         out[better], least[better] = shorter[better], its_share[better]
         shorter, its_share = line, share
-    least[least > KINKED * float(np.median(least))] = 1.0
+    least[least > policy.prepare.KINKED_VARIANCE * float(np.median(least))] = 1.0
     levels = [found for i, n in zip(first, size, strict=True) if (found := _still(time, value, i, i + n, noise))]
     for one in levels:
         least[first[level[one.first]] : one.first] = 1.0  # on its way there
@@ -94,7 +83,7 @@ def smoothed(time: Floats, value: Floats, jumps: NDArray[np.bool_], noise: float
 
 def _bent(value: Floats, jumps: NDArray[np.bool_], noise: float) -> NDArray[np.bool_]:
     """(n-1,) beside samples at which it bends by far more than noise: no line goes through these."""
-    bent = (np.abs(np.diff(value, 2)) > BENT * np.sqrt(6.0) * noise) & ~(jumps[1:] | jumps[:-1])
+    bent = (np.abs(np.diff(value, 2)) > policy.prepare.BENT_SIGMA * np.sqrt(6.0) * noise) & ~(jumps[1:] | jumps[:-1])
     out = np.zeros(value.size - 1, dtype=bool)
     out[:-1] |= bent
     out[1:] |= bent
@@ -128,7 +117,7 @@ def _no_kink(
     index = np.arange(value.size)
     left, its = _line(time, value, begin, index + 1)
     right, other = _line(time, value, index, end)
-    out: NDArray[np.bool_] = np.abs(left - right) <= KINK * noise * np.sqrt(its + other)
+    out: NDArray[np.bool_] = np.abs(left - right) <= policy.prepare.KINK_SIGMA * noise * np.sqrt(its + other)
     return out
 
 
@@ -146,9 +135,9 @@ def _still(time: Floats, value: Floats, first: int, last: int, noise: float) -> 
 def _stands(time: Floats, value: Floats, noise: float) -> bool:
     """Whether there is no more than white noise in these samples."""
     n = value.size
-    if n < FEW:
+    if n < policy.prepare.STILL_SAMPLES:
         return False
     off, late = value - value.mean(), time - time.mean()
     slope, along = float(off @ late) / float(np.sqrt(late @ late)), float(off[1:] @ off[:-1]) / float(np.sqrt(n))
-    narrow = float(off @ off) / (n - 1) < noise**2 * (1 + SPREAD * float(np.sqrt(2 / n)))
-    return narrow and abs(slope) < STILL * noise and along < STILL * noise**2
+    narrow = float(off @ off) / (n - 1) < noise**2 * (1 + policy.prepare.STILL_VARIANCE_SIGMA * float(np.sqrt(2 / n)))
+    return narrow and abs(slope) < policy.prepare.STILL_SIGMA * noise and along < policy.prepare.STILL_SIGMA * noise**2

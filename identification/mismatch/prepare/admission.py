@@ -6,15 +6,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from identification.mismatch.prepare.preparing import FEW_SAMPLES, Refusal
+from identification.mismatch import policy
+from identification.mismatch.prepare.preparing import Refusal
 from identification.recording import Recording
 from identification.run_history.history import CHANGED, History
 from identification.twin import Twin
-
-LEAST_SAMPLES = 50
-"""Of one recording with a course of time; a table of levels may have fewer."""
-ONE_LEVEL = 1e-6
-"""Share of the largest driver: levels nearer than this are one."""
 
 
 def unfit(
@@ -73,12 +69,12 @@ def _too_little(name: str, history: History) -> Refusal | None:
     """What a line through two points would describe without a residual is not diagnosed."""
     samples, driven = int(history.count.sum()), history.driver[history.rows]
     levels = 1 + int(np.count_nonzero(np.abs(np.diff(driven)) > CHANGED * history.size))
-    if samples < LEAST_SAMPLES and samples > FEW_SAMPLES * levels:
+    if samples < policy.prepare.COURSE_SAMPLES and samples > policy.prepare.TABLE_SAMPLES * levels:
         return Refusal(
-            f"{name} has {samples} thrust samples, at least {LEAST_SAMPLES} are needed to tell physics from noise; "
-            "record for longer"
+            f"{name} has {samples} thrust samples, at least {policy.prepare.COURSE_SAMPLES} are needed to tell "
+            "physics from noise; record for longer"
         )
-    if float(np.ptp(driven)) <= ONE_LEVEL * history.size:
+    if float(np.ptp(driven)) <= policy.prepare.ONE_LEVEL * history.size:
         return Refusal(
             f"{name} has thrust at one level of {history.driver_quantity} only ({driven[0]:.4g}); at least two levels "
             "are needed"

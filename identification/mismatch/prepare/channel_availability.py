@@ -10,6 +10,7 @@ from identification.recording import Recording
 from identification.run_history.history import History
 
 MOST_NAMED = 3
+"""Recordings that a note names one by one."""
 
 
 def held_by_all(

@@ -8,16 +8,13 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.prepare.grid import STEP, Held
+from identification.mismatch import policy
+from identification.mismatch.prepare.grid import Held
 from identification.recording import Channel, Floats, Recording
 
 CALMED = ("flow_speed", "motor_temperature", "water_temperature")
 REACHES = (4, 16, 64, 256)
 """Samples on either side that are averaged: as many as let the neighbours foretell each sample best."""
-NO_MORE = 3.0
-"""Standard errors of a narrow window's mean by which that of a wider one may differ."""
-REST_TOLD = 0.005
-"""Of the supply's variance beside its load: less foretold by the neighbours is noise."""
 LOADS = 6
 """Columns of the supply's load."""
 
@@ -38,7 +35,7 @@ def jumps(value: Floats) -> NDArray[np.bool_]:
     """(n-1,) where neighbouring samples differ by far more than their noise."""
     step = np.abs(np.diff(value))
     noise = float(np.median(step)) / 0.6745
-    return step > max(6 * noise, 1e-9 * float(np.max(np.abs(value), initial=0.0)))
+    return step > max(policy.prepare.CHANNEL_JUMP_SIGMA * noise, 1e-9 * float(np.max(np.abs(value), initial=0.0)))
 
 
 def _calmest(value: Floats, reaches: Sequence[int], apart: NDArray[np.bool_] | None = None) -> tuple[Floats, float]:
@@ -73,7 +70,7 @@ def _calm_where_it_rests(value: Floats, apart: NDArray[np.bool_]) -> Floats:
     for reach in (1, 2, *REACHES):
         low, high = np.maximum(index - reach, starts[which]), np.minimum(index + reach + 1, starts[which + 1])
         mean = value[0] + (total[high] - total[low]) / (high - low)
-        grows &= np.abs(mean - out) <= NO_MORE * std / np.sqrt(many)
+        grows &= np.abs(mean - out) <= policy.prepare.CHANNEL_WINDOW_SIGMA * std / np.sqrt(many)
         out, many = np.where(grows, mean, out), np.where(grows, high - low, many)
     return out
 
@@ -98,9 +95,9 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     theta = np.linalg.lstsq(H[:, kept], value, rcond=None)[0]
     rest = value - H[:, kept] @ theta
     by_load: Floats = columns(driven, charge)[:, kept] @ theta
-    apart = np.abs(np.diff(then)) > STEP * size
+    apart = np.abs(np.diff(then)) > policy.prepare.COMMAND_STEP * size
     smooth, missed = _calmest(rest, REACHES, apart)
-    if missed > (1 - REST_TOLD) * float(np.mean(rest**2)):
+    if missed > (1 - policy.prepare.SUPPLY_REST_TOLD) * float(np.mean(rest**2)):
         return by_load
     return by_load + np.interp(at, time, smooth)
 
@@ -120,7 +117,9 @@ def torque(channel: Channel, held: Held, edges: Floats, driven: Floats) -> Float
         return np.column_stack([np.ones(u.size), u, np.abs(u), u * np.abs(u), u**2])
 
     law = np.linalg.lstsq(columns(then), value, rcond=None)[0]
-    smooth = _calm_where_it_rests(value - columns(then) @ law, np.abs(np.diff(then)) > STEP * size)
+    smooth = _calm_where_it_rests(
+        value - columns(then) @ law, np.abs(np.diff(then)) > policy.prepare.COMMAND_STEP * size
+    )
     out: Floats = columns(driven) @ law + _means(time, smooth, edges)
     return out
 

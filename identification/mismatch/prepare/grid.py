@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.mismatch.prepare.measured_driver import NOISES, measured
+from identification.mismatch import policy
+from identification.mismatch.prepare.measured_driver import measured
 from identification.recording import Channel, Floats
 
 FINEST = 0.01
@@ -15,6 +16,7 @@ COARSEST = 0.25
 FINEST_AFTER_STEP = 0.0025
 """s: motor lags of some milliseconds are as steep as this."""
 GROWTH_AFTER_STEP = 0.12
+"""Length of an interval per time since a step: finer than GROWTH where all dynamics are."""
 WINDOW = 0.0015
 """s before and after a sample that stands for its time."""
 WINDOW_ZONE = 0.1
@@ -37,8 +39,6 @@ LARGEST_TICK = 0.08
 """...larger than this share of the largest driver."""
 REST = 3.0
 """Spacings of the samples: a command that stood for longer was held."""
-STEP = 0.02
-"""Share of the largest driver: a change of a command that is a step."""
 
 
 def distinct(time: Floats, value: Floats) -> tuple[Floats, Floats]:
@@ -131,13 +131,15 @@ class Held:
         """Times at which it begins to move, and not by a step, after it stood for more than `rest` s."""
         change = np.diff(self.value)
         moves, far = self.time[1:][change != 0], np.abs(change[change != 0])
-        begins = (np.diff(moves, prepend=-np.inf) > rest) & (far <= STEP * float(np.max(np.abs(self.value))))
+        begins = (np.diff(moves, prepend=-np.inf) > rest) & (
+            far <= policy.prepare.COMMAND_STEP * float(np.max(np.abs(self.value)))
+        )
         out: Floats = moves[begins]
         return out
 
     def changes(self) -> Floats:
         """Times at which it has moved by MOVES of its size since the last such time."""
-        step = max(MOVES * float(np.max(np.abs(self.value))), NOISES * self.noise)
+        step = max(MOVES * float(np.max(np.abs(self.value))), policy.prepare.DRIVER_NOISE_SIGMA * self.noise)
         index, last = [0], self.value[0]
         if self.value.size < 200_000:
             for i, v in enumerate(self.value.tolist()):
@@ -193,7 +195,7 @@ def _with_starts(edges: Floats, candidates: Floats, held: Held, spacing: float, 
 def _with_steps(edges: Floats, held: Held, spacing: float, most: int) -> Floats:
     """Each step of a command is an edge, followed by intervals that begin at FINEST_AFTER_STEP and grow."""
     size = float(np.max(np.abs(held.value)))
-    steps = held.time[1:][np.abs(np.diff(held.value)) > STEP * size]
+    steps = held.time[1:][np.abs(np.diff(held.value)) > policy.prepare.COMMAND_STEP * size]
     steps = steps[(steps > edges[0]) & (steps < edges[-1])]
     if steps.size > most // TICKING:  # a fast ramp, of which each tick would be a step
         steps = held.time[1:][np.abs(np.diff(held.value)) > LARGEST_TICK * size]
@@ -222,7 +224,7 @@ def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most:
     if not held.stepwise:
         return edges
     dense = spacing < LEAST_WINDOWED
-    least = STEP * float(np.max(np.abs(held.value))) if dense else 0.0
+    least = policy.prepare.COMMAND_STEP * float(np.max(np.abs(held.value))) if dense else 0.0
     changes = held.time[1:][np.abs(np.diff(held.value)) > least]
     changes = changes[(changes > edges[0]) & (changes < edges[-1])]
     if not changes.size or changes.size > most:

@@ -7,29 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch import policy
 from identification.mismatch.prepare.adaptive_smoothing import Level, smoothed
 from identification.recording import Floats
 
-JUMP = 0.02
-"""Share of the largest driver: a smaller change between two samples is no jump."""
-ALONE = 3.0
-"""Times the changes on both sides: a jump is quicker than the samples, what merely moves goes on in the next ones."""
-NOISES = 6.0
-"""Standard deviations of a sample: what changes by less may be noise."""
-LOUD = 1e-4
-"""Of the largest driver: noise that is averaged."""
-LOST = 0.5
-"""Of the noise of a thrust sample: what the driver's own noise makes of the thrust, where it is not seen."""
-STRAY = 0.2
-"""The same of what a straight line between samples is off by: after each step it is off alike."""
-SEEN = 1e-3
-"""Of the thrust at the largest driver: less than this is not seen either."""
 MOST = (1.0, 2.0, 4.0, 8.0, 16.0)
 """Times that: what is allowed where too little would be left."""
-STAMP = 1e-3
-"""Of the time between two samples: a thrust so near to one is of its instant."""
-ENOUGH = 0.5
-"""Of the samples that must be left."""
 INSTANT = 1e-6
 """Of the time between two samples: how long a jump is made to take."""
 
@@ -80,11 +63,14 @@ class Measured:
         size, noise = float(np.max(np.abs(self.value))), noise_of(force)
         stray, error = self._astray(time), np.interp(time, self.time, self.error)
         slope = 2 * C * (np.abs(n) + stray)
-        least = SEEN * C * size**2
-        much = slope * np.maximum(stray / max(STRAY * noise, least), error / max(LOST * noise, least))
+        least = policy.prepare.DRIVER_ERROR_UNSEEN * C * size**2
+        much = slope * np.maximum(
+            stray / max(policy.prepare.STRAIGHT_LINE_UNSEEN * noise, least),
+            error / max(policy.prepare.DRIVER_NOISE_UNSEEN * noise, least),
+        )
         for most in MOST:
             told: NDArray[np.bool_] = much <= most
-            if np.count_nonzero(told) > ENOUGH * time.size:
+            if np.count_nonzero(told) > policy.prepare.SAMPLES_LEFT * time.size:
                 return told
         return np.ones(time.size, dtype=bool)
 
@@ -95,7 +81,7 @@ class Measured:
         step = np.diff(self.value)
         bend = np.where(self.jumped[1:] | self.jumped[:-1], 0.0, np.abs(np.diff(step)))
         bent = np.maximum(np.append(bend, 0.0), np.append(0.0, bend))
-        across = np.where(np.minimum(share, 1 - share) > STAMP, np.abs(step[gap]), 0.0)
+        across = np.where(np.minimum(share, 1 - share) > policy.prepare.SAMPLE_INSTANT, np.abs(step[gap]), 0.0)
         out: Floats = np.where(self.jumped[gap], across, 0.5 * share * (1 - share) * bent[gap])
         return out
 
@@ -104,7 +90,7 @@ def measured(time: Floats, value: Floats) -> Measured:
     """From the samples as they were read, at distinct times."""
     noise, size = noise_of(value), float(np.max(np.abs(value), initial=0.0))
     jumped = _jumped(value, noise, size)
-    if noise <= LOUD * size:
+    if noise <= policy.prepare.LOUD_DRIVER * size:
         return Measured(time, value, jumped, noise, np.zeros(value.size), (), loud=False)
     smooth = smoothed(time, value, jumped, noise)
     return Measured(time, smooth.value, jumped, noise, smooth.error, smooth.levels, loud=True)
@@ -126,5 +112,9 @@ def _jumped(value: Floats, noise: float, size: float) -> NDArray[np.bool_]:
     if step.size == 0:
         return np.zeros(0, dtype=bool)
     beside = np.maximum(np.append(step[1:], 0.0), np.append(0.0, step[:-1]))
-    out: NDArray[np.bool_] = step > max(JUMP * size, NOISES * noise) + ALONE * beside
+    out: NDArray[np.bool_] = (
+        step
+        > max(policy.prepare.DRIVER_JUMP * size, policy.prepare.DRIVER_NOISE_SIGMA * noise)
+        + policy.prepare.DRIVER_JUMP_ALONE * beside
+    )
     return out

@@ -7,35 +7,23 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch import policy
 from identification.mismatch.prepare.channels import followed, jumps, neighbour_at, supply, torque
-from identification.mismatch.prepare.grid import STEP, Held, distinct, edges_of
+from identification.mismatch.prepare.grid import Held, distinct, edges_of
 from identification.recording import Channel, Floats, Recording
 from identification.run_history.history import CHANGED, History
 from identification.run_history.sub_interval_leads import with_leads
 
 DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
 """What may explain the thrust, best first."""
-JITTER_BEFORE, JITTER_AFTER = 0.002, 0.003
-"""s round a step within which a sample may belong to either level: time stamps are not better."""
-JITTER_SHARE = 0.1
-"""Of the time between samples: where they are dense and even, so good are their stamps."""
-JITTERS = 3.0
-"""Standard deviations of the time between samples that a stamp may be off."""
 MOST_INTERVALS = 6000
+"""Intervals of one run: predictions cost time in proportion, and after steps they are still 2.5 ms."""
 MOST_MOVING = 10000
 """The same where the driver hardly ever stands still: within an interval a kink of the curve is not seen."""
 MANY_CHANGES = 1500
+"""Changes of the driver, above which it hardly ever stands still."""
 MOST_LEVELS = 300
 """Of a measured driver, whose errors are told from noise."""
-AFTER_UNKNOWN = 1.0
-"""s after a stretch of unknown command before thrust counts again."""
-LEAST_DWELL = 0.5
-"""s of a level in a static table."""
-FEW_SAMPLES = 3
-"""Samples of a level, at most, that make a static table."""
-LEAST_HELD = 0.5
-"""s of a level of which the second half counts as steady."""
-LEAST_SAMPLES = 5
 FOLLOWED = ("bus_voltage", "flow_speed", "current", "torque", "motor_temperature", "water_temperature", "rotation_rate")
 """Quantities that terms and tests may look at."""
 
@@ -56,17 +44,19 @@ def history_of(recording: Recording, most_intervals: int = MOST_INTERVALS) -> Hi
         return Refusal(f"{name} has no thrust channel (quantity thrust): there is no response to explain")
     good = np.isfinite(thrust.value) & np.isfinite(thrust.time)
     time, force = distinct(thrust.time[good], thrust.value[good])
-    if time.size < LEAST_SAMPLES:
-        return Refusal(f"{name} has {time.size} finite thrust samples; at least {LEAST_SAMPLES} are needed")
+    if time.size < policy.prepare.THRUST_SAMPLES:
+        return Refusal(
+            f"{name} has {time.size} finite thrust samples; at least {policy.prepare.THRUST_SAMPLES} are needed"
+        )
     driver = _driver(recording)
     if isinstance(driver, str):
         return Refusal(f"{name} {driver}")
     held = Held(driver, float(time[-1]))
     time, force = _driven(time, force, held)
-    if time.size < LEAST_SAMPLES:
+    if time.size < policy.prepare.THRUST_SAMPLES:
         return Refusal(f"{name}: thrust and {driver.quantity} share no stretch of time; are both on one clock?")
     time, force = _clear_of_steps(time, force, held)
-    if time.size < LEAST_SAMPLES:
+    if time.size < policy.prepare.THRUST_SAMPLES:
         return Refusal(f"{name}: almost every thrust sample coincides with a change of the driver")
     edges = edges_of(time, held, MOST_MOVING if held.changes().size > MANY_CHANGES else most_intervals)
     return _filled(recording, driver, held, edges, time, force)
@@ -101,7 +91,7 @@ def _driven(time: Floats, force: Floats, held: Held) -> tuple[Floats, Floats]:
     end = np.inf if held.stepwise else held.time[-1] + slack
     inside = (time >= held.time[0] - slack) & (time <= end)
     for begun, ended in held.unknown:
-        inside &= (time < begun) | (time > ended + AFTER_UNKNOWN)
+        inside &= (time < begun) | (time > ended + policy.prepare.AFTER_UNKNOWN_COMMAND)
     return time[inside], force[inside]
 
 
@@ -112,14 +102,16 @@ def _clear_of_steps(time: Floats, force: Floats, held: Held) -> tuple[Floats, Fl
         known = held.measured.known(time, force)
         return time[known], force[known]
     size = float(np.max(np.abs(held.value)))
-    big = np.abs(np.diff(held.value, prepend=0.0)) > STEP * size  # the first row is a step from nothing
+    big = (
+        np.abs(np.diff(held.value, prepend=0.0)) > policy.prepare.COMMAND_STEP * size
+    )  # the first row is a step from nothing
     steps = held.time[big]
     if not steps.size or time.size < 4 * steps.size:
         return time, force
     least = jitter_of(time)
-    after = np.searchsorted(steps, time + min(JITTER_BEFORE, least), side="right") - 1
+    after = np.searchsorted(steps, time + min(policy.prepare.JITTER_BEFORE, least), side="right") - 1
     late = time - steps[np.maximum(after, 0)]
-    clear = (after < 0) | (late > min(JITTER_AFTER, least))
+    clear = (after < 0) | (late > min(policy.prepare.JITTER_AFTER, least))
     return time[clear], force[clear]
 
 
@@ -127,7 +119,10 @@ def jitter_of(time: Floats) -> float:
     """Time in s by which stamps may be off, as their own spacing tells: a share of it, or its scatter."""
     step = np.diff(time)
     spacing = float(np.median(step))
-    return max(JITTER_SHARE * spacing, JITTERS * float(np.median(np.abs(step - spacing))) / 0.6745)
+    return max(
+        policy.prepare.JITTER_SHARE * spacing,
+        policy.prepare.JITTER_SIGMA * float(np.median(np.abs(step - spacing))) / 0.6745,
+    )
 
 
 def _clear_of_jumps(recording: Recording, time: Floats, force: Floats) -> tuple[Floats, Floats]:
@@ -137,10 +132,14 @@ def _clear_of_jumps(recording: Recording, time: Floats, force: Floats) -> tuple[
         return time, force
     good = np.isfinite(flow.value)
     at, value = flow.time[good], flow.value[good]
-    found = np.flatnonzero(jumps(value) & (np.abs(np.diff(value)) > 0.03 * np.ptp(value)))
+    found = np.flatnonzero(jumps(value) & (np.abs(np.diff(value)) > policy.prepare.FLOW_JUMP * np.ptp(value)))
     gap = np.searchsorted(at, time, side="right") - 1
     clear = ~np.isin(gap, found)
-    return (time[clear], force[clear]) if np.count_nonzero(clear) > 0.7 * time.size else (time, force)
+    return (
+        (time[clear], force[clear])
+        if np.count_nonzero(clear) > policy.prepare.SAMPLES_CLEAR_OF_FLOW_JUMPS * time.size
+        else (time, force)
+    )
 
 
 def _binned(time: Floats, value: Floats, edges: Floats) -> tuple[Floats, NDArray[np.int64], Floats]:
@@ -234,7 +233,7 @@ def _rate_per_driver(driven: Floats, rate: Floats, edges: Floats) -> float:
     starts = np.flatnonzero(new)
     which = np.searchsorted(starts, np.arange(dt.size), side="right") - 1
     begun, ended = edges[starts][which], np.append(edges[starts[1:]], edges[-1])[which]
-    held = (edges[:-1] > 0.5 * (begun + ended)) & (ended - begun > LEAST_HELD)
+    held = (edges[:-1] > 0.5 * (begun + ended)) & (ended - begun > policy.prepare.STEADY_LEVEL)
     weight = driven**2 * dt * held
     if not weight.any():
         weight = driven**2 * dt
@@ -272,6 +271,6 @@ def _explaining(recording: Recording, driver: Channel, held: Held, edges: Floats
 def _is_table(held: Held, samples: int) -> bool:
     """Levels held for long with hardly a sample each: a table of levels, not a course of time."""
     changes = held.time[np.concatenate([[True], np.diff(held.value) != 0])]
-    if not held.stepwise or changes.size < 2 or samples > FEW_SAMPLES * changes.size:
+    if not held.stepwise or changes.size < 2 or samples > policy.prepare.TABLE_SAMPLES * changes.size:
         return False
-    return float(np.median(np.diff(changes))) >= LEAST_DWELL
+    return float(np.median(np.diff(changes))) >= policy.prepare.TABLE_DWELL

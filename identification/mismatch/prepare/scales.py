@@ -11,6 +11,7 @@ from identification.run_history.history import History
 from identification.run_history.remembered import RememberedRun
 
 MANY_SAMPLES = 100
+"""Samples, above which scatter is told by second differences: fewer are compared level by level."""
 
 
 def scale_of(runs: Sequence[RememberedRun], C: float) -> Scale:

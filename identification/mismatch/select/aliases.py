@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, refresh
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import with_values
-
-ALIKE = 4.0
-"""Of chi-square: a model that loses less by ringing that the samples can show is as good."""
 
 
 def within_samples(estimate: Estimate, data: Data) -> Estimate:
@@ -19,6 +17,6 @@ def within_samples(estimate: Estimate, data: Data) -> Estimate:
         if term.id == "stand_resonance" and limit < values[1] < 2 * limit:
             slower = with_values(now.model, now.theta, term, (values[0], 2 * limit - values[1], values[2]))
             found = fit(now.model, slower, data, estimate.weights)
-            if found.values[term][1] < limit and found.chi2 < now.chi2 + ALIKE:
+            if found.values[term][1] < limit and found.chi2 < now.chi2 + policy.select.ALIAS_LOSS:
                 return refresh(found.model, found.theta, data, None, estimate)
     return estimate

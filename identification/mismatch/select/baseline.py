@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, by_run, refresh, unweighted
 from identification.mismatch.estimate.fitting import Fit, fit, raw
 from identification.mismatch.model.data import Data, PriorPredictionFactor
@@ -17,22 +18,13 @@ from identification.mismatch.model.whitening import Weights
 from identification.mismatch.prepare.scales import scale_of
 from identification.mismatch.select.covariates import covariates
 from identification.mismatch.select.jumps import jumps
-from identification.mismatch.select.screening import (
-    MOST_PLAIN,
-    PLAIN,
-    lengths,
-    matching_pursuit,
-    orthogonal_basis,
-)
+from identification.mismatch.select.screening import MOST_PLAIN, lengths, matching_pursuit, orthogonal_basis
 from identification.physics.term import Term
 from identification.recording import Floats
 from identification.run_history.history import History
 
-CLOCKS = 0.001
-"""s: clocks of two devices are not trusted to agree better, unless stamps are dense and even."""
 NOISE_ROUNDS = 5
-PLAIN_JUMP = 5.0
-"""Sigmas of a jump that is plainly no noise: hundreds of instants were looked at."""
+"""Rounds of taking out what is plainly no noise and estimating the noise of the rest, at most."""
 
 
 def start(histories: Sequence[History]) -> tuple[Data, Theta]:
@@ -48,9 +40,9 @@ def start(histories: Sequence[History]) -> tuple[Data, Theta]:
         right += float(np.sum((f - fm) * (y - ym)))
         means.append((fm, ym))
     C = right / gram if gram > 0 else 0.0
-    with_rate = all(h.rate is not None and h.rate_rows.size > 20 for h in histories)
+    with_rate = all(h.rate is not None and h.rate_rows.size > policy.select.RATE_ROWS for h in histories)
     moving = histories[0].driver_quantity == "command_voltage" and not any(h.static for h in histories)
-    most = min(CLOCKS, max(h.jitter for h in histories)) if moving else 0.0
+    most = min(policy.select.CLOCK_DIFFERENCE, max(h.jitter for h in histories)) if moving else 0.0
     predictor = Predictor()
     scale = scale_of([predictor.run(h) for h in histories], C or 1e-12)
     data = Data(tuple(histories), scale, with_rate=with_rate, most_shift=most, predictor=predictor)
@@ -97,7 +89,7 @@ def plain_shapes(fit_now: Fit, data: Data, judged: Weights, raw_columns: Floats)
     columns -= basis @ (basis.T @ columns)
     first = lengths(columns)
     columns *= np.where(first > 1e-6 * np.median(first), 1 / np.maximum(first, 1e-300), 0.0)
-    chosen, _ = matching_pursuit(columns, fit_now.residual[:n], PLAIN, MOST_PLAIN)
+    chosen, _ = matching_pursuit(columns, fit_now.residual[:n], policy.select.PLAIN_DIRECTION_SIGMA, MOST_PLAIN)
     out: Floats = raw_columns[:, chosen]
     return out
 
@@ -122,7 +114,7 @@ def plain_jumps(estimate: Estimate, data: Data) -> list[Floats]:
     at, score = jumps(
         estimate.fit.residual, data, estimate.weights, orthogonal_basis(estimate.fit.jacobian[: data.size])
     )
-    return [(when[:, None] >= t).astype(np.float64) for t in at[score > PLAIN_JUMP][:1]]
+    return [(when[:, None] >= t).astype(np.float64) for t in at[score > policy.select.PLAIN_JUMP_SIGMA][:1]]
 
 
 def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> Estimate:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.flexible_terms.flexible import turned
+from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
@@ -20,10 +21,9 @@ from identification.recording import Floats
 from identification.run_history.filters import delayed, lowpass
 
 MOST_HATS = 17
+"""Hats over one covariate, at most: a shape with more would be noise."""
 FEW_ROWS = 60
 """Static tables with fewer rows have fewer hats."""
-TURNING = 0.02
-"""Share of the largest driver beyond which it has a direction."""
 LOADS = (5.0, 20.0, 60.0, 200.0)
 """s, memories of long loads."""
 FOLLOWED = (
@@ -143,7 +143,7 @@ def _levels(view: _View) -> Iterator[Covariate]:
     most = MOST_HATS if data.size >= FEW_ROWS else max(3, data.size // 4)
     quantity = data.histories[0].driver_quantity
     yield _splines(quantity, data.scale.driver_unit, V, _knots(V, most), (), "the static curve has another shape")
-    least = TURNING * data.scale.driver
+    least = policy.select.DIRECTION_DRIVER * data.scale.driver
     sides = [np.column_stack([v > least, v < -least]).astype(np.float64) for v in V]
     columns = tuple(np.column_stack([s, s * f[:, None]]) for s, f in zip(sides, view.force, strict=True))
     yield Covariate("direction", tuple(np.sign(v) for v in V), "1", columns, "the two directions differ")

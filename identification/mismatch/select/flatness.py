@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
@@ -11,17 +12,6 @@ from identification.mismatch.noise.covariance import Noise
 from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.term import Term
 from identification.recording import Floats
-
-DEEP = 1.0
-"""Standard deviations of the noise beyond the limit: what clips leaves 8 % of the variance there, or less."""
-BENT = 0.8
-"""Slope of a knee below which readings are looked at."""
-ROUGH = 0.5
-"""Share of the variance that is said to be missing above which the readings there are not flat."""
-CERTAIN = 3.0
-"""Standard errors of what variance is left, which the difference must be."""
-LEAST = 10
-"""Samples there, below which nothing is said."""
 
 
 def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
@@ -39,17 +29,21 @@ def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
         for side in (1.0, -1.0):
             reached = np.minimum(side * first, side * last) + side * fitted.theta.tares[i]  # not on the way there
             slope = term.slope(reached, values)
-            deep = (reached > term.start(values)) & (slope < BENT)
+            deep = (reached > term.start(values)) & (slope < policy.select.KNEE_SLOPE)
             if term.form == "hard":
-                deep &= reached > values[0] + DEEP * np.sqrt(variance)
+                deep &= reached > values[0] + policy.select.CLIPPED_DEPTH * np.sqrt(variance)
             count, beside = h.count[rows][deep].astype(np.float64), h.thrust[rows][deep] - shown[deep]
             if count.sum() > 1:
                 left += float(count @ (beside - np.average(beside, weights=count)) ** 2 + h.within[rows][deep].sum())
                 scatter += float(count @ variance[deep])
                 told += float(count @ (slope[deep] ** 2 * variance[deep]))
                 samples += float(count.sum())
-    missing = ROUGH * (scatter - told)
-    return samples >= LEAST and missing > CERTAIN * told * np.sqrt(2 / samples) and left > told + missing
+    missing = policy.select.CLIPPED_VARIANCE_MISSING * (scatter - told)
+    return (
+        samples >= policy.select.CLIPPED_SAMPLES
+        and missing > policy.select.CLIPPED_VARIANCE_SIGMA * told * np.sqrt(2 / samples)
+        and left > told + missing
+    )
 
 
 def _force(fitted: Fit, term: Term, data: Data, run: int) -> Floats:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.tails import chi2_isf
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
 from identification.mismatch.estimate.fitting import DELAYING, Fit, at_bound, fit
 from identification.mismatch.model.data import Data, price
@@ -26,28 +27,18 @@ from identification.physics.catalogue import CATALOGUE
 from identification.physics.term import Term
 from identification.run_history.history import History
 
-ALARM = 0.01
-"""Family-wise false-alarm rate of the search."""
 CANDIDATES = 5
+"""Terms of a round that are fitted: a fit costs as much as the screening of all."""
 MOST_MORE = 3
-"""Candidates beside these whose trials say little."""
-NEARLY = 0.93
-"""Of the best gain: a candidate with fewer parameters that reaches it goes first; swaps come later (rivals.py)."""
-MOST_TERMS = 6
-HIDDEN = 2.0
-"""Sigmas from which a candidate is tried with noise of its own, where none passes."""
-CLEARER = 3.0
-"""The same of a first term that takes its time only where the plan does: a staircase of minutes."""
+"""Terms of a round that are fitted beside CANDIDATES: those whose trials say little of what a fit would find."""
 SLOW_COVARIATES = frozenset({"time", "flow_speed"})
 """Coordinates along which nothing changes quickly: slow noise takes for its own what an effect does over them."""
 MOST_HIDDEN = 3
+"""Terms of a round that are estimated together with the noise: each costs a search for variances."""
 MOST_INSTANTS = 5
+"""Trials of a jump that is hidden: which is the best depends on the noise, and each costs a search for variances."""
 INSTANTS_APART = 0.05
 """Of the run: trials of a jump that is hidden."""
-HIDDEN_PRICE = 0.5
-"""Of the price of a term's parameters asked for what is hidden, beside the family-wise threshold."""
-OFFSET_PRICE = 0.35
-"""The same of a jump of the zero: of 336 clean recordings one gained more and was named."""
 STEADY = frozenset({"zero_drift"})
 """Terms of one shape, that no instant or place is looked for: they pay for themselves alone. On 336 clean recordings of
 six kinds of noise their largest gain was 11.3; of a drift that an oracle sees at 8 sigma half gain more than 15."""
@@ -55,8 +46,6 @@ SOUGHT = frozenset({"stand_resonance"})
 """Terms whose trials the data point to: they pay in full."""
 STATIC = ("command_voltage", "thrust")
 """Coordinates of the static curve."""
-MOST_STATIC = 2
-"""Shapes on one static curve: any curve can be made of more."""
 TWINS = {"asymmetry", "torque_crosstalk"}
 """The same curve in other words: never both, unless a torque was recorded."""
 MOVING = {
@@ -143,7 +132,7 @@ def static_curve(term: Term, *, measured: bool) -> str:
 
 
 def accept_threshold(extra: int) -> float:
-    return chi2_isf(ALARM / 50, extra)
+    return chi2_isf(policy.select.KEPT_TERM_FALSE_ALARM, extra)
 
 
 def search(
@@ -192,7 +181,7 @@ def _forward(
                 f"{[t.id for t in estimate.fit.model.terms]} largest {judged.largest:.1f} of {judged.threshold:.2f} "
                 + str([(t.id, t.form, round(z, 1)) for t, _, z in judged.best(6)])
             )
-        if len(ids) >= MOST_TERMS:
+        if len(ids) >= policy.select.MODEL_TERMS:
             break
         larger = _lasting(estimate, judged, data, terms, seen)
         if larger is None:
@@ -208,12 +197,17 @@ def _screened(estimate: Estimate, data: Data, terms: Sequence[Term], rng: np.ran
     ids = {t.id for t in inside}
     shapes = Counter(static_curve(t, measured=data.with_rate) for t in inside)
     left = [t for t in terms if t.id not in ids]
-    left = [t for t in left if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < MOST_STATIC]
+    left = [
+        t
+        for t in left
+        if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < policy.select.STATIC_CURVE_TERMS
+    ]
     if ids & TWINS and data.scale.torque <= 0:
         left = [t for t in left if t.id not in TWINS]
     found = directions(estimate.fit, data, estimate.weights, left)
-    spared = allowed(corrections(estimate.fit, data, estimate.weights), found.columns)
-    return screen(estimate.fit, found, rng, ALARM, spared)
+    changes = corrections(estimate.fit, data, estimate.weights)
+    spared = allowed(changes, found.columns, policy.select.NEXT_TERM_SHAPE_ERROR)
+    return screen(estimate.fit, found, rng, spared)
 
 
 def _lasting(
@@ -248,11 +242,14 @@ def _larger(
 
 def _hidden(estimate: Estimate, judged: Screening, data: Data) -> Estimate | None:
     """The model with a term that the noise had taken for its own: they are told apart when estimated together."""
-    least = CLEARER if not estimate.fit.model.terms else np.inf  # shape error would be taken for what is hidden
+    least = (
+        policy.select.HIDDEN_FIRST_TERM_SIGMA if not estimate.fit.model.terms else np.inf
+    )  # shape error would be taken for what is hidden
     likely = [
         (t, v)
         for rank, (t, v, z) in enumerate(judged.best(2 * MOST_HIDDEN))
-        if (rank < MOST_HIDDEN or t.id in STEADY) and z > (HIDDEN if SLOW_COVARIATES & set(t.covariates) else least)
+        if (rank < MOST_HIDDEN or t.id in STEADY)
+        and z > (policy.select.HIDDEN_SIGMA if SLOW_COVARIATES & set(t.covariates) else least)
     ]
     likely = [each for t, v in likely for each in ((t, at) for at in _instants(judged, t, data) or (v,))]
     if not likely:
@@ -292,8 +289,14 @@ def _instants(judged: Screening, term: Term, data: Data) -> list[tuple[float, ..
 def _asked_of_hidden(term: Term, judged: Screening, data: Data) -> float:
     """Gain in deviance from which a term that is told from noise by estimating both is believed."""
     if term.id in STEADY:
-        return chi2_isf(ALARM / 20, price(term, data))
-    share = 1.0 if term.id in SOUGHT else OFFSET_PRICE if term.id == "zero_offset" else HIDDEN_PRICE
+        return chi2_isf(policy.select.STEADY_TERM_FALSE_ALARM, price(term, data))
+    share = (
+        1.0
+        if term.id in SOUGHT
+        else policy.select.HIDDEN_OFFSET_PRICE
+        if term.id == "zero_offset"
+        else policy.select.HIDDEN_TERM_PRICE
+    )
     return float(judged.threshold**2 + share * price(term, data) * np.log(data.size))
 
 
@@ -326,7 +329,7 @@ def _best_addition(estimate: Estimate, judged: Screening, data: Data, refused: C
         return None
     possible = [each for each in fits if not each[0]] or fits
     most = max(each[1] for each in possible)
-    near = [each for each in possible if each[1] >= NEARLY * most]
+    near = [each for each in possible if each[1] >= policy.select.SIMPLER_TERM_GAIN * most]
     return min(near, key=lambda each: (each[2], -each[1]))[3]
 
 

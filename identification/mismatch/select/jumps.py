@@ -9,17 +9,16 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.recording import Floats
 
 TRIED = 600
-"""Instants, evenly over the rows."""
+"""Instants, evenly over the rows: the p-value of the likeliest is multiplied by it."""
 SIZED = 60
 """Of these the sigmas are worked out, and of as many that look likeliest; between them the size is interpolated."""
-APART = 0.02
-"""Share of the longest run between two that are told."""
 
 
 def likeliest_jumps(
@@ -32,7 +31,7 @@ def likeliest_jumps(
     when, _ = jumps(fitted.residual, data, weights, basis, of)
     found: list[float] = []
     for at in when:
-        if all(abs(at - other) > APART * data.scale.duration for other in found):
+        if all(abs(at - other) > policy.select.JUMPS_APART * data.scale.duration for other in found):
             found.append(float(at))
         if len(found) == most:
             break

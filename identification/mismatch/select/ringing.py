@@ -16,7 +16,7 @@ APART = 4.0
 SHARP, DULL = 0.05, 0.3
 """Damping."""
 LOWEST = 5.0
-"""Hz."""
+"""Hz: what rings more slowly is among the term's own trials."""
 
 
 def likeliest_rings(fitted: Fit, data: Data, term: Term, most: int) -> tuple[tuple[float, ...], ...]:

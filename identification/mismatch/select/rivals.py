@@ -8,6 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
 from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, fit
 from identification.mismatch.model.data import Data, price
@@ -17,23 +18,14 @@ from identification.mismatch.select.screening import directions, orthogonal_basi
 from identification.physics.term import Term
 from identification.recording import Floats
 
-NEAR = 9.0
-"""BIC units: a rival this near is stated."""
-EQUAL = 4.0
-"""BIC units: nearer than this two answers are equally good."""
-LIKELY = 40.0
-"""Chi-square that a rival may lose by the tangent alone and is still refitted: its inner parameters may move."""
-PRESSED_SHARE = 0.3
-"""Of its gain: a rival may be worse by this than a term whose parameters end at what is possible."""
 MOST_MERGERS = 3
 """Terms tried in the place of each pair."""
-MERGING = 0.5
-"""Of what a term must gain in their place: one that promises less by its tangent is not refitted."""
 RIVAL_STEPS = 15
+"""Steps of the fit of a rival: what is not near by then is no rival."""
 MOST_REFITS = 7
-BETTER = 0.5
-"""BIC units by which a rival must be better to take the place."""
+"""Rivals of one term that are refitted, the most alike first: each costs a fit."""
 ROUNDS = 3
+"""Exchanges of a term for a rival, at most: more would go in circles."""
 
 
 def swap_tests(estimate: Estimate, data: Data, terms: Sequence[Term]) -> tuple[Estimate, dict[Term, SwapTest] | None]:
@@ -49,11 +41,11 @@ def swap_tests(estimate: Estimate, data: Data, terms: Sequence[Term]) -> tuple[E
             if at_bound(term, estimate.fit, data, estimate.weights) or noise_goes_on(
                 estimate.fit, term, estimate.noise, data
             ):
-                price = PRESSED_SHARE * (less.chi2 - estimate.fit.chi2)
+                price = policy.select.PRESSED_TERM_HANDICAP * (less.chi2 - estimate.fit.chi2)
             for rival in standing[term][1]:
                 loss = rival.bic_loss - price
                 lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.term.parameters(data.scale)))
-                if lasts and loss < -BETTER and (best is None or loss < best[0]):
+                if lasts and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):
                     best = (loss, rival.fit)
         best = _one_for_two(estimate, data, terms, best)
         if best is None:
@@ -79,8 +71,12 @@ def _one_for_two(
             if other in tried:
                 continue
             more = (price(other, data) - sum(price(t, data) for t in pair)) * logn
-            wanted = now.chi2 - more + (-BETTER if best is None else min(best[0], -BETTER))
-            if len(tried) == MOST_MERGERS or score[j] ** 2 < MERGING * (less.chi2 - wanted):
+            wanted = (
+                now.chi2
+                - more
+                + (-policy.select.RIVAL_BETTER_BIC if best is None else min(best[0], -policy.select.RIVAL_BETTER_BIC))
+            )
+            if len(tried) == MOST_MERGERS or score[j] ** 2 < policy.select.MERGER_PROMISE * (less.chi2 - wanted):
                 break
             tried.add(other)
             values = mirrored(other, found.values[j], data) if score[j] < 0 else found.values[j]
@@ -88,7 +84,11 @@ def _one_for_two(
             bigger, theta = less.more(other, begin)
             new = fit(bigger, theta, data, estimate.weights, RIVAL_STEPS, wanted)
             loss = new.chi2 - now.chi2 + more
-            if loss < -BETTER and (best is None or loss < best[0]) and not at_bound(other, new, data, estimate.weights):
+            if (
+                loss < -policy.select.RIVAL_BETTER_BIC
+                and (best is None or loss < best[0])
+                and not at_bound(other, new, data, estimate.weights)
+            ):
                 best = (float(loss), new)
     return best
 
@@ -120,7 +120,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
     extra_now = price(term, data)
     logn = float(np.log(max(now.residual.size, 2)))
     for other, (r, values) in ranked[:MOST_REFITS]:
-        if (1 - r**2) * gain > LIKELY and r < 0.9:
+        if (1 - r**2) * gain > policy.select.RIVAL_REFIT_CHI2 and r < policy.select.RIVAL_REFIT_LIKENESS:
             break
         begin = refined(less, data, estimate.weights, other, values)
         more = price(other, data) - extra_now
@@ -129,7 +129,14 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
         if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
             new = fit(bigger, begun, data, estimate.weights)
         else:
-            new = fit(bigger, begun, data, estimate.weights, RIVAL_STEPS, now.chi2 + NEAR - min(extra, 2.0 * more))
+            new = fit(
+                bigger,
+                begun,
+                data,
+                estimate.weights,
+                RIVAL_STEPS,
+                now.chi2 + policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more),
+            )
         if at_bound(other, new, data, estimate.weights) or noise_goes_on(new, other, estimate.noise, data):
             continue
         loss = new.chi2 - now.chi2 + extra

@@ -15,6 +15,7 @@ import numpy as np
 
 from identification.estimation.singular_values import thin_svd
 from identification.estimation.tails import normal_sf
+from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, raw, residual_of, ticks_told
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
@@ -24,19 +25,21 @@ from identification.physics.term import Term
 from identification.recording import Floats
 
 VALLEYS = 3
-"""Delays round which the likeliest is sought."""
+"""Delays round which the likeliest is sought: ticks make a valley at each of a few."""
 CLOSELY = np.linspace(0.85, 1.15, 21)
-"""Of such a delay."""
+"""Of such a delay: factors that are tried, fine enough for the fit to find the bottom."""
 SURROGATES = 1000
+"""Draws of the null distribution: 1 % of them are ten, and beyond them its tail is fitted."""
 BLOCKS = 120
-"""Blocks whose signs are drawn, at most."""
-PLAIN = 4.0
-"""Sigmas at which a direction is taken out before surrogates are made, and before noise is estimated."""
+"""Blocks whose signs are drawn, at most: more would be shorter, and noise is correlated within them."""
 MOST_PLAIN = 10
+"""Directions taken out, at most: more would take noise with them."""
 MOST_JUMPS = 4
+"""Instants of a jump of the zero that are tried beside the term's own, the likeliest first."""
 MOST_RINGS = 4
+"""Frequencies of a ringing stand that are tried beside the term's own, the likeliest first."""
 TICKS = (-1, 1, 2, 3)
-"""Delays that are tried."""
+"""Delays that are tried, in ticks of the command: whole ones look alike."""
 SLOW_TICK = 0.5
 """s: a command that changes no faster does not tick on."""
 LEAST_DIRECTION = 1e-6
@@ -66,14 +69,18 @@ class Screening:
     p_value: float
     """Family-wise, of the largest."""
     threshold: float
-    """z that the largest exceeds with the false-alarm rate asked for."""
+    """z that the largest exceeds with SCREENING_FALSE_ALARM."""
 
     @property
     def largest(self) -> float:
         return float(self.z.max(initial=0.0))
 
-    def best(self, most: int, share: float = 0.5) -> list[tuple[Term, tuple[float, ...], float]]:
-        """Terms in descending order of z, each form once with its best trial, those within `share` of the best."""
+    def best(self, most: int, share: float | None = None) -> list[tuple[Term, tuple[float, ...], float]]:
+        """Terms in descending order of z, each form once with its best trial, those within `share` of the best.
+
+        `share`: CANDIDATE_SIGMA_SHARE where nothing is given.
+        """
+        share = policy.select.CANDIDATE_SIGMA_SHARE if share is None else share
         out: list[tuple[Term, tuple[float, ...], float]] = []
         seen: set[Term] = set()
         for j in np.argsort(-self.plain):
@@ -212,13 +219,12 @@ def _trials(term: Term, fit: Fit, data: Data, weights: Weights, basis: Floats) -
     return found
 
 
-def screen(
-    fit: Fit, found: Directions, rng: np.random.Generator, alarm: float = 0.01, allowed: Floats | None = None
-) -> Screening:
+def screen(fit: Fit, found: Directions, rng: np.random.Generator, allowed: Floats | None = None) -> Screening:
     """Sigmas of each direction and the family-wise judgement of the largest.
 
     `allowed` (q,): sigmas of each that the terms found so far may leave behind (shape_error.py).
     """
+    alarm = policy.select.SCREENING_FALSE_ALARM
     score = found.columns.T @ fit.residual
     sided = np.array(found.one_sided, dtype=bool)
     plain = np.where(sided, np.maximum(score, 0.0), np.abs(score))
@@ -260,7 +266,7 @@ def matching_pursuit(columns: Floats, residual: Floats, least: float, most: int)
 
 def quiet(residual: Floats, columns: Floats) -> Floats:
     """The residual without what is plainly no noise in the span of unit columns: what surrogates are made from."""
-    return matching_pursuit(columns, residual, PLAIN, MOST_PLAIN)[1]
+    return matching_pursuit(columns, residual, policy.select.PLAIN_DIRECTION_SIGMA, MOST_PLAIN)[1]
 
 
 def surrogate_scores(columns: Floats, residual: Floats, rng: np.random.Generator) -> Floats:

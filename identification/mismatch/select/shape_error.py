@@ -9,16 +9,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, change_of
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.screening import orthogonal_basis
 from identification.recording import Floats
-
-SHAPE_ERROR = 0.03
-"""Share of its own correction to which a shape is trusted before something unknown is said to be left."""
-NEXT_TERM = 0.006
-"""The same before another term of the catalogue is added: its shape is known."""
 
 
 def corrections(fitted: Fit, data: Data, weights: Weights) -> list[Floats]:
@@ -39,7 +35,7 @@ def _of_terms(fitted: Fit) -> NDArray[np.bool_]:
     return of_terms[fitted.free]
 
 
-def allowed(changes: list[Floats], columns: Floats, share: float = NEXT_TERM) -> Floats:
+def allowed(changes: list[Floats], columns: Floats, share: float) -> Floats:
     """(q,) sigmas that shape error may put into unit columns (n, q): no more than it has where they are."""
     out = np.zeros(columns.shape[1])
     size = np.abs(columns)
@@ -50,5 +46,5 @@ def allowed(changes: list[Floats], columns: Floats, share: float = NEXT_TERM) ->
 
 def allowed_in(changes: list[Floats], span: Floats) -> float:
     """Chi-square that shape error may put into an orthonormal span (n, q) of all."""
-    most = SHAPE_ERROR**2 * float(sum(change @ change for change in changes))
-    return min(float(np.sum(allowed(changes, span, SHAPE_ERROR) ** 2)), most)
+    most = policy.select.SHAPE_ERROR**2 * float(sum(change @ change for change in changes))
+    return min(float(np.sum(allowed(changes, span, policy.select.SHAPE_ERROR) ** 2)), most)

@@ -14,10 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.flexible_terms.flexible import Flexible
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, refresh
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.locate.pulses import Pulses
-from identification.mismatch.locate.residual_structure_test import ALARM, residual_structure
+from identification.mismatch.locate.residual_structure_test import residual_structure
 from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.unnamed.flexible_kinds import UNITS
@@ -26,20 +27,12 @@ from identification.mismatch.validate.held_out import Score
 from identification.mismatch.validate.train_test_split import Judge, TrainTestSplit, better
 from identification.physics.term import Term
 
-MOST_TERMS = 3
 MOST_COVARIATES = 3
-"""Coordinates tried for each term, the clearest first."""
-EQUAL = 10.0
-"""BIC within which two covariates do equally well."""
-MONOTONE = 0.9
-"""Rank correlation with time above which a recorded quantity goes one way only."""
-LOCATED = 0.8
-"""Share of the best covariate's gain at which the located one is kept."""
+"""Covariates tried for each term, the clearest first: each costs a search for knots."""
 FOLLOW_LOAD = ("bus_voltage", "current", "torque", "load_history")
 """Quantities that a thruster's own load moves."""
-AS_GOOD = 1.02
-"""Held-out RMSE over that of terms without an earned name at which a shape that claims nothing takes their place."""
 FIT_STEPS = 10
+"""Steps of the fit with a new term: its values begin at the linear solution."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +61,7 @@ def extend(
     split: TrainTestSplit,
     rng: np.random.Generator,
 ) -> Extended | None:
-    """The model with up to MOST_TERMS flexible terms; None where none improves what was not fitted.
+    """The model with up to FLEXIBLE_TERMS flexible terms; None where none improves what was not fitted.
 
     None also where they predict it worse than the baseline, `before`.
 
@@ -80,7 +73,9 @@ def extend(
     plain = judge(fit(before.fit.model, before.fit.theta, part, begin.weights))
     for smaller in _bases(begin, part, [n.term for n in unearned]):
         estimate, terms, held, equals = _grown(smaller, part, located, judge, rng)
-        improves = better(held, first, 0) or (smaller is not begin and held.rmse < AS_GOOD * first.rmse)
+        improves = better(held, first, 0) or (
+            smaller is not begin and held.rmse < policy.unnamed.SHAPE_INSTEAD_OF_NAMES_RMSE * first.rmse
+        )
         if terms and improves and held.rmse < plain.rmse:
             break
     else:
@@ -145,7 +140,7 @@ def _grown(
         if new is None:
             return estimate, terms, held, equals
         estimate = new
-        if len(terms) == MOST_TERMS:
+        if len(terms) == policy.unnamed.FLEXIBLE_TERMS:
             return estimate, terms, held, equals
         order, pulses = _left(estimate, part, rng)
 
@@ -153,8 +148,8 @@ def _grown(
 def _left(estimate: Estimate, part: Data, rng: np.random.Generator) -> tuple[list[str], Pulses | None]:
     """Coordinates over which something is left, the clearest first, and pulses that come back."""
     left = residual_structure(estimate.fit, part, estimate.weights, rng)
-    clear = [g.covariate.quantity for g in left.groups if g.p_value < ALARM]
-    return (clear, left.pulses) if left.p_value < ALARM else ([], None)
+    clear = [g.covariate.quantity for g in left.groups if g.p_value < policy.locate.RESIDUAL_FALSE_ALARM]
+    return (clear, left.pulses) if left.p_value < policy.locate.RESIDUAL_FALSE_ALARM else ([], None)
 
 
 def _candidates(estimate: Estimate, part: Data, order: Sequence[str], pulses: Pulses | None) -> list[FlexibleCandidate]:
@@ -167,14 +162,14 @@ def _candidates(estimate: Estimate, part: Data, order: Sequence[str], pulses: Pu
     if not gaining:
         return []
     most = max(c.gain for c in gaining)
-    equal = {c.term.quantity for c in gaining if c.gain > most - EQUAL}
+    equal = {c.term.quantity for c in gaining if c.gain > most - policy.unnamed.COVARIATES_EQUAL_BIC}
     rising = {q for q in equal if q in UNITS and _with_time(q, part)}
     first = "time" if "time" in equal and order[0] in rising else order[0]
     follows = max(gaining, key=lambda c: c.gain).term.quantity in FOLLOW_LOAD
     static = (part.histories[0].driver_quantity, "direction")
 
     def rank(c: FlexibleCandidate) -> tuple[bool, bool, bool, float]:
-        near = c.gain > LOCATED * most
+        near = c.gain > policy.unnamed.LOCATED_GAIN * most
         itself = follows and near and c.term.quantity in static
         recorded = c.term.quantity in equal - rising and c.term.quantity in UNITS
         return not itself, not recorded, c.term.quantity != first or not near, -c.gain
@@ -188,12 +183,16 @@ def _with_time(quantity: str, data: Data) -> bool:
         np.corrcoef(np.argsort(np.argsort(h.others[quantity][r])), np.arange(r.size))[0, 1]
         for h, r in zip(data.histories, data.rows, strict=True)
     ]
-    return bool(np.min(np.abs(order)) > MONOTONE)
+    return bool(np.min(np.abs(order)) > policy.unnamed.MONOTONE_CORRELATION)
 
 
 def _equals(chosen: FlexibleCandidate, candidates: Sequence[FlexibleCandidate]) -> tuple[str, ...]:
     """Coordinates of the others that gain about as much."""
-    return tuple(c.term.quantity for c in candidates if c is not chosen and c.gain > chosen.gain - EQUAL)
+    return tuple(
+        c.term.quantity
+        for c in candidates
+        if c is not chosen and c.gain > chosen.gain - policy.unnamed.COVARIATES_EQUAL_BIC
+    )
 
 
 def _added(estimate: Estimate, part: Data, candidate: FlexibleCandidate) -> tuple[Estimate, Flexible]:

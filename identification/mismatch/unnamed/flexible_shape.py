@@ -25,8 +25,11 @@ from identification.run_history.history import History
 from identification.run_history.splines import spline
 
 POINTS = 81
+"""Points at which a shape is told: a line through them looks smooth."""
 MOST_LEVELS = 24
+"""Values of a covariate that are bins each, at most; more are shared out evenly."""
 BINS = 14
+"""Bins of the table of a shape over a covariate without levels."""
 
 
 def shapes_of(extended: Extended, data: Data) -> tuple[FlexibleShape, ...]:

@@ -27,6 +27,7 @@ from identification.flexible_terms.formula import (
     quantity,
 )
 from identification.flexible_terms.formula import times as multiplied
+from identification.mismatch import policy
 from identification.mismatch.diagnosis import FormulaFound
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, fit
@@ -43,17 +44,12 @@ from identification.recording import Floats
 from identification.run_history.history import History
 
 MOST_DEGREE = 3
+"""Highest degree of a product of powers: a term of a higher one is told from a lower one by no plan."""
 TIMES: tuple[Times, ...] = ("1", "F", "|F|")
 MOST_ALIKE = 1 - 1e-7
 """Squared correlation of two columns that are taken to be one."""
-NEAR = 9.0
-"""BIC: formulas this near are equally good, the plainest is told."""
-LEAST_GAIN = 20.0
-NEARLY = 0.85
-"""Share of the flexible terms' fall of the squared held-out error that a formula must reach."""
-SAME = 0.01
-"""p-value of the same coefficients in both halves below which they are not."""
 MOST_EQUALS = 3
+"""Formulas of other symbols that are told beside the plainest: a reader wants no more."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +87,7 @@ def find_formula(extended_by: Extended, data: Data, others: Sequence[History]) -
         return None
     whole = _with(term, bare, data)
     p = halves(term, whole, data)
-    if p < SAME or _left_over(term, whole, data, extended_by.terms):
+    if p < policy.unnamed.FORMULA_HALVES_P or _left_over(term, whole, data, extended_by.terms):
         return None
     text, coefficients = told(term, whole.fit, data)
     same = {frozenset(q for m in plainest for q, _ in m.powers)}
@@ -142,7 +138,7 @@ def _fitted_shapes(found: Extended, estimate: Estimate, data: Data) -> Fit:
 def _predicts(before: Score, after: Score, free: Score) -> bool:
     """Whether what was not fitted is predicted nearly as well as by the free shape."""
     fall = before.chi2 - free.chi2
-    return better(after, before, MOST_DEGREE) and before.chi2 - after.chi2 > NEARLY * fall
+    return better(after, before, MOST_DEGREE) and before.chi2 - after.chi2 > policy.unnamed.FORMULA_PREDICTS * fall
 
 
 def symbols_of(data: Data) -> dict[str, list[Floats]]:
@@ -208,7 +204,7 @@ def _column(m: Monomial, unit: dict[str, Floats], force: Floats) -> Floats:
 
 
 def _near(grid: _Grid) -> dict[tuple[Monomial, ...], float]:
-    """One or two monomials with their gain, best first: those within NEAR of the best.
+    """One or two monomials with their gain, best first: those within FORMULAS_EQUAL_BIC of the best.
 
     Time does what any quantity that drifts with it does: where only formulas of time are left, those of recorded
     quantities that fit as well are given, though they may be longer.
@@ -222,15 +218,15 @@ def _near(grid: _Grid) -> dict[tuple[Monomial, ...], float]:
     fall = np.where(apart, (s[i] ** 2 + s[j] ** 2 - 2 * rho * s[i] * s[j]) / np.where(apart, rest, 1.0), 0.0)
     double = fall - 2 * grid.price
     best = max(float(single.max()), float(double.max(initial=-np.inf)))
-    if best < LEAST_GAIN:
+    if best < policy.unnamed.FORMULA_GAIN_BIC:
         return {}
     own = np.array([any(q == "t" for q, _ in m.powers) for m in grid.monomials])
     timed = own[i] | own[j]
-    one, two = single > best - NEAR, double > best - NEAR
+    one, two = single > best - policy.unnamed.FORMULAS_EQUAL_BIC, double > best - policy.unnamed.FORMULAS_EQUAL_BIC
     if not (one & ~own).any() and not (two & ~timed).any():
         most = max(float(np.max(s**2, where=one, initial=0.0)), float(np.max(fall, where=two, initial=0.0)))
-        one |= ~own & (s**2 > most - NEAR)
-        two |= ~timed & (fall > most - NEAR)
+        one |= ~own & (s**2 > most - policy.unnamed.FORMULAS_EQUAL_BIC)
+        two |= ~timed & (fall > most - policy.unnamed.FORMULAS_EQUAL_BIC)
     out = {(grid.monomials[k],): float(single[k]) for k in np.flatnonzero(one)}
     out |= {(grid.monomials[i[k]], grid.monomials[j[k]]): float(double[k]) for k in np.flatnonzero(two)}
     return dict(sorted(out.items(), key=lambda each: -each[1]))

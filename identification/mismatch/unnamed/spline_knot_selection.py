@@ -15,14 +15,17 @@ from typing import Literal
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.recording import Floats
 from identification.run_history.splines import spline
 
 Degree = Literal[1, 3]
 RIDGE = 1e-13
+"""Share of a unit column's square that is added to solve for columns that are nearly one."""
 LEAST_NEW = 1e-12
 """Of a unit column's square: less is left of it beside the others, and it is one of them."""
 MOST_NODES = 65
+"""Places at which a knot may be: a search over more would take longer and choose the same."""
 EVEN = (2, 3, 4, 5, 7, 9, 13)
 """Knots at even shares of the data to begin with."""
 FEW_NODES = 17
@@ -30,9 +33,9 @@ FEW_NODES = 17
 ENDS = (0.03, 0.1, 0.3)
 """Of the outermost share of the data: where a limit shows, within the last of a sine."""
 MOST_KNOTS = 24
-SMOOTH = 10.0
-"""BIC by which a broken line must be better to be preferred to a cubic."""
+"""Knots of one spline, at most: BIC is to stop it before."""
 MOST_MOVES = 4
+"""Rounds in which knots are moved to neighbouring nodes, and taken out."""
 LEAST_SHARE = 0.003
 """Of all rows: a level met more often than this is a node."""
 
@@ -106,7 +109,9 @@ def choose(
     `begin`: knots to begin with, beside even ones.
     """
     found = [c for degree in degrees if (c := _of_degree(moments, must, degree, begin)) is not None]
-    return max(found, key=lambda each: each.gain + (SMOOTH if each.degree == 3 else 0.0), default=None)
+    return max(
+        found, key=lambda each: each.gain + (policy.unnamed.BROKEN_LINE_BIC if each.degree == 3 else 0.0), default=None
+    )
 
 
 def heights(moments: Moments, knots: tuple[int, ...], degree: Degree, free: Sequence[tuple[int, ...]]) -> Floats:

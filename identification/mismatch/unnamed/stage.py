@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.confidence_intervals import Interval, intervals
 from identification.mismatch.estimate.estimate import Estimate, refresh
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.locate.residual_structure_test import ALARM, ResidualStructure, residual_structure
+from identification.mismatch.locate.residual_structure_test import ResidualStructure, residual_structure
 from identification.mismatch.locate.stage import Located
 from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
@@ -76,12 +77,14 @@ def _located(
         return after, left
     bare = replace(after, fit=fit(*after.fit.less(*(n.term for n in unearned)), data, after.weights))
     seen = residual_structure(bare.fit, data, after.weights, rng)
-    return (bare, seen) if seen.p_value < ALARM else (after, left)
+    return (bare, seen) if seen.p_value < policy.locate.RESIDUAL_FALSE_ALARM else (after, left)
 
 
 def foremost_covariate(left: ResidualStructure, unearned: Sequence[Named], data: Data) -> str:
     """The covariate over which it is left most clearly; a static curve is one over what drives."""
-    if left.p_value >= ALARM:  # nothing beyond noise is left: the doubt itself is the place
+    if (
+        left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM
+    ):  # nothing beyond noise is left: the doubt itself is the place
         driver = data.histories[0].driver_quantity
         own = {driver if c in STATIC else c for n in unearned for c in n.term.covariates}
         return next((g for g in left.groups if g.covariate.quantity in own), left.groups[0]).covariate.quantity

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data
@@ -15,9 +16,7 @@ from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.validate.held_out import HeldOut, by_blocks, least_noise, rmse, with_tares
 
 FOLDS = 4
-"""Runs are left out one by one, or in as many groups."""
-ALIKE = 0.5
-"""Of the largest driver of all runs, and of their median number of samples: a run with less tells too little."""
+"""Runs are left out one by one, or in as many groups: each costs two fits."""
 
 
 def by_folds(before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise) -> HeldOut:
@@ -41,7 +40,10 @@ def by_folds(before: Estimate, after: Estimate, data: Data, measured: Data, quie
 def _alike(data: Data) -> bool:
     driver = np.array([float(np.max(np.abs(h.driver[r]))) for h, r in zip(data.histories, data.rows, strict=True)])
     samples = np.array([float(h.count[r].sum()) for h, r in zip(data.histories, data.rows, strict=True)])
-    return bool(driver.min() > ALIKE * driver.max() and samples.min() > ALIKE * float(np.median(samples)))
+    return bool(
+        driver.min() > policy.validate.RUNS_ALIKE * driver.max()
+        and samples.min() > policy.validate.RUNS_ALIKE * float(np.median(samples))
+    )
 
 
 def _judged(estimate: Estimate, data: Data, fold: Sequence[int]) -> tuple[float, float]:

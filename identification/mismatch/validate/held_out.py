@@ -18,10 +18,11 @@ from identification.mismatch.noise.covariance import Noise
 from identification.run_history.history import History
 
 KEPT_BACK = 4
-"""One block of so many is not fitted."""
+"""One block of so many is not fitted: a quarter judges, and three quarters still determine the model."""
 BLOCKS_PER_RUN = 24
+"""Blocks of time of a long run: enough that every part of a plan is in both shares."""
 LEAST_BLOCK = 8.0
-"""s."""
+"""s: a shorter block would be known from its neighbours, whose slow noise it shares."""
 
 
 @dataclass(frozen=True, slots=True)

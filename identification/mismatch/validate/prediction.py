@@ -6,6 +6,7 @@ from collections.abc import Collection, Sequence
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.data import Data
@@ -16,8 +17,6 @@ from identification.run_history.history import History
 
 EVENTS = frozenset({"zero_offset", "zero_drift", "time_skew"})
 """Of one run's own clocks: another run need not repeat them."""
-WORSE = 9.0
-"""Of whitened chi-square on what was not fitted: doing so much better without a term doubts its name."""
 
 
 def worse_predicted(split: TrainTestSplit, terms: Collection[Term], *, same_run: bool) -> tuple[Term, ...]:
@@ -30,7 +29,11 @@ def worse_predicted(split: TrainTestSplit, terms: Collection[Term], *, same_run:
     asked = [t for t in estimate.fit.model.terms if t in terms and (same_run or t.id not in EVENTS)]
     less = {t: split.judge(fit(*estimate.fit.less(t), split.data, estimate.weights)) for t in asked}
     most = np.inf if same_run else now.rmse
-    return tuple(t for t, score in less.items() if score.chi2 < now.chi2 - WORSE and score.rmse < most)
+    return tuple(
+        t
+        for t, score in less.items()
+        if score.chi2 < now.chi2 - policy.validate.PREDICTED_WORSE_CHI2 and score.rmse < most
+    )
 
 
 def predicting(

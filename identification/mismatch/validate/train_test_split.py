@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
@@ -12,10 +13,6 @@ from identification.mismatch.model.whitening import weights
 from identification.mismatch.validate.held_out import Score, blocks, judge_blocks, judge_runs, refitted
 from identification.run_history.history import History
 
-WORTH = 6.0
-"""By which chi-square must fall on what was not fitted, beside 2 for each parameter."""
-SLACK = 1.002
-"""RMSE may grow by this where chi-square falls: the loudest noise weighs most in it."""
 Judge = Callable[[Fit], Score]
 
 
@@ -44,4 +41,7 @@ def train_test_split(after: Estimate, data: Data, others: Sequence[History]) -> 
 
 def better(new: Score, old: Score, parameters: int) -> bool:
     """Whether what was not fitted is predicted better by more than chance."""
-    return new.chi2 < old.chi2 - (WORTH + 2 * parameters if parameters else 0) and new.rmse < SLACK * old.rmse
+    return (
+        new.chi2 < old.chi2 - (policy.validate.HELD_OUT_WORTH + 2 * parameters if parameters else 0)
+        and new.rmse < policy.validate.HELD_OUT_RMSE_SLACK * old.rmse
+    )

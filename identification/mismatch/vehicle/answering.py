@@ -7,16 +7,15 @@ from collections.abc import Sequence
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
+from identification.mismatch import policy
 from identification.mismatch.diagnosis import Curves, Finding, Mismatch, Remainder, RivalFinding
 from identification.mismatch.noise.whiteness import whiteness
 from identification.mismatch.value import Value, Where
 from identification.mismatch.vehicle.fitting import Fit
-from identification.mismatch.vehicle.left import ALARM, BACK, Left, Structure, place_of
+from identification.mismatch.vehicle.left import BACK, Left, Structure, place_of
 from identification.mismatch.vehicle.naming import Named
 from identification.mismatch.vehicle.runs import Prepared
 from identification.mismatch.vehicle.search import Found, State
-
-MOST_PLACES = 3
 
 
 def baseline_words(data: Prepared) -> str:
@@ -97,8 +96,8 @@ def _place(where: Where, data: Prepared) -> str:
 def places_of(left: Left, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
     """Where the baseline fails, the clearest covariates first."""
     out = []
-    for structure in left.structures[:MOST_PLACES]:
-        if structure.p_value > ALARM:
+    for structure in left.structures[: policy.locate.PLACES_TOLD]:
+        if structure.p_value > policy.vehicle.FREE_FORCE_FALSE_ALARM:
             break
         where = where_of(structure)
         says = (
@@ -129,10 +128,10 @@ def place_of_findings(left: Left, found: Found, data: Prepared, channel: str) ->
 
 def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Remainder | None:
     """What remains; `named` are those whose name is doubted."""
-    if not left.structures or (left.p_value >= ALARM and not named):
+    if not left.structures or (left.p_value >= policy.vehicle.FREE_FORCE_FALSE_ALARM and not named):
         return None
     structure = left.structures[0]
-    if left.p_value >= ALARM:
+    if left.p_value >= policy.vehicle.FREE_FORCE_FALSE_ALARM:
         own = {c for n in named for c in n.term.covariates}
         structure = next((s for s in left.structures if s.covariate.quantity in own), structure)
     where = where_of(structure)

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.answer.verdict import decided
 from identification.mismatch.diagnosis import Diagnosis, Mismatch, Rmse
 from identification.mismatch.prepare.preparing import Refusal
@@ -24,7 +25,7 @@ from identification.mismatch.vehicle.answering import (
 from identification.mismatch.vehicle.experiment import propose
 from identification.mismatch.vehicle.free_force import FreeForce, free_index, with_free_force
 from identification.mismatch.vehicle.judging import better_predicting, held_out, only, residuals, rms
-from identification.mismatch.vehicle.left import ALARM, Left, judge_left
+from identification.mismatch.vehicle.left import Left, judge_left
 from identification.mismatch.vehicle.naming import Named, name
 from identification.mismatch.vehicle.runs import Prepared, prepare
 from identification.mismatch.vehicle.screening import applicable
@@ -33,8 +34,6 @@ from identification.mismatch.vehicle.setup import VehicleSetup, axis_of, straigh
 from identification.recording import Recording
 
 NO_SETUP = VehicleSetup()
-NOT_WHITE = 1e-3
-"""p-value."""
 
 
 def diagnose_vehicle(
@@ -95,7 +94,7 @@ def _diagnosed(
     found = replace(found, after=after)
     left = judge_left(after.fit, after.white, data, rng)
     held, last = held_out(found.before, after, data, unseen), after
-    if left.p_value < ALARM:
+    if left.p_value < policy.vehicle.FREE_FORCE_FALSE_ALARM:
         free = pruned(with_free_force(after, data, left.structures[0]), data)
         held, last = better_predicting(found.before, (held, after), free, data, unseen)
     standing = [_beside(n, last, left) for n in named]
@@ -173,14 +172,14 @@ def _places(found: Found, data: Prepared, channel: str, left: Left, rng: np.rand
 def _noise_note(after: State, data: Prepared) -> tuple[str, ...]:
     """Slow noise is where a disturbance (waves, wind, a hand on the cable) goes that no term carries."""
     out = []
-    if state_whiteness(after) < NOT_WHITE:
+    if state_whiteness(after) < policy.vehicle.VEHICLE_NOT_WHITE_P:
         out.append(
             "what remains is not white: white and slow noise do not describe this sensor (a filter, steps of its own); "
             "standard errors may be too small"
         )
     slow = float(np.sqrt(sum(after.noise.slow)))
     white = float(np.sqrt(after.noise.white))
-    if slow < 2 * white:
+    if slow < policy.vehicle.SLOW_DISTURBANCE * white:
         return tuple(out)
     unit = data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit
     out.append(

@@ -8,18 +8,17 @@ from dataclasses import replace
 import numpy as np
 from scipy.stats import norm
 
+from identification.mismatch import policy
 from identification.mismatch.diagnosis import NextExperiment, PlanStep
 from identification.mismatch.noise.covariance import Noise, Rows, Whitener
 from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.model import on_other_runs, predict
-from identification.mismatch.vehicle.naming import EQUAL, Named
+from identification.mismatch.vehicle.naming import Named
 from identification.mismatch.vehicle.runs import Prepared, Run
 from identification.mismatch.vehicle.search import State
 
 BUDGET = 300.0
-"""s."""
-LEAST_POWER = 0.5
-ALARM = 0.01
+"""s of a proposed run, as of a thruster's sweep."""
 MOORED = (
     "moor the vehicle to a force gauge and run these steps: the steady pull is the thrust as installed, which no free "
     "run tells from the mass"
@@ -28,7 +27,7 @@ MOORED = (
 
 def propose(state: State, named: Sequence[Named], data: Prepared) -> NextExperiment | None:
     """For the finding whose nearest rival is nearest."""
-    pairs = [(n, r) for n in named for r in n.rivals if r.bic_loss < EQUAL]
+    pairs = [(n, r) for n in named for r in n.rivals if r.bic_loss < policy.select.RIVALS_EQUAL_BIC]
     if not pairs:
         return None
     finding, rival = min(pairs, key=lambda pair: pair[1].bic_loss)
@@ -36,7 +35,7 @@ def propose(state: State, named: Sequence[Named], data: Prepared) -> NextExperim
     found = [(power(steps, state.fit, rival.fit, data, state.noise), steps) for steps in plans(top)]
     best, steps = max(found, key=lambda one: one[0])
     why = f"separates {finding.term.id} from {rival.term.id}"
-    if best < LEAST_POWER:
+    if best < policy.vehicle.VEHICLE_SWEEP_POWER:
         why = f"{MOORED} ({finding.term.id} or {rival.term.id})"
         steps = tuple(PlanStep(sign * share * top, 20.0) for share in (0.4, 0.7, 1.0) for sign in (1, -1))
     return NextExperiment(why, steps, best)
@@ -58,7 +57,7 @@ def plans(top: float) -> tuple[tuple[PlanStep, ...], ...]:
 
 
 def power(steps: Sequence[PlanStep], one: Fit, other: Fit, data: Prepared, noise: Noise) -> float:
-    """Probability that a run of these steps decides between two fitted models, at a false-alarm rate of ALARM."""
+    """Probability that a run of these steps decides between two fitted models, at VEHICLE_SWEEP_FALSE_ALARM."""
     run = _planned(steps, data)
     there = replace(data, runs=(run,))
     predicted = []
@@ -74,7 +73,7 @@ def power(steps: Sequence[PlanStep], one: Fit, other: Fit, data: Prepared, noise
         base = white.whiten(ones)
         left = left - base @ np.linalg.lstsq(base, left, rcond=None)[0]
     d = float(np.linalg.norm(left))
-    return float(norm.sf(norm.isf(ALARM) - d))
+    return float(norm.sf(norm.isf(policy.vehicle.VEHICLE_SWEEP_FALSE_ALARM) - d))
 
 
 def _planned(steps: Sequence[PlanStep], data: Prepared) -> Run:

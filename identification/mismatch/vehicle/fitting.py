@@ -17,9 +17,11 @@ from identification.mismatch.vehicle.runs import Prepared
 from identification.recording import Floats
 
 STEPS = 30
+"""Steps of Levenberg and Marquardt: what needs more goes along a valley that tells nothing."""
 ENOUGH = 1e-3
 """Change of chi-square below which a fit has arrived."""
 DAMPING = 1e-3
+"""Of the first step, in units of the columns' squares."""
 Mask = NDArray[np.bool_]
 
 

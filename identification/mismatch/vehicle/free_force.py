@@ -18,7 +18,7 @@ from identification.physics.vehicle.term import Body, Scale, Stage, Untouched, V
 from identification.recording import Floats
 
 MOST = 5.0
-"""Of the largest force."""
+"""Of the largest force: bound of a free force at a knot, beyond anything that acts."""
 LOCAL = ("time", "run")
 """Coordinates that say nothing of other runs."""
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.vehicle.fitting import Fit, fit, weights
@@ -17,12 +18,13 @@ from identification.mismatch.vehicle.search import State
 from identification.recording import Floats
 
 FOLDS = 4
-LEAST_RUNS = 3
-"""With fewer, blocks of time are kept back."""
+"""Groups of runs that are left out in turn: each costs two fits."""
 KEPT_BACK = 4
 """One block of so many is not fitted."""
 BLOCKS = 24
+"""Blocks of time of one run, of which every fourth is judged."""
 PLAIN = Noise(1.0, 0.0)
+"""White noise of 1: in whole runs that were not fitted every row counts alike."""
 
 
 def rms(parts: Sequence[Floats]) -> float:
@@ -52,7 +54,7 @@ def held_out(before: State, after: State, data: Prepared, unseen: Prepared | Non
         return HeldOutRmse(
             rms(old), rms(new), noise, f"whole runs not fitted ({names}); only {_starts(after, data)} fitted"
         )
-    if len(data.runs) < LEAST_RUNS:
+    if len(data.runs) < policy.vehicle.VEHICLE_RUNS:
         return _by_blocks(before, after, data)
     folds = min(FOLDS, len(data.runs))
     olds: list[Floats] = []

@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2 as chi2_law
 
 from identification.estimation.singular_values import thin_svd
+from identification.mismatch import policy
 from identification.mismatch.vehicle.fitting import Fit, Weights
 from identification.mismatch.vehicle.model import added_forces, respond
 from identification.mismatch.vehicle.motion import Motion
@@ -17,12 +18,9 @@ from identification.mismatch.vehicle.screening import beyond, surrogates
 from identification.recording import Floats
 
 BUMPS = 6
-ALARM = 0.01
-INCONSTANT = 1e-3
-"""p-value, after all tests of a term, below which its parameter is not the same everywhere."""
-SAME = 0.15
-"""Parts of the recordings whose parameters differ by less count as the same."""
+"""Knots of a free force: as many as the quantiles of a run of minutes determine."""
 BACK = 1e-300
+"""Smallest p-value that is told: 0 has no logarithm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +71,7 @@ def covariates(fitted: Fit, data: Prepared) -> tuple[Covariate, ...]:
     if data.runs[0].quantity == "position":
         name = "depth" if data.scale.axis == "heave" else "position"
         out.append(_coordinate(name, data.scale.length_unit, place, "a force over the place"))
-    if np.isfinite(data.scale.heading_spread) and data.scale.heading_spread > 1e-3:
+    if np.isfinite(data.scale.heading_spread) and data.scale.heading_spread > policy.vehicle.HEADING_SPREAD:
         psi = tuple(np.angle(np.exp(1j * run.moment.heading)) for run in data.runs)
         out.append(_coordinate("heading", "rad", psi, "a force over the heading"))
     if len(data.runs) > 1:
@@ -198,7 +196,7 @@ def place_of(structure: Structure) -> Place:
 
 
 def inconstancies(fitted: Fit, white: Weights, data: Prepared, term: int) -> list[str]:
-    """Parts of the recordings in which a term's amount differs by more than chance and by more than SAME."""
+    """Parts of the recordings in which a term's amount differs by more than chance and VEHICLE_PART_DIFFERENCE."""
     base = _base(fitted)
     layout, i = fitted.layout, fitted.layout.first_of[term]
     amount = fitted.theta[i] - (layout.parts[term][0].neutral or 0.0)
@@ -219,7 +217,7 @@ def inconstancies(fitted: Fit, white: Weights, data: Prepared, term: int) -> lis
             continue
         shift = float(left @ fitted.residual) / size
         p = float(chi2_law.sf(shift**2 * size, 1)) * len(splits)
-        if p < INCONSTANT and abs(shift) > SAME * abs(amount):
+        if p < policy.name.INCONSTANT_P and abs(shift) > policy.vehicle.VEHICLE_PART_DIFFERENCE * abs(amount):
             out.append(f"it is not the same {name} (by {100 * abs(shift / amount):.0f} %)")
     return out
 
@@ -230,7 +228,7 @@ def _splits(motions: Sequence[Motion], data: Prepared) -> dict[str, list[Floats]
     ahead = [(_middle(m.v) > 0).astype(np.float64) for m in motions]
     out = {"in the first and the second half of the runs": halves}
     share = float(np.mean(np.concatenate(ahead)))
-    if 0.1 < share < 0.9:
+    if policy.vehicle.AHEAD_ASTERN_SHARE < share < 1 - policy.vehicle.AHEAD_ASTERN_SHARE:
         out["ahead and astern"] = ahead
     if len(data.runs) > 1:
         out["in every second run"] = [np.full(run.steps, float(j % 2)) for j, run in enumerate(data.runs)]

@@ -17,6 +17,7 @@ from identification.physics.vehicle.term import Body
 from identification.recording import Floats
 
 MOST_ITERATIONS = 60
+"""Newton iterations over the whole motion, at most: they end by SAME."""
 SAME = 1e-9
 """Of the largest speed: where Newton's iterations end."""
 

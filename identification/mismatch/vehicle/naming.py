@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
+from identification.mismatch import policy
 from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.left import inconstancies
 from identification.mismatch.vehicle.runs import Prepared
@@ -15,14 +16,8 @@ from identification.mismatch.vehicle.screening import screen, trials
 from identification.mismatch.vehicle.search import FITTED, State, bic, dropped, fitted_with
 from identification.physics.vehicle.term import VehicleTerm
 
-NEAR = 9.0
-"""BIC units: a rival this near is stated."""
-EQUAL = 4.0
-"""BIC units: nearer than this two answers are equally good."""
-EDGE = 1e-3
 SWAPS = 2
-BETTER = 0.5
-"""BIC units by which a rival must be better to take the place."""
+"""Rounds in which a term gives way to a better rival: more would go in circles."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +49,7 @@ def name(
     """Each term against its rivals; another that does better takes the place first."""
     named = _all_named(state, data, candidates, rng)
     for _ in range(SWAPS):
-        better = [r for n in named for r in n.rivals if r.bic_loss < -BETTER]
+        better = [r for n in named for r in n.rivals if r.bic_loss < -policy.select.RIVAL_BETTER_BIC]
         if not better:
             break
         state = State(min(better, key=lambda r: r.bic_loss).fit, state.noise, state.white)
@@ -74,10 +69,10 @@ def _named(state: State, data: Prepared, candidates: Sequence[VehicleTerm], i: i
     gain = less.chi2 - state.fit.chi2
     count = len(state.fit.layout.parts[i])
     rivals = _rivals(state, less, data, candidates, term, rng)
-    near = tuple(r for r in rivals if r.bic_loss < NEAR)
+    near = tuple(r for r in rivals if r.bic_loss < policy.select.RIVAL_STATED_BIC)
     probability = 1 / (1 + sum(float(np.exp(-0.5 * r.bic_loss)) for r in near))
     doubts = (*_edges(state.fit, i), *inconstancies(state.fit, state.white, data, i))
-    kept = tuple(r for r in near if _key(r.term) != _key(term) or r.bic_loss < -BETTER)
+    kept = tuple(r for r in near if _key(r.term) != _key(term) or r.bic_loss < -policy.select.RIVAL_BETTER_BIC)
     p = max(float(chi2_law.sf(gain, count)), 1e-300)
     return Named(i, term, gain, p, bic(less) - state.bic(), kept, probability, doubts)
 
@@ -96,7 +91,10 @@ def _rivals(
     ranked, _ = screen(less, state.white, trials(less, data, others), rng)
     out = []
     for screened in ranked[: FITTED + 1]:
-        if less.chi2 - screened.gain > state.fit.chi2 + 0.5 * (less.chi2 - state.fit.chi2) + NEAR:
+        if (
+            less.chi2 - screened.gain
+            > state.fit.chi2 + 0.5 * (less.chi2 - state.fit.chi2) + policy.select.RIVAL_STATED_BIC
+        ):
             continue
         other = fitted_with(less, state.white, data, screened)
         out.append(Rival(screened.trial.term, other, bic(other) - state.bic()))
@@ -114,6 +112,6 @@ def _edges(fitted: Fit, i: int) -> list[str]:
     for k, p in enumerate(fitted.layout.parts[i]):
         value = fitted.theta[begin + k]
         span = p.high - p.low
-        if min(value - p.low, p.high - value) <= EDGE * span and p.neutral != value:
+        if min(value - p.low, p.high - value) <= policy.vehicle.EDGE_OF_POSSIBLE * span and p.neutral != value:
             out.append(f"its {p.name} of {value:.3g} {p.unit} is at the edge of what is possible")
     return out

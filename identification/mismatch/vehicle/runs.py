@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.noise.covariance import Rows
 from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.vehicle.setup import ANY_AXIS, Stated, VehicleSetup, thrust_known
@@ -15,7 +16,6 @@ from identification.recording import Channel, Floats, Recording
 from identification.vehicle.efficiency import Installation
 from identification.vehicle.trials import response_of, thruster_volts
 
-LEAST_SAMPLES = 20
 LOOKS = 2
 """At the command in each step of the grid."""
 FINEST, COARSEST = 0.02, 0.2
@@ -121,8 +121,11 @@ def _measured(recording: Recording, axis: str) -> Measured | Refusal:
     if channel is None:
         return Refusal(f"{name} has no position, depth, heading or speed of {axis}: there is no motion to explain")
     time, value = _finite(channel)
-    if time.size < LEAST_SAMPLES:
-        return Refusal(f"{name} has {time.size} finite samples of {channel.name}; at least {LEAST_SAMPLES} are needed")
+    if time.size < policy.vehicle.MOTION_SAMPLES:
+        return Refusal(
+            f"{name} has {time.size} finite samples of {channel.name}; "
+            f"at least {policy.vehicle.MOTION_SAMPLES} are needed"
+        )
     if float(np.ptp(value)) == 0:
         return Refusal(f"{name}: {channel.name} is {value[0]:g} throughout; the vehicle did not move")
     return "speed" if channel.quantity == "speed" else "position", time, value

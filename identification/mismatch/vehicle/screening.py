@@ -9,6 +9,7 @@ import numpy as np
 from scipy.stats import chi2 as chi2_law
 
 from identification.estimation.singular_values import thin_svd
+from identification.mismatch import policy
 from identification.mismatch.vehicle.fitting import Fit, Weights
 from identification.mismatch.vehicle.model import predict, with_term
 from identification.mismatch.vehicle.runs import Prepared
@@ -17,12 +18,10 @@ from identification.physics.vehicle.installation_efficiency import InstallationE
 from identification.physics.vehicle.term import VehicleTerm
 from identification.recording import Floats
 
-ALARM = 0.01
-"""Family-wise false-alarm rate."""
 SURROGATES = 300
+"""Draws of the null distribution; beyond them a Bonferroni bound holds."""
 BLOCKS = 40
 """Of one run: the residual's sign is flipped block by block."""
-OUTLIER = 5.0
 SEEN = 1e-9
 """Share of a column that must be its own, beside the model's, to be seen at all."""
 
@@ -101,7 +100,7 @@ class Screened:
 def screen(
     fitted: Fit, white: Weights, found: Sequence[Trial], rng: np.random.Generator
 ) -> tuple[list[Screened], float]:
-    """Best trial of each term, best first; and the p-value that the best must pass (family-wise ALARM)."""
+    """Best trial of each term, best first; and the p-value that the best must pass (SCREENING_FALSE_ALARM)."""
     base, _ = np.linalg.qr(_scaled(fitted.jacobian))
     residual = fitted.residual
     bases = [_own(white, trial, base, residual.size) for trial in found]
@@ -123,14 +122,16 @@ def screen(
         if key not in best or gain > best[key].gain:
             best[key] = Screened(trial, gain, p)
     families = max(len({id(s.trial.term) for s in best.values()}), 1)
-    needed = min(float(np.quantile(least, ALARM)), ALARM / families)
+    needed = min(
+        float(np.quantile(least, policy.select.SCREENING_FALSE_ALARM)), policy.select.SCREENING_FALSE_ALARM / families
+    )
     return sorted(best.values(), key=lambda s: (s.p_value, -s.gain)), needed
 
 
 def _of_unit_size(quiet: Floats) -> Floats:
     """What the catalogue does not reach, robustly no larger than the noise model says: its correlation counts here."""
     size = max(float(np.median(np.abs(quiet)) / 0.6745), 1e-12)
-    return np.clip(quiet / max(size, 1.0), -OUTLIER, OUTLIER)
+    return np.clip(quiet / max(size, 1.0), -policy.vehicle.VEHICLE_OUTLIER_SIGMA, policy.vehicle.VEHICLE_OUTLIER_SIGMA)
 
 
 def _scaled(H: Floats) -> Floats:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2 as chi2_law
 
+from identification.mismatch import policy
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.vehicle.fitting import Fit, Weights, fit, noise_of, weights
 from identification.mismatch.vehicle.model import Layout, VehicleModel, begin, layout_of, with_term, without_term
@@ -16,11 +17,8 @@ from identification.mismatch.vehicle.screening import Screened, screen, trials
 from identification.physics.vehicle.term import VehicleTerm
 from identification.recording import Floats
 
-MOST_TERMS = 5
 FITTED = 4
-"""Candidates of a round that are fitted."""
-WORTH = 0.2
-"""Of the best candidate's gain: what promises less is not fitted."""
+"""Candidates of a round that are fitted: each costs a simulation for every slope."""
 LIGHT = 0.1
 """Of the mass that a first guess takes."""
 QUICK = 10
@@ -61,7 +59,7 @@ def search(data: Prepared, candidates: Sequence[VehicleTerm], rng: np.random.Gen
     """The baseline, and the model that nothing in the catalogue improves any more."""
     state = _baseline(data, candidates)
     first = state
-    for _ in range(MOST_TERMS):
+    for _ in range(policy.vehicle.VEHICLE_MODEL_TERMS):
         left = [term for term in candidates if _new(term, state.terms)]
         best = _best(state, data, left, rng)
         if best is None:
@@ -125,7 +123,7 @@ def _best(state: State, data: Prepared, terms: Sequence[VehicleTerm], rng: np.ra
 def promising(ranked: Sequence[Screened]) -> list[Screened]:
     """Those that promise most."""
     most = max((s.gain for s in ranked), default=0.0)
-    return [s for s in ranked if s.gain >= WORTH * most][:FITTED]
+    return [s for s in ranked if s.gain >= policy.vehicle.VEHICLE_CANDIDATE_GAIN * most][:FITTED]
 
 
 def _more(state: State, other: Fit) -> int:

@@ -7,14 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.prepare.preparing import Refusal
 from identification.recording import Recording
 from identification.vehicle.efficiency import Installation, Thruster
 from identification.vehicle.trials import dominant_axis
-
-KNOWN = 0.5
-"""Relative standard deviation of a thruster's model above which it counts as not known."""
-
 
 ANY_AXIS = ""
 """Key of a mass that holds for the axis that is diagnosed, whichever that is."""
@@ -49,7 +46,7 @@ class VehicleSetup:
 def thrust_known(installation: Installation) -> bool:
     """Whether the thrusters' models are measured ones: a stated 1 +- 10 N/V^2 is none."""
     values, std = np.abs(installation.coefficients), np.sqrt(np.diag(installation.cov))
-    return bool(np.all(std <= KNOWN * np.maximum(values, 1e-300) + 1e-300))
+    return bool(np.all(std <= policy.vehicle.THRUST_KNOWN * np.maximum(values, 1e-300) + 1e-300))
 
 
 def straight_ahead(recordings: Sequence[Recording]) -> Installation | Refusal:

@@ -1,0 +1,55 @@
+"""Thresholds: what an answer says beside its findings, and what of a twin has changed."""
+
+from __future__ import annotations
+
+from identification.mismatch.policy.threshold import Threshold
+
+WHITE_P = Threshold(
+    0.01,
+    unit="probability of whiteness",
+    reason=(
+        "Below it what remains is called not white, and intervals and p-values are said to rest on a noise "
+        "model that does not describe all of it."
+    ),
+)
+LINE_KNOWN_SIGMA = Threshold(
+    4.0,
+    unit="sigma",
+    reason=(
+        "A line within so many standard errors of a twin's frequency or ratio is the twin's line: both were "
+        "estimated, and one of several might be meant."
+    ),
+)
+LINE_KNOWN_RATIO = Threshold(
+    0.01,
+    unit="share of the ratio",
+    reason=(
+        "How well one run's turns are those of another: the scale of a measured rate, or of the volts in the "
+        "place of it."
+    ),
+)
+LINE_CHANGED_SIGMA = Threshold(
+    3.3,
+    unit="sigma",
+    reason=(
+        "By so many standard errors an amplitude must differ from the twin's to be a finding: noise does it "
+        "once in a thousand."
+    ),
+    evidence="Two-sided normal tail at 3.3: 0.00097.",
+)
+CHANGED_CONSTANT_FALSE_ALARM = Threshold(
+    0.01,
+    unit="probability",
+    reason=(
+        "A thrust constant that differs from the twin's by less than noise would make it in one comparison of "
+        "a hundred is the same."
+    ),
+)
+CONSTANT_MOVED = Threshold(
+    0.02,
+    unit="share of C",
+    reason=(
+        "Where another effect was found, C may move by this much with what that effect refers to (a highest "
+        "bus voltage, say), and is no finding of its own."
+    ),
+)

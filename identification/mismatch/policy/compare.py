@@ -1,0 +1,39 @@
+"""Thresholds: whether a simulation may be compared with a recording."""
+
+from __future__ import annotations
+
+from identification.mismatch.policy.threshold import Threshold
+
+COMMANDS_DIFFER = Threshold(
+    0.02,
+    unit="share of the largest driver",
+    reason="Commands that differ by more are two: rounding and quanta are smaller.",
+)
+COMMANDS_DIFFER_TIME = Threshold(
+    0.02,
+    unit="share of the time",
+    reason="For so long they may differ, round steps: a simulation of another plan is refused.",
+)
+CLOCKS_DIFFER = Threshold(
+    0.1,
+    unit="s",
+    reason="A difference shorter than this is a matter of clocks, and not what a refusal should show.",
+)
+NOISY_SIMULATION = Threshold(
+    0.3,
+    unit="share of the real noise",
+    reason=(
+        "A simulation with more noise is not subtracted sample by sample where it is well described: its "
+        "noise would be added to the recording's."
+    ),
+)
+SIMULATION_COVERS = Threshold(
+    0.9,
+    unit="share of the real thrust samples",
+    reason="A simulation that covers less is refused: the rest would be judged against nothing.",
+)
+SIGNATURE_THRUST = Threshold(
+    0.02,
+    unit="share of the largest change or thrust",
+    reason="A smaller thrust tells nothing of a share of it.",
+)

@@ -1,0 +1,89 @@
+"""Thresholds: when a shape or a formula without a name is told."""
+
+from __future__ import annotations
+
+from identification.mismatch.policy.threshold import Count, Threshold
+
+FLEXIBLE_TERMS = Count(
+    3,
+    unit="terms",
+    reason=(
+        "After three splines over different covariates what is left is not of one covariate, and a fourth "
+        "would follow noise."
+    ),
+)
+COVARIATES_EQUAL_BIC = Threshold(
+    10.0,
+    unit="BIC",
+    reason=(
+        "Two covariates whose splines differ by less do equally well, and the one that claims less is told "
+        "with the other beside it."
+    ),
+    evidence=(
+        "Kass and Raftery, Bayes factors, J. Am. Stat. Assoc. 90 (1995) 773: twice the log of a Bayes factor "
+        "of 6 to 10 is strong, above 10 very strong."
+    ),
+)
+MONOTONE_CORRELATION = Threshold(
+    0.9,
+    unit="rank correlation with time",
+    reason="A recorded quantity that goes one way only, but for its noise, is time by another name.",
+)
+LOCATED_GAIN = Threshold(
+    0.8,
+    unit="share of the best covariate's gain",
+    reason=(
+        "The covariate over which the residual was located is kept while its spline gains nearly as much as the best."
+    ),
+)
+SHAPE_INSTEAD_OF_NAMES_RMSE = Threshold(
+    1.02,
+    unit="ratio of held-out RMSE",
+    reason=(
+        "A shape that claims nothing takes the place of terms whose name was not earned where it predicts "
+        "about as well: two per cent worse is still the more honest model."
+    ),
+)
+FORMULAS_EQUAL_BIC = Threshold(
+    9.0,
+    unit="BIC",
+    reason="Formulas nearer to the best are equally good, and the plainest is told.",
+    evidence=(
+        "Kass and Raftery, Bayes factors, J. Am. Stat. Assoc. 90 (1995) 773: twice the log of a Bayes factor "
+        "of 6 to 10 is strong, above 10 very strong."
+    ),
+)
+FORMULA_GAIN_BIC = Threshold(
+    20.0,
+    unit="BIC",
+    reason=(
+        "Thousands of products of powers are tried, so a formula must gain twice what is very strong evidence "
+        "for one model alone."
+    ),
+    evidence=(
+        "Kass and Raftery, Bayes factors, J. Am. Stat. Assoc. 90 (1995) 773: twice the log of a Bayes factor "
+        "of 6 to 10 is strong, above 10 very strong."
+    ),
+)
+FORMULA_PREDICTS = Threshold(
+    0.85,
+    unit="share of the flexible terms' fall of the held-out chi-square",
+    reason=(
+        "A formula is told only where it predicts nearly as well as the free shape: else it is a part of the "
+        "truth at best."
+    ),
+)
+FORMULA_HALVES_P = Threshold(
+    0.01,
+    unit="probability",
+    reason="Coefficients that differ so much between the halves are no law of the whole run.",
+)
+BROKEN_LINE_BIC = Threshold(
+    10.0,
+    unit="BIC",
+    reason="A broken line must be better by so much to be preferred to a cubic: most physics has no kinks.",
+    evidence=(
+        "Kass and Raftery, Bayes factors, J. Am. Stat. Assoc. 90 (1995) 773: twice the log of a Bayes factor "
+        "of 6 to 10 is strong, above 10 very strong."
+    ),
+)
