@@ -36,12 +36,13 @@ from shutil import rmtree
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from rig.blind.elsewhere import read
+from rig.prove import designed
+
 from identification.mismatch import policy
 from rig.blind.answering import answered
-from rig.blind.elsewhere import read
 from rig.blind.scoring import LOCATED, OPEN_CELLS, scored
 from rig.blind.store import Store, version_of_diagnosis
-from rig.prove import designed
 
 ROOT = Path(__file__).resolve().parents[1]
 DRAW = "2026-11-24"
@@ -83,7 +84,7 @@ ASKED = {
     "name.REPAIR_SHARE": "when two shapes only repair each other",
     "validate.PREDICTED_WORSE_CHI2": "when prediction doubts a name",
     "periodic.LINE_FALSE_ALARM": "lines that are taken out before all else",
-    "noise.LONGEST_NOISE_SCALE": "what is a drift and no noise",
+    "estimate.LONGEST_NOISE_SCALE": "what is a drift and no noise",
 }
 """The twenty of the most consequence, each with what it decides."""
 AT_VALUE = "at its value"

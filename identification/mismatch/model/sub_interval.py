@@ -94,12 +94,12 @@ def shown(model: Model, theta: Theta, history: History, F: Floats, x: Floats, ta
 
 
 def _is_late(late: float, history: History) -> bool:
-    return abs(late) >= policy.model.TICK_DELAY * history.tick
+    return abs(late) >= policy.estimate.TICK_DELAY * history.tick
 
 
 def _changes(passed: Passed, history: History) -> bool:
     """Whether dynamics change what the ticks do."""
-    return passed != Passed() and history.ticks is not None and history.tick <= policy.model.TICK_INTERVAL
+    return passed != Passed() and history.ticks is not None and history.tick <= policy.estimate.TICK_INTERVAL
 
 
 def _remembered(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:

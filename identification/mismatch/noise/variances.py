@@ -33,7 +33,7 @@ NEARLY = 1e-2
 
 def longest_scale(runs: Sequence[Rows]) -> float:
     """s: LONGEST_NOISE_SCALE of the longest run. What is slower is a drift, and no noise."""
-    return policy.noise.LONGEST_NOISE_SCALE * max(float(r.time[-1] - r.time[0]) for r in runs)
+    return policy.estimate.LONGEST_NOISE_SCALE * max(float(r.time[-1] - r.time[0]) for r in runs)
 
 
 def time_scales(runs: Sequence[Rows]) -> tuple[float, ...]:
@@ -88,7 +88,7 @@ def fit_noise(
     total = np.concatenate(residuals)
     variance = float(np.mean(total**2)) or 1.0
     weight = np.concatenate([r.count for r in runs])
-    if total.size < policy.noise.COLOURED_NOISE_ROWS:
+    if total.size < policy.estimate.COLOURED_NOISE_ROWS:
         X = np.concatenate(columns) * np.sqrt(weight)[:, None]
         y = total * np.sqrt(weight)
         left = y - X @ np.linalg.lstsq(X, y, rcond=None)[0] if X.shape[1] else y

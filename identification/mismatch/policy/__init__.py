@@ -8,10 +8,8 @@ from identification.mismatch.policy import (
     estimate,
     faults,
     locate,
-    model,
     name,
     next_experiment,
-    noise,
     periodic,
     prepare,
     select,
@@ -19,9 +17,9 @@ from identification.mismatch.policy import (
     validate,
     vehicle,
 )
-from identification.mismatch.policy.budget import Alarm, false_alarms, nominal
-from identification.mismatch.policy.every import overridden, thresholds
-from identification.mismatch.policy.threshold import Count, Threshold
+from identification.mismatch.policy.record.budget import Alarm, false_alarms, nominal
+from identification.mismatch.policy.record.every import overridden, thresholds
+from identification.mismatch.policy.record.threshold import Count, Threshold
 
 __all__ = [
     "Alarm",
@@ -33,10 +31,8 @@ __all__ = [
     "false_alarms",
     "faults",
     "locate",
-    "model",
     "name",
     "next_experiment",
-    "noise",
     "nominal",
     "overridden",
     "periodic",

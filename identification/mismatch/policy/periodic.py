@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from identification.mismatch.policy.threshold import Count, Threshold
+from identification.mismatch.policy.record.threshold import Count, Threshold
 
 LINE_FALSE_ALARM = Threshold(
     0.005,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from identification.mismatch.policy.threshold import Threshold
+from identification.mismatch.policy.record.threshold import Threshold
 
 HELD_OUT_WORTH = Threshold(
     6.0,

@@ -12,10 +12,8 @@ from identification.mismatch.policy import (
     estimate,
     faults,
     locate,
-    model,
     name,
     next_experiment,
-    noise,
     periodic,
     prepare,
     select,
@@ -23,13 +21,11 @@ from identification.mismatch.policy import (
     validate,
     vehicle,
 )
-from identification.mismatch.policy.threshold import Count, Threshold
+from identification.mismatch.policy.record.threshold import Count, Threshold
 
 ROOMS = (
     prepare,
     faults,
-    noise,
-    model,
     estimate,
     periodic,
     select,

@@ -1,6 +1,6 @@
 """docs/method-thresholds.md, written from the thresholds themselves.
 
-python -m identification.mismatch.policy.page > docs/method-thresholds.md
+python -m identification.mismatch.policy.record.page > docs/method-thresholds.md
 """
 
 from __future__ import annotations
@@ -9,15 +9,15 @@ import sys
 from collections.abc import Iterator
 from itertools import groupby
 
-from identification.mismatch.policy.budget import Alarm, false_alarms, nominal
-from identification.mismatch.policy.every import ROOMS, thresholds
-from identification.mismatch.policy.threshold import Count, Threshold
+from identification.mismatch.policy.record.budget import Alarm, false_alarms, nominal
+from identification.mismatch.policy.record.every import ROOMS, thresholds
+from identification.mismatch.policy.record.threshold import Count, Threshold
 
 HEAD = """# Every number that decides
 
-Written by `python -m identification.mismatch.policy.page` from `identification/mismatch/policy`, where each threshold
-stands once; a test keeps this page to it. A *threshold* decides what is claimed, doubted, kept, dropped, counted as
-noise or refused; vehicles use those of thrusters beside their own. What depends on a number is asked by
+Written by `python -m identification.mismatch.policy.record.page` from `identification/mismatch/policy`, where each
+threshold stands once; a test keeps this page to it. A *threshold* decides what is claimed, doubted, kept, dropped,
+counted as noise or refused; vehicles use those of thrusters beside their own. What depends on a number is asked by
 `python benchmarks/sensitivity.py`, which puts the twenty of the most consequence at half and at double.
 """
 ALARMS = """## What can alarm on a clean recording
