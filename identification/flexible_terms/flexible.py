@@ -12,12 +12,13 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.physics.rotation_coupling import slip
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass, since_opposite
 from identification.run_history.history import TURNING, History
 from identification.run_history.remembered import RememberedRun
+from identification.run_history.slip import slip
 from identification.run_history.splines import spline
 
 Multiplier = Literal["force", "gain", "even", "step", "reversed", "rate", "drive", "late"]
@@ -47,6 +48,7 @@ class Flexible:
     """A cubic or broken line through values at knots over a covariate."""
 
     physics: ClassVar[str] = "a free shape; no physics is claimed for it"
+    traits: ClassVar[Traits] = Traits()
     quantity: str
     unit: str
     knots: tuple[float, ...]

@@ -9,6 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 from identification.run_history.history import History
@@ -49,6 +50,7 @@ class Formula:
     id: ClassVar[str] = "formula"
     stage: ClassVar[Stage] = "hydro"
     physics: ClassVar[str] = "a formula; no physics is claimed for it"
+    traits: ClassVar[Traits] = Traits()
     needs: ClassVar[tuple[str, ...]] = ()
     monomials: tuple[Monomial, ...]
     sizes: tuple[tuple[str, float], ...]

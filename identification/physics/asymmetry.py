@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 
 
@@ -20,6 +21,7 @@ class Asymmetry:
     physics: ClassVar[str] = "the two directions have different coefficients"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("direction",)
+    traits: ClassVar[Traits] = Traits(even=True, revealed_by="the same levels of both signs, with rests between")
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -33,6 +33,7 @@ from identification.physics import (
     zero_offset,
 )
 from identification.physics.term import Term
+from identification.physics.traits import Traits
 
 CATALOGUE: tuple[Term, ...] = tuple(
     chain(
@@ -65,3 +66,9 @@ CATALOGUE: tuple[Term, ...] = tuple(
     )
 )
 """In the order in which they act within their stage."""
+
+
+def traits_of(effect: str, form: str = "") -> Traits | None:
+    """Of an effect by its id, in one of its forms, or the first; None of what has no term: a line, a fault."""
+    forms = [term for term in CATALOGUE if term.id == effect]
+    return next((term.traits for term in (*(t for t in forms if t.form == form), *forms)), None)

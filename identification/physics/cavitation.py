@@ -8,7 +8,10 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
+
+RATE = Proxy("rotation_rate", "no rotation rate was recorded", "the voltage, as the steady rate that goes with it,")
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,6 +23,11 @@ class Cavitation:
     physics: ClassVar[str] = "thrust breaks down above a rate"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    traits: ClassVar[Traits] = Traits(
+        proxy=RATE,
+        told_by=(("rotation_rate", "the measured rotation rate"), ("", "another depth")),
+        revealed_by="high levels at another depth; the measured rotation rate",
+    )
     form: Literal["linear", "square"] = "linear"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

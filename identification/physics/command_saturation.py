@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.physics.soft_limit import limited, mean_slope
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.history import History
 
@@ -25,6 +26,11 @@ class CommandSaturation:
     physics: ClassVar[str] = "the drive gives no more than a limit"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    traits: ClassVar[Traits] = Traits(
+        limits="command",
+        told_by=(("rotation_rate", "the measured rotation rate"),),
+        revealed_by="current or rotation rate at the highest levels: they stop rising too",
+    )
     form: Literal["hard", "knee"] = "hard"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 
 EDGE = 2e-3
@@ -25,6 +26,7 @@ class DeadBand:
     physics: ClassVar[str] = "below a voltage the rotor does not turn"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    traits: ClassVar[Traits] = Traits(revealed_by="fine levels close to zero, of both signs")
     form: Literal["shrink", "jump"] = "shrink"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 
 
@@ -20,6 +21,7 @@ class Exponent:
     physics: ClassVar[str] = "thrust does not grow with the square"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    traits: ClassVar[Traits] = Traits(revealed_by="levels over the whole range, evenly in thrust")
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

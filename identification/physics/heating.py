@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 from identification.run_history.history import History
@@ -22,6 +23,14 @@ def _slowest(scale: Scale) -> float:
     return max(60.0, 0.7 * scale.duration)
 
 
+POWER = Proxy(
+    THERMOMETER,
+    "no motor temperature was recorded",
+    "the power drawn before, the fourth power of the rotor's rate as the model has it, low-passed",
+    better=("current", "the power drawn before, the recorded current squared, low-passed"),
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Heating:
     """No thermometer: T (1 - h Theta), Theta' = (power - Theta)/tau, power as V^4 or I^2; magnets follow later."""
@@ -31,6 +40,15 @@ class Heating:
     physics: ClassVar[str] = "winding and magnets warm up under load"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time",)
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        seen_by=THERMOMETER,
+        proxy=POWER,
+        shown_over="time",
+        shown_as="gain",
+        told_by=((THERMOMETER, "the motor temperature"),),
+        revealed_by="a long load, a rest of minutes, the same load again; the motor's temperature",
+    )
     form: Literal["winding", "magnet"] = "winding"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -73,6 +91,14 @@ class MeasuredHeating:
     physics: ClassVar[str] = "winding and magnets warm up under load"
     needs: ClassVar[tuple[str, ...]] = (THERMOMETER,)
     covariates: ClassVar[tuple[str, ...]] = (THERMOMETER, "time")
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        seen_by=THERMOMETER,
+        shown_over="time",
+        shown_as="gain",
+        told_by=((THERMOMETER, "the motor temperature"),),
+        revealed_by="a long load, a rest of minutes, the same load again; the motor's temperature",
+    )
     form: Literal["measured_winding", "measured_magnet"] = "measured_winding"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import play
 
@@ -19,6 +20,9 @@ class Hysteresis:
     physics: ClassVar[str] = "friction or play in the load path"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("previous_voltage", "direction_of_change")
+    traits: ClassVar[Traits] = Traits(
+        moving=True, shown_as="turn", revealed_by="slow triangles, up and down through the same levels"
+    )
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

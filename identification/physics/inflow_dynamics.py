@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import lag, lowpass
 
@@ -24,6 +25,13 @@ class InflowDynamics:
     physics: ClassVar[str] = "the water in the duct must be accelerated first, so thrust overshoots"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        delays=True,
+        shown_over="time_since_step",
+        shown_as="step",
+        revealed_by="steps of several sizes: overshoot that scales with the flow, not with the rotor",
+    )
     form: Literal["", "momentum"] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 
 
@@ -18,6 +19,7 @@ class LinearTerm:
     physics: ClassVar[str] = "thrust has a part in proportion to the voltage"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    traits: ClassVar[Traits] = Traits(revealed_by="small and medium levels of both signs")
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

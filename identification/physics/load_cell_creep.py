@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar, Literal
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 
@@ -19,6 +20,12 @@ class LoadCellCreep:
     physics: ClassVar[str] = "the load cell creeps under load"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time_since_step", "time")
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        shown_over="time_since_step",
+        shown_as="step",
+        revealed_by="a rest after a long load: creep goes on there",
+    )
     form: Literal["one_constant", "two_constants"] = "one_constant"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 
 
@@ -20,6 +21,9 @@ class LoadCellNonlinearity:
     physics: ClassVar[str] = "the load cell is not straight"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("thrust",)
+    traits: ClassVar[Traits] = Traits(
+        told_by=(("", "dead weights on the cell"),), revealed_by="dead weights on the load cell"
+    )
     form: Literal["quadratic", "cubic"] = "quadratic"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -10,6 +10,7 @@ from scipy.special import ndtr
 
 from identification.physics.soft_limit import limited, slope_at
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.history import TAIL, History
 
@@ -49,7 +50,17 @@ class LoadCellSaturation:
     physics: ClassVar[str] = "the load cell or its amplifier clips"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("thrust",)
+    traits: ClassVar[Traits] = Traits(
+        limits="reading",
+        told_by=(("", "dead weights on the cell"),),
+        revealed_by="current or rotation rate at the highest levels: they go on rising",
+    )
     form: Literal["hard", "knee"] = "hard"
+
+    @property
+    def sharp(self) -> bool:
+        """Whether readings end at one value, and not over a knee."""
+        return self.form == "hard"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         most = 1.3 * scale.reading

@@ -5,11 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-import numpy as np
-
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Dynamics, Traits
 from identification.recording import Floats
 
+AT_ONCE = 1e-6
+"""s: a rotor that is quicker follows at once."""
+SLOWEST = 1e-3
+"""Of the time constant's inverse: the least rate of following, of a rotor that hardly turns."""
 NEARLY_LINEAR = 0.9
 """Linear share from which a lag is told as one that is the same at all levels."""
 
@@ -20,10 +23,10 @@ def torques(form: str, theta: tuple[float, ...], largest: float) -> tuple[float,
     return (1 - linear) / (2 * theta[0] * largest), linear / theta[0]
 
 
-def rate_at(form: str, theta: tuple[float, ...], level: Floats, largest: float) -> Floats:
-    """1/s at which small changes about a level (any shape) are followed."""
-    quadratic, linear = torques(form, theta, largest)
-    return np.maximum(2 * quadratic * np.abs(level) + linear, 1e-3 / theta[0])
+def _dynamics(term: MotorLag, theta: tuple[float, ...], largest: float) -> Dynamics:
+    if theta[0] <= AT_ONCE:
+        return Dynamics()
+    return Dynamics(rotor=torques(term.form, theta, largest), slowest=SLOWEST / theta[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,6 +41,15 @@ class MotorLag:
     physics: ClassVar[str] = "the rotor needs time to follow"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        delays=True,
+        dynamics=_dynamics,
+        shown_over="time_since_step",
+        shown_as="step",
+        told_by=(("rotation_rate", "the measured rotation rate"),),
+        revealed_by="small and large steps, sampled fast; the measured rotation rate",
+    )
     form: Literal["first_order", "quadratic", "mixed"] = "first_order"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -52,8 +64,7 @@ class MotorLag:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        tau = theta[0]
-        if tau <= 1e-6:
+        if theta[0] <= AT_ONCE:
             return value
         return now.run.followed(value, torques(self.form, theta, now.scale.driver))
 

@@ -11,8 +11,13 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
+
+JET = "the rotor's rate as the model has it, low-passed"
+INSTEAD = {"rate": JET, "thrust": "the root of the thrust, low-passed", "circuit": f"{JET} twice"}
+"""Of the flow, where none was recorded."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +30,17 @@ class Recirculation:
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time_since_step", "time")
     form: Literal["rate", "thrust", "circuit"] = "rate"
+
+    @property
+    def traits(self) -> Traits:
+        proxy = Proxy("flow_speed", "no flow was recorded", INSTEAD[self.form])
+        return Traits(
+            moving=True,
+            proxy=proxy,
+            shown_over="time_since_step",
+            shown_as="gain",
+            revealed_by="long levels in alternating directions, with rests for the water to calm",
+        )
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (

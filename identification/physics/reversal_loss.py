@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import since_opposite
 from identification.run_history.history import TURNING
@@ -22,6 +23,12 @@ class ReversalLoss:
     physics: ClassVar[str] = "after a reversal the propeller works in its own wake"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time_since_reversal", "time_since_step")
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        shown_over="time_since_reversal",
+        shown_as="gain",
+        revealed_by="the same step with and without a change of sign before it",
+    )
     form: Literal["wake", "step"] = "wake"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -5,30 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-import numpy as np
-
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
-from identification.run_history.filters import reconstructed
-from identification.run_history.rate_gap import running, without_ticks
-from identification.run_history.remembered import RememberedRun
-
-
-def slip(run: RememberedRun, x: Floats, k: float) -> Floats:
-    """(M,) measured rate / k minus x, without the noise of the rate."""
-    history = run.history
-    rows = history.rate_rows
-    if history.rate is None or history.rate_sampled is None or rows.size < 2:
-        return np.zeros_like(x)
-    there = reconstructed(x, history.middle, history.rate_sampled)[rows]
-    gap = without_ticks(history.rate[rows] / k - there, history)
-    if run.rate_gap is not None:
-        return run.rate_gap.calmed(gap, history)
-    amount, share = running(gap, np.ones_like(gap)), running(gap, there)
-    by_share = share.error < amount.error
-    found = share if by_share else amount
-    out: Floats = np.interp(history.middle, history.rate_sampled[rows], found.coefficient)
-    return x * out if by_share else out
+from identification.run_history.slip import slip
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +20,12 @@ class RotationCoupling:
     physics: ClassVar[str] = "thrust follows the measured rotation rate, and the rate does not follow the command"
     needs: ClassVar[tuple[str, ...]] = ("rotation_rate",)
     covariates: ClassVar[tuple[str, ...]] = ("rotation_rate",)
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        shown_over="rotation_rate",
+        told_by=(("rotation_rate", "the measured rotation rate"),),
+        revealed_by="the same command at another load or supply, the rotation rate measured",
+    )
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

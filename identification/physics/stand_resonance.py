@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Dynamics, Traits
 from identification.recording import Floats
 from identification.run_history.filters import resonant
 
@@ -15,6 +16,10 @@ TRIED = 18
 """Frequencies to look for it with."""
 HIGHEST = 300.0
 """Hz: what rings faster is not seen by a load cell."""
+
+
+def _dynamics(_term: StandResonance, theta: tuple[float, ...], _largest: float) -> Dynamics:
+    return Dynamics(ring=(theta[0], theta[1], theta[2]))
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +31,16 @@ class StandResonance:
     physics: ClassVar[str] = "the stand rings after a step"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        delays=True,
+        from_data=True,
+        frequency="frequency",
+        dynamics=_dynamics,
+        shown_over="time_since_step",
+        shown_as="step",
+        revealed_by="a spectrum of the ringing after a step, at two levels",
+    )
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 
 
@@ -20,6 +21,11 @@ class StrutDrag:
     physics: ClassVar[str] = "the flow pushes on the mounting"
     needs: ClassVar[tuple[str, ...]] = ("flow_speed",)
     covariates: ClassVar[tuple[str, ...]] = ("flow_speed",)
+    traits: ClassVar[Traits] = Traits(
+        shown_over="flow_speed",
+        told_by=(("", "other flow speeds, recorded"),),
+        revealed_by="flow with the propeller at rest",
+    )
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -8,8 +8,12 @@ from typing import ClassVar
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
+
+UNKNOWN = "no bus voltage was recorded"
+OTHER_SUPPLY = (("", "another supply voltage at the same levels"),)
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,6 +25,13 @@ class SupplySag:
     physics: ClassVar[str] = "the command is a fraction of a supply voltage that moves"
     needs: ClassVar[tuple[str, ...]] = ("bus_voltage",)
     covariates: ClassVar[tuple[str, ...]] = ("bus_voltage",)
+    traits: ClassVar[Traits] = Traits(
+        seen_by="bus_voltage",
+        shown_over="bus_voltage",
+        shown_as="gain",
+        told_by=OTHER_SUPPLY,
+        revealed_by="the same level at another supply voltage",
+    )
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -54,6 +65,13 @@ class Buffered:
     physics: ClassVar[str] = "the command is a fraction of a buffered supply voltage that moves"
     needs: ClassVar[tuple[str, ...]] = ("bus_voltage",)
     covariates: ClassVar[tuple[str, ...]] = ("bus_voltage",)
+    traits: ClassVar[Traits] = Traits(
+        seen_by="bus_voltage",
+        shown_over="bus_voltage",
+        shown_as="gain",
+        told_by=OTHER_SUPPLY,
+        revealed_by="the same level at another supply voltage",
+    )
     form: ClassVar[str] = "buffered"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -87,6 +105,15 @@ class Discharge:
     physics: ClassVar[str] = "the supply falls as it is drawn on"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time",)
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        seen_by="bus_voltage",
+        proxy=Proxy("bus_voltage", UNKNOWN, "the energy drawn so far, |V|^3 over time,"),
+        shown_over="bus_voltage",
+        shown_as="gain",
+        told_by=OTHER_SUPPLY,
+        revealed_by="the same level at another supply voltage",
+    )
     form: ClassVar[str] = "discharge"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -120,6 +147,15 @@ class Loaded:
     physics: ClassVar[str] = "the supply gives way to the load"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        seen_by="bus_voltage",
+        proxy=Proxy("bus_voltage", UNKNOWN, "the power drawn, |V|^3,"),
+        shown_over="bus_voltage",
+        shown_as="gain",
+        told_by=OTHER_SUPPLY,
+        revealed_by="the same level at another supply voltage",
+    )
     form: ClassVar[str] = "loaded"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

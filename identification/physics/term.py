@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.history import History
 from identification.run_history.remembered import RememberedRun
@@ -100,6 +101,10 @@ class Term(Protocol):
     @property
     def covariates(self) -> tuple[str, ...]:
         """Covariates over which its shape can be tested against a free form."""
+
+    @property
+    def traits(self) -> Traits:
+        """What an engine must know of it beside its prediction."""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         """In the order of theta; the first one is the amount."""

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 
 
@@ -20,6 +21,13 @@ class ThrusterInteraction:
     physics: ClassVar[str] = "a neighbouring thruster takes thrust when it runs"
     needs: ClassVar[tuple[str, ...]] = ("neighbour_thrust",)
     covariates: ClassVar[tuple[str, ...]] = ("neighbour_thrust",)
+    traits: ClassVar[Traits] = Traits(
+        neighbour=True,
+        shown_over="neighbour_thrust",
+        shown_as="gain",
+        told_by=(("", "the neighbour switched on and off at one level"),),
+        revealed_by="the neighbour switched on and off at one level",
+    )
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -8,11 +8,16 @@ from typing import ClassVar
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Dynamics, Traits
 from identification.recording import Floats
 from identification.run_history.filters import delayed
 
 FINER = tuple(np.geomspace(0.2, 5.0, 17).tolist())
 """Of a trial delay: from one trial to the next."""
+
+
+def _dynamics(_term: TimeSkew, theta: tuple[float, ...], _largest: float) -> Dynamics:
+    return Dynamics(delay=theta[0])
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +29,17 @@ class TimeSkew:
     physics: ClassVar[str] = "force and command are not on one clock"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        delays=True,
+        own_clock=True,
+        delay="delay",
+        dynamics=_dynamics,
+        shown_over="time_since_step",
+        shown_as="step",
+        told_by=(("rotation_rate", "the measured rotation rate"),),
+        revealed_by="small and large steps, sampled fast: a delay keeps the shape of the step",
+    )
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 
 TORQUE = "torque"
@@ -24,6 +25,13 @@ class TorqueCrosstalk:
     physics: ClassVar[str] = "the cell feels the torque of the propeller"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage", "direction")
+    traits: ClassVar[Traits] = Traits(
+        even=True,
+        seen_by=TORQUE,
+        proxy=Proxy(TORQUE, "no torque was recorded", "the square of the rotor's rate as the model has it"),
+        told_by=((TORQUE, "the torque channel"), ("", "dead weights on the cell")),
+        revealed_by="dead weights on the load cell, or a torque channel",
+    )
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
@@ -63,6 +71,12 @@ class MeasuredTorque:
     physics: ClassVar[str] = "the cell feels the torque of the propeller"
     needs: ClassVar[tuple[str, ...]] = (TORQUE,)
     covariates: ClassVar[tuple[str, ...]] = (TORQUE,)
+    traits: ClassVar[Traits] = Traits(
+        even=True,
+        seen_by=TORQUE,
+        told_by=((TORQUE, "the torque channel"), ("", "dead weights on the cell")),
+        revealed_by="dead weights on the load cell, with and without a moment",
+    )
     form: ClassVar[str] = "measured"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 
 
@@ -20,6 +21,10 @@ class WindingResistance:
     physics: ClassVar[str] = "voltage is lost in the winding as the current grows"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
+    traits: ClassVar[Traits] = Traits(
+        told_by=(("rotation_rate", "the measured rotation rate"), ("current", "the measured current")),
+        revealed_by="the measured rotation rate or current at high levels",
+    )
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

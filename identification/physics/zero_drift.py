@@ -8,6 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 
 
@@ -20,6 +21,13 @@ class ZeroDrift:
     physics: ClassVar[str] = "the zero of the cell drifts"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time",)
+    traits: ClassVar[Traits] = Traits(
+        moving=True,
+        own_clock=True,
+        one_shape=True,
+        shown_over="time",
+        revealed_by="rests again and again: a zero that moves shows there, a gain does not",
+    )
     form: Literal["linear", "exponential"] = "linear"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

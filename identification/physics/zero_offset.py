@@ -8,6 +8,7 @@ from typing import ClassVar
 import numpy as np
 
 from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.traits import Traits
 from identification.recording import Floats
 
 
@@ -20,6 +21,7 @@ class ZeroOffset:
     physics: ClassVar[str] = "the zero of the cell jumped between two tares"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time",)
+    traits: ClassVar[Traits] = Traits(moving=True, own_clock=True, instant="at", revealed_by="rests before and after")
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

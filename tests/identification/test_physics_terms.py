@@ -1,9 +1,11 @@
 """Every textbook form: absent at its neutral amount, seen at its trials, bounded, told in one sentence; and the
 filters behind them against solvers that know nothing of them."""
 
+import ast
 import re
 from dataclasses import replace
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,10 +17,10 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.predictor import predict
 from identification.physics.catalogue import CATALOGUE
-from identification.physics.rotation_coupling import slip
 from identification.physics.term import STAGES
 from identification.run_history import filters
 from identification.run_history.remembered import RememberedRun
+from identification.run_history.slip import slip
 
 H = history()
 S = scale(H)
@@ -653,3 +655,22 @@ def test_what_is_remembered_is_what_is_computed():
         again, _ = predicted([lag, clip], [(tau,), (limit,)], old, S, C, tare)
         first, _ = predicted([lag, clip], [(tau,), (limit,)], fresh, S, C, tare)
         assert np.array_equal(again, first)
+
+
+def test_the_engine_names_no_effect():
+    """Groups of effects are traits of the terms: adding one is its file, its page, its line in the catalogue."""
+    ids = {term.id for term in CATALOGUE} - {"current"}
+    engine = Path(__file__).parents[2] / "identification" / "mismatch"
+    found = [
+        (path.name, node.value)
+        for path in engine.rglob("*.py")
+        if "vehicle" not in path.parts
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.Constant) and node.value in ids
+    ]
+    assert found == []
+    rooms = {term.__class__.__module__ for term in CATALOGUE}
+    reached = [
+        path.name for path in engine.rglob("*.py") if rooms & set(re.findall(r"from (\S+) import", path.read_text()))
+    ]
+    assert reached == []

@@ -9,7 +9,7 @@ import numpy as np
 
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.diagnosis import Finding
-from identification.mismatch.faults.channel_faults import Fault
+from identification.mismatch.faults.channel_faults import EFFECT, Fault
 from identification.mismatch.value import Value
 
 LEAST_P = 1e-300
@@ -19,7 +19,7 @@ LEAST_P = 1e-300
 def fault_finding(fault: Fault) -> Finding:
     values = {k: Value(v.value, v.std, v.unit) for k, v in fault.parameters.items()}
     p = max(fault.p_value, LEAST_P)
-    return Finding("channel_fault", fault.kind, fault.statement, values, p, -2 * float(np.log(p)), 1.0, ())
+    return Finding(EFFECT, fault.kind, fault.statement, values, p, -2 * float(np.log(p)), 1.0, ())
 
 
 def with_channels(draft: Draft, faults: Sequence[Fault], recordings: Sequence[str]) -> Draft:

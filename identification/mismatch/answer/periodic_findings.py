@@ -10,11 +10,10 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.diagnosis import Finding, Mismatch, RivalFinding
-from identification.mismatch.periodic.periodic_disturbances import Line
+from identification.mismatch.periodic.periodic_disturbances import EFFECT, Line
 from identification.mismatch.value import Value, Where
 from identification.twin import Twin, TwinLine
 
-EFFECT = "periodic_disturbance"
 LEAST_P = 1e-300
 """Smallest p-value that is written: 0 has no logarithm for those who draw it."""
 

@@ -2,47 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Sequence
 
 from identification.mismatch.diagnosis import Finding
 from identification.mismatch.model.model import Model
 from identification.mismatch.prepare.channels import neighbour_of
+from identification.physics.catalogue import traits_of
+from identification.physics.traits import Proxy
 from identification.recording import Recording
 from identification.run_history.history import History
 
-
-@dataclass(frozen=True, slots=True)
-class Proxy:
-    """What one form of an effect takes in the place of a quantity."""
-
-    quantity: str
-    """Of recording-format.md; where it is recorded the form looks at it, or stands beside one that does."""
-    lacks: str
-    instead: str
-
-
-POWER = "the power drawn before, the fourth power of the rotor's rate as the model has it, low-passed"
-JET = "the rotor's rate as the model has it, low-passed"
-_TEMPERATURE = Proxy("motor_temperature", "no motor temperature was recorded", POWER)
-_FLOW = Proxy("flow_speed", "no flow was recorded", JET)
-_RATE = Proxy("rotation_rate", "no rotation rate was recorded", "the voltage, as the steady rate that goes with it,")
-_TORQUE = Proxy("torque", "no torque was recorded", "the square of the rotor's rate as the model has it")
-_BUS = "no bus voltage was recorded"
-PROXIES: Mapping[tuple[str, str], Proxy] = {
-    ("heating", "winding"): _TEMPERATURE,
-    ("heating", "magnet"): _TEMPERATURE,
-    ("supply_sag", "discharge"): Proxy("bus_voltage", _BUS, "the energy drawn so far, |V|^3 over time,"),
-    ("supply_sag", "loaded"): Proxy("bus_voltage", _BUS, "the power drawn, |V|^3,"),
-    ("recirculation", "rate"): _FLOW,
-    ("recirculation", "thrust"): Proxy("flow_speed", _FLOW.lacks, "the root of the thrust, low-passed"),
-    ("recirculation", "circuit"): Proxy("flow_speed", _FLOW.lacks, f"{JET} twice"),
-    ("cavitation", "linear"): _RATE,
-    ("cavitation", "square"): _RATE,
-    ("torque_crosstalk", ""): _TORQUE,
-}
-"""By effect and form."""
-CURRENT = "the power drawn before, the recorded current squared, low-passed"
 TURNS = "periods_per_volt_second"
 """Parameter of a line that is locked to the integral of the voltage."""
 
@@ -57,14 +26,13 @@ def proxies(
     used = [(term.id, term.form) for term in (*(g.term for g in model.given), *model.terms)]
     used += [(f.effect, f.form) for f in findings] + [(r.effect, r.form) for f in findings for r in f.rivals]
     have = {histories[0].driver_quantity}.union(set.intersection(*(set(h.others) for h in histories)))
-    out = [_said(effect, proxy, have) for effect, form in used if (proxy := PROXIES.get((effect, form))) is not None]
-    effects = {effect for effect, _ in used}
-    if "thruster_interaction" in effects and _by_command(recordings):
-        out.append("thruster_interaction: the neighbour's thrust was not recorded; V|V| of its command stands for it.")
-    if any(TURNS in f.parameters for f in findings):
-        out.append(
-            "periodic_disturbance: no rotation rate was recorded; the integral of |V| stands for the rotor's turns."
-        )
+    known = [(effect, traits) for effect, form in used if (traits := traits_of(effect, form)) is not None]
+    out = [_said(effect, traits.proxy, have) for effect, traits in known if traits.proxy is not None]
+    if _by_command(recordings):
+        instead = "the neighbour's thrust was not recorded; V|V| of its command stands for it."
+        out += [f"{effect}: {instead}" for effect, traits in known if traits.neighbour]
+    by_volts = (f.effect for f in findings if TURNS in f.parameters)
+    out += [f"{e}: no rotation rate was recorded; the integral of |V| stands for the rotor's turns." for e in by_volts]
     return tuple(dict.fromkeys(text for text in out if text))
 
 
@@ -72,7 +40,8 @@ def _said(effect: str, proxy: Proxy, have: Collection[str]) -> str:
     """Empty where the quantity was recorded."""
     if proxy.quantity in have:
         return ""
-    instead = CURRENT if effect == "heating" and "current" in have else proxy.instead
+    quantity, better = proxy.better or ("", "")
+    instead = better if quantity in have else proxy.instead
     return f"{effect}: {proxy.lacks}; {instead} stands for it."
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,35 +16,13 @@ from numpy.typing import NDArray
 from identification.mismatch import policy
 from identification.mismatch.compare.reported_runs import Run
 from identification.mismatch.diagnosis import Finding
+from identification.physics.catalogue import traits_of
+from identification.physics.traits import SignatureKind
 from identification.recording import Floats
 
-Kind = Literal["force", "gain", "step", "turn"]
-"""What is averaged in a bin: the residual itself / N; its share of the thrust; its share of the last change of thrust;
-the residual towards the last change of the driver / N (half the width of a loop)."""
+Kind = SignatureKind
 SPREAD_OUT = frozenset({"time_since_step", "time_since_reversal"})
 """Coordinates with a logarithmic scale."""
-SIGNATURES: Mapping[str, tuple[str, Kind]] = {
-    "heating": ("time", "gain"),
-    "recirculation": ("time_since_step", "gain"),
-    "zero_drift": ("time", "force"),
-    "load_cell_creep": ("time_since_step", "step"),
-    "load_cell_nonlinearity": ("driver", "force"),
-    "load_cell_saturation": ("driver", "force"),
-    "motor_lag": ("time_since_step", "step"),
-    "inflow_dynamics": ("time_since_step", "step"),
-    "stand_resonance": ("time_since_step", "step"),
-    "time_skew": ("time_since_step", "step"),
-    "reversal_loss": ("time_since_reversal", "gain"),
-    "hysteresis": ("driver", "turn"),
-    "supply_sag": ("bus_voltage", "gain"),
-    "rotation_coupling": ("rotation_rate", "force"),
-    "speed_of_advance": ("flow_speed", "gain"),
-    "strut_drag": ("flow_speed", "force"),
-    "thruster_interaction": ("neighbour_thrust", "gain"),
-}
-"""Where an effect is best seen; over the driver, as a force, when it is not here."""
-NOWHERE = frozenset({"periodic_disturbance", "channel_fault", "thrust_constant"})
-"""Effects that no covariate of these shows: a line of a spectrum, a channel that lies, another C."""
 SHAPES: Mapping[str, Kind] = {"driver": "force", "time_since_step": "step", "direction": "force", "thrust": "force"}
 """What is averaged over a covariate where no effect says it; a share of the thrust when it is not here."""
 LEVELS = 24
@@ -85,10 +62,11 @@ class Profile:
 
 
 def signature(runs: Sequence[Run], finding: Finding) -> Signature | None:
-    """Of one finding; None where its covariate does not move enough to be seen."""
-    if finding.effect in NOWHERE:
+    """Of one finding; None where its covariate does not move enough to be seen, or none shows it (a line, a fault)."""
+    traits = traits_of(finding.effect, finding.form)
+    if traits is None:
         return None
-    quantity, kind = SIGNATURES.get(finding.effect, ("driver", "force"))
+    quantity, kind = traits.shown_over, traits.shown_as
     if not all(quantity in run.covariates for run in runs):
         quantity = "time" if kind == "gain" else "driver"
     key = finding.effect, finding.form

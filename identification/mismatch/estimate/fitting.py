@@ -28,7 +28,6 @@ LEAST_REACH = 0.05
 """sigma: a parameter that changes less within its bounds is left where it is."""
 SLOW_FALLS = 3.0
 """Further falls of the last size that a fit may be short of what is hoped for."""
-DELAYING = frozenset({"motor_lag", "time_skew", "stand_resonance", "inflow_dynamics"})
 CLOSE = 1e-4
 """Fall of chi-square at which a fit has ended; a difference of 1 is one sigma."""
 
@@ -95,7 +94,7 @@ def bounds_of(model: Model, data: Data, theta: Theta) -> tuple[Floats, Floats, F
     """(low, high, step) of the whole vector."""
     scale, at = data.scale, model.layout(theta)
     known = [p for group in parameters(model, scale) for p in group]
-    most = 0.0 if any(term.id == "time_skew" for term in model.terms) else data.most_shift
+    most = 0.0 if any(term.traits.delay for term in model.terms) else data.most_shift
     low, high, step = np.full(at.size, -np.inf), np.full(at.size, np.inf), np.empty(at.size)
     low[at.of_terms], high[at.of_terms] = [p.low for p in known], [p.high for p in known]
     low[at.shift], high[at.shift] = -most, most
@@ -220,7 +219,7 @@ def fit(
         return found
     alike = replace(found.theta, shift=0.0, rate_shift=0.0)
     doubtful = shift > policy.estimate.DOUBTFUL_CLOCK_SHIFT * data.most_shift > 0 and any(
-        term.id in DELAYING for term in model.terms
+        term.traits.delays for term in model.terms
     )
     if not doubtful:
         left = residual_of(model, alike, data, weights)

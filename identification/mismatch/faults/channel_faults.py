@@ -31,6 +31,8 @@ from identification.mismatch.faults.swaps import swapped_voltages, swaps
 from identification.mismatch.value import Value
 from identification.recording import Channel, Recording
 
+EFFECT = "channel_fault"
+"""Its id: it has no term, for a channel that lies is put right before any physics."""
 Kind = Literal["swapped", "rescaled", "reversed", "frozen", "unsigned", "nan"]
 
 

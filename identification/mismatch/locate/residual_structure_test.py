@@ -136,7 +136,12 @@ def _jump(time: Covariate, fit: Fit, residual: Floats, data: Data, weights: Weig
     Taken for one only where it is plainly no noise.
     """
     when, score = jumps(residual, data, weights, basis)
-    known = [v[1] for t, v in fit.values.items() if t.id == "zero_offset"]
+    known = [
+        value
+        for term, values in fit.values.items()
+        for p, value in zip(term.parameters(data.scale), values, strict=True)
+        if p.name == term.traits.instant
+    ]
     new = np.all([np.abs(when - at) > policy.select.JUMPS_APART * data.scale.duration for at in known], axis=0)
     when, score = (when[new], score[new]) if known else (when, score)
     if not score.size:

@@ -92,4 +92,4 @@ class Data:
 
 def price(term: Term, data: Data) -> int:
     """Parameters that a term adds: a delay takes the place of the small one that the clocks are allowed."""
-    return len(term.parameters(data.scale)) - int(term.id == "time_skew" and data.most_shift > 0)
+    return len(term.parameters(data.scale)) - int(bool(term.traits.delay) and data.most_shift > 0)

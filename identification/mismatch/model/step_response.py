@@ -7,14 +7,12 @@ import numpy as np
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model, acting
 from identification.mismatch.model.parameters import Theta
-from identification.physics.motor_lag import MotorLag, rate_at
 from identification.physics.term import Scale, Term
+from identification.physics.traits import Dynamics
 from identification.recording import Floats
 from identification.run_history.filters import lowpass, resonant
 from identification.run_history.step_response_rows import TickRows
 
-DYNAMIC = ("motor_lag", "stand_resonance", "time_skew")
-"""What shows within a few ticks."""
 Acting = tuple[Term, tuple[float, ...], Scale]
 
 
@@ -27,7 +25,7 @@ def ticked(model: Model, theta: Theta, data: Data) -> list[Floats]:
 def told(rows: TickRows, acting: list[Acting], C: float, shift: float) -> Floats:
     """The rows as a model foretells them."""
     terms = _dynamic(acting)
-    late = shift + sum(values[0] for term, values, _ in terms if term.id == "time_skew")
+    late = shift + sum(_acting(each).delay for each in terms)
     return rows.kept((C, *_key(terms, shift)), lambda: rows.predicted(C, held_back(rows, terms, shift), late))
 
 
@@ -43,7 +41,14 @@ def held_back(rows: TickRows, acting: list[Acting], shift: float) -> Floats:
 
 
 def _dynamic(acting: list[Acting]) -> list[Acting]:
-    return [each for each in acting if each[0].id in DYNAMIC]
+    """Those that show within a few ticks."""
+    return [each for each in acting if each[0].traits.dynamics is not None]
+
+
+def _acting(each: Acting) -> Dynamics:
+    term, values, sizes = each
+    assert term.traits.dynamics is not None
+    return term.traits.dynamics(term, values, sizes.driver)
 
 
 def _key(terms: list[Acting], shift: float) -> tuple[object, ...]:
@@ -51,25 +56,28 @@ def _key(terms: list[Acting], shift: float) -> tuple[object, ...]:
 
 
 def _held_back(rows: TickRows, terms: list[Acting], shift: float) -> Floats:
-    levels = rows.levels if any(term.id == "motor_lag" for term, _, _ in terms) else rows.levels[:1]
+    known = [_acting(each) for each in terms]
+    levels = rows.levels if any(each.rotor is not None for each in known) else rows.levels[:1]
     after = rows.after
     dt = np.full(after.size, 2 * after[0])
-    back = 1 - np.mean([_later(_response(terms, level, dt, after), after, shift) for level in levels], axis=0)
+    back = 1 - np.mean([_later(_response(known, level, dt, after), after, shift) for level in levels], axis=0)
     # what is not over yet goes on smoothly, and the means have it: without this it would seem to end in a jump
     u = after / rows.nodes[-1]
     out: Floats = rows.hats @ (back - back[-1] * u**2 * (3 - 2 * u))
     return out
 
 
-def _response(terms: list[Acting], level: Floats, dt: Floats, after: Floats) -> Floats:
+def _response(known: list[Dynamics], level: float, dt: Floats, after: Floats) -> Floats:
     s = np.ones(dt.size)
-    for term, values, sizes in terms:
-        if isinstance(term, MotorLag) and values[0] > 1e-6:
-            s = lowpass(s, dt, float(1 / rate_at(term.form, values, level, sizes.driver)))[1]
-        elif term.id == "stand_resonance":
-            s = s + values[0] * (resonant(s, dt, values[1], values[2]) - s)
-        elif term.id == "time_skew":
-            s = _later(s, after, values[0])
+    for each in known:
+        if each.rotor is not None:
+            quadratic, linear = each.rotor
+            s = lowpass(s, dt, 1 / max(2 * quadratic * abs(level) + linear, each.slowest))[1]
+        elif each.ring is not None:
+            compliance, frequency, damping = each.ring
+            s = s + compliance * (resonant(s, dt, frequency, damping) - s)
+        elif each.delay:
+            s = _later(s, after, each.delay)
     return s
 
 

@@ -6,15 +6,14 @@ What a screening or a fit asks for again is remembered with the run.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import cast
 
 import numpy as np
 
 from identification.mismatch import policy
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
-from identification.physics.command_saturation import CommandSaturation
-from identification.physics.load_cell_saturation import LoadCellSaturation
-from identification.physics.motor_lag import MotorLag, torques
+from identification.physics.traits import Dynamics, LimitsCommand, LimitsReading
 from identification.recording import Floats
 from identification.run_history.filters import delayed, reconstructed
 from identification.run_history.history import History
@@ -25,7 +24,7 @@ from identification.run_history.sub_interval_leads import curvature, each_lead, 
 
 def delay_of(model: Model, theta: Theta) -> float:
     """Time in s by which the force comes after the driver."""
-    return sum(v[0] for t, v in zip(model.terms, theta.terms, strict=True) if t.id == "time_skew")
+    return sum(each.delay for each in _dynamics(model, theta, 1.0))
 
 
 def ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: float, late: float) -> Floats:
@@ -80,16 +79,16 @@ def sample_lead(model: Model, theta: Theta, run: RememberedRun, rate: Floats, la
 def passed_on(model: Model, theta: Theta, history: History) -> Floats | float:
     """(M,) or 1: the share of what the command does within an interval that the drive gives the rotor."""
     for term, values in zip(model.terms, theta.terms, strict=True):
-        if isinstance(term, CommandSaturation):
-            return term.passed(history, values)
+        if term.traits.limits == "command":
+            return cast(LimitsCommand, term).passed(history, values)
     return 1.0
 
 
 def shown(model: Model, theta: Theta, history: History, F: Floats, x: Floats, tare: float) -> Floats | float:
     """(M,) or 1: the share of what the force F (without tare) does within an interval that the cell shows."""
     for term, values in zip(model.terms, theta.terms, strict=True):
-        if isinstance(term, LoadCellSaturation):
-            return term.shown(history, theta.C, x, F + tare, values)
+        if term.traits.limits == "reading":
+            return cast(LimitsReading, term).shown(history, theta.C, x, F + tare, values)
     return 1.0
 
 
@@ -151,14 +150,15 @@ def _size(history: History, passed: Passed) -> float:
 
 def _rotor(model: Model, theta: Theta, largest: float) -> tuple[float, float] | None:
     """Coefficients of a rotor that does not follow at once."""
-    for term, values in zip(model.terms, theta.terms, strict=True):
-        if isinstance(term, MotorLag) and values[0] > 1e-6:
-            return torques(term.form, values, largest)
-    return None
+    return next((each.rotor for each in _dynamics(model, theta, largest) if each.rotor is not None), None)
 
 
 def _ring(model: Model, theta: Theta) -> tuple[float, float, float] | None:
-    for term, values in zip(model.terms, theta.terms, strict=True):
-        if term.id == "stand_resonance" and values[0] > 0:
-            return values[0], values[1], values[2]
-    return None
+    rings = (each.ring for each in _dynamics(model, theta, 1.0))
+    return next((ring for ring in rings if ring is not None and ring[0] > 0), None)
+
+
+def _dynamics(model: Model, theta: Theta, largest: float) -> list[Dynamics]:
+    """Of the terms that have such."""
+    every = zip(model.terms, theta.terms, strict=True)
+    return [term.traits.dynamics(term, values, largest) for term, values in every if term.traits.dynamics is not None]

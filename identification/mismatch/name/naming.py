@@ -92,7 +92,7 @@ def failed_checks(estimate: Estimate, term: Term, data: Data, many: int) -> tupl
 def _unseen(now: Fit, term: Term, data: Data) -> bool:
     """Ringing beyond half the sampling rate: between the samples it may be any other delay."""
     named = dict(zip((p.name for p in term.parameters(data.scale)), now.values[term], strict=True))
-    return term.id == "stand_resonance" and named["frequency"] > 0.5 / min(h.spacing for h in data.histories)
+    return bool(term.traits.frequency) and named[term.traits.frequency] > 0.5 / min(h.spacing for h in data.histories)
 
 
 def _cancelled(now: Fit, term: Term, change: list[Floats], data: Data) -> list[Term]:

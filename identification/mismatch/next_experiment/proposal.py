@@ -8,7 +8,7 @@ SWEEP_DECIDES or the budget is spent; then pieces that are not needed are left o
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from itertools import permutations
 
@@ -29,6 +29,7 @@ from identification.mismatch.next_experiment.predicted_response import (
     stretches,
 )
 from identification.mismatch.next_experiment.sweeps import REST, SHORT, Block, Limits, blocks, put_together
+from identification.physics.catalogue import traits_of
 from identification.recording import Floats
 
 MOST_RIVALS = 4
@@ -37,23 +38,6 @@ MOST_SHORTENED = 4
 """Blocks without which a sweep is tried."""
 TARGETS = (30.0, 60.0, 120.0, 400.0)
 """Expected chi-square between two rivals that is aimed at: raised while the probability is not SWEEP_DECIDES."""
-BEYOND: Mapping[str, tuple[tuple[str, str], ...]] = {
-    "torque_crosstalk": (("torque", "the torque channel"), ("", "dead weights on the cell")),
-    "load_cell_nonlinearity": (("", "dead weights on the cell"),),
-    "load_cell_saturation": (("", "dead weights on the cell"),),
-    "winding_resistance": (("rotation_rate", "the measured rotation rate"), ("current", "the measured current")),
-    "command_saturation": (("rotation_rate", "the measured rotation rate"),),
-    "rotation_coupling": (("rotation_rate", "the measured rotation rate"),),
-    "cavitation": (("rotation_rate", "the measured rotation rate"), ("", "another depth")),
-    "supply_sag": (("", "another supply voltage at the same levels"),),
-    "heating": (("motor_temperature", "the motor temperature"),),
-    "speed_of_advance": (("", "other flow speeds, recorded"),),
-    "strut_drag": (("", "other flow speeds, recorded"),),
-    "thruster_interaction": (("", "the neighbour switched on and off at one level"),),
-    "motor_lag": (("rotation_rate", "the measured rotation rate"),),
-    "time_skew": (("rotation_rate", "the measured rotation rate"),),
-}
-"""What else would tell an effect from others, when no sweep does: its quantity, if it is a channel, and its name."""
 
 
 def _utility(apart: Floats, target: float) -> Floats:
@@ -285,5 +269,6 @@ def _looked_at(bench: Bench, fits: Sequence[Fit], every: Sequence[Block]) -> Pie
 def _other_means(one: str, other: str, recorded: Collection[str]) -> str:
     """What else would tell two answers apart, but for channels that were `recorded` already."""
     ids = [effect for name in (one, other) for effect in name.split(" with ")]
-    means = [what for effect in ids for channel, what in BEYOND.get(effect, ()) if channel not in recorded]
+    traits = [found for effect in ids if (found := traits_of(effect)) is not None]
+    means = [what for each in traits for channel, what in each.told_by if channel not in recorded]
     return ", or ".join(dict.fromkeys(means)) if means else "a quieter cell or larger levels"

@@ -33,6 +33,8 @@ from identification.mismatch.periodic.spectrum import (
 from identification.mismatch.periodic.steady_segments import speed_of
 from identification.recording import Floats
 
+EFFECT = "periodic_disturbance"
+"""Its id: it has no term, for a line is found in the spectrum and taken out."""
 TRIED = 6
 """Peaks that are looked at before a spectrum holds no line."""
 MAINS = (50.0, 60.0)

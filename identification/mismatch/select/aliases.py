@@ -7,6 +7,7 @@ from identification.mismatch.estimate.estimate import Estimate, refresh
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import with_values
+from identification.physics.term import Term
 
 
 def within_samples(estimate: Estimate, data: Data) -> Estimate:
@@ -14,9 +15,17 @@ def within_samples(estimate: Estimate, data: Data) -> Estimate:
     limit = 0.5 / min(h.spacing for h in data.histories)
     now = estimate.fit
     for term, values in now.values.items():
-        if term.id == "stand_resonance" and limit < values[1] < 2 * limit:
-            slower = with_values(now.model, now.theta, term, (values[0], 2 * limit - values[1], values[2]))
-            found = fit(now.model, slower, data, estimate.weights)
-            if found.values[term][1] < limit and found.chi2 < now.chi2 + policy.select.ALIAS_LOSS:
+        at = _place(term, data)
+        if at is not None and limit < values[at] < 2 * limit:
+            mirrored = (*values[:at], 2 * limit - values[at], *values[at + 1 :])
+            found = fit(now.model, with_values(now.model, now.theta, term, mirrored), data, estimate.weights)
+            if found.values[term][at] < limit and found.chi2 < now.chi2 + policy.select.ALIAS_LOSS:
                 return refresh(found.model, found.theta, data, None, estimate)
     return estimate
+
+
+def _place(term: Term, data: Data) -> int | None:
+    """Of its frequency among its parameters."""
+    if not term.traits.frequency:
+        return None
+    return [p.name for p in term.parameters(data.scale)].index(term.traits.frequency)

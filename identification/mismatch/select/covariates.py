@@ -16,9 +16,9 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
-from identification.physics.rotation_coupling import slip
 from identification.recording import Floats
 from identification.run_history.filters import delayed, lowpass
+from identification.run_history.slip import slip
 
 MOST_HATS = 17
 """Hats over one covariate, at most: a shape with more would be noise."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 
 from identification.mismatch import policy
@@ -9,15 +11,16 @@ from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.noise.covariance import Noise
-from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.term import Term
+from identification.physics.traits import LimitsReading
 from identification.recording import Floats
 
 
 def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
     """Whether the readings scatter as ever where a load-cell saturation of the model says that they clip."""
-    if not isinstance(term, LoadCellSaturation):
+    if term.traits.limits != "reading":
         return False
+    cell = cast(LimitsReading, term)
     values = fitted.values[term]
     left = scatter = told = samples = 0.0
     for i, (h, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
@@ -28,9 +31,9 @@ def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
         variance = noise.white + noise.proportional * force**2 + sum(noise.slow) + sum(noise.band)
         for side in (1.0, -1.0):
             reached = np.minimum(side * first, side * last) + side * fitted.theta.tares[i]  # not on the way there
-            slope = term.slope(reached, values)
-            deep = (reached > term.start(values)) & (slope < policy.select.KNEE_SLOPE)
-            if term.form == "hard":
+            slope = cell.slope(reached, values)
+            deep = (reached > cell.start(values)) & (slope < policy.select.KNEE_SLOPE)
+            if cell.sharp:
                 deep &= reached > values[0] + policy.select.CLIPPED_DEPTH * np.sqrt(variance)
             count, beside = h.count[rows][deep].astype(np.float64), h.thrust[rows][deep] - shown[deep]
             if count.sum() > 1:

@@ -11,7 +11,7 @@ import numpy as np
 from identification.estimation.tails import chi2_isf
 from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
-from identification.mismatch.estimate.fitting import DELAYING, Fit, at_bound, fit
+from identification.mismatch.estimate.fitting import Fit, at_bound, fit
 from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
@@ -39,34 +39,8 @@ MOST_INSTANTS = 5
 """Trials of a jump that is hidden: which is the best depends on the noise, and each costs a search for variances."""
 INSTANTS_APART = 0.05
 """Of the run: trials of a jump that is hidden."""
-STEADY = frozenset({"zero_drift"})
-"""Terms of one shape, that no instant or place is looked for: they pay for themselves alone. On 336 clean recordings of
-six kinds of noise their largest gain was 11.3; of a drift that an oracle sees at 8 sigma half gain more than 15."""
-SOUGHT = frozenset({"stand_resonance"})
-"""Terms whose trials the data point to: they pay in full."""
 STATIC = ("command_voltage", "thrust")
 """Coordinates of the static curve."""
-TWINS = {"asymmetry", "torque_crosstalk"}
-"""The same curve in other words: never both, unless a torque was recorded."""
-MOVING = {
-    "motor_lag",
-    "inflow_dynamics",
-    "recirculation",
-    "heating",
-    "reversal_loss",
-    "stand_resonance",
-    "hysteresis",
-    "time_skew",
-    "load_cell_creep",
-    "zero_drift",
-    "zero_offset",
-    "rotation_coupling",
-}
-"""Not to be seen in a static table."""
-
-
-PROXIES = {"supply_sag": "bus_voltage", "heating": "motor_temperature", "torque_crosstalk": "torque"}
-"""Effects with forms that do without the channel that shows them; where it was recorded they must use it."""
 
 
 def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
@@ -77,16 +51,14 @@ def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
     static = any(h.static for h in data.histories)
     out = []
     for term in CATALOGUE:
-        if term.id in without or not set(term.needs) <= have or (static and term.id in MOVING):
+        if term.id in without or not set(term.needs) <= have or (static and term.traits.moving):
             continue
         if data.histories[0].driver_quantity == "rotation_rate" and term.stage in ("command", "rotor"):
             continue
-        if term.id == "speed_of_advance" and data.scale.flow <= 0:
+        if term.traits.flow and data.scale.flow <= 0:
             continue
-        if PROXIES.get(term.id, "") in have - set(term.needs):
+        if term.traits.seen_by in have - set(term.needs):
             continue
-        if term.id == "supply_sag" and static and not term.needs:
-            continue  # a table is of one supply voltage
         out.append(term)
     return tuple(out)
 
@@ -202,8 +174,8 @@ def _screened(estimate: Estimate, data: Data, terms: Sequence[Term], rng: np.ran
         for t in left
         if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < policy.select.STATIC_CURVE_TERMS
     ]
-    if ids & TWINS and data.scale.torque <= 0:
-        left = [t for t in left if t.id not in TWINS]
+    if data.scale.torque <= 0 and any(t.traits.even for t in inside):
+        left = [t for t in left if not t.traits.even]
     found = directions(estimate.fit, data, estimate.weights, left)
     changes = corrections(estimate.fit, data, estimate.weights)
     spared = allowed(changes, found.columns, policy.select.NEXT_TERM_SHAPE_ERROR)
@@ -248,7 +220,7 @@ def _hidden(estimate: Estimate, judged: Screening, data: Data) -> Estimate | Non
     likely = [
         (t, v)
         for rank, (t, v, z) in enumerate(judged.best(2 * MOST_HIDDEN))
-        if (rank < MOST_HIDDEN or t.id in STEADY)
+        if (rank < MOST_HIDDEN or t.traits.one_shape)
         and z > (policy.select.HIDDEN_SIGMA if SLOW_COVARIATES & set(t.covariates) else least)
     ]
     likely = [each for t, v in likely for each in ((t, at) for at in _instants(judged, t, data) or (v,))]
@@ -272,13 +244,14 @@ def _hidden(estimate: Estimate, judged: Screening, data: Data) -> Estimate | Non
 
 def _instants(judged: Screening, term: Term, data: Data) -> list[tuple[float, ...]]:
     """Of a jump in time the likeliest trials: which is the best depends on the noise, and that takes it for its own."""
-    if term.id != "zero_offset":
+    if not term.traits.instant:
         return []
+    place = [p.name for p in term.parameters(data.scale)].index(term.traits.instant)
     out: list[tuple[float, ...]] = []
     for j in np.argsort(-judged.plain):
         at = judged.directions.values[j]
         if judged.directions.terms[j] == term and all(
-            abs(at[1] - v[1]) > INSTANTS_APART * data.scale.duration for v in out
+            abs(at[place] - v[place]) > INSTANTS_APART * data.scale.duration for v in out
         ):
             out.append(at)
         if len(out) == MOST_INSTANTS:
@@ -288,26 +261,24 @@ def _instants(judged: Screening, term: Term, data: Data) -> list[tuple[float, ..
 
 def _asked_of_hidden(term: Term, judged: Screening, data: Data) -> float:
     """Gain in deviance from which a term that is told from noise by estimating both is believed."""
-    if term.id in STEADY:
+    if term.traits.one_shape:
         return chi2_isf(policy.select.STEADY_TERM_FALSE_ALARM, price(term, data))
-    share = (
-        1.0
-        if term.id in SOUGHT
-        else policy.select.HIDDEN_OFFSET_PRICE
-        if term.id == "zero_offset"
-        else policy.select.HIDDEN_TERM_PRICE
-    )
+    share = 1.0 if term.traits.from_data else _share_of_hidden(term)
     return float(judged.threshold**2 + share * price(term, data) * np.log(data.size))
+
+
+def _share_of_hidden(term: Term) -> float:
+    return float(policy.select.HIDDEN_OFFSET_PRICE if term.traits.instant else policy.select.HIDDEN_TERM_PRICE)
 
 
 def _candidates(judged: Screening, data: Data) -> list[tuple[Term, tuple[float, ...]]]:
     """The likeliest terms, and a few of those whose trials say little of what a fit would find: jumps between levels,
     of which no trial is near unless it is the right one, and what comes late where clocks that differ may hide it."""
     likely = {term: values for term, values, _ in judged.best(CANDIDATES)}
-    late = any(term.id in DELAYING for term in likely)
+    late = any(term.traits.delays for term in likely)
     most = len(likely) + MOST_MORE
     for term, values, z in judged.best(len(judged.directions.terms), share=0.0):
-        told = (late and term.id in DELAYING) or any(p.jumps for p in term.parameters(data.scale))
+        told = (late and term.traits.delays) or any(p.jumps for p in term.parameters(data.scale))
         if told and z > judged.threshold and len(likely) < most:
             likely.setdefault(term, values)
     return list(likely.items())

@@ -115,7 +115,7 @@ def refined(fit: Fit, data: Data, weights: Weights, term: Term, values: tuple[fl
     trials = term.finer(values, data.scale)
     if not trials:
         return values
-    if term.id == "time_skew":
+    if term.traits.delay:
         return _likeliest_delay(fit, data, weights, term, [values, *trials])
     found = directions(fit, data, weights, [term], trials)
     score = np.abs(found.columns.T @ fit.residual)
@@ -180,7 +180,7 @@ def directions(
         [np.column_stack(c) for c in rate if c],
         [np.column_stack(c) for c in ticks],
     )
-    late = np.array([term.id == "time_skew" for term in used])
+    late = np.array([bool(term.traits.delay) for term in used])
     before = lengths(columns)
     columns -= basis @ ((basis.T @ columns) * ~late)
     if late.any():
@@ -210,11 +210,11 @@ def _unit(found: Directions, before: Floats) -> Directions:
 def _trials(term: Term, fit: Fit, data: Data, weights: Weights, basis: Floats) -> list[tuple[float, ...]]:
     """The term's own; for a jump of the zero, for a delay and for ringing also those that the data point to."""
     found = list(term.trials(data.scale))
-    if term.id == "time_skew":  # ticks of a ramp meet the samples as before only when whole ones have passed
+    if term.traits.delay:  # ticks of a ramp meet the samples as before only when whole ones have passed
         found += [(k * tick,) for tick in {h.tick for h in data.histories if h.tick < SLOW_TICK} for k in TICKS]
-    if term.id == "zero_offset":
+    if term.traits.instant:
         found += [(found[0][0], at) for at in likeliest_jumps(fit, data, weights, basis, MOST_JUMPS)]
-    if term.id == "stand_resonance" and weights.ticks:
+    if term.traits.frequency and weights.ticks:
         found += likeliest_rings(fit, data, term, MOST_RINGS)
     return found
 

@@ -15,9 +15,6 @@ from identification.mismatch.validate.train_test_split import TrainTestSplit, be
 from identification.physics.term import Term
 from identification.run_history.history import History
 
-EVENTS = frozenset({"zero_offset", "zero_drift", "time_skew"})
-"""Of one run's own clocks: another run need not repeat them."""
-
 
 def worse_predicted(split: TrainTestSplit, terms: Collection[Term], *, same_run: bool) -> tuple[Term, ...]:
     """Of these terms those without which the model predicts what was not fitted better.
@@ -26,7 +23,7 @@ def worse_predicted(split: TrainTestSplit, terms: Collection[Term], *, same_run:
     why their errors must fall as well.
     """
     estimate, now = split.estimate, split.judge(split.estimate.fit)
-    asked = [t for t in estimate.fit.model.terms if t in terms and (same_run or t.id not in EVENTS)]
+    asked = [t for t in estimate.fit.model.terms if t in terms and (same_run or not t.traits.own_clock)]
     less = {t: split.judge(fit(*estimate.fit.less(t), split.data, estimate.weights)) for t in asked}
     most = np.inf if same_run else now.rmse
     return tuple(

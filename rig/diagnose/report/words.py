@@ -9,8 +9,9 @@ from math import isfinite
 from identification.mismatch.compare.signature import Kind
 from identification.mismatch.diagnosis import Diagnosis, Finding
 from identification.mismatch.value import Value, Where
+from identification.physics.catalogue import CATALOGUE
 from identification.thruster.thrust_report import digits
-from rig.diagnose.report.rivals import REVEALED_BY
+from rig.diagnose.report.rivals import WITHOUT_TERM
 from rig.report.style import prose, unit_text
 
 UNITS: Mapping[str, str] = {
@@ -43,7 +44,8 @@ KINDS: Mapping[Kind, tuple[str, float]] = {
 """Label of a signature's ordinate and its factor."""
 LOST = 100.0
 """Standard errors in units of the value from which a number is not determined."""
-_NAMES = re.compile(r"\b(" + "|".join(sorted((*UNITS, *REVEALED_BY), key=len, reverse=True)) + r")\b")
+EFFECTS = (*{term.id for term in CATALOGUE}, *WITHOUT_TERM)
+_NAMES = re.compile(r"\b(" + "|".join(sorted((*UNITS, *EFFECTS), key=len, reverse=True)) + r")\b")
 
 
 def words(text: str) -> str:

@@ -1,0 +1,106 @@
+"""What else is to be known of a term beside its prediction: an engine that reads it spells out no effect."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Literal, Protocol
+
+from identification.recording import Floats
+from identification.run_history.history import History
+
+SignatureKind = Literal["force", "gain", "step", "turn"]
+"""What is averaged where an effect is shown: the residual itself / N; its share of the thrust; its share of the last
+change of thrust; the residual towards the last change of the driver / N (half the width of a loop)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Dynamics:
+    """What a term does between the ticks of a command, which intervals are too long to show."""
+
+    rotor: tuple[float, float] | None = None
+    """Coefficients of n' = quadratic (w|w| - n|n|) + linear (w - n) in 1/(s unit of the driver) and 1/s."""
+    slowest: float = 0.0
+    """1/s, the least rate at which such a rotor follows a small change."""
+    ring: tuple[float, float, float] | None = None
+    """Compliance, frequency in Hz and damping of a stand that rings."""
+    delay: float = 0.0
+    """s by which the reading comes late."""
+
+
+@dataclass(frozen=True, slots=True)
+class Proxy:
+    """What a form takes in the place of a quantity that nobody recorded."""
+
+    quantity: str
+    """Of recording-format.md; where it is recorded the form looks at it, or stands beside one that does."""
+    lacks: str
+    instead: str
+    better: tuple[str, str] | None = None
+    """Another quantity, and what of it is taken where that one was recorded."""
+
+
+class LimitsCommand(Protocol):
+    """A term whose drive clips the command."""
+
+    def passed(self, history: History, theta: tuple[float, ...]) -> Floats:
+        """(M,) share of what the command does within each interval that the drive gives the rotor."""
+
+
+class LimitsReading(Protocol):
+    """A term whose cell or amplifier clips the reading."""
+
+    @property
+    def sharp(self) -> bool:
+        """Whether readings end at one value, and not over a knee."""
+
+    def shown(self, history: History, C: float, x: Floats, reading: Floats, theta: tuple[float, ...]) -> Floats:
+        """(M,) share of what the force does within each interval that the cell shows."""
+
+    def slope(self, reading: Floats, theta: tuple[float, ...]) -> Floats:
+        """What the cell would show of a small change where it reads `reading` N."""
+
+    def start(self, theta: tuple[float, ...]) -> float:
+        """N, where the cell begins to show less."""
+
+
+@dataclass(frozen=True, slots=True)
+class Traits:
+    """Of one effect in one form. Most have none."""
+
+    moving: bool = False
+    """It needs a course of time: it is not to be seen in a table of levels."""
+    delays: bool = False
+    """It comes late after a step: clocks that differ look alike."""
+    own_clock: bool = False
+    """It is of one run's own time: another run need not repeat it."""
+    one_shape: bool = False
+    """No instant, place or scale is looked for: it pays for itself alone."""
+    from_data: bool = False
+    """Some of its trials are where the data point to: it pays for all its parameters in full."""
+    delay: str = ""
+    """The parameter that is a delay of the reading: such a term takes the place of the nuisance shift of clocks."""
+    instant: str = ""
+    """The parameter that is an instant, anywhere in the run."""
+    frequency: str = ""
+    """The parameter that is a frequency in Hz: beyond half the sampling rate it has an alias below."""
+    even: bool = False
+    """Even in the drive: one curve in other words, with every other such term, unless a torque was recorded."""
+    flow: bool = False
+    """Water that never moves shows nothing of it."""
+    neighbour: bool = False
+    """It looks at a neighbour, of which the command stands in where its thrust was not recorded."""
+    seen_by: str = ""
+    """The quantity that shows the effect: forms that do without it are none where it was recorded."""
+    proxy: Proxy | None = None
+    limits: Literal["", "command", "reading"] = ""
+    """It clips: LimitsCommand or LimitsReading."""
+    dynamics: Callable[[Any, tuple[float, ...], float], Dynamics] | None = None
+    """Of the term, its values and the largest driver: what it does between ticks."""
+    shown_over: str = "driver"
+    """The covariate that shows it best in a picture."""
+    shown_as: SignatureKind = "force"
+    revealed_by: str = ""
+    """What would decide between it and another effect that explains a recording as well, as a clause."""
+    told_by: tuple[tuple[str, str], ...] = ()
+    """What else would tell it from others where no sweep does: (its quantity, if it is a channel; its name)."""
