@@ -44,7 +44,9 @@ def test_each_says_what_it_is():
 
 def test_each_is_read_and_none_is_read_that_is_not_there():
     read = {name for path in SOURCES for name in read_by(tree(path))}
-    assert read | {name for name in EVERY if name in read_by(tree(ENGINE / "policy" / "record" / "budget.py"))} == set(EVERY)
+    assert read | {name for name in EVERY if name in read_by(tree(ENGINE / "policy" / "record" / "budget.py"))} == set(
+        EVERY
+    )
 
 
 def test_none_is_read_before_it_decides():
