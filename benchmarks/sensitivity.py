@@ -36,12 +36,11 @@ from shutil import rmtree
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from rig.blind.elsewhere import read
-from rig.prove import designed
-
 from identification.mismatch import policy
 from rig.blind.answering import answered
-from rig.blind.scoring import LOCATED, OPEN_CELLS, scored
+from rig.blind.command import designed
+from rig.blind.score_file import read
+from rig.blind.scoring.score import LOCATED, OPEN_CELLS, scored
 from rig.blind.store import Store, version_of_diagnosis
 
 ROOT = Path(__file__).resolve().parents[1]

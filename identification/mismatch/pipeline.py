@@ -60,8 +60,7 @@ class Draws(NamedTuple):
 
     @classmethod
     def of(cls, seed: int) -> Draws:
-        rng = np.random.default_rng(seed)
-        return cls(rng, rng, rng, rng, rng, rng)
+        return cls(*map(np.random.default_rng, np.random.SeedSequence(seed).spawn(len(cls._fields))))
 
 
 def diagnose(

@@ -12,8 +12,8 @@ SCREENING_FALSE_ALARM = Threshold(
         "reaches in one clean recording of a hundred."
     ),
     evidence=(
-        "docs/proof.md (benchmarks/proof/scores.jsonl.gz): 6 of 1,002 clean recordings were given the name of "
-        "a term that is in the screening, 1 another was left with a term whose name was not earned."
+        "2 of 648 clean recordings of benchmarks/hidden_gains.py pass it; docs/howto/diagnose.md: in the "
+        "proof 3 of 1,002 passed it and were given a name."
     ),
 )
 SIMPLER_TERM_GAIN = Threshold(
