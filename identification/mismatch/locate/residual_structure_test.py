@@ -20,7 +20,7 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.covariates import Covariate, covariates
 from identification.mismatch.select.jumps import TRIED, jumps
-from identification.mismatch.select.screening import normal_scores, orthogonal_basis, quiet, surrogate_scores
+from identification.mismatch.select.screening import beside, normal_scores, orthogonal_basis, quiet, surrogate_scores
 from identification.mismatch.select.shape_error import allowed_in, corrections
 from identification.recording import Floats
 
@@ -66,8 +66,7 @@ def residual_structure(
     groups, spans = [], []
     for c in found:
         columns = Weights(weights.thrust).whiten(list(c.columns), [])
-        columns = columns - basis @ (basis.T @ columns)
-        Q = orthogonal_basis(columns)
+        Q = orthogonal_basis(beside(columns, basis))
         if Q.shape[1] == 0:
             continue
         score = Q.T @ residual

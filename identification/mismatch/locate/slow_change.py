@@ -16,7 +16,7 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, forces, refresh
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
-from identification.mismatch.select.screening import orthogonal_basis
+from identification.mismatch.select.screening import beside, orthogonal_basis
 from identification.recording import Floats
 
 SLOW, QUICK = 2, 16
@@ -71,5 +71,5 @@ def _taken(estimate: Estimate, data: Data, columns: Floats) -> float:
     parts = np.split(columns, np.cumsum([rows.size for rows in data.rows])[:-1])
     whitened = Weights(estimate.weights.thrust).whiten(list(parts), [])
     basis = orthogonal_basis(estimate.fit.jacobian[:n])
-    score = orthogonal_basis(whitened - basis @ (basis.T @ whitened)).T @ estimate.fit.residual[:n]
+    score = orthogonal_basis(beside(whitened, basis)).T @ estimate.fit.residual[:n]
     return float(score @ score)

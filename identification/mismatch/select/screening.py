@@ -110,6 +110,15 @@ def orthogonal_basis(columns: Floats) -> Floats:
     return out
 
 
+def beside(columns: Floats, basis: Floats) -> Floats:
+    """(n, r) columns less what an orthonormal basis (n, p) can follow; without those of which only rounding is left,
+    for made unit they would be directions of their own."""
+    before = lengths(columns)
+    rest = columns - basis @ (basis.T @ columns)
+    out: Floats = rest[:, lengths(rest) > LEAST_DIRECTION * before]
+    return out
+
+
 def refined(fit: Fit, data: Data, weights: Weights, term: Term, values: tuple[float, ...]) -> tuple[float, ...]:
     """The best trial closely round `values`, for terms that have such."""
     trials = term.finer(values, data.scale)
