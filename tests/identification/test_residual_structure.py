@@ -27,7 +27,8 @@ def test_a_covariate_of_one_value_tells_nothing():
     found = search((history(n=300),), np.random.default_rng(1))
     data, estimate = found.data, found.before
     (force,) = forces(estimate.fit.model, estimate.fit.theta, data)
-    still = Covariate("previous_voltage", (np.zeros(force.size),), "V", (np.column_stack([force**0, force]),), "nothing")
+    columns = np.column_stack([np.ones(force.size), force])
+    still = Covariate("previous_voltage", (np.zeros(force.size),), "V", (columns,), "nothing")
     left = residual_structure(estimate.fit, data, estimate.weights, np.random.default_rng(2), [still], pulsing=False)
     assert left.groups == ()
     assert left.p_value == 1.0
