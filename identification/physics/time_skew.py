@@ -10,7 +10,6 @@ import numpy as np
 from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Dynamics, Traits
 from identification.recording import Floats
-from identification.run_history.filters import delayed
 
 FINER = tuple(np.geomspace(0.2, 5.0, 17).tolist())
 """Of a trial delay: from one trial to the next."""
@@ -53,7 +52,7 @@ class TimeSkew:
         return tuple((sign * values[0] * factor,) for sign in (1.0, -1.0) for factor in FINER)
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        return delayed(value, now.history.edges, theta[0])
+        return now.run.delayed(value, theta[0])
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

@@ -146,11 +146,14 @@ def integral(value: Floats, edges: Floats, at: Floats) -> Floats:
     return out
 
 
-def delayed(value: Floats, edges: Floats, delay: float) -> Floats:
-    """Means over each interval of value(t - delay)."""
+def delayed(
+    value: Floats, edges: Floats, delay: float, places: tuple[NDArray[np.intp], Floats] | None = None
+) -> Floats:
+    """Means over each interval of value(t - delay). `places`: of `edges - delay`, where they are known."""
     dt = edges[1:] - edges[:-1]
     if abs(delay) > float(dt.min()):
-        return np.asarray(np.diff(integral(value, edges, edges - delay)) / dt, dtype=np.float64)
+        known = places or places_of(edges, edges - delay)
+        return np.asarray(np.diff(integral_at(value, dt, known)) / dt, dtype=np.float64)
     # of each interval only a part beside its edge is the neighbour's
     out = value.copy()
     rise = value[1:] - value[:-1]
@@ -159,6 +162,21 @@ def delayed(value: Floats, edges: Floats, delay: float) -> Floats:
     else:
         out[:-1] -= rise * (delay / dt[:-1])
     return out
+
+
+def places_of(edges: Floats, at: Floats) -> tuple[NDArray[np.intp], Floats]:
+    """(k,) interval of each time, the first or last one beyond the ends, and s since it began."""
+    index = np.clip(np.searchsorted(edges, at, side="right") - 1, 0, edges.size - 2)
+    return index, at - edges[index]
+
+
+def integral_at(value: Floats, dt: Floats, places: tuple[NDArray[np.intp], Floats]) -> Floats:
+    """As `integral`, at places that are known."""
+    index, since = places
+    total = np.cumsum(value * dt)
+    before: Floats = np.where(index > 0, total[index - 1], 0.0)
+    before += since * value[index]
+    return before
 
 
 def reconstructed(mean: Floats, middle: Floats, at: Floats) -> Floats:

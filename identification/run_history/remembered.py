@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
-from identification.run_history.filters import lag, lag_ends
+from identification.run_history.filters import delayed, lag, lag_ends, places_of
 from identification.run_history.history import History, Samples
 from identification.run_history.least_recently_used import LeastRecentlyUsed
 from identification.run_history.rate_gap import RateGap, rate_gap
@@ -29,6 +29,8 @@ MOST_LATELY = 12
 """What the rates of the last few models make at the samples: most terms change none."""
 MOST_REFERENCES = 24
 """Rotors from whose rates those of similar ones are sought."""
+MOST_DELAYS = 8
+"""Delays of which the places between the edges are known: that of a fit, and of its slope."""
 REFERENCES = 8.0
 """Of them to a factor e in each coefficient."""
 
@@ -42,6 +44,7 @@ class RememberedRun:
         self.leads = LeastRecentlyUsed[Floats](MOST_LEADS)
         self.lately = LeastRecentlyUsed[Floats](MOST_LATELY)
         self._references = LeastRecentlyUsed[Floats](MOST_REFERENCES)
+        self._delays = LeastRecentlyUsed[tuple[NDArray[np.intp], Floats]](MOST_DELAYS)
         self._since: dict[Channel, tuple[float, tuple[NDArray[np.intp], Floats]]] = {}
 
     @cached_property
@@ -77,6 +80,11 @@ class RememberedRun:
         quadratic, linear = (exp(round(REFERENCES * log(c)) / REFERENCES) if c > 0 else 0.0 for c in rotor)
         key = (of, quadratic, linear)
         return self._references(key, lambda: lag_ends(value, dt, quadratic, linear, float(value[0])))
+
+    def delayed(self, value: Floats, delay: float) -> Floats:
+        """(M,) means over each interval of `value` (M,) `delay` s before."""
+        edges = self.history.edges
+        return delayed(value, edges, delay, self._delays(delay, lambda: places_of(edges, edges - delay)))
 
     def samples(self, channel: Channel) -> Samples:
         """Every sample of a channel that is in an interval."""

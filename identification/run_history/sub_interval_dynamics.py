@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
-from identification.run_history.filters import complex_recursion, delayed, lagged, recursion, resonant
+from identification.run_history.filters import complex_recursion, lagged, recursion, resonant
 from identification.run_history.remembered import RememberedRun
 
 SETTLED = 25.0
@@ -37,7 +37,7 @@ class Passed:
         """(M,) of the rotor's rate, means over intervals, of a driver that stands still in each."""
         history = run.history
         out = history.driver if self.rotor is None else run.followed(history.driver, self.rotor)
-        return delayed(out, history.edges, self.delay) if self.delay else out
+        return run.delayed(out, self.delay) if self.delay else out
 
     def rung_means(self, run: RememberedRun) -> Floats:
         """(M,) of rate |rate| as the stand shows it, means over intervals, of a driver that stands still in each."""
@@ -47,7 +47,7 @@ class Passed:
         force = x * np.abs(x)
         moved = force - history.driver[0] * np.abs(history.driver[0])
         out = force + self.ring[0] * (resonant(moved, history.dt, *self.ring[1:]) - moved)
-        return delayed(out, history.edges, self.delay) if self.delay else out
+        return run.delayed(out, self.delay) if self.delay else out
 
     def rung_at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats, rates: Floats) -> Floats:
         """(N,) rate |rate| as the stand shows it then; the ticks at `when` (T,) s."""

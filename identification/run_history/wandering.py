@@ -17,7 +17,6 @@ from dataclasses import dataclass
 import celerite2
 import numpy as np
 from celerite2 import terms
-from scipy.optimize import minimize
 
 from identification.recording import Floats
 
@@ -62,6 +61,8 @@ class Law:
 def law_of(at: Floats, told: Floats, weight: Floats) -> Law | None:
     """The likeliest for rows at `at` (n,) s that tell m = `told` (n,), `weight` (n,) the inverse of its variance for a
     noise of 1; None where too few blocks of them tell anything."""
+    from scipy.optimize import minimize  # a quarter of a second, for recordings with a rate alone
+
     at, told, weight = _blocks(at, told, weight)
     if at.size < LEAST_BLOCKS or not np.any(told):
         return None

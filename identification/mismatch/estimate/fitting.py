@@ -18,7 +18,7 @@ from identification.mismatch.model.sub_interval import ahead, delay_of, shown, t
 from identification.mismatch.model.whitening import Weights
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
-from identification.run_history.filters import delayed, reconstructed
+from identification.run_history.filters import reconstructed
 
 MOST_STEPS = 25
 """Steps of Levenberg and Marquardt: what needs more goes along a valley that tells nothing."""
@@ -121,8 +121,15 @@ def raw(
     Ticks of the command come with the delay of `near`, else of `theta`: a small step moves none across a sample, and
     would hide the slope.
     """
+    key = (model, theta.vector.tobytes(), with_rate, None if near is None else near.vector.tobytes())
+    found: tuple[list[Floats], list[Floats]] = data.predictor.lately(
+        key, lambda: _raw(model, theta, data, near or theta, with_rate=with_rate), data
+    )
+    return found
+
+
+def _raw(model: Model, theta: Theta, data: Data, there: Theta, *, with_rate: bool) -> tuple[list[Floats], list[Floats]]:
     thrust, rate = [], []
-    there = near or theta
     late = delay_of(model, there) + there.shift
     for run, rows, tare in zip(data.runs, data.rows, theta.tares, strict=True):
         history = run.history
@@ -130,7 +137,7 @@ def raw(
         more = theta.C * shown(model, theta, history, F, x, tare)
         more = more * ahead(model, theta, run, x, data.scale.driver, late)
         if theta.shift:
-            F = delayed(F, history.edges, theta.shift)
+            F = run.delayed(F, theta.shift)
         thrust.append((reconstructed(F, history.middle, history.sampled) + more)[rows] + tare)
         if with_rate:
             seen = turning(model, theta, run, x, data.scale.driver, there.rate_shift)

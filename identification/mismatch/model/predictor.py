@@ -20,6 +20,8 @@ HYDRO = STAGES.index("hydro")
 CELL = STAGES.index("cell")
 MOST_RUNS = 64
 """Histories of which something is remembered: a diagnosis has some tens at most, with their parts."""
+MOST_LATELY = 4
+"""Whole predictions: a fit asks for the residual and then for the slopes at the same values."""
 MOST_ANSWERS = 64
 """Fits without a term, and what else is asked for more than once of the very same estimate."""
 
@@ -33,6 +35,7 @@ class Predictor:
     def __init__(self) -> None:
         self._runs = LeastRecentlyUsed[RememberedRun](MOST_RUNS)
         self._answers = LeastRecentlyUsed[Any](MOST_ANSWERS)
+        self._lately = LeastRecentlyUsed[Any](MOST_LATELY)
         self.shapes = Shapes()
 
     def run(self, history: History) -> RememberedRun:
@@ -41,6 +44,10 @@ class Predictor:
     def once(self, key: Hashable, make: Callable[[], Any], *of: object) -> Any:
         """What `make` makes of the objects `of`, made once."""
         return self._answers(key, make, *of)
+
+    def lately(self, key: Hashable, make: Callable[[], Any], *of: object) -> Any:
+        """The same of what is asked for again at once or never."""
+        return self._lately(key, make, *of)
 
 
 def predict(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: float = 0.0) -> tuple[Floats, Floats]:

@@ -15,7 +15,7 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.physics.traits import Dynamics, LimitsCommand, LimitsReading
 from identification.recording import Floats
-from identification.run_history.filters import delayed, reconstructed
+from identification.run_history.filters import reconstructed
 from identification.run_history.history import History
 from identification.run_history.remembered import Channel, RememberedRun
 from identification.run_history.sub_interval_dynamics import Passed
@@ -51,7 +51,7 @@ def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: 
 
     def made() -> Floats:
         assert history.rate_sampled is not None
-        moved = delayed(x, history.edges, shift) if shift else x
+        moved = run.delayed(x, shift) if shift else x
         line = reconstructed(moved, history.middle, history.rate_sampled)
         return np.asarray(line + share * np.atleast_2d(known)[0], dtype=np.float64)
 
