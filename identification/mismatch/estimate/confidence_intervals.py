@@ -14,7 +14,8 @@ from math import log, sqrt
 
 import numpy as np
 
-from identification.mismatch.estimate.fitting import LEAST_REACH, Fit, bounds_of, columns_of, residual_of
+from identification.mismatch.estimate.bounded_least_squares import LEAST_REACH
+from identification.mismatch.estimate.fitting import Fit, bounds_of, columns_of, residual_of
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.value import QUANTILE

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from identification.estimation.singular_values import thin_svd
 from identification.mismatch import policy
+from identification.mismatch.estimate.bounded_least_squares import MOST_STEPS, least_squares
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model, extended, parameters, reduced
 from identification.mismatch.model.parameters import Layout, Theta
@@ -19,17 +20,6 @@ from identification.mismatch.model.whitening import Weights
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed
-
-MOST_STEPS = 25
-"""Steps of Levenberg and Marquardt: what needs more goes along a valley that tells nothing."""
-MOST_TRIES = 8
-"""Dampings tried for one step."""
-LEAST_REACH = 0.05
-"""sigma: a parameter that changes less within its bounds is left where it is."""
-SLOW_FALLS = 3.0
-"""Further falls of the last size that a fit may be short of what is hoped for."""
-CLOSE = 1e-4
-"""Fall of chi-square at which a fit has ended; a difference of 1 is one sigma."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,46 +235,25 @@ def _descended(model: Model, start: Theta, data: Data, weights: Weights, most_st
     may[at.k] = bool(weights.rate)
     may[at.shift] = high[at.shift] > low[at.shift]
     may[at.rate_shift] = bool(weights.rate) and high[at.rate_shift] > low[at.rate_shift]
-    residual = residual_of(model, theta, data, weights)
-    damping = 1e-3
-    J = columns_of(model, theta, data, weights, may)
-    for _ in range(most_steps):
-        go = _movable(theta.vector[may], J, residual, low[may], high[may])
-        size = np.linalg.norm(J[:, go], axis=0)
-        A = J[:, go] / size
-        gram, right = A.T @ A, A.T @ residual
-        chi2 = float(residual @ residual)
-        for _ in range(MOST_TRIES):
-            moved = theta.vector
-            moved[np.flatnonzero(may)[go]] += np.linalg.solve(gram + damping * np.eye(gram.shape[0]), right) / size
-            trial = theta.with_vector(np.clip(moved, low, high))
-            new = residual_of(model, trial, data, weights)
-            fall = chi2 - float(new @ new)
-            if np.isfinite(fall) and fall > 0:
-                break
-            damping = max(damping, 1e-6) * 8
-        else:
-            break
-        theta, residual = trial, new
-        if chi2 - (1 + SLOW_FALLS) * fall > hopeless:
-            break
-        damping = max(damping / 10, 1e-9)
-        J = columns_of(model, theta, data, weights, may)
-        if fall < CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1)):
-            break
-    ended = (theta.vector <= low) | (theta.vector >= high)
+
+    def whole(part: Floats) -> Theta:
+        vector = theta.vector
+        vector[may] = part
+        return theta.with_vector(vector)
+
+    found = least_squares(
+        lambda part: residual_of(model, whole(part), data, weights),
+        lambda part: columns_of(model, whole(part), data, weights, may),
+        theta.vector[may],
+        low[may],
+        high[may],
+        most_steps,
+        hopeless,
+    )
+    best = whole(found.at)
+    ended = (best.vector <= low) | (best.vector >= high)
     free = may & ~ended
-    return Fit(model, theta, residual, J[:, free[may]], free, weights.log_det)
-
-
-def _movable(vector: Floats, J: Floats, residual: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
-    """(p,) parameters that are not pressed against a bound and change something within their bounds."""
-    slope = J.T @ residual
-    stuck = ((vector <= low) & (slope < 0)) | ((vector >= high) & (slope > 0))
-    size = np.linalg.norm(J, axis=0)
-    span = np.where(np.isfinite(high - low), high - low, np.inf)
-    out: NDArray[np.bool_] = ~stuck & (size > 0) & (size * span > LEAST_REACH)
-    return out
+    return Fit(model, best, found.residual, found.slopes[:, free[may]], free, weights.log_det)
 
 
 def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:

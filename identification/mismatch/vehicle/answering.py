@@ -148,7 +148,7 @@ def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Remain
 
 def state_whiteness(state: State) -> float:
     """p-value of `whiteness` of the whitened residual."""
-    return whiteness(state.fit.residual, [w.rows.time.size for w in state.white])
+    return whiteness(state.fit.residual, [w.rows.time.size for w in state.white.thrust])
 
 
 def curves_of(before: Fit, after: Fit, data: Prepared) -> tuple[Curves, ...]:

@@ -9,19 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimation.singular_values import thin_svd
+from identification.mismatch.estimate.bounded_least_squares import MOST_STEPS, Minimum, least_squares
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise, Rows, Shapes, Whitener
 from identification.mismatch.noise.variances import fit_noise
-from identification.mismatch.vehicle.model import Known, Layout, known, predict
+from identification.mismatch.vehicle.model import Layout, Prediction, known, predict
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared
 from identification.recording import Floats
 
-STEPS = 30
-"""Steps of Levenberg and Marquardt: what needs more goes along a valley that tells nothing."""
-ENOUGH = 1e-3
-"""Change of chi-square below which a fit has arrived."""
-DAMPING = 1e-3
-"""Of the first step, in units of the columns' squares."""
 Mask = NDArray[np.bool_]
 
 
@@ -31,8 +27,6 @@ class Fit:
 
     layout: Layout
     theta: Floats
-    chi2: float
-    """Of whitened measurements and of what was known beforehand."""
     residual: Floats
     """(N + q,) whitened: all runs, then what was known."""
     jacobian: Floats
@@ -44,15 +38,17 @@ class Fit:
     free: Mask
     """(p,) not at a bound."""
 
-
-Weights = tuple[Whitener, ...]
+    @property
+    def chi2(self) -> float:
+        """Of whitened measurements and of what was known beforehand."""
+        return float(self.residual @ self.residual)
 
 
 def weights(noise: Noise, data: Prepared, keep: Sequence[Floats] | None = None) -> Weights:
     """One whitening for each run, of the rows in `keep` alone where it is given."""
     kept = [run.rows if keep is None else _part(run.rows, keep[j]) for j, run in enumerate(data.runs)]
     shapes = Shapes()
-    return tuple(Whitener(noise, rows, np.zeros(rows.time.size), shapes) for rows in kept)
+    return Weights(tuple(Whitener(noise, rows, np.zeros(rows.time.size), shapes) for rows in kept))
 
 
 def _part(rows: Rows, keep: Floats) -> Rows:
@@ -60,40 +56,39 @@ def _part(rows: Rows, keep: Floats) -> Rows:
     return Rows(rows.time[on], rows.count[on], rows.extra[on], rows.width[on])
 
 
-@dataclass(frozen=True, eq=False)
-class _At:
-    chi2: float
-    residual: Floats
-    jacobian: Floats
-    motions: tuple[Motion, ...]
-    predicted: tuple[Floats, ...]
+class _Problem:
+    """What the solver asks of a vehicle's model: its whitened residual and slopes; motions begin near the last."""
 
+    def __init__(
+        self,
+        layout: Layout,
+        data: Prepared,
+        white: Weights,
+        guess: Sequence[Motion] | None,
+        keep: Sequence[Floats] | None,
+    ) -> None:
+        self.layout, self.data, self.white, self.guess = layout, data, white, guess
+        self.rows = [slice(None) if keep is None else k > 0 for k in keep or data.runs]
+        self.told = known(layout, data)
 
-def _at(
-    layout: Layout,
-    theta: Floats,
-    data: Prepared,
-    white: Weights,
-    told: Known,
-    keep: Sequence[Floats] | None,
-    guess: Sequence[Motion] | None,
-    slopes: bool,
-) -> _At:
-    rs, Hs, motions, predicted = [], [], [], []
-    for j, run in enumerate(data.runs):
-        one = predict(layout, theta, data, j, None if guess is None else guess[j], slopes)
-        r, H = run.response - one.response, one.slopes
-        r = np.nan_to_num(r, nan=1e6, posinf=1e6, neginf=-1e6)
-        if keep is not None:
-            r, H = r[keep[j] > 0], H[keep[j] > 0]
-        rs.append(white[j].whiten(r))
-        Hs.append(white[j].whiten(H) if slopes else H)
-        motions.append(one.motion)
-        predicted.append(one.response)
-    rs.append(told.right - told.rows @ theta)
-    Hs.append(told.rows if slopes else np.empty((told.right.size, 0)))
-    residual = np.concatenate(rs)
-    return _At(float(residual @ residual), residual, np.vstack(Hs), tuple(motions), tuple(predicted))
+    def predicted(self, theta: Floats, *, slopes: bool = False) -> list[Prediction]:
+        """All runs."""
+        near = self.guess or [None for _ in self.data.runs]
+        return [predict(self.layout, theta, self.data, j, near[j], slopes) for j in range(len(self.data.runs))]
+
+    def residual(self, theta: Floats) -> Floats:
+        """(N + q,) whitened: all runs, then what was known."""
+        left = [run.response - one.response for run, one in zip(self.data.runs, self.predicted(theta), strict=True)]
+        left = [np.nan_to_num(r, nan=1e6, posinf=1e6, neginf=-1e6)[on] for r, on in zip(left, self.rows, strict=True)]
+        return self.white.whiten(left, [], [self.told.right - self.told.rows @ theta])
+
+    def slopes(self, theta: Floats) -> Floats:
+        """(N + q, p) of the same; the motions there are where the next ones begin."""
+        found = self.predicted(theta, slopes=True)
+        self.guess = [one.motion for one in found]
+        return self.white.whiten(
+            [one.slopes[on] for one, on in zip(found, self.rows, strict=True)], [], [self.told.rows]
+        )
 
 
 def fit(
@@ -103,10 +98,10 @@ def fit(
     white: Weights,
     guess: Sequence[Motion] | None = None,
     keep: Sequence[Floats] | None = None,
-    steps: int = STEPS,
+    steps: int = MOST_STEPS,
     fixed: Floats | None = None,
 ) -> Fit:
-    """Gauss and Newton's steps with damping; a parameter that would leave its bounds stays there for the step.
+    """Least squares of the whitened residual within the physical bounds.
 
     `keep` (n,) per run: rows above 0 are fitted; `white` must then be made of those rows.
     `fixed` (p,): parameters above 0 keep their values.
@@ -115,53 +110,27 @@ def fit(
     theta = np.clip(theta, low, high)
     if fixed is not None:
         low, high = np.where(fixed > 0, theta, low), np.where(fixed > 0, theta, high)
-    told = known(layout, data)
-    now = _at(layout, theta, data, white, told, keep, guess, slopes=True)
-    damping = DAMPING
-    for _ in range(steps):
-        step = _step(now, theta, low, high, damping)
-        new_theta = np.clip(theta + step, low, high)
-        new = _at(layout, new_theta, data, white, told, keep, now.motions, slopes=False)
-        if new.chi2 < now.chi2:
-            gained = now.chi2 - new.chi2
-            theta, damping = new_theta, max(damping / 5, 1e-9)
-            now = _at(layout, theta, data, white, told, keep, new.motions, slopes=True)
-            if gained < ENOUGH * (1 + 1e-4 * now.chi2):
-                break
-        elif damping > 1e6 or float(np.abs(step).max()) == 0:
-            break
-        else:
-            damping = max(10 * damping, 1e-4)
-    free = ~_stuck(now, theta, low, high)
+    problem = _Problem(layout, data, white, guess, keep)
+    found = least_squares(problem.residual, problem.slopes, theta, low, high, steps)
+    there = problem.predicted(found.at)
+    free = ~_stuck(found, low, high)
     return Fit(
-        layout, theta, now.chi2, now.residual, now.jacobian, now.motions, now.predicted, _cov(now.jacobian, free), free
+        layout,
+        found.at,
+        found.residual,
+        found.slopes,
+        tuple(one.motion for one in there),
+        tuple(one.response for one in there),
+        _cov(found.slopes, free),
+        free,
     )
 
 
-def _stuck(now: _At, theta: Floats, low: Floats, high: Floats) -> Mask:
+def _stuck(found: Minimum, low: Floats, high: Floats) -> Mask:
     """(p,) at a bound, and the data would push it on."""
-    downhill = now.jacobian.T @ now.residual
-    out: Mask = ((theta <= low) & (downhill <= 0)) | ((theta >= high) & (downhill >= 0)) | (low >= high)
+    downhill = found.slopes.T @ found.residual
+    out: Mask = ((found.at <= low) & (downhill <= 0)) | ((found.at >= high) & (downhill >= 0)) | (low >= high)
     return out
-
-
-def _step(now: _At, theta: Floats, low: Floats, high: Floats, damping: float) -> Floats:
-    step = np.zeros(theta.size)
-    free = ~_stuck(now, theta, low, high)
-    for _ in range(3):  # what a step takes to a bound stays there, the others go on
-        H = now.jacobian[:, free]
-        size = np.sqrt(np.sum(H**2, axis=0))
-        size[size == 0] = 1.0
-        left = now.residual - now.jacobian[:, ~free] @ step[~free]
-        A = np.vstack([H / size, np.sqrt(damping) * np.eye(H.shape[1])])
-        found, *_ = np.linalg.lstsq(A, np.append(left, np.zeros(H.shape[1])), rcond=1e-12)
-        step[free] = found / size
-        beyond = free & ((theta + step < low) | (theta + step > high))
-        if not beyond.any():
-            break
-        step[beyond] = np.clip(theta[beyond] + step[beyond], low[beyond], high[beyond]) - theta[beyond]
-        free = free & ~beyond
-    return step
 
 
 def _cov(H: Floats, free: Mask) -> Floats:

@@ -10,11 +10,12 @@ from scipy.stats import chi2 as chi2_law
 
 from identification.estimation.singular_values import thin_svd
 from identification.mismatch import policy
-from identification.mismatch.vehicle.fitting import Fit, Weights
+from identification.mismatch.model.whitening import Weights
+from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.model import added_forces, respond
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared, Run
-from identification.mismatch.vehicle.screening import beyond, surrogates
+from identification.mismatch.vehicle.screening import beyond, surrogates, whitened
 from identification.recording import Floats
 
 BUMPS = 6
@@ -129,13 +130,13 @@ def free_columns(fitted: Fit, data: Prepared, covariate: Covariate) -> list[Floa
 def judge_left(fitted: Fit, white: Weights, data: Prepared, rng: np.random.Generator) -> Left:
     """Does a free force over any covariate still explain something?"""
     base = _base(fitted)
-    flipped = surrogates(fitted.residual, [w.rows.time.size for w in white], rng)
+    flipped = surrogates(fitted.residual, [w.rows.time.size for w in white.thrust], rng)
     flipped = flipped - base @ (base.T @ flipped)
     size = max(float(np.mean(fitted.residual**2)), 1e-12)
     found = []
     seen = covariates(fitted, data)
     for covariate in seen:
-        columns = _stacked(white, free_columns(fitted, data, covariate), fitted.residual.size)
+        columns = whitened(white, free_columns(fitted, data, covariate), fitted.residual.size)
         Q = beyond(base, columns)
         if not Q.shape[1]:
             continue
@@ -157,11 +158,6 @@ def _base(fitted: Fit) -> Floats:
     size = np.sqrt(np.sum(fitted.jacobian**2, axis=0))
     Q, _ = np.linalg.qr(fitted.jacobian[:, size > 0] / size[size > 0])
     return np.asarray(Q)
-
-
-def _stacked(white: Weights, columns: Sequence[Floats], rows: int) -> Floats:
-    whole = np.vstack([w.whiten(c) for w, c in zip(white, columns, strict=True)])
-    return np.vstack([whole, np.zeros((rows - whole.shape[0], whole.shape[1]))])
 
 
 def _solved(columns: Floats, base: Floats, residual: Floats) -> tuple[Floats, Floats]:
@@ -210,7 +206,7 @@ def inconstancies(fitted: Fit, white: Weights, data: Prepared, term: int) -> lis
             respond(layout, fitted.theta, data, j, fitted.motions[j], (effects[j] * masks[j])[:, None])[:, :-2]
             for j in range(len(data.runs))
         ]
-        column = _stacked(white, columns, fitted.residual.size)[:, 0]
+        column = whitened(white, columns, fitted.residual.size)[:, 0]
         left = column - base @ (base.T @ column)
         size = float(left @ left)
         if size <= 1e-6 * float(column @ column):

@@ -10,7 +10,8 @@ from scipy.stats import chi2 as chi2_law
 
 from identification.estimation.singular_values import thin_svd
 from identification.mismatch import policy
-from identification.mismatch.vehicle.fitting import Fit, Weights
+from identification.mismatch.model.whitening import Weights
+from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.model import predict, with_term
 from identification.mismatch.vehicle.runs import Prepared
 from identification.physics.vehicle.catalogue import CATALOGUE
@@ -108,7 +109,7 @@ def screen(
     U, s, _ = thin_svd(every)
     span = U[:, s > np.sqrt(SEEN) * s[0]]
     quiet = residual - span @ (span.T @ residual)
-    flipped = surrogates(_of_unit_size(quiet), [w.rows.time.size for w in white], rng)
+    flipped = surrogates(_of_unit_size(quiet), [w.rows.time.size for w in white.thrust], rng)
     flipped = flipped - base @ (base.T @ flipped)
     least = np.ones(flipped.shape[1])
     best: dict[tuple[str, str, str], Screened] = {}
@@ -142,9 +143,13 @@ def _scaled(H: Floats) -> Floats:
 
 def _own(white: Weights, trial: Trial, base: Floats, rows: int) -> Floats:
     """Orthonormal basis (N + q, k) of what the trial changes and the model's parameters do not."""
-    columns = np.vstack([w.whiten(c) for w, c in zip(white, trial.columns, strict=True)])
-    whole = np.vstack([columns, np.zeros((rows - columns.shape[0], columns.shape[1]))])
-    return beyond(base, whole)
+    return beyond(base, whitened(white, trial.columns, rows))
+
+
+def whitened(white: Weights, columns: Sequence[Floats], rows: int) -> Floats:
+    """(N + q, k) whitened columns of all runs; what was known beforehand does not move."""
+    known = rows - sum(c.shape[0] for c in columns)
+    return white.whiten(columns, [], [np.zeros((known, columns[0].shape[1]))])
 
 
 def beyond(base: Floats, columns: Floats) -> Floats:

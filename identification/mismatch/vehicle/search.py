@@ -9,8 +9,9 @@ import numpy as np
 from scipy.stats import chi2 as chi2_law
 
 from identification.mismatch import policy
+from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
-from identification.mismatch.vehicle.fitting import Fit, Weights, fit, noise_of, weights
+from identification.mismatch.vehicle.fitting import Fit, fit, noise_of, weights
 from identification.mismatch.vehicle.model import Layout, VehicleModel, begin, layout_of, with_term, without_term
 from identification.mismatch.vehicle.runs import Prepared
 from identification.mismatch.vehicle.screening import Screened, screen, trials
