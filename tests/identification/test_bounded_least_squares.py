@@ -55,7 +55,11 @@ def test_the_minimum_is_that_of_scipy(curve: Curve, slopes: Curve, low: Floats, 
 
     found = least_squares(residual, lambda p: slopes(p) / 0.05, start, low, high)
     inside = np.clip(start, low + 1e-6, high - 1e-6)  # scipy begins within
-    wanted = oracle(residual, inside, lambda p: -slopes(p) / 0.05, (low, high), xtol=1e-12, ftol=1e-12, gtol=1e-12)
+
+    def falling(p: Floats) -> Floats:
+        return -slopes(p) / 0.05
+
+    wanted = oracle(residual, inside, falling, (low, high), xtol=1e-12, ftol=1e-12, gtol=1e-12)
     assert found.residual @ found.residual == pytest.approx(2 * wanted.cost, abs=0.01)
     std = np.sqrt(np.diag(np.linalg.pinv(found.slopes.T @ found.slopes)))
     assert np.all(np.abs(found.at - wanted.x) < 0.05 * std + 1e-6)

@@ -8,8 +8,8 @@ from identification.mismatch.locate.residual_structure_test import residual_stru
 from identification.mismatch.model.model import Model
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.select.baseline import baseline, start
+from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.jumps import TRIED, likeliest_jumps
-from identification.mismatch.select.screening import orthogonal_basis
 from tests.identification.diagnosed_runs import run
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -263,14 +264,19 @@ def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:
     """
     begin, values = fitted.layout.of(term).start, fitted.values[term]
     known = term.parameters(data.scale)
-    ended = [_ends(p, value) for p, value in zip(known, values, strict=True)]
-    inner = [end for p, end in zip(known, ended, strict=True) if p.neutral is None]
-    if (inner and all(inner)) or any(e and p.neutral is not None for p, e in zip(known, ended, strict=True)):
+    if impossible(known, values):
         return True
     return any(
-        e and abs(_push(begin + j, fitted, data, weights)) > policy.estimate.PRESSED_AT_BOUND_SIGMA
-        for j, e in enumerate(ended)
+        _ends(p, value) and abs(_push(begin + j, fitted, data, weights)) > policy.estimate.PRESSED_AT_BOUND_SIGMA
+        for j, (p, value) in enumerate(zip(known, values, strict=True))
     )
+
+
+def impossible(known: Sequence[Parameter], values: Sequence[float]) -> bool:
+    """Whether the amount of a term, or all that is inner of it, ends at what is physically possible."""
+    ended = [(p, _ends(p, value)) for p, value in zip(known, values, strict=True)]
+    inner = [end for p, end in ended if p.neutral is None]
+    return (bool(inner) and all(inner)) or any(end and p.neutral is not None for p, end in ended)
 
 
 def _ends(p: Parameter, value: float) -> bool:

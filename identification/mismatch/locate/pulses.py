@@ -18,7 +18,7 @@ from identification.mismatch.estimate.estimate import forces
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
-from identification.mismatch.select.screening import orthogonal_basis
+from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.recording import Floats
 
 LENGTHS = (180, 125, 87, 60, 42, 29)

@@ -19,8 +19,8 @@ from identification.mismatch.locate.pulses import Pulses, likeliest_pulses
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.covariates import Covariate, covariates
+from identification.mismatch.select.family_wise import beside, family_p_value, orthogonal_basis
 from identification.mismatch.select.jumps import TRIED, jumps
-from identification.mismatch.select.screening import beside, normal_scores, orthogonal_basis, quiet, surrogate_scores
 from identification.mismatch.select.shape_error import allowed_in, corrections
 from identification.recording import Floats
 
@@ -94,39 +94,8 @@ def residual_structure(
     order = sorted(range(len(groups)), key=lambda i: (groups[i].p_value, groups[i].dof - groups[i].statistic))
     if not groups:
         return ResidualStructure((), 1.0)
-    p_family = _family(groups, spans, residual, rng)
+    p_family = family_p_value([g.p_value for g in groups], spans, residual, rng)
     return ResidualStructure(tuple(groups[i] for i in order), p_family, pulses)
-
-
-def _family(
-    groups: Sequence[CovariateTest], spans: Sequence[Floats], residual: Floats, rng: np.random.Generator
-) -> float:
-    """P-value of the smallest p-value of all groups, by draws of the residual over their spans (n, q)."""
-    every = np.column_stack(spans)
-    clean = quiet(residual, every)
-    plain = [Q for Q, g in zip(spans, groups, strict=True) if g.p_value < policy.locate.PLAIN_STRUCTURE_P]
-    if plain:  # a structure of many small parts would be in the draws, and hide itself
-        known = orthogonal_basis(np.column_stack(plain))
-        clean = clean - known @ (known.T @ clean)
-    least = min(g.p_value for g in groups)
-    # of blocks' signs: heavy tails and colour within a block are in them; of white normal noise: few blocks are not
-    draws = (surrogate_scores(every, clean, rng), normal_scores(every, rng))
-    p = max(_of_family(least, scores, [Q.shape[1] for Q in spans]) for scores in draws)
-    return float(max(min(p, 1.0), min(1.0, least)))
-
-
-def _of_family(least: float, scores: Floats, sizes: Sequence[int]) -> float:
-    """How often the smallest p-value of all groups is as small as `least`, by draws of their scores (s, q).
-
-    Beyond the draws scaled so that the family behaves as they do.
-    """
-    parts = np.split(scores**2, np.cumsum(sizes)[:-1], axis=1)
-    smallest = np.min([chi2_sf(s.sum(axis=1), s.shape[1]) for s in parts], axis=0)
-    p = (1 + np.count_nonzero(smallest <= least)) / (1 + smallest.size)
-    if p < 20 / smallest.size:
-        at = float(np.quantile(smallest, 0.05))
-        p = min(p, max(0.05 / max(at, 1e-300), float(len(sizes))) * least)
-    return float(p)
 
 
 def _jump(time: Covariate, fit: Fit, residual: Floats, data: Data, weights: Weights, basis: Floats) -> CovariateTest:

@@ -16,7 +16,7 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, forces, refresh
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
-from identification.mismatch.select.screening import beside, orthogonal_basis
+from identification.mismatch.select.family_wise import beside, orthogonal_basis
 from identification.recording import Floats
 
 SLOW, QUICK = 2, 16

@@ -18,10 +18,10 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.prepare.preparing import DRIVERS
+from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import STATIC, Rival, SwapTest, static_curve
 from identification.mismatch.select.rivals import swaps
-from identification.mismatch.select.screening import orthogonal_basis
 from identification.physics.term import Term
 from identification.recording import Floats
 
@@ -78,15 +78,31 @@ def failed_checks(estimate: Estimate, term: Term, data: Data, many: int) -> tupl
             < 1 - policy.name.PART_SIZE**2
         ):
             continue
-        rest = column - basis @ (basis.T @ column)
-        size = float(np.linalg.norm(rest))
-        if size < 1e-3 * float(np.linalg.norm(column)) or size < policy.name.PART_SIGMA:
-            continue
-        score = float(rest @ estimate.fit.residual[:n]) / size
-        p = float(noncentral_chi2_sf(score**2, 1, (policy.name.PART_DIFFERENCE * size) ** 2))
-        if p * len(splits) * many < policy.name.INCONSTANT_P:
-            out.append(f"its parameter is not the same {what} ({abs(score) / size * 100:.0f} % apart)")
+        residual = estimate.fit.residual[:n]
+        apart = difference(column, basis, residual, policy.name.PART_DIFFERENCE, len(splits) * many)
+        if apart is not None:
+            out.append(f"its parameter is not the same {what} ({apart * 100:.0f} % apart)")
     return tuple(out)
+
+
+def difference(column: Floats, basis: Floats, residual: Floats, spared: float, tests: int) -> float | None:
+    """By what share of itself an effect differs in one part of the recordings; None: by no more than chance.
+
+    `column` (n,): all that it does there, whitened; `basis` (n, p): orthonormal, what the model can follow. A share of
+    `spared` counts as the same, and chance has `tests` trials.
+    """
+    rest = column - basis @ (basis.T @ column)
+    size = float(np.linalg.norm(rest))
+    if size < 1e-3 * float(np.linalg.norm(column)) or size < policy.name.PART_SIGMA:
+        return None
+    score = float(rest @ residual) / size
+    p = float(noncentral_chi2_sf(score**2, 1, (spared * size) ** 2))
+    return abs(score) / size if p * tests < policy.name.INCONSTANT_P else None
+
+
+def probability_beside(losses: Sequence[float]) -> float:
+    """Of a name beside rivals whose BIC is worse by these."""
+    return float(1.0 / (1.0 + sum(np.exp(-0.5 * max(loss, 0.0)) for loss in losses)))
 
 
 def _unseen(now: Fit, term: Term, data: Data) -> bool:
@@ -171,7 +187,6 @@ def name(
         unique: dict[str, Rival] = {}
         for r in close:
             unique.setdefault(r.term.id, r)
-        probability = 1.0 / (1.0 + sum(np.exp(-0.5 * max(r.bic_loss, 0.0)) for r in unique.values()))
         out.append(
             Named(
                 term,
@@ -180,7 +195,7 @@ def name(
                 gain,
                 gain - len(values) * logn,
                 max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
-                float(probability),
+                probability_beside([r.bic_loss for r in unique.values()]),
                 tuple(unique.values()),
                 (*failed_checks(estimate, term, data, many), *repaired.get(term, ())),
             )

@@ -307,12 +307,20 @@ def _best_addition(estimate: Estimate, judged: Screening, data: Data, refused: C
 def prune(estimate: Estimate, data: Data) -> Estimate:
     """Drop terms that no longer earn their place."""
     while estimate.fit.model.terms:
-        costs = []
-        for term, values in estimate.fit.values.items():
-            less = fit_without(estimate, term, data)
-            costs.append((less.chi2 - estimate.fit.chi2 - accept_threshold(len(values)), less))
-        worst, less = min(costs, key=lambda pair: pair[0])
-        if worst > 0:
+        less = [fit_without(estimate, term, data) for term in estimate.fit.model.terms]
+        losses = [each.chi2 - estimate.fit.chi2 for each in less]
+        worst = least_earned(losses, [len(values) for values in estimate.fit.values.values()])
+        if worst is None:
             break
-        estimate = refresh(less.model, less.theta, data, None, estimate)
+        estimate = refresh(less[worst].model, less[worst].theta, data, None, estimate)
     return estimate
+
+
+def least_earned(losses: Sequence[float], sizes: Sequence[int]) -> int | None:
+    """Which term gives the model least beside its price; None where all earn their place.
+
+    `losses`: of chi-square without each; `sizes`: the number of parameters of each.
+    """
+    short = [loss - accept_threshold(size) for loss, size in zip(losses, sizes, strict=True)]
+    worst = short.index(min(short))
+    return None if short[worst] > 0 else worst

@@ -12,9 +12,10 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
 from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, fit
 from identification.mismatch.model.data import Data, price
+from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import Rival, SwapTest, accept_threshold
-from identification.mismatch.select.screening import directions, orthogonal_basis, refined
+from identification.mismatch.select.screening import directions, refined
 from identification.physics.term import Term
 from identification.recording import Floats
 

@@ -2,8 +2,7 @@
 
 A little of every term in every form, at a few inner settings, gives a direction (tangent space of the present model).
 What the present model's own parameters can follow is projected out (Frisch and Waugh). The largest correlation of all
-is judged against the largest of its own null distribution: directions are correlated, so that is drawn from the data,
-by changing the sign of whole blocks of the residual at random (symmetric noise of any colour within a block).
+is judged against the largest of its own null distribution (family_wise.py).
 """
 
 from __future__ import annotations
@@ -13,12 +12,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.estimation.singular_values import thin_svd
-from identification.estimation.tails import normal_sf
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, raw, residual_of, ticks_told
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
+from identification.mismatch.select.family_wise import (
+    LEAST_DIRECTION,
+    lengths,
+    normal_scores,
+    orthogonal_basis,
+    p_of_largest,
+    quiet,
+    surrogate_scores,
+)
 from identification.mismatch.select.jumps import likeliest_jumps
 from identification.mismatch.select.ringing import likeliest_rings
 from identification.physics.term import Term
@@ -28,12 +34,6 @@ VALLEYS = 3
 """Delays round which the likeliest is sought: ticks make a valley at each of a few."""
 CLOSELY = np.linspace(0.85, 1.15, 21)
 """Of such a delay: factors that are tried, fine enough for the fit to find the bottom."""
-SURROGATES = 1000
-"""Draws of the null distribution: 1 % of them are ten, and beyond them its tail is fitted."""
-BLOCKS = 120
-"""Blocks whose signs are drawn, at most: more would be shorter, and noise is correlated within them."""
-MOST_PLAIN = 10
-"""Directions taken out, at most: more would take noise with them."""
 MOST_JUMPS = 4
 """Instants of a jump of the zero that are tried beside the term's own, the likeliest first."""
 MOST_RINGS = 4
@@ -42,8 +42,6 @@ TICKS = (-1, 1, 2, 3)
 """Delays that are tried, in ticks of the command: whole ones look alike."""
 SLOW_TICK = 0.5
 """s: a command that changes no faster does not tick on."""
-LEAST_DIRECTION = 1e-6
-"""Share of a direction that must remain when the present model is projected out."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,32 +89,6 @@ class Screening:
                 seen.add(term)
                 out.append((term, self.directions.values[j], float(self.plain[j])))
         return out
-
-
-def lengths(columns: Floats) -> Floats:
-    """(q,) Euclidean norms of columns (n, q), without a copy of them."""
-    out: Floats = np.sqrt(np.einsum("ij,ij->j", columns, columns))
-    return out
-
-
-def orthogonal_basis(columns: Floats) -> Floats:
-    """(n, r) orthonormal basis of what columns span."""
-    if columns.shape[1] == 0:
-        return columns
-    size = np.linalg.norm(columns, axis=0)
-    scaled = columns[:, size > 0] / size[size > 0]
-    u, s, _ = thin_svd(scaled)
-    out: Floats = u[:, s > 1e-9 * s[0]] if s.size else scaled
-    return out
-
-
-def beside(columns: Floats, basis: Floats) -> Floats:
-    """(n, r) columns less what an orthonormal basis (n, p) can follow; without those of which only rounding is left,
-    for made unit they would be directions of their own."""
-    before = lengths(columns)
-    rest = columns - basis @ (basis.T @ columns)
-    out: Floats = rest[:, lengths(rest) > LEAST_DIRECTION * before]
-    return out
 
 
 def refined(fit: Fit, data: Data, weights: Weights, term: Term, values: tuple[float, ...]) -> tuple[float, ...]:
@@ -245,68 +217,4 @@ def screen(fit: Fit, found: Directions, rng: np.random.Generator, allowed: Float
     normal = normal_scores(found.columns, rng)
     normal = np.where(sided, np.maximum(normal, 0.0), np.abs(normal)).max(axis=1)
     threshold = float(max(np.quantile(null, 1 - alarm), np.quantile(normal, 1 - alarm)))
-    return Screening(found, z, plain, _p_value(float(z.max()), null, normal), threshold)
-
-
-def matching_pursuit(columns: Floats, residual: Floats, least: float, most: int) -> tuple[list[int], Floats]:
-    """Indices of unit columns (n, q) that take more than `least` sigma, one after the other, and what is left (n,)."""
-    chosen: list[int] = []
-    taken = np.empty((residual.size, 0))
-    left = residual
-    score = columns.T @ left
-    size = np.ones(columns.shape[1])
-    for _ in range(most):
-        z = np.where(size > 1e-2, np.abs(score) / np.maximum(size, 1e-12), 0.0)
-        j = int(np.argmax(z)) if z.size else 0
-        rest = float(left @ left) - float(z[j] ** 2) if z.size else 0.0
-        # Student's t of the direction: what it takes is not held against it
-        if not z.size or z[j] ** 2 * max(residual.size - len(chosen) - 1, 1) < least**2 * max(rest, 0.0):
-            break
-        chosen.append(j)
-        q = columns[:, j] - taken @ (taken.T @ columns[:, j])
-        q /= np.linalg.norm(q)
-        taken = np.column_stack([taken, q])
-        left = left - q * (q @ left)
-        overlap = columns.T @ q
-        size = np.sqrt(np.maximum(size**2 - overlap**2, 0.0))
-        score = columns.T @ left
-    return chosen, left
-
-
-def quiet(residual: Floats, columns: Floats) -> Floats:
-    """The residual without what is plainly no noise in the span of unit columns: what surrogates are made from."""
-    return matching_pursuit(columns, residual, policy.select.PLAIN_DIRECTION_SIGMA, MOST_PLAIN)[1]
-
-
-def surrogate_scores(columns: Floats, residual: Floats, rng: np.random.Generator) -> Floats:
-    """(SURROGATES, q) scores after the signs of blocks of the residual were drawn anew."""
-    blocks = min(BLOCKS, max(residual.size // 4, 1))
-    edges = np.linspace(0, residual.size, blocks + 1).astype(int)[:-1]
-    parts = np.add.reduceat(columns * residual[:, None], edges, axis=0)
-    signs = rng.choice((-1.0, 1.0), size=(SURROGATES, blocks))
-    out: Floats = signs @ parts
-    return out
-
-
-def normal_scores(columns: Floats, rng: np.random.Generator) -> Floats:
-    """(4 SURROGATES, q) scores of white normal residuals."""
-    gram = columns.T @ columns
-    values, vectors = np.linalg.eigh(gram)
-    root = vectors * np.sqrt(np.maximum(values, 0.0))
-    out: Floats = rng.standard_normal((4 * SURROGATES, values.size)) @ root.T
-    return out
-
-
-def _p_value(largest: float, null: Floats, normal: Floats) -> float:
-    """The larger of both; beyond the draws a Gumbel tail fitted to them."""
-    found = []
-    for draws in (null, normal):
-        share = (1 + np.count_nonzero(draws >= largest)) / (1 + draws.size)
-        if share > 20 / draws.size:
-            found.append(float(share))
-            continue
-        # tail of the normal maximum: as of one normal deviate, times the number of independent ones it acts like
-        at = max(float(np.quantile(draws, 0.95)), 1e-6)
-        many = 0.05 / max(float(normal_sf(at)), 1e-300)
-        found.append(min(many * float(normal_sf(largest)), float(share)))
-    return max(found)
+    return Screening(found, z, plain, p_of_largest(float(z.max()), null, normal), threshold)

@@ -13,7 +13,7 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, change_of
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
-from identification.mismatch.select.screening import orthogonal_basis
+from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.recording import Floats
 
 

@@ -34,7 +34,7 @@ from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.whitening import Weights
-from identification.mismatch.select.screening import orthogonal_basis
+from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.unnamed.flexible import Extended
 from identification.mismatch.unnamed.flexible_knots import best_over
 from identification.mismatch.unnamed.formula_words import legend, told

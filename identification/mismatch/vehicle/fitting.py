@@ -68,13 +68,14 @@ class _Problem:
         keep: Sequence[Floats] | None,
     ) -> None:
         self.layout, self.data, self.white, self.guess = layout, data, white, guess
-        self.rows = [slice(None) if keep is None else k > 0 for k in keep or data.runs]
+        kept = keep or [np.ones(run.time.size) for run in data.runs]
+        self.rows = [k > 0 for k in kept]
         self.told = known(layout, data)
 
     def predicted(self, theta: Floats, *, slopes: bool = False) -> list[Prediction]:
         """All runs."""
-        near = self.guess or [None for _ in self.data.runs]
-        return [predict(self.layout, theta, self.data, j, near[j], slopes) for j in range(len(self.data.runs))]
+        near = self.guess or [None] * len(self.data.runs)
+        return [predict(self.layout, theta, self.data, j, guess, slopes) for j, guess in enumerate(near)]
 
     def residual(self, theta: Floats) -> Floats:
         """(N + q,) whitened: all runs, then what was known."""

@@ -6,17 +6,20 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2 as chi2_law
 
 from identification.estimation.singular_values import thin_svd
+from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.model.whitening import Weights
+from identification.mismatch.name.naming import difference
+from identification.mismatch.select.family_wise import beyond, family_p_value, orthogonal_basis
 from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.model import added_forces, respond
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared, Run
-from identification.mismatch.vehicle.screening import beyond, surrogates, whitened
+from identification.mismatch.vehicle.screening import whitened
 from identification.recording import Floats
+from identification.run_history.splines import spline
 
 BUMPS = 6
 """Knots of a free force: as many as the quantiles of a run of minutes determine."""
@@ -36,10 +39,8 @@ class Covariate:
 
     def bumps(self, j: int) -> Floats:
         """(g, b): triangles that add up to one, flat beyond the ends; 0 where the covariate is not known."""
-        x = self.values[j]
-        eye = np.eye(self.knots.size)
-        out = np.column_stack([np.interp(x, self.knots, row) for row in eye])
-        out[~np.isfinite(x)] = 0.0
+        out = spline(self.values[j], self.knots, np.eye(self.knots.size), 1)
+        out[~np.isfinite(self.values[j])] = 0.0
         return out
 
 
@@ -49,7 +50,7 @@ class Structure:
 
     covariate: Covariate
     p_value: float
-    """Of the covariate, allowing for how many were tried."""
+    """Of this covariate alone."""
     share: float
     """Of the whitened residual's sum of squares."""
     force: Floats
@@ -116,6 +117,7 @@ class Left:
     """Every covariate against the residual, the clearest first."""
 
     p_value: float
+    """Family-wise, of the clearest."""
     structures: tuple[Structure, ...]
 
 
@@ -129,35 +131,24 @@ def free_columns(fitted: Fit, data: Prepared, covariate: Covariate) -> list[Floa
 
 def judge_left(fitted: Fit, white: Weights, data: Prepared, rng: np.random.Generator) -> Left:
     """Does a free force over any covariate still explain something?"""
-    base = _base(fitted)
-    flipped = surrogates(fitted.residual, [w.rows.time.size for w in white.thrust], rng)
-    flipped = flipped - base @ (base.T @ flipped)
-    size = max(float(np.mean(fitted.residual**2)), 1e-12)
-    found = []
-    seen = covariates(fitted, data)
-    for covariate in seen:
-        columns = whitened(white, free_columns(fitted, data, covariate), fitted.residual.size)
+    base = orthogonal_basis(fitted.jacobian)
+    residual = np.clip(fitted.residual, -policy.locate.OUTLIER_SIGMA, policy.locate.OUTLIER_SIGMA)
+    total = float(residual @ residual)
+    spans, found = [], []
+    for covariate in covariates(fitted, data):
+        columns = whitened(white, free_columns(fitted, data, covariate), residual.size)
         Q = beyond(base, columns)
         if not Q.shape[1]:
             continue
-        gain = float(np.sum((Q.T @ fitted.residual) ** 2))
-        usual = float(np.mean(np.sum((Q.T @ flipped) ** 2, axis=0))) / Q.shape[1]
-        p = float(chi2_law.sf(gain / max(usual, size, 1.0), Q.shape[1]))
+        gain = float(np.sum((Q.T @ residual) ** 2))
+        p = max(float(chi2_sf(gain, Q.shape[1])), BACK)
         beta, std = _solved(columns, base, fitted.residual)
-        found.append((p, gain, covariate, beta, std))
-    found.sort(key=lambda one: (one[0], -one[1]))
-    total = float(fitted.residual @ fitted.residual)
-    structures = tuple(
-        Structure(c, min(1.0, max(p, BACK) * len(seen)), gain / total, beta - beta.mean(), std, beta)
-        for p, gain, c, beta, std in found
-    )
-    return Left(structures[0].p_value if structures else 1.0, structures)
-
-
-def _base(fitted: Fit) -> Floats:
-    size = np.sqrt(np.sum(fitted.jacobian**2, axis=0))
-    Q, _ = np.linalg.qr(fitted.jacobian[:, size > 0] / size[size > 0])
-    return np.asarray(Q)
+        spans.append(Q)
+        found.append(Structure(covariate, p, gain / total, beta - beta.mean(), std, beta))
+    if not found:
+        return Left(1.0, ())
+    p_value = family_p_value([one.p_value for one in found], spans, residual, rng)
+    return Left(p_value, tuple(sorted(found, key=lambda one: (one.p_value, -one.share))))
 
 
 def _solved(columns: Floats, base: Floats, residual: Floats) -> tuple[Floats, Floats]:
@@ -193,12 +184,14 @@ def place_of(structure: Structure) -> Place:
 
 def inconstancies(fitted: Fit, white: Weights, data: Prepared, term: int) -> list[str]:
     """Parts of the recordings in which a term's amount differs by more than chance and VEHICLE_PART_DIFFERENCE."""
-    base = _base(fitted)
     layout, i = fitted.layout, fitted.layout.first_of[term]
     amount = fitted.theta[i] - (layout.parts[term][0].neutral or 0.0)
     if len(layout.parts[term]) > 1 or amount == 0 or not fitted.free[i]:
         return []
-    effects = [added_forces(layout, fitted.theta, data, j, fitted.motions[j])[:, i] for j in range(len(data.runs))]
+    base = orthogonal_basis(fitted.jacobian)
+    effects = [
+        amount * added_forces(layout, fitted.theta, data, j, fitted.motions[j])[:, i] for j in range(len(data.runs))
+    ]
     out = []
     splits = _splits(fitted.motions, data)
     for name, masks in splits.items():
@@ -207,14 +200,9 @@ def inconstancies(fitted: Fit, white: Weights, data: Prepared, term: int) -> lis
             for j in range(len(data.runs))
         ]
         column = whitened(white, columns, fitted.residual.size)[:, 0]
-        left = column - base @ (base.T @ column)
-        size = float(left @ left)
-        if size <= 1e-6 * float(column @ column):
-            continue
-        shift = float(left @ fitted.residual) / size
-        p = float(chi2_law.sf(shift**2 * size, 1)) * len(splits)
-        if p < policy.name.INCONSTANT_P and abs(shift) > policy.vehicle.VEHICLE_PART_DIFFERENCE * abs(amount):
-            out.append(f"it is not the same {name} (by {100 * abs(shift / amount):.0f} %)")
+        apart = difference(column, base, fitted.residual, policy.vehicle.VEHICLE_PART_DIFFERENCE, len(splits))
+        if apart is not None:
+            out.append(f"its parameter is not the same {name} ({100 * apart:.0f} % apart)")
     return out
 
 

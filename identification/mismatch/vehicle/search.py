@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2 as chi2_law
 
+from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
+from identification.mismatch.select.forward_selection import least_earned
 from identification.mismatch.vehicle.fitting import Fit, fit, noise_of, weights
 from identification.mismatch.vehicle.model import Layout, VehicleModel, begin, layout_of, with_term, without_term
 from identification.mismatch.vehicle.runs import Prepared
@@ -59,13 +60,17 @@ class Found:
 def search(data: Prepared, candidates: Sequence[VehicleTerm], rng: np.random.Generator) -> Found:
     """The baseline, and the model that nothing in the catalogue improves any more."""
     state = _baseline(data, candidates)
-    first = state
-    for _ in range(policy.vehicle.VEHICLE_MODEL_TERMS):
+    first, seen = state, {frozenset(state.terms)}
+    while len(state.terms) < policy.vehicle.VEHICLE_MODEL_TERMS:
         left = [term for term in candidates if _new(term, state.terms)]
         best = _best(state, data, left, rng)
         if best is None:
             break
-        state = pruned(refreshed(best, data, left), data)
+        larger = pruned(refreshed(best, data, left), data)
+        if frozenset(larger.terms) in seen:
+            break
+        state = larger
+        seen.add(frozenset(state.terms))
     return Found(_under(first, state, data), state, tuple(candidates))
 
 
@@ -116,7 +121,7 @@ def _best(state: State, data: Prepared, terms: Sequence[VehicleTerm], rng: np.ra
     """The best model with one term more, when it passes the family-wise threshold and its BIC is better."""
     ranked, needed = screen(state.fit, state.white, trials(state.fit, data, terms), rng)
     found = [fitted_with(state.fit, state.white, data, s) for s in promising(ranked)]
-    good = [one for one in found if chi2_law.sf(state.fit.chi2 - one.chi2, _more(state, one)) < needed]
+    good = [one for one in found if chi2_sf(state.fit.chi2 - one.chi2, _more(state, one)) < needed]
     good = [one for one in good if bic(one) < state.bic()]
     return min(good, key=bic) if good else None
 
@@ -150,10 +155,10 @@ def pruned(state: State, data: Prepared) -> State:
     """Without terms that no longer earn their place, worst first."""
     while state.terms:
         less = [dropped(state, data, i) for i in range(len(state.terms))]
-        i = int(np.argmin([bic(one) for one in less]))
-        if bic(less[i]) >= state.bic():
+        worst = least_earned([one.chi2 - state.fit.chi2 for one in less], [*map(len, state.fit.layout.parts)])
+        if worst is None:
             return state
-        state = State(less[i], state.noise, state.white)
+        state = State(less[worst], state.noise, state.white)
     return state
 
 
