@@ -67,15 +67,15 @@ class _Problem:
         guess: Sequence[Motion] | None,
         keep: Sequence[Floats] | None,
     ) -> None:
-        self.layout, self.data, self.white, self.guess = layout, data, white, guess
+        self.layout, self.data, self.white = layout, data, white
+        self.guess: Sequence[Motion | None] = guess or [None] * len(data.runs)
         kept = keep or [np.ones(run.time.size) for run in data.runs]
         self.rows = [k > 0 for k in kept]
         self.told = known(layout, data)
 
     def predicted(self, theta: Floats, *, slopes: bool = False) -> list[Prediction]:
         """All runs."""
-        near = self.guess or [None] * len(self.data.runs)
-        return [predict(self.layout, theta, self.data, j, guess, slopes) for j, guess in enumerate(near)]
+        return [predict(self.layout, theta, self.data, j, near, slopes) for j, near in enumerate(self.guess)]
 
     def residual(self, theta: Floats) -> Floats:
         """(N + q,) whitened: all runs, then what was known."""
