@@ -74,7 +74,7 @@ def refresh(
     parts = by_run(J, data)
     if extra is not None and extra.shape[1]:
         parts = [np.column_stack([p, e]) for p, e in zip(parts, by_run(extra, data), strict=True)]
-    parts = _independent(parts)
+    parts = independent(parts)
     rows = estimate.rows if estimate is not None else data.thrust_rows
     in_time = not any(h.static for h in data.histories)  # rows of a table may stand in the order of their levels
     least = 0.0 if in_time else max(reading_step(h.thrust[h.rows]) for h in data.histories) ** 2 / 12
@@ -133,8 +133,8 @@ def by_run(columns: Floats, data: Data) -> list[Floats]:
     return list(np.split(columns[: ends[-1]], ends[:-1]))
 
 
-def _independent(parts: Sequence[Floats]) -> list[Floats]:
-    """The same span, orthonormal over all runs together."""
+def independent(parts: Sequence[Floats]) -> list[Floats]:
+    """The same span, run by run (n, r), orthonormal over all runs together: what repeats another is left out."""
     stacked = np.concatenate(parts)
     size = np.linalg.norm(stacked, axis=0)
     stacked = stacked[:, size > 0] / size[size > 0]

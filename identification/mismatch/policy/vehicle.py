@@ -4,27 +4,12 @@ from __future__ import annotations
 
 from identification.mismatch.policy.record.threshold import Count, Threshold
 
-FREE_FORCE_FALSE_ALARM = Threshold(
-    0.01,
-    unit="probability",
-    reason=(
-        "A free force over some covariate must explain more than flipped signs do in one clean recording of a "
-        "hundred to be called structure."
-    ),
-)
 VEHICLE_PART_DIFFERENCE = Threshold(
     0.15,
     unit="share of the parameter",
     reason=(
         "Parts of the recordings whose parameters differ by less count as the same: a vehicle's forces are "
         "known less well than a thrust."
-    ),
-)
-VEHICLE_OUTLIER_SIGMA = Threshold(
-    5.0,
-    unit="sigma",
-    reason=(
-        "A residual farther out counts as one this far out when surrogates are drawn: one wave is no null distribution."
     ),
 )
 VEHICLE_MODEL_TERMS = Count(
@@ -36,14 +21,6 @@ VEHICLE_CANDIDATE_GAIN = Threshold(
     0.2,
     unit="share of the best candidate's gain",
     reason="What promises less is not fitted in this round.",
-)
-EDGE_OF_POSSIBLE = Threshold(
-    1e-3,
-    unit="share of the parameter's range",
-    reason=(
-        "A parameter so near to an end of its range is pressed to the edge of what is possible, and its name "
-        "is doubted."
-    ),
 )
 VEHICLE_NOT_WHITE_P = Threshold(
     1e-3,

@@ -19,6 +19,15 @@ FOLDS = 4
 """Runs are left out one by one, or in as many groups: each costs two fits."""
 
 
+def folds(runs: int) -> list[list[int]]:
+    """Which runs are left out together: each alone, or in FOLDS groups where there are more.
+
+    >>> folds(2), folds(5)
+    ([[0], [1]], [[0, 1], [2], [3], [4]])
+    """
+    return [fold.tolist() for fold in np.array_split(np.arange(runs), min(runs, FOLDS))]
+
+
 def by_folds(before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise) -> HeldOut:
     """Both models fitted without a run and judged on it, every run in turn; of the run itself only its tare is fitted.
 
@@ -27,12 +36,12 @@ def by_folds(before: Estimate, after: Estimate, data: Data, measured: Data, quie
     R = len(data.histories)
     if R < 2 or not _alike(data):
         return by_blocks(before, after, data, measured, quiet)
-    folds = [fold.tolist() for fold in np.array_split(np.arange(R), min(R, FOLDS))]
-    old = [_judged(before, measured, fold) for fold in folds]
-    new = [_judged(after, data, fold) for fold in folds]
+    left_out = folds(R)
+    old = [_judged(before, measured, fold) for fold in left_out]
+    new = [_judged(after, data, fold) for fold in left_out]
     keep = [np.ones(r.size, dtype=bool) for r in data.rows]
     noise = least_noise(after.fit, (after.noise, quiet), data, keep)
-    each = "each run" if len(folds) == R else f"each of {len(folds)} groups of runs"
+    each = "each run" if len(left_out) == R else f"each of {len(left_out)} groups of runs"
     what = f"{each} by a model fitted to the others, its own tare fitted; terms were chosen on all of them"
     return HeldOut(_together(old), _together(new), noise, what)
 

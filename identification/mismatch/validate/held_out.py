@@ -15,6 +15,7 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
+from identification.recording import Floats
 from identification.run_history.history import History
 
 KEPT_BACK = 4
@@ -46,6 +47,11 @@ def blocks(history: History) -> NDArray[np.bool_]:
     t = history.sampled[history.rows]
     if history.static:
         return np.asarray(np.arange(t.size) % KEPT_BACK != KEPT_BACK - 2)
+    return fitted_blocks(t)
+
+
+def fitted_blocks(t: Floats) -> NDArray[np.bool_]:
+    """(n,) of bool at times in s: all but every fourth of the blocks of time."""
     span = float(t[-1] - t[0])
     length = max(span / BLOCKS_PER_RUN, min(LEAST_BLOCK, span / 8))
     index = np.floor((t - t[0]) / length).astype(int)

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import chi2 as chi2_law
 
+from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.diagnosis import Curves, Finding, Mismatch, Remainder, RivalFinding
 from identification.mismatch.noise.whiteness import whiteness
 from identification.mismatch.value import Value, Where
 from identification.mismatch.vehicle.fitting import Fit
-from identification.mismatch.vehicle.left import BACK, Left, Structure, place_of
+from identification.mismatch.vehicle.free_force import BACK, Left, Structure, place_of
 from identification.mismatch.vehicle.naming import Named
 from identification.mismatch.vehicle.runs import Prepared
 from identification.mismatch.vehicle.search import Found, State
@@ -58,7 +58,8 @@ def findings_of(named: Sequence[Named], state: State, data: Prepared) -> tuple[F
 
 
 def _finding(n: Named, state: State, data: Prepared) -> Finding:
-    values = state.fit.layout.of(n.index, state.fit.theta)
+    index = state.terms.index(n.term)
+    values = state.fit.layout.of(index, state.fit.theta)
     rivals = tuple(
         RivalFinding(
             r.term.id,
@@ -73,7 +74,7 @@ def _finding(n: Named, state: State, data: Prepared) -> Finding:
         n.term.id,
         n.term.form,
         n.term.statement(values, data.scale),
-        _parameters(state.fit, n.index),
+        _parameters(state.fit, index),
         n.p_value,
         n.bic_gain,
         n.probability,
@@ -95,10 +96,11 @@ def _place(where: Where, data: Prepared) -> str:
 
 def places_of(left: Left, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
     """Where the baseline fails, the clearest covariates first."""
+    if left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM:
+        return ()
     out = []
-    for structure in left.structures[: policy.locate.PLACES_TOLD]:
-        if structure.p_value > policy.vehicle.FREE_FORCE_FALSE_ALARM:
-            break
+    clear = [s for i, s in enumerate(left.structures) if i == 0 or s.p_value <= policy.locate.PLACE_P]
+    for structure in clear[: policy.locate.PLACES_TOLD]:
         where = where_of(structure)
         says = (
             f"{structure.covariate.what} explains {100 * structure.share:.0f} % of the whitened residual, most at "
@@ -117,7 +119,7 @@ def place_of_findings(left: Left, found: Found, data: Prepared, channel: str) ->
         return ()
     gain = found.before.fit.chi2 - found.after.fit.chi2
     count = sum(map(len, found.after.fit.layout.parts))
-    p = max(float(chi2_law.sf(gain, count)), BACK)
+    p = max(float(chi2_sf(gain, count)), BACK)
     where, share = where_of(structure), gain / found.before.fit.chi2
     says = (
         f"What was found explains {100 * share:.2g} % of the whitened residual together; of a free force over "
@@ -127,11 +129,11 @@ def place_of_findings(left: Left, found: Found, data: Prepared, channel: str) ->
 
 
 def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Remainder | None:
-    """What remains; `named` are those whose name is doubted."""
-    if not left.structures or (left.p_value >= policy.vehicle.FREE_FORCE_FALSE_ALARM and not named):
+    """What remains; `named` are those whose name is not earned."""
+    if not left.structures or (left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM and not named):
         return None
     structure = left.structures[0]
-    if left.p_value >= policy.vehicle.FREE_FORCE_FALSE_ALARM:
+    if left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM:
         own = {c for n in named for c in n.term.covariates}
         structure = next((s for s in left.structures if s.covariate.quantity in own), structure)
     where = where_of(structure)
@@ -139,9 +141,9 @@ def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Remain
         f"Something is left that no effect of the catalogue carries: {structure.covariate.what}, clearest at "
         f"{_place(where, data)}, {100 * structure.share:.2g} % of the whitened residual."
     )
-    resembles = tuple(f"{n.term.id}: {'; '.join(n.doubts)}" for n in named)
+    resembles = tuple(f"{n.term.id}: {'; '.join(n.failed_checks)}" for n in named)
     if named:
-        says += f" It resembles {', '.join(n.term.id for n in named)}, but {named[0].doubts[0]}."
+        says += f" It resembles {', '.join(n.term.id for n in named)}, but {named[0].failed_checks[0]}."
     table = place_of(structure).table
     return Remainder(where, structure.share, left.p_value, table, says, resembles)
 

@@ -23,9 +23,8 @@ from identification.mismatch.vehicle.answering import (
     values_of,
 )
 from identification.mismatch.vehicle.experiment import propose
-from identification.mismatch.vehicle.free_force import FreeForce, free_index, with_free_force
+from identification.mismatch.vehicle.free_force import FreeForce, Left, free_index, judge_left, with_free_force
 from identification.mismatch.vehicle.judging import better_predicting, held_out, only, residuals, rms
-from identification.mismatch.vehicle.left import Left, judge_left
 from identification.mismatch.vehicle.naming import Named, name
 from identification.mismatch.vehicle.runs import Prepared, prepare
 from identification.mismatch.vehicle.screening import applicable
@@ -94,16 +93,16 @@ def _diagnosed(
     found = replace(found, after=after)
     left = judge_left(after.fit, after.white, data, rng)
     held, last = held_out(found.before, after, data, unseen), after
-    if left.p_value < policy.vehicle.FREE_FORCE_FALSE_ALARM:
+    if left.p_value < policy.locate.RESIDUAL_FALSE_ALARM:
         free = pruned(with_free_force(after, data, left.structures[0]), data)
         held, last = better_predicting(found.before, (held, after), free, data, unseen)
     standing = [_beside(n, last, left) for n in named]
-    doubted = [n for n in standing if n.doubts]
-    unnamed = [n.term for n in doubted if n.term in last.terms]
+    unearned = [n for n in standing if n.failed_checks]
+    unnamed = [n.term for n in unearned if n.term in last.terms]
     if unnamed:
         held, last = better_predicting(found.before, (held, last), less(last, data, unnamed), data, unseen)
-    earned = [_beside(n, last, left) for n in standing if not n.doubts]
-    unexplained = unexplained_of(_as_fitted(left, last), doubted, data)
+    earned = [_beside(n, last, left) for n in standing if not n.failed_checks]
+    unexplained = unexplained_of(_as_fitted(left, last), unearned, data)
     experiment = propose(after, earned, data) if unexplained is None else None
     n, p = last.fit.residual.size, int(np.sum(last.fit.free))
     channel = _channel(data)
@@ -134,9 +133,9 @@ def _diagnosed(
 def _beside(n: Named, last: State, left: Left) -> Named:
     """A name beside the free force: where the term stands now, or what took its place."""
     if n.term in last.terms:
-        return replace(n, index=last.terms.index(n.term))
+        return n
     instead = f"a free force over {left.structures[0].covariate.quantity} takes its place"
-    return replace(n, doubts=(*n.doubts, instead))
+    return replace(n, failed_checks=(*n.failed_checks, instead))
 
 
 def _as_fitted(left: Left, last: State) -> Left:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from identification.estimation.singular_values import thin_svd
 from identification.mismatch.estimate.bounded_least_squares import MOST_STEPS, Minimum, least_squares
+from identification.mismatch.estimate.estimate import independent
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise, Rows, Shapes, Whitener
 from identification.mismatch.noise.variances import fit_noise
@@ -44,15 +45,14 @@ class Fit:
         return float(self.residual @ self.residual)
 
 
-def weights(noise: Noise, data: Prepared, keep: Sequence[Floats] | None = None) -> Weights:
+def weights(noise: Noise, data: Prepared, keep: Sequence[Mask] | None = None) -> Weights:
     """One whitening for each run, of the rows in `keep` alone where it is given."""
     kept = [run.rows if keep is None else _part(run.rows, keep[j]) for j, run in enumerate(data.runs)]
     shapes = Shapes()
     return Weights(tuple(Whitener(noise, rows, np.zeros(rows.time.size), shapes) for rows in kept))
 
 
-def _part(rows: Rows, keep: Floats) -> Rows:
-    on = keep > 0
+def _part(rows: Rows, on: Mask) -> Rows:
     return Rows(rows.time[on], rows.count[on], rows.extra[on], rows.width[on])
 
 
@@ -65,12 +65,11 @@ class _Problem:
         data: Prepared,
         white: Weights,
         guess: Sequence[Motion] | None,
-        keep: Sequence[Floats] | None,
+        keep: Sequence[Mask] | None,
     ) -> None:
         self.layout, self.data, self.white = layout, data, white
         self.guess: Sequence[Motion | None] = guess or [None] * len(data.runs)
-        kept = keep or [np.ones(run.time.size) for run in data.runs]
-        self.rows = [k > 0 for k in kept]
+        self.rows = keep or [np.ones(run.time.size, dtype=bool) for run in data.runs]
         self.told = known(layout, data)
 
     def predicted(self, theta: Floats, *, slopes: bool = False) -> list[Prediction]:
@@ -98,13 +97,13 @@ def fit(
     data: Prepared,
     white: Weights,
     guess: Sequence[Motion] | None = None,
-    keep: Sequence[Floats] | None = None,
+    keep: Sequence[Mask] | None = None,
     steps: int = MOST_STEPS,
     fixed: Floats | None = None,
 ) -> Fit:
     """Least squares of the whitened residual within the physical bounds.
 
-    `keep` (n,) per run: rows above 0 are fitted; `white` must then be made of those rows.
+    `keep` (n,) per run: which rows are fitted; `white` must then be made of those rows.
     `fixed` (p,): parameters above 0 keep their values.
     """
     low, high = layout.bounds()
@@ -155,17 +154,6 @@ def noise_of(fitted: Fit, data: Prepared, extra: Sequence[Floats] | None = None)
         one = predict(fitted.layout, fitted.theta, data, j, fitted.motions[j], slopes=True)
         residuals.append(run.response - one.response)
         columns.append(one.slopes if extra is None else np.hstack([one.slopes, extra[j]]))
-    columns = _independent(columns)
+    columns = independent(columns)
     nothing = [np.zeros(r.size) for r in residuals]
     return fit_noise([run.rows for run in data.runs], residuals, columns, nothing)
-
-
-def _independent(columns: Sequence[Floats]) -> list[Floats]:
-    """The same space in columns at right angles: what repeats another is left out."""
-    whole = np.vstack(columns)
-    size = np.sqrt(np.sum(whole**2, axis=0))
-    whole = whole[:, size > 0] / size[size > 0]
-    U, s, _ = thin_svd(whole)
-    basis = U[:, s > 1e-7 * s.max()] if s.size else U
-    ends = np.cumsum([c.shape[0] for c in columns])[:-1]
-    return [np.ascontiguousarray(part) for part in np.split(basis, ends)]

@@ -10,6 +10,8 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.noise.covariance import Noise
+from identification.mismatch.validate.cross_validation import folds
+from identification.mismatch.validate.held_out import fitted_blocks
 from identification.mismatch.vehicle.fitting import Fit, fit, weights
 from identification.mismatch.vehicle.free_force import carried, free_index
 from identification.mismatch.vehicle.model import Layout, on_other_runs, without_term
@@ -17,12 +19,6 @@ from identification.mismatch.vehicle.runs import Prepared, Run
 from identification.mismatch.vehicle.search import State
 from identification.recording import Floats
 
-FOLDS = 4
-"""Groups of runs that are left out in turn: each costs two fits."""
-KEPT_BACK = 4
-"""One block of so many is not fitted."""
-BLOCKS = 24
-"""Blocks of time of one run, of which every fourth is judged."""
 PLAIN = Noise(1.0, 0.0)
 """White noise of 1: in whole runs that were not fitted every row counts alike."""
 
@@ -56,15 +52,15 @@ def held_out(before: State, after: State, data: Prepared, unseen: Prepared | Non
         )
     if len(data.runs) < policy.vehicle.VEHICLE_RUNS:
         return _by_blocks(before, after, data)
-    folds = min(FOLDS, len(data.runs))
+    left_out = folds(len(data.runs))
     olds: list[Floats] = []
     news: list[Floats] = []
-    for fold in range(folds):
-        kept = only(data, [run for j, run in enumerate(data.runs) if j % folds != fold])
-        back = only(data, [run for j, run in enumerate(data.runs) if j % folds == fold])
+    for fold in left_out:
+        kept = only(data, [run for j, run in enumerate(data.runs) if j not in fold])
+        back = only(data, [data.runs[j] for j in fold])
         olds += _elsewhere(_refitted(before, data, kept), kept, back)
         news += _elsewhere(_refitted(after, data, kept), kept, back)
-    share = "each run" if folds == len(data.runs) else f"the runs, {folds} groups"
+    share = "each run" if len(left_out) == len(data.runs) else f"the runs, {len(left_out)} groups"
     what = (
         f"{share} in turn simulated by a model fitted to the others; only {_starts(after, data)} fitted; terms: on all"
     )
@@ -126,20 +122,12 @@ def _begun(layout: Layout, theta: Floats, data: Prepared, unseen: Prepared) -> F
 
 def _by_blocks(before: State, after: State, data: Prepared) -> HeldOutRmse:
     """Simulated throughout; every fourth block of time is judged and not fitted."""
-    keep = [_blocks(run) for run in data.runs]
+    keep = [fitted_blocks(run.time) for run in data.runs]
     white = weights(after.noise, data, keep)
     out = []
     for state in (before, after):
         found = fit(state.fit.layout, state.fit.theta, data, white, state.fit.motions, keep)
-        out.append(rms([r[k == 0] for r, k in zip(residuals(found, data), keep, strict=True)]))
-    rows = sum(int(np.sum(k == 0)) for k in keep)
+        out.append(rms([r[~k] for r, k in zip(residuals(found, data), keep, strict=True)]))
+    rows = sum(int(np.sum(~k)) for k in keep)
     what = f"every fourth block of time, {rows} rows, simulated through from the commands; terms were chosen on all"
     return HeldOutRmse(out[0], out[1], noise_rms(after.noise), what)
-
-
-def _blocks(run: Run) -> Floats:
-    """(n,) 1 where a row is fitted."""
-    t = run.time - run.time[0]
-    index = np.floor(t / (t[-1] / BLOCKS)).astype(int)
-    out: Floats = (index % KEPT_BACK != KEPT_BACK - 2).astype(np.float64)
-    return out

@@ -6,15 +6,21 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2 as chi2_law
 
+from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
+from identification.mismatch.estimate.fitting import impossible
+from identification.mismatch.model.whitening import Weights
+from identification.mismatch.name.naming import difference, probability_beside
+from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.vehicle.fitting import Fit
-from identification.mismatch.vehicle.left import inconstancies
+from identification.mismatch.vehicle.model import added_forces, respond
+from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared
-from identification.mismatch.vehicle.screening import screen, trials
+from identification.mismatch.vehicle.screening import screen, trials, whitened
 from identification.mismatch.vehicle.search import FITTED, State, bic, dropped, fitted_with
 from identification.physics.vehicle.term import VehicleTerm
+from identification.recording import Floats
 
 SWAPS = 2
 """Rounds in which a term gives way to a better rival: more would go in circles."""
@@ -31,16 +37,15 @@ class Rival:
 
 @dataclass(frozen=True, eq=False)
 class Named:
-    index: int
-    """Of the term in the model."""
     term: VehicleTerm
-    gain: float
+    chi2_gain: float
     """Chi-square that is lost without it."""
     p_value: float
     bic_gain: float
     rivals: tuple[Rival, ...]
     probability: float
-    doubts: tuple[str, ...]
+    failed_checks: tuple[str, ...]
+    """Why the name is not earned; empty when it is."""
 
 
 def name(
@@ -70,11 +75,12 @@ def _named(state: State, data: Prepared, candidates: Sequence[VehicleTerm], i: i
     count = len(state.fit.layout.parts[i])
     rivals = _rivals(state, less, data, candidates, term, rng)
     near = tuple(r for r in rivals if r.bic_loss < policy.select.RIVAL_STATED_BIC)
-    probability = 1 / (1 + sum(float(np.exp(-0.5 * r.bic_loss)) for r in near))
-    doubts = (*_edges(state.fit, i), *inconstancies(state.fit, state.white, data, i))
+    failed = ["its parameters end at what is physically possible"] if ended(state.fit, i) else []
+    failed += inconstancies(state.fit, state.white, data, i)
     kept = tuple(r for r in near if _key(r.term) != _key(term) or r.bic_loss < -policy.select.RIVAL_BETTER_BIC)
-    p = max(float(chi2_law.sf(gain, count)), 1e-300)
-    return Named(i, term, gain, p, bic(less) - state.bic(), kept, probability, doubts)
+    p = max(float(chi2_sf(gain, count)), 1e-300)
+    probability = probability_beside([r.bic_loss for r in near])
+    return Named(term, gain, p, bic(less) - state.bic(), kept, probability, tuple(failed))
 
 
 def _rivals(
@@ -105,13 +111,43 @@ def _key(term: VehicleTerm) -> tuple[str, str]:
     return term.id, getattr(term, "name", "")
 
 
-def _edges(fitted: Fit, i: int) -> list[str]:
-    """Parameters that the data press against the limit of what is possible."""
-    begin = fitted.layout.first_of[i]
+def ended(fitted: Fit, i: int) -> bool:
+    """Whether the parameters of term i are at the end of what is possible."""
+    return impossible(fitted.layout.parts[i], fitted.layout.of(i, fitted.theta))
+
+
+def inconstancies(fitted: Fit, white: Weights, data: Prepared, term: int) -> list[str]:
+    """Parts of the recordings in which a term's amount differs by more than chance and VEHICLE_PART_DIFFERENCE."""
+    layout, i = fitted.layout, fitted.layout.first_of[term]
+    amount = fitted.theta[i] - (layout.parts[term][0].neutral or 0.0)
+    if len(layout.parts[term]) > 1 or amount == 0 or not fitted.free[i]:
+        return []
+    base = orthogonal_basis(fitted.jacobian)
+    effects = [
+        amount * added_forces(layout, fitted.theta, data, j, fitted.motions[j])[:, i] for j in range(len(data.runs))
+    ]
     out = []
-    for k, p in enumerate(fitted.layout.parts[i]):
-        value = fitted.theta[begin + k]
-        span = p.high - p.low
-        if min(value - p.low, p.high - value) <= policy.vehicle.EDGE_OF_POSSIBLE * span and p.neutral != value:
-            out.append(f"its {p.name} of {value:.3g} {p.unit} is at the edge of what is possible")
+    splits = _splits(fitted.motions, data)
+    for name, masks in splits.items():
+        columns = [
+            respond(layout, fitted.theta, data, j, fitted.motions[j], (effects[j] * masks[j])[:, None])[:, :-2]
+            for j in range(len(data.runs))
+        ]
+        column = whitened(white, columns, fitted.residual.size)[:, 0]
+        apart = difference(column, base, fitted.residual, policy.vehicle.VEHICLE_PART_DIFFERENCE, len(splits))
+        if apart is not None:
+            out.append(f"its parameter is not the same {name} ({100 * apart:.0f} % apart)")
+    return out
+
+
+def _splits(motions: Sequence[Motion], data: Prepared) -> dict[str, list[Floats]]:
+    """Two parts of all that was recorded, several times."""
+    halves = [(np.arange(run.steps) < run.steps // 2).astype(np.float64) for run in data.runs]
+    ahead = [(0.5 * (m.v[1:] + m.v[:-1]) > 0).astype(np.float64) for m in motions]
+    out = {"in the first and the second half of the runs": halves}
+    share = float(np.mean(np.concatenate(ahead)))
+    if policy.vehicle.AHEAD_ASTERN_SHARE < share < 1 - policy.vehicle.AHEAD_ASTERN_SHARE:
+        out["ahead and astern"] = ahead
+    if len(data.runs) > 1:
+        out["in every second run"] = [np.full(run.steps, float(j % 2)) for j, run in enumerate(data.runs)]
     return out
