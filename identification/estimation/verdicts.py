@@ -9,6 +9,7 @@ from scipy.stats import chi2 as chi2_law
 from scipy.stats import f as f_law
 from scipy.stats import t as student
 
+from identification.estimation.ljung_box import ljung_box
 from identification.recording import Floats
 
 ALPHA = 0.05
@@ -131,11 +132,5 @@ def whiteness(residual: Floats, alpha: float = ALPHA) -> Whiteness | None:
     if n < 10:
         return None
     lags = min(10, n // 5)
-    centred = residual - residual.mean()
-    power = float(centred @ centred)
-    if power == 0.0:
-        return Whiteness(1.0, lags, True)
-    r = np.array([centred[k:] @ centred[:-k] for k in range(1, lags + 1)]) / power
-    q = n * (n + 2) * float(np.sum(r**2 / (n - np.arange(1, lags + 1))))
-    p_value = float(chi2_law.sf(q, lags))
+    p_value = float(chi2_law.sf(ljung_box([residual - residual.mean()], [lags]), lags))
     return Whiteness(p_value, lags, p_value >= alpha)

@@ -10,6 +10,7 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.diagnosis import Finding, Mismatch, RivalFinding
+from identification.mismatch.name.naming import probability_beside
 from identification.mismatch.periodic.periodic_disturbances import EFFECT, Line
 from identification.mismatch.value import Value, Where
 from identification.twin import Twin, TwinLine
@@ -48,7 +49,7 @@ def line_values(line: TwinLine) -> dict[str, Value]:
 def line_finding(line: Line) -> Finding:
     p = max(line.p_value, LEAST_P)
     rivals = tuple(_rivals(line))
-    probability = 1.0 / (1.0 + sum(float(np.exp(-0.5 * max(r.bic_loss, 0.0))) for r in rivals))
+    probability = probability_beside([r.bic_loss for r in rivals])
     return Finding(EFFECT, line.kind, line.statement, line_values(twin_line(line)), p, line.gain, probability, rivals)
 
 
