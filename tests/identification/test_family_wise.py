@@ -15,7 +15,7 @@ ROWS = 400
 SPANS = 8
 LOOKS = np.random.default_rng(7).standard_normal((ROWS, 3 * SPANS)).cumsum(axis=0)
 BASIS = orthogonal_basis(np.random.default_rng(8).standard_normal((ROWS, 4)))
-WIDE = [beyond(BASIS, LOOKS[:, 3 * i : 3 * i + 3]) for i in range(SPANS)]
+WIDE = [beyond(LOOKS[:, 3 * i : 3 * i + 3], BASIS) for i in range(SPANS)]
 
 
 def p_values(residual: Floats) -> list[float]:
@@ -54,7 +54,7 @@ def test_beyond_is_at_right_angles_to_the_basis_and_spans_the_rest() -> None:
     rng = np.random.default_rng(2)
     own = rng.standard_normal((ROWS, 2))
     columns = np.column_stack([1e6 * own[:, 0], BASIS @ np.ones(4), np.zeros(ROWS), own @ np.array([1.0, 1e-3])])
-    found = beyond(BASIS, columns)
+    found = beyond(columns, BASIS)
     assert found.shape == (ROWS, 2)
     np.testing.assert_allclose(found.T @ found, np.eye(2), atol=1e-12)
     np.testing.assert_allclose(BASIS.T @ found, 0.0, atol=1e-12)

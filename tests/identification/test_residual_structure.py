@@ -5,8 +5,8 @@ import numpy as np
 from identification.mismatch.estimate.estimate import forces
 from identification.mismatch.locate.residual_structure_test import residual_structure
 from identification.mismatch.select.covariates import Covariate
-from identification.mismatch.select.forward_selection import search
 from identification.mismatch.select.family_wise import beside, orthogonal_basis
+from identification.mismatch.select.forward_selection import search
 from tests.identification.runs_on_intervals import history
 
 

@@ -54,7 +54,7 @@ def beside(columns: Floats, basis: Floats) -> Floats:
     return out
 
 
-def beyond(basis: Floats, columns: Floats) -> Floats:
+def beyond(columns: Floats, basis: Floats) -> Floats:
     """(n, r) orthonormal basis of what columns (n, q) plainly span outside another orthonormal `basis` (n, p)."""
     size = lengths(columns)
     scaled = columns[:, size > 0] / size[size > 0]

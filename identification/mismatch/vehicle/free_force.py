@@ -146,7 +146,7 @@ def judge_left(fitted: Fit, white: Weights, data: Prepared, rng: np.random.Gener
     spans, found = [], []
     for covariate in covariates(fitted, data):
         columns = whitened(white, free_columns(fitted, data, covariate), residual.size)
-        Q = beyond(base, columns)
+        Q = beyond(columns, base)
         if not Q.shape[1]:
             continue
         gain = float(np.sum((Q.T @ residual) ** 2))

@@ -98,7 +98,7 @@ def screen(
     base, residual = orthogonal_basis(fitted.jacobian), fitted.residual
     spans, judged = [], []
     for trial in found:
-        Q = beyond(base, whitened(white, trial.columns, residual.size))
+        Q = beyond(whitened(white, trial.columns, residual.size), base)
         if Q.shape[1]:
             gain = float(np.sum((Q.T @ residual) ** 2))
             spans.append(Q)
