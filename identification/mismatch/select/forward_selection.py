@@ -285,7 +285,7 @@ def _candidates(judged: Screening, data: Data) -> list[tuple[Term, tuple[float, 
 
 
 def _best_addition(estimate: Estimate, judged: Screening, data: Data, refused: Collection[Term]) -> Fit | None:
-    fits = []
+    found, gains, sizes, pressed = [], [], [], []
     for term, values in _candidates(judged, data):
         if term in refused:
             continue
@@ -295,13 +295,22 @@ def _best_addition(estimate: Estimate, judged: Screening, data: Data, refused: C
         gain = estimate.fit.chi2 - new.chi2
         cost = price(term, data) * np.log(new.residual.size)
         if gain > max(cost, np.log(new.residual.size)):
-            fits.append((at_bound(term, new, data, estimate.weights), gain - cost, len(values), new))
-    if not fits:
-        return None
-    possible = [each for each in fits if not each[0]] or fits
-    most = max(each[1] for each in possible)
-    near = [each for each in possible if each[1] >= policy.select.SIMPLER_TERM_GAIN * most]
-    return min(near, key=lambda each: (each[2], -each[1]))[3]
+            found.append(new)
+            gains.append(float(gain - cost))
+            sizes.append(len(values))
+            pressed.append(at_bound(term, new, data, estimate.weights))
+    return found[preferred(gains, sizes, pressed)] if found else None
+
+
+def preferred(gains: Sequence[float], sizes: Sequence[int], pressed: Sequence[bool]) -> int:
+    """Which addition goes first: the best gain beyond its price, or a simpler one that gains nearly as much.
+
+    `sizes`: the number of parameters of each; `pressed`: against the end of what is possible, so that others go before.
+    """
+    possible = [j for j, ended in enumerate(pressed) if not ended] or range(len(gains))
+    most = max(gains[j] for j in possible)
+    near = [j for j in possible if gains[j] >= policy.select.SIMPLER_TERM_GAIN * most]
+    return min(near, key=lambda j: (sizes[j], -gains[j]))
 
 
 def prune(estimate: Estimate, data: Data) -> Estimate:

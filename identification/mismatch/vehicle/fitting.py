@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from identification.estimation.singular_values import thin_svd
 from identification.mismatch.estimate.bounded_least_squares import MOST_STEPS, Minimum, least_squares
 from identification.mismatch.estimate.estimate import independent
+from identification.mismatch.estimate.fitting import impossible
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise, Rows, Shapes, Whitener
 from identification.mismatch.noise.variances import fit_noise
@@ -145,6 +146,11 @@ def _cov(H: Floats, free: Mask) -> Floats:
     unseen = np.sum(Vt[~kept] ** 2, axis=0) > 1e-6
     out[at[unseen], at[unseen]] = np.nan
     return out
+
+
+def at_bound(fitted: Fit, i: int) -> bool:
+    """Whether the parameters of term i end at what is physically possible."""
+    return impossible(fitted.layout.parts[i], fitted.layout.of(i, fitted.theta))
 
 
 def noise_of(fitted: Fit, data: Prepared, extra: Sequence[Floats] | None = None) -> Noise:

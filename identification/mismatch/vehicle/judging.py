@@ -19,9 +19,6 @@ from identification.mismatch.vehicle.runs import Prepared, Run
 from identification.mismatch.vehicle.search import State
 from identification.recording import Floats
 
-PLAIN = Noise(1.0, 0.0)
-"""White noise of 1: in whole runs that were not fitted every row counts alike."""
-
 
 def rms(parts: Sequence[Floats]) -> float:
     whole = np.concatenate(parts)
@@ -45,7 +42,7 @@ def held_out(before: State, after: State, data: Prepared, unseen: Prepared | Non
     """Both models on what was not fitted; `unseen`: runs that were given for it."""
     noise = noise_rms(after.noise)
     if unseen is not None:
-        old, new = _elsewhere(before.fit, data, unseen), _elsewhere(after.fit, data, unseen)
+        old, new = _elsewhere(before.fit, data, unseen, noise), _elsewhere(after.fit, data, unseen, noise)
         names = ", ".join(run.recording_id for run in unseen.runs)
         return HeldOutRmse(
             rms(old), rms(new), noise, f"whole runs not fitted ({names}); only {_starts(after, data)} fitted"
@@ -58,8 +55,8 @@ def held_out(before: State, after: State, data: Prepared, unseen: Prepared | Non
     for fold in left_out:
         kept = only(data, [run for j, run in enumerate(data.runs) if j not in fold])
         back = only(data, [data.runs[j] for j in fold])
-        olds += _elsewhere(_refitted(before, data, kept), kept, back)
-        news += _elsewhere(_refitted(after, data, kept), kept, back)
+        olds += _elsewhere(_refitted(before, data, kept), kept, back, noise)
+        news += _elsewhere(_refitted(after, data, kept), kept, back, noise)
     share = "each run" if len(left_out) == len(data.runs) else f"the runs, {len(left_out)} groups"
     what = (
         f"{share} in turn simulated by a model fitted to the others; only {_starts(after, data)} fitted; terms: on all"
@@ -96,18 +93,21 @@ def _refitted(state: State, data: Prepared, kept: Prepared) -> Fit:
     return fit(layout, theta, kept, weights(state.noise, kept), [state.fit.motions[j] for j in at])
 
 
-def _elsewhere(fitted: Fit, data: Prepared, unseen: Prepared) -> list[Floats]:
-    """Residual in runs that were not fitted; a free force is laid over their own motion."""
+def _elsewhere(fitted: Fit, data: Prepared, unseen: Prepared, noise: float) -> list[Floats]:
+    """Residual in runs that were not fitted, of `noise` at each sample; a free force is laid over their own motion."""
     at = free_index(fitted.layout)
     if at is None:
-        return residuals(_begun(fitted.layout, fitted.theta, data, unseen), unseen)
+        return residuals(_begun(fitted.layout, fitted.theta, data, unseen, noise), unseen)
     layout, theta = without_term(fitted.layout, data, fitted.theta, at)
-    bare = _begun(layout, theta, data, unseen)
-    return residuals(_begun(carried(fitted.layout, at, bare, unseen), fitted.theta, data, unseen), unseen)
+    bare = _begun(layout, theta, data, unseen, noise)
+    return residuals(_begun(carried(fitted.layout, at, bare, unseen), fitted.theta, data, unseen, noise), unseen)
 
 
-def _begun(layout: Layout, theta: Floats, data: Prepared, unseen: Prepared) -> Fit:
-    """Other runs under this model: what begins a run, and a ballast of its own, are found on it, nothing else."""
+def _begun(layout: Layout, theta: Floats, data: Prepared, unseen: Prepared, noise: float) -> Fit:
+    """Other runs under this model: what begins a run, and a ballast of its own, are found on it, nothing else.
+
+    Every row counts alike there, whatever the noise's colour.
+    """
     old = replace(layout, runs=len(data.runs))
     new, start = on_other_runs(old, unseen, theta)
     fixed = np.ones(new.size)
@@ -117,7 +117,7 @@ def _begun(layout: Layout, theta: Floats, data: Prepared, unseen: Prepared) -> F
         if term.form == "by_ballast":
             for k, one in enumerate(unseen.scale.ballasts):
                 fixed[new.first_of[i] + k] = float(one in known)
-    return fit(new, start, unseen, weights(PLAIN, unseen), fixed=fixed)
+    return fit(new, start, unseen, weights(Noise(noise**2, 0.0), unseen), fixed=fixed)
 
 
 def _by_blocks(before: State, after: State, data: Prepared) -> HeldOutRmse:

@@ -9,11 +9,10 @@ import numpy as np
 
 from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
-from identification.mismatch.estimate.fitting import impossible
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.name.naming import difference, probability_beside
 from identification.mismatch.select.family_wise import orthogonal_basis
-from identification.mismatch.vehicle.fitting import Fit
+from identification.mismatch.vehicle.fitting import Fit, at_bound
 from identification.mismatch.vehicle.model import added_forces, respond
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared
@@ -75,7 +74,7 @@ def _named(state: State, data: Prepared, candidates: Sequence[VehicleTerm], i: i
     count = len(state.fit.layout.parts[i])
     rivals = _rivals(state, less, data, candidates, term, rng)
     near = tuple(r for r in rivals if r.bic_loss < policy.select.RIVAL_STATED_BIC)
-    failed = ["its parameters end at what is physically possible"] if ended(state.fit, i) else []
+    failed = ["its parameters end at what is physically possible"] if at_bound(state.fit, i) else []
     failed += inconstancies(state.fit, state.white, data, i)
     kept = tuple(r for r in near if _key(r.term) != _key(term) or r.bic_loss < -policy.select.RIVAL_BETTER_BIC)
     p = max(float(chi2_sf(gain, count)), 1e-300)
@@ -103,17 +102,14 @@ def _rivals(
         ):
             continue
         other = fitted_with(less, state.white, data, screened)
+        if at_bound(other, len(other.layout.parts) - 1):
+            continue
         out.append(Rival(screened.trial.term, other, bic(other) - state.bic()))
     return sorted(out, key=lambda r: r.bic_loss)
 
 
 def _key(term: VehicleTerm) -> tuple[str, str]:
     return term.id, getattr(term, "name", "")
-
-
-def ended(fitted: Fit, i: int) -> bool:
-    """Whether the parameters of term i are at the end of what is possible."""
-    return impossible(fitted.layout.parts[i], fitted.layout.of(i, fitted.theta))
 
 
 def inconstancies(fitted: Fit, white: Weights, data: Prepared, term: int) -> list[str]:

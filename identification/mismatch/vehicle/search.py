@@ -11,8 +11,8 @@ from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
-from identification.mismatch.select.forward_selection import least_earned
-from identification.mismatch.vehicle.fitting import Fit, fit, noise_of, weights
+from identification.mismatch.select.forward_selection import least_earned, preferred
+from identification.mismatch.vehicle.fitting import Fit, at_bound, fit, noise_of, weights
 from identification.mismatch.vehicle.model import Layout, VehicleModel, begin, layout_of, with_term, without_term
 from identification.mismatch.vehicle.runs import Prepared
 from identification.mismatch.vehicle.screening import Screened, screen, trials
@@ -86,11 +86,9 @@ def _baseline(data: Prepared, candidates: Sequence[VehicleTerm]) -> State:
     white = float(np.median(np.abs(spread)) / 0.6745) ** 2 / 6 or 1e-6 * float(np.var(data.runs[0].response))
     noise = Noise(white, 0.0)
     rough = min((fit(layout, start, data, weights(noise, data)) for start in _starts(layout, data)), key=_chi2)
-    for _ in range(1):
-        noise = noise_of(rough, data, _columns(rough, data, candidates))
-        white_of = weights(noise, data)
-        rough = fit(layout, rough.theta, data, white_of, rough.motions)
-    return State(rough, noise, white_of)
+    noise = noise_of(rough, data, _columns(rough, data, candidates))
+    white_of = weights(noise, data)
+    return State(fit(layout, rough.theta, data, white_of, rough.motions), noise, white_of)
 
 
 def _chi2(fitted: Fit) -> float:
@@ -123,7 +121,11 @@ def _best(state: State, data: Prepared, terms: Sequence[VehicleTerm], rng: np.ra
     found = [fitted_with(state.fit, state.white, data, s) for s in promising(ranked)]
     good = [one for one in found if chi2_sf(state.fit.chi2 - one.chi2, _more(state, one)) < needed]
     good = [one for one in good if bic(one) < state.bic()]
-    return min(good, key=bic) if good else None
+    if not good:
+        return None
+    at = len(state.terms)
+    gains, pressed = [state.bic() - bic(one) for one in good], [at_bound(one, at) for one in good]
+    return good[preferred(gains, [_more(state, one) for one in good], pressed)]
 
 
 def promising(ranked: Sequence[Screened]) -> list[Screened]:
