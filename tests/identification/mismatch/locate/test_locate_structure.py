@@ -98,7 +98,6 @@ def test_one_covariate_that_was_asked_for_alone_is_judged():
     assert found.p_value == pytest.approx(group.p_value, abs=0.15)
 
 
-@pytest.mark.xfail(strict=True, reason="what rounding leaves of a column in the model's span is made a unit direction")
 def test_what_the_model_can_follow_is_no_structure():
     """Up and down times the size of the drive is C's own column on this plan: with it the statistic is three times
     that of the regression, as rounding goes with the level."""
