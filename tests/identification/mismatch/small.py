@@ -74,7 +74,7 @@ def selected(values: Values, recordings: Sequence[Recording], terms: Sequence[Te
     """As a search ends, beside the white noise that was put in."""
     data, before = known_noise({}, recordings)
     bigger, theta = placed(values, before.fit.theta)
-    after = replace(before, fit=fit(bigger, theta, data, before.weights))
+    after = replace(before, fit=fit(bigger, theta, data, before.weights)) if values else before
     return Selected(data, tuple(terms), before, after, (), None)
 
 
