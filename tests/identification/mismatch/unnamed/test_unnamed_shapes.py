@@ -109,25 +109,38 @@ def test_each_covariate_offers_kinds_that_may_act_over_it():
     assert all(s.memory < 0.5 * data.scale.duration for s in shapes_over("load_history", data))
 
 
+def since(t, V):
+    """(s since the last step, volts before it)."""
+    changed = np.concatenate([[0], np.flatnonzero(np.diff(V)) + 1])
+    which = np.searchsorted(changed, np.arange(t.size), side="right") - 1
+    return t - t[changed[which]], np.concatenate([[0.0], V[changed[1:] - 1]])[which]
+
+
+def late(t, V, F):
+    """Three tenths of each change come late, over half a second."""
+    age, before = since(t, V)
+    return F - 0.3 * (F - C * before * np.abs(before)) * np.exp(-age / 0.5)
+
+
+def lossy(t, V, F):
+    """A tenth is lost after the thrust has turned the other way, over a second."""
+    age, before = since(t, V)
+    return F * (1 - 0.1 * (before * V < 0) * np.exp(-age / 0.8))
+
+
 @pytest.mark.parametrize(
     ("quantity", "times_", "change"),
     [
         ("time", "gain", lambda t, V, F: F * (1 + 0.05 * np.sin(t / 12))),
         ("time", "force", lambda t, V, F: F + 2 * np.sin(t / 12)),
         ("direction", "gain", lambda t, V, F: F * np.where(V < 0, 0.9, 1.0)),
-        ("time_since_step", "step", None),
+        ("time_since_step", "step", late),
+        ("time_since_step", "reversed", lossy),
         ("water_temperature", "gain", lambda t, V, F: F * (1 + 0.02 * 4 * np.sin(t / 9))),
     ],
 )
 def test_the_kind_and_place_that_was_planted_gains_most(quantity, times_, change):
-    def late(t, V, F):
-        """Two of a hundred of each change come late, over half a second."""
-        changed = np.concatenate([[0], np.flatnonzero(np.diff(V)) + 1])
-        which = np.searchsorted(changed, np.arange(t.size), side="right") - 1
-        before = np.concatenate([[0.0], F[changed[1:] - 1]])[which]
-        return F - 0.3 * (F - before) * np.exp(-(t - t[changed[which]]) / 0.5)
-
-    data, estimate = known_noise({}, [wet(change=change or late, rate=16.0)])
+    data, estimate = known_noise({}, [wet(change=change, rate=16.0)])
     found = best_over(quantity, estimate, data)
     assert found.gain > 100
     assert times_ in found.term.times
