@@ -1,14 +1,22 @@
-"""Every test must leave nothing behind: no thread, no child process, no open file, port or socket file."""
+"""Every test must leave nothing behind: no thread, no child process, no open file, port or socket file.
+
+Linear algebra gets one thread in each process, as in rig/blind/workers.py: matrices here are small, a second thread
+waits for the first and takes the processor from the other worker meanwhile (half of all time, measured).
+"""
 
 from __future__ import annotations
 
 import multiprocessing
+import os
 import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+
+for _name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_name, "1")  # read once, when numpy is first imported
 
 GRACE = 2.0
 """s that threads and processes get to end after the test."""

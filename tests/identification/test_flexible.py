@@ -352,16 +352,3 @@ def test_a_jump_of_the_reading_gets_knots_beside_it():
     assert left.where.quantity == "time"
     (shape,) = left.flexible
     assert any(0 < b - a < 1.0 and abs(a - 188.3) < 1.0 for a, b in pairwise(shape.knots))
-
-
-@pytest.mark.timeout(300)  # six terms are tried in its place, and exchanged
-def test_what_only_reversals_lose_is_seen_after_steps():
-    def lossy(t, V, F):
-        changed = np.concatenate([[0], np.flatnonzero(np.diff(V)) + 1])
-        which = np.searchsorted(changed, np.arange(t.size), side="right") - 1
-        before = np.concatenate([[0.0], V[changed[1:] - 1]])[which]
-        return F * (1 - 0.1 * (before * V < 0) * np.exp(-(t - t[changed[which]]) / 0.8))
-
-    left = diagnosed(run(lossy), without=("reversal_loss",)).unexplained
-    assert left.where.quantity == "time_since_step"
-    assert left.flexible[0].splines[0].times == "reversed"

@@ -106,8 +106,8 @@ def test_levels_share_the_error_of_their_mean():
     assert 0.5 < np.sqrt(np.mean(np.square(errors))) < 1.5
     history = history_of(run(noise=0.1, seconds=60.0))
     data, _ = start([history])
-    assert data.spread is not None
-    assert data.spread.thrust[0].shape == (history.rows.size, history.level_errors.shape[1])
+    assert data.prior_factor is not None
+    assert data.prior_factor.thrust[0].shape == (history.rows.size, history.level_errors.shape[1])
 
 
 def test_a_driver_without_noise_is_left_as_it_is():

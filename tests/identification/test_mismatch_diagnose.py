@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from diagnosed_runs import NOISE, TOP, C, dead_band, levels, run, table
 
-from identification.mismatch import pipeline as diagnosing
 from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.estimate.fitting import fit
@@ -202,40 +201,10 @@ def test_a_hold_out_that_lies_is_found_and_put_right():
     assert found.heldout.after < 1.1 * NOISE
 
 
-def test_a_name_keeps_its_value_beside_a_shape_over_its_own_coordinate():
-    """In reverse 0.8 of the forward thrust, and a bump of the static curve that no term carries."""
-
-    def bumped(t, V, F):
-        return np.where(F < 0, 0.8, 1.0) * F * np.where(np.abs(V) == 8.0, 1.06, 1.0)
-
-    found = diagnose([run(bumped, seconds=300.0)])
-    assert found.unexplained is not None
-    assert [f.covariate for f in found.unexplained.flexible] == ["command_voltage"]
-    (finding,) = found.findings
-    assert finding.effect == "asymmetry"
-    assert finding.parameters["ratio"].value == pytest.approx(0.8, abs=0.02)
-
-
 def test_a_name_must_predict_what_was_not_fitted():
     found = diagnose([run(seed=1, volts=dead_band(0.8))], holdout=[run(seed=2)])
     assert found.verdict == "unexplained"
     assert any("predicted better without it" in text for text in found.unexplained.resembles)
-
-
-def test_names_go_where_without_those_that_are_not_earned_they_predict_worse_than_the_baseline(monkeypatch):
-    runs = [run(lambda t, V, F: np.where(F < 0, 0.8, 1.0) * F, seed=1, volts=dead_band(0.8))]
-    others = [run(lambda t, V, F: np.where(F < 0, 0.8, 1.0) * F, seed=2)]
-    found = diagnose(runs, holdout=others)
-    assert [f.effect for f in found.findings] == ["asymmetry"]
-    assert [text.split(":")[0] for text in found.unexplained.resembles] == ["dead_band"]
-    assert found.heldout.after < found.heldout.before
-    monkeypatch.setattr(diagnosing, "predicts", lambda *_: False)
-    alone = diagnose(runs, holdout=others)
-    assert alone.verdict == "unexplained"
-    assert alone.findings == ()
-    assert f"asymmetry: {diagnosing.ALONE}" in alone.unexplained.resembles
-    assert set(alone.model) == {"C", "tare"}
-    assert alone.heldout.after == pytest.approx(alone.heldout.before)
 
 
 def test_a_jump_of_one_run_need_not_be_in_another():
