@@ -8,8 +8,6 @@ from itertools import product
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 
 from identification.mismatch import policy
 from identification.mismatch.answer import stage
@@ -402,9 +400,6 @@ def test_a_place_without_a_flexible_term_is_that_of_the_clearest_structure():
 # ---------------------------------------------------------------- as JSON
 
 
-numbers = st.floats(allow_nan=True, allow_infinity=True)
-
-
 def plain(node):
     """Whether it is all numbers that are numbers, texts and nothing."""
     if isinstance(node, dict):
@@ -419,8 +414,7 @@ def explained():
     return told(short(volts=dead_band(1.2), seconds=120.0), {BAND: (1.0,)})[0]
 
 
-@settings(max_examples=30, deadline=None)
-@given(x=numbers, y=numbers)
+@pytest.mark.parametrize(("x", "y"), product([np.nan, np.inf, -np.inf, 0.5], repeat=2))
 def test_whatever_the_numbers_the_json_is_one(explained, x, y):
     """Not finite becomes null, everywhere."""
     spoiled = replace(

@@ -188,6 +188,21 @@ def test_noise_and_the_plans_own_repetition_are_no_pulses():
     assert likeliest_pulses(estimate.fit, data, estimate.weights) is None, "a table has no course of time"
 
 
+def test_what_comes_back_with_the_plan_is_no_pulse():
+    """Four levels that are run again and again, and a loss after one of them each time."""
+    start = np.arange(0.0, 160.0, 3.0)
+    volts = np.tile([0.0, 8.0, -6.0, 12.0], 20)[: start.size]
+    t = np.arange(0.05, 160.0, 0.125)
+    V = volts[np.searchsorted(start, t, side="right") - 1]
+    lost = 0.06 * ((V == 8.0) & (t % 3.0 < 1.2))
+    F = C * V * np.abs(V) * (1 - lost) + NOISE * rng(3).standard_normal(t.size)
+    command = Channel("command_voltage", "command", "command_voltage", "V", start, volts)
+    recording = replace(short(), channels=(command, Channel("thrust", "cell", "thrust", "N", t, F)))
+    data, estimate = known_noise({}, [recording])
+    found = likeliest_pulses(estimate.fit, data, estimate.weights)
+    assert found is None or abs(found.period / 12.0 - round(found.period / 12.0)) > 0.01 or found.p_value > 0.01
+
+
 def test_a_gain_that_is_restless_everywhere_is_no_pulse():
     """In proportion to the thrust, every second or so another: turbulence."""
 

@@ -49,6 +49,11 @@ def test_a_true_effect_fails_none():
     assert checks([short(volts=dead_band(1.2), seed=s, seconds=50.0) for s in (0, 1)], {BAND: (1.0,)}) == ""
 
 
+def test_a_faint_one_fails_none_by_chance():
+    """Twenty runs of an effect of some twenty sigma, four checks each."""
+    assert [checks([short(volts=dead_band(0.02), seed=s)], {BAND: (0.1,)}) for s in range(20)] == [""] * 20
+
+
 @pytest.mark.parametrize(
     ("of", "says"),
     [

@@ -67,6 +67,24 @@ def test_whitened_stretches_have_variance_one_whatever_the_colour():
     assert np.std(quick(slow, slow.residual)[200:-200]) < 0.1, "what is slow is taken off"
 
 
+def test_the_power_of_a_stretch_is_seen_over_its_own_noise():
+    """A slope of the spectrum of three decades: over it one everywhere; aliases folded back."""
+    series = turning(seed=4)
+    e = series.residual
+    red = np.convolve(e, 0.9 ** np.arange(60))[: e.size]
+    colour = Colour(Series(series.time, red, series.turns), np.zeros(e.size))
+    z = np.linspace(0.5, 4.0, 200)
+    speed = np.array([8.0])
+    seen = np.abs(z * 8.0 - RATE * np.round(z * 8.0 / RATE))
+    shape = 1 / np.abs(1 - 0.9 * np.exp(-2j * np.pi * seen / RATE)) ** 2
+    found = colour.out_of(shape, z, speed)
+    usual = seen > 3.0
+    assert np.std(np.log(found[usual])) < 0.4 < 0.5 * np.std(np.log(shape[usual]))
+    assert colour.variance(2.0, speed) == pytest.approx(
+        1 / abs(1 - 0.9 * np.exp(-2j * np.pi * 16 / RATE)) ** 2, rel=0.4
+    )
+
+
 def test_a_trend_is_up_down_or_none():
     t = np.arange(0.0, 5.0, 0.02)
     for slope, trend in ((0.0, 0), (1.0, 1), (-1.0, 2)):

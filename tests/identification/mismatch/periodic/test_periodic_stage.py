@@ -47,6 +47,18 @@ def test_a_delay_is_in_the_residual_at_every_sample():
     assert np.std(series.residual) < 0.5 * np.std(bare.residual)
 
 
+def test_a_shift_of_the_clocks_is_in_it_too():
+    """Forty milliseconds between command and force, as a nuisance and as a delay: the same residual."""
+    data, estimate = known_noise({TimeSkew(): (0.0,)}, [noisy()])
+    now = estimate.fit
+    late = replace(now, theta=replace(now.theta, terms=((0.04,),)))
+    shifted = replace(now, theta=replace(now.theta, terms=((0.0,),), shift=0.04))
+    (one,), (other,) = series_of(late, data), series_of(shifted, data)
+    assert other.residual == pytest.approx(one.residual, abs=1e-6)
+    (none,) = series_of(replace(now, theta=replace(now.theta, terms=((0.0,),))), data)
+    assert np.max(np.abs(other.residual - none.residual)) > 1.0
+
+
 def test_a_line_is_taken_from_every_sample_and_its_mean():
     data, estimate = estimated({}, [noisy(change=hum())])
     found = stage.run(estimate.fit, data, data.histories)

@@ -68,10 +68,12 @@ def test_a_corner_is_not_rounded_off():
 def test_what_is_still_on_its_way_is_no_level():
     """A rotor that takes its time: the level begins where it has arrived, and its mean is not that of the way."""
     value = 5.0 * (1 - np.exp(-T[:1200] / 1.5))
-    found = course(value)
-    (level,) = found.levels
-    assert level.begun > 5.0
-    assert level.value == pytest.approx(5.0, abs=0.05)
+    off = []
+    for seed in range(15):
+        level = course(value, seed=seed).levels[0]
+        assert level.begun > 5.0
+        off.append((level.value - 5.0) / level.error)
+    assert abs(np.mean(off)) < 0.8
 
 
 def test_a_slow_wander_is_no_level():

@@ -81,12 +81,12 @@ def test_the_threshold_is_that_of_the_largest_of_many():
 
 
 def test_what_is_plainly_there_is_seen_and_does_not_hide_itself():
-    """The null is drawn from the residual; with a direction of 12 sigma in it it would be as loud as that."""
+    """The null is drawn from the residual; with a direction of 60 sigma in it it would be six times as wide."""
     found = correlated()
-    loud = left(rng(4).standard_normal(N) + 12.0 * found.columns[:, 3])
+    loud = left(rng(4).standard_normal(N) + 60.0 * found.columns[:, 3])
     judged = screen(loud, found, rng(0))
     assert int(np.argmax(judged.z)) == 3
-    assert judged.largest == pytest.approx(12.0, abs=3.0)
+    assert judged.largest == pytest.approx(60.0, abs=3.0)
     assert judged.p_value < 1e-8
     assert judged.threshold < 4.5
     assert judged.best(1)[0][0] is found.terms[3]

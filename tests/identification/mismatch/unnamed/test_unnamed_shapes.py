@@ -391,3 +391,16 @@ def test_a_step_of_the_gain_is_no_formula():
     data, before = known_noise({}, [wet(change=lambda t, _V, F: F * np.where(t < 37, 1.0, 0.9))])
     free = extend(before, before, data, "time", (), train_test_split(before, data, ()), rng(0))
     assert find_formula(free, data, ()) is None
+
+
+def test_a_recorded_quantity_goes_before_time_that_does_as_well():
+    """Water that warms evenly is time by another name: what the thermometer says is told."""
+    t = np.arange(0.0, 80.0, 0.5)
+    water = Channel("w", "w", "water_temperature", "degC", t, 12 + 0.05 * t)
+    run = short(change=lambda t, _V, F: F * (1 - 0.003 * t), extra=(water,))
+    data, before = known_noise({}, [run])
+    free = extend(before, before, data, "time", (), train_test_split(before, data, ()), rng(0))
+    found = find_formula(free, data, ())
+    assert "T_w" in found.text
+    assert "T_w" in found.symbols
+    assert any("t" in other.split() for other in found.equals)

@@ -164,13 +164,12 @@ def pooled(values, runs):
 
 @pytest.mark.parametrize(("many", "says"), [(3, "each run by a model"), (6, "each of 4 groups of runs by a model")])
 def test_each_run_is_judged_by_the_others(many, says):
-    """Its own numbers by hand: fit without the run, tare of the run, error on it."""
-    runs = [banded(seed=s, tare=float(s), seconds=50.0) for s in range(many)]
+    """Its own numbers by hand: fit without the run, tare of the run, error on it. One run has another dead band."""
+    runs = [banded(1.2 + 0.4 * (s == 1), seed=s, tare=float(s), seconds=50.0) for s in range(many)]
     data, before, after = pooled({BAND: (1.0,)}, runs)
     held = by_folds(before, after, data, data, QUIET)
     assert held.what.startswith(says)
-    assert held.after == pytest.approx(NOISE, rel=0.05)
-    assert held.before > 3 * NOISE
+    assert 1.5 * NOISE < held.after < 0.7 * held.before
     squares, samples = [], []
     for fold in np.array_split(np.arange(many), min(many, 4)):
         rest, theta = data_of([r for i, r in enumerate(runs) if i not in fold])
