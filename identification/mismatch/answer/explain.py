@@ -66,8 +66,8 @@ def explained(trace: Trace) -> tuple[Section, ...]:
         _section("name: whether each name is earned", _named(trace)),
         _section("validate: what was not fitted", _validated(trace)),
         _section("unnamed: a free shape for what has no name", _unnamed(trace.completed)),
+        _section("next experiment: what would settle it", _next(trace.diagnosis)),
         _section("answer: the verdict", _answer(trace)),
-        _section("next experiment", _next(trace.diagnosis)),
     ]
     return tuple(found)
 

@@ -88,6 +88,8 @@ def round_lines(one: Round) -> Iterator[str]:
     for c in fitted.values():
         yield f"  {label(c.term):<42}{'':>17}{c.chi2_gain:>12.5g}{c.price:>8.3g}{' at bound' if c.at_bound else ''}"
     yield _became(one)
+    if one.hidden is not None:
+        yield f"  deviance lower by {one.hidden.gain:.4g}; {one.hidden.asked:.4g} was asked"
 
 
 def best_trials(judged: Screening) -> list[tuple[Term, float, float]]:
@@ -106,8 +108,6 @@ def _became(one: Round) -> str:
         return "the search ends: the model is full" if full else "the search ends: nothing that lasts can be added"
     added = [label(t) for t in one.after if t not in one.model]
     gone = [label(t) for t in one.model if t not in one.after]
-    why = "most gain for its parameters"
-    if one.hidden is not None:
-        why = f"told from noise by estimating both, deviance {one.hidden.gain:.4g} lower ({one.hidden.asked:.4g} asked)"
+    why = "most gain for its parameters" if one.hidden is None else "told from noise by estimating both"
     dropped = f"; dropped: {', '.join(gone)}" if gone else ""
     return f"added: {', '.join(added) or 'nothing'}: {why}{dropped}"
