@@ -30,6 +30,7 @@ from identification.recording import Recording
 from identification.run_history.history import History
 
 WIDTH = 96
+"""Columns of a line: with the indent that the command gives it, a terminal's 100 hold it."""
 MOST_PLACES = 10
 """Covariates that are shown, those of the smallest p-value."""
 MOST_RUNS = 6

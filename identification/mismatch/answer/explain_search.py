@@ -20,6 +20,7 @@ MOST_TERMS = 6
 LEAST_P = 1e-12
 """A smaller p-value is not told: no tail is known so far out."""
 MOST_TARES = 6
+"""Tares that are shown, those of the first recordings."""
 
 
 def label(term: Term) -> str:
