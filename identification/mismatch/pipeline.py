@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from identification.mismatch.answer import stage as answer
 from identification.mismatch.answer.periodic_findings import told_lines
+from identification.mismatch.answer.trace import Trace
 from identification.mismatch.compare.saved_model_baseline import starting
 from identification.mismatch.faults import stage as faults
 from identification.mismatch.locate import stage as locate
@@ -19,33 +19,16 @@ from identification.mismatch.periodic import stage as periodic
 from identification.mismatch.prepare import stage as prepare
 from identification.mismatch.prepare.channel_availability import predictable
 from identification.mismatch.prepare.preparing import Refusal
-from identification.mismatch.select.forward_selection import Selected, search
+from identification.mismatch.select.forward_selection import search
 from identification.mismatch.select.stage import exchange_rivals
 from identification.mismatch.unnamed import stage as unnamed
 from identification.mismatch.validate import stage as validate
 
 if TYPE_CHECKING:
     from identification.mismatch.diagnosis import Diagnosis
-    from identification.mismatch.name.naming import Named
     from identification.mismatch.next_experiment.sweeps import Limits
     from identification.recording import Recording
     from identification.twin import Twin
-
-
-@dataclass(frozen=True, eq=False, slots=True)
-class Trace:
-    """What every stage handed on: `rig diagnose --explain` tells it."""
-
-    prepared: prepare.Prepared
-    sound: faults.Sound
-    first: Selected
-    cleaned: periodic.Cleaned
-    selected: Selected
-    located: locate.Located
-    named: tuple[Named, ...]
-    validated: validate.Validated
-    completed: unnamed.Completed
-    diagnosis: Diagnosis
 
 
 class Draws(NamedTuple):

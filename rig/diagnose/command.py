@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from importlib import import_module
 from itertools import chain
@@ -19,6 +19,7 @@ from rig.errors import RecordingError, RigError
 from rig.list_option import ListCommand
 
 if TYPE_CHECKING:  # numpy and scipy come up when a diagnosis is made, not for `rig diagnose --help`
+    from identification.mismatch.answer.trace import Trace
     from identification.mismatch.diagnosis import Diagnosis
     from identification.mismatch.next_experiment.sweeps import Limits
     from identification.recording import Recording
@@ -72,12 +73,14 @@ def diagnose_files(
     limits: Limits | None = None,
     vehicle: VehicleFiles = NO_VEHICLE,
     wanted: Wanted = NOTHING,
+    watched: Callable[[Trace], object] | None = None,
 ) -> Diagnosis:
     """The diagnosis of recordings of one thruster, against C V|V| or a twin; its own twin knows the files' hashes.
 
     Of recordings of a vehicle, against its drag and its thrusters' models; `vehicle` says what is known of it.
     `limits`: of the next experiment. `wanted`: what is to be written of the answer; what cannot be is refused before
-    anything is computed. Raises RecordingError or ConfigError for what cannot be used, TwinError for such a twin.
+    anything is computed. `watched` is given what each stage of a thruster's diagnosis handed on.
+    Raises RecordingError or ConfigError for what cannot be used, TwinError for such a twin.
     """
     from rig.twin.reading import read_twin
     from rig.twin.writing import stamped
@@ -88,18 +91,26 @@ def diagnose_files(
     recordings = read(files)
     wanted.refuse(recordings)
     if is_vehicle(recordings):
-        _refuse_for_vehicle(files, twin, limits)
+        _refuse_for_vehicle(files, twin, limits, explained=watched is not None)
         kept = dict(zip(held, read(held), strict=True))
         return diagnose_vehicle_files(dict(zip(files, recordings, strict=True)), kept, seed, vehicle)
     refuse_for_tunnel(vehicle)
     if baseline is not None and any_thruster:
         baseline = replace(baseline, thruster=recordings[0].thruster)
-    found = diagnosed(recordings, read(held), seed, baseline, limits)
+    trace = traced(recordings, read(held), seed, baseline, limits)
+    if watched is not None:
+        watched(trace)
+    found = trace.diagnosis
     by_id = {r.recording_id: path for r, path in zip(recordings, files, strict=True)}
     return found if found.twin is None else replace(found, twin=stamped(found.twin, by_id))
 
 
-def _refuse_for_vehicle(files: Sequence[Path], twin: Path | None, limits: Limits | None) -> None:
+def _refuse_for_vehicle(files: Sequence[Path], twin: Path | None, limits: Limits | None, *, explained: bool) -> None:
+    if explained:
+        raise RecordingError(
+            f"--explain shows the stages of a thruster's diagnosis and is not there yet for a vehicle, and {files[0]} "
+            "is of a vehicle; leave --explain out"
+        )
     if twin is not None:
         raise RecordingError(f"--twin is of a thruster, and {files[0]} is a recording of a vehicle")
     if limits is not None:
@@ -108,18 +119,18 @@ def _refuse_for_vehicle(files: Sequence[Path], twin: Path | None, limits: Limits
         )
 
 
-def diagnosed(
+def traced(
     recordings: Sequence[Recording],
     holdout: Sequence[Recording] = (),
     seed: int = 0,
     baseline: Twin | None = None,
     limits: Limits | None = None,
-) -> Diagnosis:
-    """As identification has it, a refusal raised as RecordingError."""
-    from identification.mismatch.pipeline import diagnose
+) -> Trace:
+    """As identification has it for a thruster, a refusal raised as RecordingError."""
+    from identification.mismatch.pipeline import traced as trace_of
     from identification.mismatch.prepare.preparing import Refusal
 
-    found = diagnose(recordings, holdout, seed, baseline, limits)
+    found = trace_of(recordings, holdout, seed, baseline, limits)
     if isinstance(found, Refusal):
         raise RecordingError(found.reason)
     return found
@@ -152,6 +163,14 @@ def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = ())
         _plan(found, wanted.campaign, wanted.plan, err=wanted.alone)
 
 
+def explain(trace: Trace, wanted: Wanted) -> None:
+    """How it came to the answer, after it; on standard error where standard output is for the JSON alone."""
+    from identification.mismatch.answer.explain import explained
+    from rig.diagnose.explanation import explanation_text
+
+    click.echo(("" if wanted.alone else "\n") + explanation_text(explained(trace)), err=wanted.alone)
+
+
 def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) -> None:
     """The next experiment as a campaign, or why there is none."""
     if found.next_experiment is None:
@@ -174,6 +193,7 @@ def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) 
 @click.option("--mass-std", type=float, default=0.0, metavar="KG", help="Standard deviation of --mass.  [default: 0]")
 @click.option("--axis", type=click.Choice(["surge", "sway", "heave", "yaw"]), help="Vehicle: only trials of this axis.")
 @seed_option
+@click.option("--explain", "wants_stages", is_flag=True, help="Also print what each stage handed on, in figures.")
 def diagnose_command(
     files: tuple[Path, ...],
     twin: Path | None,
@@ -185,6 +205,7 @@ def diagnose_command(
     mass_std: float,
     axis: str | None,
     seed: int,
+    wants_stages: bool,
     **outputs: Any,
 ) -> None:
     """Find the physics that C V|V| leaves out of recordings of one thruster; a folder stands for its *.h5.
@@ -196,6 +217,7 @@ def diagnose_command(
     try:
         wanted = wanted_of(**outputs)
         vehicle = VehicleFiles(thrusters, installation, mass, mass_std, axis or "")
+        traces: list[Trace] = []
         found = diagnose_files(
             files,
             holdout,
@@ -205,8 +227,11 @@ def diagnose_command(
             limits=wanted.limits,
             vehicle=vehicle,
             wanted=wanted,
+            watched=traces.append if wants_stages else None,
         )
         tell(found, wanted, read(recordings_in(files)) if wanted.report is not None else ())
+        for trace in traces:
+            explain(trace, wanted)
     except (RigError, OSError) as error:
         click.echo(f"rig diagnose: {error}", err=True)
         raise SystemExit(2) from error

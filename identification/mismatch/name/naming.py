@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -26,6 +26,19 @@ from identification.physics.term import Term
 from identification.recording import Floats
 
 
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing that a name is asked."""
+
+    asked: str
+    failed: str = ""
+    """Why the name is not earned; empty where it passes."""
+    told: str = ""
+    """Its figures, or why it says nothing here."""
+    silent: bool = False
+    """Whether it says nothing here."""
+
+
 @dataclass(frozen=True, eq=False)
 class Named:
     """One term of the final model and what speaks for its name."""
@@ -39,21 +52,42 @@ class Named:
     probability: float
     rivals: tuple[Rival, ...]
     """Other effects within RIVAL_STATED_BIC, best first."""
-    failed_checks: tuple[str, ...]
-    """Why the name is not earned; empty when it is."""
+    checks: tuple[Check, ...]
+    """All that it was asked."""
+
+    @property
+    def failed_checks(self) -> tuple[str, ...]:
+        """Why the name is not earned; empty when it is."""
+        return tuple(check.failed for check in self.checks if check.failed)
+
+    def asked(self, *more: Check) -> Named:
+        """The same with further checks."""
+        return replace(self, checks=(*self.checks, *more))
 
 
-def failed_checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[str, ...]:
-    """Where the parameter of a term is not the same: halves of the run, directions, levels, runs."""
-    out = []
-    if at_bound(term, estimate.fit, data, estimate.weights):
-        out.append("its parameters end at what is physically possible")
-    if _unseen(estimate.fit, term, data):
-        out.append("it is faster than the samples can show")
-    if noise_goes_on(estimate.fit, term, estimate.noise, data):
-        out.append("the noise goes on where the readings should be flat")
+def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check, ...]:
+    """Whether its value is possible and seen, and its parameter the same in halves, directions, at levels, in runs.
+
+    `many`: terms of the model, all of which are asked.
+    """
+    ended, unseen = at_bound(term, estimate.fit, data, estimate.weights), _unseen(estimate.fit, term, data)
+    scatters = noise_goes_on(estimate.fit, term, estimate.noise, data)
     change = _raw_effect(estimate.fit, (term,), data)
-    out += [f"it and {other.id} nearly cancel" for other in _cancelled(estimate.fit, term, change, data)]
+    cancelled = _cancelled(estimate.fit, term, change, data)
+    return (
+        Check("its values are possible", "its parameters end at what is physically possible" if ended else ""),
+        Check("the samples can show it", "it is faster than the samples can show" if unseen else ""),
+        Check(
+            "noise vanishes where it clips", "the noise goes on where the readings should be flat" if scatters else ""
+        ),
+        *(Check("no other term undoes it", f"it and {other.id} nearly cancel") for other in cancelled),
+        *(() if cancelled else (Check("no other term undoes it"),)),
+        *_constancy(estimate, change, data, many),
+    )
+
+
+def _constancy(estimate: Estimate, change: list[Floats], data: Data, many: int) -> Iterator[Check]:
+    """The parameter in each part by itself: a score test of a further column, the term's change in one part alone."""
     n = data.size
     basis = orthogonal_basis(estimate.fit.jacobian[:n])
     driver = [h.driver[r] for h, r in zip(data.histories, data.rows, strict=True)]
@@ -71,25 +105,41 @@ def failed_checks(estimate: Estimate, term: Term, data: Data, many: int) -> tupl
     weights = Weights(estimate.weights.thrust)
     whole = float(np.linalg.norm(weights.whiten(change, [])))
     for what, masks in splits.items():
+        asked = f"the same {what}"
         column = weights.whiten([c * m for c, m in zip(change, masks, strict=True)], [])
         if (
             not policy.name.PART_SIZE
             < float(np.linalg.norm(column)) / max(whole, 1e-300)
             < 1 - policy.name.PART_SIZE**2
         ):
+            yield Check(asked, told="nearly all of it is in one part", silent=True)
             continue
-        residual = estimate.fit.residual[:n]
-        apart = difference(column, basis, residual, policy.name.PART_DIFFERENCE, len(splits) * many)
-        if apart is not None:
-            out.append(f"its parameter is not the same {what} ({apart * 100:.0f} % apart)")
-    return tuple(out)
+        apart = part_difference(column, basis, estimate.fit.residual[:n], policy.name.PART_DIFFERENCE)
+        if apart is None:
+            yield Check(asked, told="the parts tell too little", silent=True)
+            continue
+        p = apart.p_value * len(splits) * many
+        says = f"{100 * apart.share:.0f} % apart"
+        failed = f"its parameter is not the same {what} ({says})" if p < policy.name.INCONSTANT_P else ""
+        yield Check(asked, failed, f"{says}, +- {100 * apart.error:.0f} %; p {min(p, 1.0):.2g}")
 
 
-def difference(column: Floats, basis: Floats, residual: Floats, spared: float, tests: int) -> float | None:
-    """By what share of itself an effect differs in one part of the recordings; None: by no more than chance.
+@dataclass(frozen=True, slots=True)
+class PartDifference:
+    """Of an effect in one part of the recordings, as a share of itself."""
+
+    share: float
+    error: float
+    """Standard error."""
+    p_value: float
+    """That it is no more than what is spared."""
+
+
+def part_difference(column: Floats, basis: Floats, residual: Floats, spared: float) -> PartDifference | None:
+    """By how much an effect differs there; None where that part tells too little.
 
     `column` (n,): all that it does there, whitened; `basis` (n, p): orthonormal, what the model can follow. A share of
-    `spared` counts as the same, and chance has `tests` trials.
+    `spared` counts as the same.
     """
     rest = column - basis @ (basis.T @ column)
     size = float(np.linalg.norm(rest))
@@ -97,7 +147,16 @@ def difference(column: Floats, basis: Floats, residual: Floats, spared: float, t
         return None
     score = float(rest @ residual) / size
     p = float(noncentral_chi2_sf(score**2, 1, (spared * size) ** 2))
-    return abs(score) / size if p * tests < policy.name.INCONSTANT_P else None
+    return PartDifference(abs(score) / size, 1 / size, p)
+
+
+def difference(column: Floats, basis: Floats, residual: Floats, spared: float, tests: int) -> float | None:
+    """By what share of itself an effect differs in one part of the recordings; None: by no more than chance.
+
+    As of `part_difference`; chance has `tests` trials.
+    """
+    found = part_difference(column, basis, residual, spared)
+    return found.share if found is not None and found.p_value * tests < policy.name.INCONSTANT_P else None
 
 
 def probability_beside(losses: Sequence[float]) -> float:
@@ -166,10 +225,15 @@ def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[
     return out
 
 
+def _not_repaired(told: tuple[str, ...]) -> tuple[Check, ...]:
+    asked = "no repair of another shape"
+    return tuple(Check(asked, each) for each in told) or (Check(asked),)
+
+
 def name(
     estimate: Estimate, data: Data, terms: Sequence[Term], standing: Mapping[Term, SwapTest] | None = None
 ) -> tuple[Named, ...]:
-    """Every term of the model with its rivals and failed_checks, the largest gain first."""
+    """Every term of the model with its rivals and checks, the largest gain first."""
     out = []
     logn = float(np.log(max(estimate.fit.residual.size, 2)))
     std = estimate.fit.std
@@ -197,7 +261,7 @@ def name(
                 max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
                 probability_beside([r.bic_loss for r in unique.values()]),
                 tuple(unique.values()),
-                (*failed_checks(estimate, term, data, many), *repaired.get(term, ())),
+                (*checks(estimate, term, data, many), *_not_repaired(repaired.get(term, ()))),
             )
         )
     return tuple(sorted(out, key=lambda n: -n.chi2_gain))
@@ -217,17 +281,15 @@ def with_joint_checks(named: Sequence[Named], left: ResidualStructure | None, *,
     )
     out = []
     for n in named:
-        more: list[str] = []
         names = {d for c in n.term.covariates for d in (DRIVERS if c in STATIC else (c,))}
         own = [
             q
             for q, g in clear.items()
             if q in names and g.statistic - g.dof > policy.name.OWN_COVARIATE_SHARE * n.chi2_gain
         ]
-        if own:
-            more.append(f"more is left over its own covariate, {own[0]}")
+        over = f"more is left over its own covariate, {own[0]}" if own else ""
         curve = static_curve(n.term, measured=measured)
-        if curve and shapes[curve] >= policy.name.CURVE_OF_ANY_SHAPE_TERMS:
-            more.append(f"{shapes[curve]} shapes on one static curve make any curve")
-        out.append(replace(n, failed_checks=(*n.failed_checks, *more)))
+        any_curve = bool(curve) and shapes[curve] >= policy.name.CURVE_OF_ANY_SHAPE_TERMS
+        many = f"{shapes[curve]} shapes on one static curve make any curve" if any_curve else ""
+        out.append(n.asked(Check("nothing is left over its own covariate", over), Check("few shapes on a curve", many)))
     return tuple(out)

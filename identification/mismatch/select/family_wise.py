@@ -117,7 +117,7 @@ def normal_scores(columns: Floats, rng: np.random.Generator) -> Floats:
 
 
 def p_of_largest(largest: float, null: Floats, normal: Floats) -> float:
-    """The larger of both; beyond the draws a Gumbel tail fitted to them."""
+    """The larger of both; beyond the draws the tail of as many normal deviates as they act like."""
     found = []
     for draws in (null, normal):
         share = (1 + np.count_nonzero(draws >= largest)) / (1 + draws.size)

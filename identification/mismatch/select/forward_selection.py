@@ -16,6 +16,7 @@ from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
+from identification.mismatch.select.rounds import Candidate, Round, Unhidden
 from identification.mismatch.select.screening import (
     Screening,
     directions,
@@ -89,7 +90,8 @@ class Selected:
     before: Estimate
     """The baseline."""
     after: Estimate
-    screenings: tuple[Screening, ...]
+    rounds: tuple[Round, ...]
+    """Of the search, and of one that was resumed: then it begins with a model that is not the last that lasted."""
     last: Screening | None
     """Of the model `after`; None once it was exchanged for another."""
     standing: Mapping[Term, SwapTest] | None = None
@@ -110,7 +112,6 @@ def accept_threshold(extra: int) -> float:
 def search(
     histories: Sequence[History],
     rng: np.random.Generator,
-    trace: list[str] | None = None,
     given: Callable[[Data, Theta], tuple[Data, Theta, Model]] | None = None,
     bands: tuple[tuple[float, float], ...] = (),
     without: Collection[str] = (),
@@ -124,12 +125,14 @@ def search(
     data = replace(data, bands=bands)
     terms = available(data, without)
     before = baseline(data, theta, terms, first)
-    return _forward(data, terms, before, before, rng, trace)
+    return _forward(data, terms, before, before, rng)
 
 
 def resumed(found: Selected, estimate: Estimate, rng: np.random.Generator) -> Selected:
     """The search gone on with from `estimate`, a model of the same recordings that is not the one that was `found`."""
-    return _forward(found.data, found.terms, found.before, estimate, rng, None, frozenset(found.after.fit.model.terms))
+    known = frozenset(found.after.fit.model.terms)
+    again = _forward(found.data, found.terms, found.before, estimate, rng, known)
+    return replace(again, rounds=(*found.rounds, *again.rounds))
 
 
 def _forward(
@@ -138,29 +141,24 @@ def _forward(
     before: Estimate,
     estimate: Estimate,
     rng: np.random.Generator,
-    trace: list[str] | None,
     *known: frozenset[Term],
 ) -> Selected:
     """Larger models from `estimate` on while something passes, none of those that are `known`."""
-    screenings = []
+    rounds = []
     seen = {frozenset(estimate.fit.model.terms), *known}
     while True:
-        ids = {t.id for t in estimate.fit.model.terms}
+        inside = estimate.fit.model.terms
         judged = _screened(estimate, data, terms, rng)
-        screenings.append(judged)
-        if trace is not None:
-            trace.append(
-                f"{[t.id for t in estimate.fit.model.terms]} largest {judged.largest:.1f} of {judged.threshold:.2f} "
-                + str([(t.id, t.form, round(z, 1)) for t, _, z in judged.best(6)])
-            )
-        if len(ids) >= policy.select.MODEL_TERMS:
+        full = len({t.id for t in inside}) >= policy.select.MODEL_TERMS
+        larger = _Lasting(None) if full else _lasting(estimate, judged, data, terms, seen)
+        found = larger.estimate
+        after = None if found is None else found.fit.model.terms
+        rounds.append(Round(inside, judged, larger.fitted, larger.hidden, after))
+        if found is None:
             break
-        larger = _lasting(estimate, judged, data, terms, seen)
-        if larger is None:
-            break
-        estimate = larger
+        estimate = found
         seen.add(frozenset(estimate.fit.model.terms))
-    return Selected(data, tuple(terms), before, estimate, tuple(screenings), judged)
+    return Selected(data, tuple(terms), before, estimate, tuple(rounds), judged)
 
 
 def _screened(estimate: Estimate, data: Data, terms: Sequence[Term], rng: np.random.Generator) -> Screening:
@@ -182,37 +180,45 @@ def _screened(estimate: Estimate, data: Data, terms: Sequence[Term], rng: np.ran
     return screen(estimate.fit, found, rng, spared)
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Lasting:
+    """A larger model, and as of Round how it was found."""
+
+    estimate: Estimate | None
+    fitted: tuple[Candidate, ...] = ()
+    hidden: Unhidden | None = None
+
+
 def _lasting(
     estimate: Estimate, judged: Screening, data: Data, terms: Sequence[Term], seen: Collection[frozenset[Term]]
-) -> Estimate | None:
-    """The larger model, pruned; of additions that are dropped again the next best. None where none lasts."""
-    refused: set[Term] = set()
-    found = judged.largest > judged.threshold
-    while larger := _larger(estimate, judged, data, terms, refused) if found else None:
+) -> _Lasting:
+    """The larger model, pruned; of additions that are dropped again the next best. Without one where none lasts."""
+    found = _additions(estimate, judged, data) if judged.largest > judged.threshold else []
+    fitted = tuple(candidate for candidate, _ in found)
+    while found:
+        larger = _larger(estimate, _best(found), data, terms)
         pruned = prune(larger, data)
         if frozenset(pruned.fit.model.terms) not in seen:
-            return pruned
-        refused |= set(larger.fit.model.terms) - set(estimate.fit.model.terms)
+            return _Lasting(pruned, fitted)
+        refused = set(larger.fit.model.terms) - set(estimate.fit.model.terms)
+        found = [each for each in found if each[0].term not in refused]
     hidden = _hidden(estimate, judged, data)
     if hidden is None:
-        return None
-    pruned = prune(hidden, data)
-    return None if frozenset(pruned.fit.model.terms) in seen else pruned
+        return _Lasting(None, fitted)
+    told, beside = hidden
+    pruned = prune(beside, data)
+    last = None if frozenset(pruned.fit.model.terms) in seen else pruned
+    return _Lasting(last, fitted, None if last is None else told)
 
 
-def _larger(
-    estimate: Estimate, judged: Screening, data: Data, terms: Sequence[Term], refused: Collection[Term]
-) -> Estimate | None:
-    """The model with one more term, none of those `refused`, its noise estimated anew."""
-    best = _best_addition(estimate, judged, data, refused)
-    if best is None:
-        return None
+def _larger(estimate: Estimate, best: Fit, data: Data, terms: Sequence[Term]) -> Estimate:
+    """The model with one more term, as fitted, its noise estimated anew."""
     remaining = [t for t in terms if t.id not in {u.id for u in best.model.terms}]
     plain = plain_shapes(best, data, estimate.weights, every_shape(best, data, remaining))
     return refresh(best.model, best.theta, data, plain, estimate)
 
 
-def _hidden(estimate: Estimate, judged: Screening, data: Data) -> Estimate | None:
+def _hidden(estimate: Estimate, judged: Screening, data: Data) -> tuple[Unhidden, Estimate] | None:
     """The model with a term that the noise had taken for its own: they are told apart when estimated together."""
     least = (
         policy.select.HIDDEN_FIRST_TERM_SIGMA if not estimate.fit.model.terms else np.inf
@@ -234,12 +240,12 @@ def _hidden(estimate: Estimate, judged: Screening, data: Data) -> Estimate | Non
         first = fit(bigger, theta, data, estimate.weights)
         new = refresh(bigger, first.theta, data, None, now, now.noise)
         gain = now.fit.deviance - new.fit.deviance
-        if gain > _asked_of_hidden(term, judged, data):
-            found.append((gain, new))
+        if gain > (asked := _asked_of_hidden(term, judged, data)):
+            found.append((Unhidden(gain, asked), new))
     if not found:
         return None
-    best = max(found, key=lambda each: each[0])[1].fit
-    return refresh(best.model, best.theta, data, None, None)
+    told, best = max(found, key=lambda each: each[0].gain)
+    return told, refresh(best.fit.model, best.fit.theta, data, None, None)
 
 
 def _instants(judged: Screening, term: Term, data: Data) -> list[tuple[float, ...]]:
@@ -284,22 +290,25 @@ def _candidates(judged: Screening, data: Data) -> list[tuple[Term, tuple[float, 
     return list(likely.items())
 
 
-def _best_addition(estimate: Estimate, judged: Screening, data: Data, refused: Collection[Term]) -> Fit | None:
-    found, gains, sizes, pressed = [], [], [], []
+def _additions(estimate: Estimate, judged: Screening, data: Data) -> list[tuple[Candidate, Fit]]:
+    """Candidates, fitted, that gain more than their parameters cost."""
+    found = []
     for term, values in _candidates(judged, data):
-        if term in refused:
-            continue
         begin = refined(estimate.fit, data, estimate.weights, term, values)
         bigger, theta = estimate.fit.more(term, begin)
         new = fit(bigger, theta, data, estimate.weights)
         gain = estimate.fit.chi2 - new.chi2
-        cost = price(term, data) * np.log(new.residual.size)
-        if gain > max(cost, np.log(new.residual.size)):
-            found.append(new)
-            gains.append(float(gain - cost))
-            sizes.append(len(values))
-            pressed.append(at_bound(term, new, data, estimate.weights))
-    return found[preferred(gains, sizes, pressed)] if found else None
+        logn = float(np.log(new.residual.size))
+        cost = price(term, data) * logn
+        if gain > max(cost, logn):
+            found.append((Candidate(term, gain, cost, at_bound(term, new, data, estimate.weights)), new))
+    return found
+
+
+def _best(found: Sequence[tuple[Candidate, Fit]]) -> Fit:
+    gains = [candidate.chi2_gain - candidate.price for candidate, _ in found]
+    sizes = [len(fitted.values[candidate.term]) for candidate, fitted in found]
+    return found[preferred(gains, sizes, [candidate.at_bound for candidate, _ in found])][1]
 
 
 def preferred(gains: Sequence[float], sizes: Sequence[int], pressed: Sequence[bool]) -> int:

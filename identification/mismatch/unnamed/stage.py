@@ -14,7 +14,7 @@ from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.locate.residual_structure_test import ResidualStructure, residual_structure
 from identification.mismatch.locate.stage import Located
 from identification.mismatch.model.data import Data
-from identification.mismatch.name.naming import Named
+from identification.mismatch.name.naming import Check, Named
 from identification.mismatch.select.forward_selection import STATIC, Selected
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import refitted_names, shared
@@ -63,7 +63,8 @@ def run(
         return Completed(flexible.estimate, valued, known, unearned, flexible, open_ended, bare, left)
     after = predicting(now, split, data, selected.terms, [n.term for n in unearned], unseen)
     if earned and unearned and not predicts(after, before, data, unseen):
-        after, unearned, earned = before, (*unearned, *(replace(n, failed_checks=(ALONE,)) for n in earned)), ()
+        refuted = Check("predicts better than the baseline", ALONE)
+        after, unearned, earned = before, (*unearned, *(n.asked(refuted) for n in earned)), ()
         bare, left = _located(now, data, located.left, unearned, rng)
     valued, known = _with_values(earned, now, after, data, None)
     return Completed(after, valued, known, unearned, None, open_ended, bare, left)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,24 +12,42 @@ from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.select.baseline import baseline
+from identification.mismatch.validate.held_out import Score
 from identification.mismatch.validate.train_test_split import TrainTestSplit, better, train_test_split
 from identification.physics.term import Term
 from identification.run_history.history import History
 
 
-def worse_predicted(split: TrainTestSplit, terms: Collection[Term], *, same_run: bool) -> tuple[Term, ...]:
-    """Of these terms those without which the model predicts what was not fitted better.
+@dataclass(frozen=True, eq=False, slots=True)
+class WithoutEach:
+    """Scores on what was not fitted."""
 
-    `same_run`: that is blocks of time of the runs that were fitted. The noise of other runs may be another, which is
-    why their errors must fall as well.
+    whole: Score
+    """Of the model."""
+    less: Mapping[Term, Score]
+    """Of the model without a term, refitted."""
+
+
+def without_each(split: TrainTestSplit, terms: Collection[Term], *, same_run: bool) -> WithoutEach:
+    """The model, and it without each of these terms; without none that another run need not repeat.
+
+    `same_run`: what was not fitted is blocks of time of the runs that were.
     """
     estimate, now = split.estimate, split.judge(split.estimate.fit)
     asked = [t for t in estimate.fit.model.terms if t in terms and (same_run or not t.traits.own_clock)]
-    less = {t: split.judge(fit(*estimate.fit.less(t), split.data, estimate.weights)) for t in asked}
-    most = np.inf if same_run else now.rmse
+    return WithoutEach(now, {t: split.judge(fit(*estimate.fit.less(t), split.data, estimate.weights)) for t in asked})
+
+
+def worse_predicted(scores: WithoutEach, *, same_run: bool) -> tuple[Term, ...]:
+    """Of these terms those without which the model predicts what was not fitted better.
+
+    `same_run` as in `without_each`. The noise of other runs may be another, which is why their errors must fall as
+    well.
+    """
+    now, most = scores.whole, np.inf if same_run else scores.whole.rmse
     return tuple(
         t
-        for t, score in less.items()
+        for t, score in scores.less.items()
         if score.chi2 < now.chi2 - policy.validate.PREDICTED_WORSE_CHI2 and score.rmse < most
     )
 

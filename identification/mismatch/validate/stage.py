@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.model.data import Data
-from identification.mismatch.name.naming import Named
+from identification.mismatch.name.naming import Check, Named
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.validate.cross_validation import by_folds
 from identification.mismatch.validate.held_out import HeldOut, by_blocks, by_runs
-from identification.mismatch.validate.prediction import worse_predicted
+from identification.mismatch.validate.prediction import WithoutEach, without_each, worse_predicted
 from identification.mismatch.validate.train_test_split import TrainTestSplit, train_test_split
 from identification.run_history.history import History
 
@@ -22,6 +22,8 @@ class Validated:
 
     split: TrainTestSplit
     """The model fitted to a part of the data, and what judges it on the rest."""
+    scores: WithoutEach
+    """Of the model there, and of it without each term whose name stood so far."""
     earned: tuple[Named, ...]
     unearned: tuple[Named, ...]
     """Each with the checks that it failed."""
@@ -31,11 +33,22 @@ def run(estimate: Estimate, named: Sequence[Named], data: Data, unseen: Sequence
     """`unseen`: whole runs held out; where there are none blocks of time are kept back."""
     split = train_test_split(estimate, data, unseen)
     asked = [n.term for n in named if not n.failed_checks]
-    worse = worse_predicted(split, asked, same_run=not unseen)
+    scores = without_each(split, asked, same_run=not unseen)
+    worse = worse_predicted(scores, same_run=not unseen)
     failed = "what was not fitted is predicted better without it"
-    checked = [replace(n, failed_checks=(*n.failed_checks, failed)) if n.term in worse else n for n in named]
+    checked = [n.asked(_check(n, scores, failed if n.term in worse else "")) for n in named]
     earned = tuple(n for n in checked if not n.failed_checks)
-    return Validated(split, earned, tuple(n for n in checked if n.failed_checks))
+    return Validated(split, scores, earned, tuple(n for n in checked if n.failed_checks))
+
+
+def _check(named: Named, scores: WithoutEach, failed: str) -> Check:
+    """On what was not fitted."""
+    asked = "predicts what was not fitted"
+    score = scores.less.get(named.term)
+    if score is None:
+        told = "not asked: it failed before" if named.failed_checks else "not asked: another run need not repeat it"
+        return Check(asked, told=told, silent=True)
+    return Check(asked, failed, f"chi-square {score.chi2 - scores.whole.chi2:+.4g} without it")
 
 
 def score(

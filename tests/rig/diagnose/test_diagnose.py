@@ -19,6 +19,8 @@ from rig.hdf5 import load
 from rig.twin.reading import read_twin
 from rig.twin.simulate import Asked, simulated, timed
 from rig.twin.writing import twin_json, write_twin
+from tests.identification.diagnosed_runs import dead_band as dead_zone
+from tests.identification.diagnosed_runs import run as small
 from tests.rig.report_reading import open_fonts
 
 ROOT = Path(__file__).parents[3]
@@ -79,6 +81,30 @@ def test_a_dead_band_is_named_with_its_width_and_the_contract_is_kept(dead):
     assert said["fit"]["heldout"]["rmse_after"] < 0.7 * said["fit"]["heldout"]["rmse_before"]
     assert {"channel", "where", "share", "p_value", "statement"} <= set(said["mismatch"][0])
     assert max(map(len, text.splitlines())) <= 100
+
+
+@pytest.fixture(scope="module")
+def short(folder):
+    """A minute of levels with a dead band of 1.5 V."""
+    channels = small(volts=dead_zone(1.5), seconds=60.0, rate=10.0).channels
+    plain.write(folder / "short.h5", *(array for c in channels for array in (c.time, c.value)))
+    return folder / "short.h5"
+
+
+def test_explained_the_answer_is_followed_by_every_stage(short):
+    result = run("diagnose", short, "--explain")
+    assert result.exit_code == 0, result.output
+    answer, told = result.output.split("How it came to that")
+    assert answer.startswith("somebody's: explained.")
+    for stage in ("prepare", "faults", "select", "periodic", "locate", "name", "validate", "unnamed", "answer"):
+        assert f". {stage}: " in told
+    assert max(map(len, result.output.splitlines())) <= 100
+
+
+def test_explained_beside_json_standard_output_is_the_json_alone(short):
+    result = run("diagnose", short, "--explain", "--json", "-")
+    assert json.loads(result.stdout)["verdict"] == "explained"
+    assert "1. prepare: " in result.stderr
 
 
 def test_against_its_own_twin_the_same_recording_is_adequate(dead):

@@ -113,6 +113,7 @@ BAD = {
     "a campaign": (("one.h5", "--campaign", RIGHT), "--campaign and --budget are of an experiment on the bench"),
     "a plan": (("one.h5", "--campaign", RIGHT, "--plan", "next.toml"), "--plan writes a campaign of the bench"),
     "held out too": (("one.h5", "--holdout", "two.h5", "one.h5"), "is both to be diagnosed and held out"),
+    "stages": (("one.h5", "--explain"), "--explain shows the stages of a thruster's diagnosis"),
     "a twin": (("one.h5", "--save-twin", "twin.json"), "--save-twin keeps the model of a thruster"),
 }
 

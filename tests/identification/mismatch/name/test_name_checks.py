@@ -12,7 +12,8 @@ from identification.mismatch import policy
 from identification.mismatch.locate.residual_structure_test import CovariateTest, ResidualStructure
 from identification.mismatch.locate.stage import Located
 from identification.mismatch.name import stage
-from identification.mismatch.name.naming import failed_checks, name, with_joint_checks
+from identification.mismatch.name.naming import checks as checks_of
+from identification.mismatch.name.naming import name, with_joint_checks
 from identification.mismatch.select.covariates import Covariate
 from identification.physics.asymmetry import Asymmetry
 from identification.physics.dead_band import DeadBand
@@ -29,6 +30,10 @@ from tests.identification.mismatch.small import known_noise, selected, short
 BAND, UNEVEN, RING, JUMP = DeadBand(), Asymmetry(), StandResonance(), ZeroOffset()
 
 
+def failed(estimate, term, data, many):
+    return tuple(check.failed for check in checks_of(estimate, term, data, many) if check.failed)
+
+
 def widths(of):
     """A dead band whose half width is a function of (t, V)."""
 
@@ -41,7 +46,7 @@ def widths(of):
 
 def checks(recordings, values, term=BAND):
     data, estimate = known_noise(values, recordings)
-    return " | ".join(failed_checks(estimate, term, data, len(values)))
+    return " | ".join(failed(estimate, term, data, len(values)))
 
 
 def test_a_true_effect_fails_none():
@@ -75,7 +80,7 @@ def test_a_parameter_that_is_not_the_same_in_all_runs():
 def test_a_table_in_the_order_of_its_levels_has_no_halves():
     flat = table(lambda v: C * dead_band(1.5)(v) * np.abs(dead_band(1.5)(v)), number=121)
     data, estimate = known_noise({BAND: (1.0,)}, [flat], 0.05)
-    assert failed_checks(estimate, BAND, data, 1) == ()
+    assert failed(estimate, BAND, data, 1) == ()
 
     def uneven_thrust(v):
         x = dead_band(np.where(v < 0, 1.0, 2.0))(v)
@@ -83,7 +88,7 @@ def test_a_table_in_the_order_of_its_levels_has_no_halves():
 
     uneven = table(uneven_thrust, number=121)
     data, estimate = known_noise({BAND: (1.0,)}, [uneven], 0.05)
-    said = " ".join(failed_checks(estimate, BAND, data, 1))
+    said = " ".join(failed(estimate, BAND, data, 1))
     assert "in both directions" in said
     assert "halves" not in said
 
@@ -100,7 +105,7 @@ def test_ringing_faster_than_the_samples_show():
 
     def said(frequency):
         theta = replace(estimate.fit.theta, terms=((1.0, frequency, 0.2),))
-        return " ".join(failed_checks(replace(estimate, fit=replace(estimate.fit, theta=theta)), RING, data, 1))
+        return " ".join(failed(replace(estimate, fit=replace(estimate.fit, theta=theta)), RING, data, 1))
 
     assert "faster than the samples can show" in said(5.0)
     assert "faster" not in said(3.0)

@@ -59,8 +59,8 @@ def test_what_is_there_is_added_one_term_after_the_other():
     assert ids(found.after) == ["dead_band", "zero_offset"]
     assert found.after.fit.values[BAND][0] == pytest.approx(1.2, abs=0.03)
     assert found.after.fit.values[JUMP] == pytest.approx((2.0, 40.0), abs=0.3)
-    assert len(found.screenings) == 3, "one before each term, and the last that found nothing"
-    assert found.last is found.screenings[-1]
+    assert len(found.rounds) == 3, "one before each term, and the last that found nothing"
+    assert found.last is found.rounds[-1].screening
     assert found.last.largest < max(found.last.threshold, 4.5)
 
 

@@ -15,7 +15,7 @@ from identification.flexible_terms.formula import quantity as value_of
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.locate.pulses import Pulses
 from identification.mismatch.locate.residual_structure_test import CovariateTest, ResidualStructure
-from identification.mismatch.name.naming import name
+from identification.mismatch.name.naming import Check, name
 from identification.mismatch.select.covariates import Covariate
 from identification.mismatch.unnamed.flexible import extend, foremost
 from identification.mismatch.unnamed.flexible_kinds import shapes_over
@@ -230,7 +230,7 @@ def test_a_flexible_term_may_take_the_place_of_a_name_that_was_not_earned():
     band = DeadBand()
     data, before = known_noise({}, [short(change=bumped)])
     _, after = known_noise({band: (0.3,)}, [short(change=bumped)])
-    named = [replace(n, failed_checks=("it is none",)) for n in name(after, data, [])]
+    named = [n.asked(Check("it is one", "it is none")) for n in name(after, data, [])]
     found = extend(after, before, data, "command_voltage", named, train_test_split(after, data, ()), rng(0))
     assert found.dropped == (band,)
     assert found.terms[0].quantity == "command_voltage"

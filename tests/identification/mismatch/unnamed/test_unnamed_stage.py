@@ -9,6 +9,7 @@ import pytest
 
 from identification.flexible_terms.flexible import Flexible
 from identification.mismatch.locate.stage import run as located_by
+from identification.mismatch.name.naming import Check
 from identification.mismatch.name.stage import run as named_by
 from identification.mismatch.unnamed import stage
 from identification.mismatch.validate.stage import run as validated_by
@@ -26,7 +27,7 @@ def completed(values, recording, unseen=(), unearn=()):
     chosen = selected(values, [recording], list(values))
     located = located_by(chosen, rng(0))
     named = named_by(chosen, located)
-    named = tuple(replace(n, failed_checks=("it is none",)) if n.term in unearn else n for n in named)
+    named = tuple(n.asked(Check("it is one", "it is none")) if n.term in unearn else n for n in named)
     validated = validated_by(located.estimate, named, chosen.data, unseen)
     return stage.run(chosen, located, validated, unseen, rng(1)), chosen
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.name.naming import name
+from identification.mismatch.name.naming import Check, name
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.validate import stage
 from identification.mismatch.validate.cross_validation import by_folds
@@ -26,7 +26,7 @@ from identification.mismatch.validate.held_out import (
     rmse,
     with_tares,
 )
-from identification.mismatch.validate.prediction import predicting, predicts, worse_predicted
+from identification.mismatch.validate.prediction import predicting, predicts, without_each, worse_predicted
 from identification.mismatch.validate.train_test_split import better, train_test_split
 from identification.physics.dead_band import DeadBand
 from identification.physics.speed_of_advance import SpeedOfAdvance
@@ -243,9 +243,9 @@ def knocked(t, _V, F):
 def test_names_without_which_the_rest_is_predicted_better_are_sent_away(fitted):
     data, _, after = fitted
     split = train_test_split(after, data, [history(short(seed=5))])
-    assert worse_predicted(split, [BAND], same_run=False) == (BAND,)
-    assert worse_predicted(split, [], same_run=False) == ()
-    assert worse_predicted(train_test_split(after, data, ()), [BAND], same_run=True) == ()
+    assert worse_predicted(without_each(split, [BAND], same_run=False), same_run=False) == (BAND,)
+    assert worse_predicted(without_each(split, [], same_run=False), same_run=False) == ()
+    assert worse_predicted(without_each(train_test_split(after, data, ()), [BAND], same_run=True), same_run=True) == ()
 
 
 def test_a_clock_or_a_jump_of_one_run_is_not_asked_of_another():
@@ -253,8 +253,8 @@ def test_a_clock_or_a_jump_of_one_run_is_not_asked_of_another():
     recording = banded(change=lambda t, _V, F: F + 2.0 * (t > 40.0))
     data, after = known_noise({BAND: (1.0,), JUMP: (2.0, 40.0), SKEW: (0.05,)}, [recording])
     split = train_test_split(after, data, [history(short(seed=5))])
-    assert worse_predicted(split, [BAND, JUMP, SKEW], same_run=False) == (BAND,)
-    assert JUMP in worse_predicted(split, [BAND, JUMP, SKEW], same_run=True)
+    assert worse_predicted(without_each(split, [BAND, JUMP, SKEW], same_run=False), same_run=False) == (BAND,)
+    assert JUMP in worse_predicted(without_each(split, [BAND, JUMP, SKEW], same_run=True), same_run=True)
 
 
 def test_a_term_without_a_name_stays_where_it_predicts_and_goes_where_it_only_describes(fitted):
@@ -284,7 +284,7 @@ def test_the_stage_parts_names_into_those_that_predict_and_those_that_do_not(fit
     bad = stage.run(after, named, data, [history(short(seed=5))])
     assert bad.earned == ()
     assert bad.unearned[0].failed_checks == ("what was not fitted is predicted better without it",)
-    doubted = [replace(n, failed_checks=("odd",)) for n in named]
+    doubted = [n.asked(Check("so", "odd")) for n in named]
     assert stage.run(after, doubted, data, [history(short(seed=5))]).unearned[0].failed_checks == ("odd",)
 
 

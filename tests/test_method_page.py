@@ -1,0 +1,68 @@
+"""docs/method.md quotes what its example says, thresholds as they are, and code that is there."""
+
+from __future__ import annotations
+
+import importlib.util
+import re
+from itertools import chain
+from pathlib import Path
+
+import pytest
+
+from identification.mismatch.answer.explain import explained
+from identification.mismatch.policy import thresholds
+from rig.diagnose.explanation import explanation_text
+
+ROOT = Path(__file__).parents[1]
+PAGE = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
+BLOCKS = re.findall(r"^```\n(\d+\. .*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
+NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
+CLOSE = 0.02
+"""Another machine rounds otherwise, and draws are compared with it."""
+
+
+@pytest.fixture(scope="module")
+def said() -> list[str]:
+    path = ROOT / "examples" / "explain_dead_band_and_drift.py"
+    spec = importlib.util.spec_from_file_location(path.stem, path)
+    assert spec is not None
+    assert spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return explanation_text(explained(module.trace())).splitlines()
+
+
+def words(line: str) -> list[str]:
+    return NUMBER.sub("#", line).split()
+
+
+def numbers(line: str) -> list[float]:
+    return [float(x) for x in NUMBER.findall(line)]
+
+
+def same(quoted: str, line: str) -> bool:
+    return words(quoted) == words(line) and numbers(quoted) == pytest.approx(numbers(line), rel=CLOSE)
+
+
+def test_every_line_that_is_quoted_is_said_in_this_order(said):
+    assert len(BLOCKS) == 10
+    for block in BLOCKS:
+        head, *lines = (line for line in block.splitlines() if line.strip() != "...")
+        at = next(i for i, line in enumerate(said) if same(head, line))
+        for quoted in lines:
+            at = next((i for i in range(at + 1, len(said)) if same(quoted, said[i])), len(said))
+            assert at < len(said), quoted
+
+
+def test_thresholds_have_the_values_that_are_quoted():
+    known = {name.rpartition(".")[2]: float(value) for name, value in thresholds()}
+    quoted = re.findall(r"`([A-Z][A-Z_0-9]+)`\s+\(([\d.e-]+)\)", PAGE)
+    assert len(quoted) > 20
+    assert [(name, known[name]) for name, _ in quoted] == [(name, float(value)) for name, value in quoted]
+
+
+def test_code_that_is_named_is_there():
+    named = re.findall(r"`((?:identification|tests|examples)/[\w/]+(?:\.py|/))`", PAGE)
+    beside = re.findall(r"`(identification/mismatch/\w+/)(?:\w+\.py)?`[^\n]*?\(([^)]*\.py[^)]*)\)", PAGE)
+    files = chain(named, (room + name for room, told in beside for name in re.findall(r"`(\w+\.py)`", told)))
+    assert [name for name in files if not (ROOT / name).exists()] == []
