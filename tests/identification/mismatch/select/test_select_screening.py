@@ -13,18 +13,15 @@ from scipy.stats import norm
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import fit, residual_of
-from identification.mismatch.select.screening import (
-    Directions,
-    directions,
+from identification.mismatch.select.family_wise import (
     lengths,
     matching_pursuit,
     normal_scores,
     orthogonal_basis,
     quiet,
-    refined,
-    screen,
     surrogate_scores,
 )
+from identification.mismatch.select.screening import Directions, directions, refined, screen
 from identification.mismatch.select.shape_error import allowed, allowed_in, corrections
 from identification.physics.asymmetry import Asymmetry
 from identification.physics.catalogue import CATALOGUE
