@@ -16,7 +16,8 @@ from identification.mismatch.locate.residual_structure_test import residual_stru
 from identification.mismatch.locate.slow_change import beside_slow_change, slow_changes, slow_columns
 from identification.mismatch.locate.stage import run as locate_stage
 from identification.mismatch.select.covariates import Covariate
-from identification.mismatch.select.screening import Directions, Screening, orthogonal_basis
+from identification.mismatch.select.family_wise import orthogonal_basis
+from identification.mismatch.select.screening import Directions, Screening
 from identification.mismatch.value import Where
 from identification.physics.dead_band import DeadBand
 from identification.physics.zero_offset import ZeroOffset

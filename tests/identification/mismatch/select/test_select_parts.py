@@ -16,11 +16,11 @@ from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.select.aliases import within_samples
 from identification.mismatch.select.baseline import baseline, level_error_factor, raw_directions
 from identification.mismatch.select.covariates import covariates, hats
+from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import available, static_curve
 from identification.mismatch.select.jumps import jumps, likeliest_jumps
 from identification.mismatch.select.ringing import likeliest_rings
-from identification.mismatch.select.screening import orthogonal_basis
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.dead_band import DeadBand
 from identification.physics.load_cell_saturation import LoadCellSaturation

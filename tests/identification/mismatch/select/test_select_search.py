@@ -84,7 +84,8 @@ def test_a_drift_that_the_noise_took_for_its_own_is_found_by_estimating_both():
     drifting = short(change=lambda t, _V, F: F + 0.003 * t, seconds=160.0)
     begun, found = searched(drifting, (DRIFT, JUMP))
     assert sum(begun.after.noise.slow) > 0.01, "a noise as slow as the drift"
-    assert found.screenings[0].largest < found.screenings[0].threshold
+    first = found.rounds[0].screening
+    assert first.largest < first.threshold
     assert ids(found.after) == ["zero_drift"]
     assert sum(found.after.noise.slow) < 0.1 * sum(begun.after.noise.slow)
 
