@@ -115,10 +115,19 @@ def quantity(symbol: str, history: History) -> Floats:
     if symbol == "t":
         return history.middle
     if symbol.startswith("lp"):
-        memory, squared = float(symbol[2 : symbol.index("(")]), symbol.endswith("|)")
-        return lowpass(driver * np.abs(driver) if squared else np.abs(driver), history.dt, memory)[1]
+        memory, of = float(symbol[2 : symbol.index("(")]), symbol[symbol.index("(") + 1 : -1]
+        return lowpass(driver * np.abs(driver) if is_square(of) else np.abs(driver), history.dt, memory)[1]
     out: Floats = history.others.get(CHANNELS[symbol][0], np.full(driver.size, np.nan))
     return out
+
+
+def is_square(of: str) -> bool:
+    """Whether what a low-pass is of goes as the square of the driver.
+
+    >>> is_square("V|V|"), is_square("|V|")
+    (True, False)
+    """
+    return not of.startswith("|")
 
 
 def driver_symbol(history: History) -> str:

@@ -235,6 +235,8 @@ def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most:
     own = time[(last >= 0) & (time - changes[np.maximum(last, 0)] < zone)]
     if own.size > most:
         return edges
+    if not own.size:
+        return np.asarray(np.union1d(edges, changes), dtype=np.float64)
     nearest = np.searchsorted(changes, own)
     before = changes[np.maximum(nearest - 1, 0)]
     after = changes[np.minimum(nearest, changes.size - 1)]

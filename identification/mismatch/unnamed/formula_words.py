@@ -6,7 +6,7 @@ from math import sqrt
 
 import numpy as np
 
-from identification.flexible_terms.formula import CHANNELS, Formula, Monomial, driver_symbol
+from identification.flexible_terms.formula import CHANNELS, Formula, Monomial, driver_symbol, is_square
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.value import Value
@@ -108,7 +108,8 @@ def _symbol_unit(symbol: str, data: Data) -> str:
     if symbol in CHANNELS and symbol != driver_symbol(data.histories[0]):
         return CHANNELS[symbol][1]
     unit = data.scale.driver_unit
-    return f"{unit}^2" if symbol.endswith("|)") and symbol.count("|") > 2 else unit
+    squared = symbol.startswith("lp") and is_square(symbol[symbol.index("(") + 1 : -1])
+    return f"{unit}^2" if squared else unit
 
 
 def _unit(m: Monomial, data: Data, *, bare: bool) -> str:

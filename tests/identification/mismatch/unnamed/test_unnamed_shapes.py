@@ -272,14 +272,12 @@ def low_passed(value, dt, tau):
     return np.array(out)
 
 
-@pytest.mark.xfail(strict=True, reason="`lp20(|V|)` and `lp20(V|V|)` both end with `|)`: both are taken for the square")
 def test_a_low_pass_of_the_size_is_not_that_of_the_square():
     data, _ = data_of([wet()])
     h = data.histories[0]
     assert value_of("lp20(|V|)", h) == pytest.approx(low_passed(np.abs(h.driver), h.dt, 20.0), abs=1e-6)
 
 
-@pytest.mark.xfail(strict=True, reason="`V|V|` has two bars, more than two are asked for: its unit is told as V")
 def test_a_coefficient_of_a_low_pass_of_the_square_is_told_per_square():
     data, before = known_noise({}, [wet()])
     term = term_of((Monomial((("lp20(V|V|)", 1),), "1"),), {"lp20(V|V|)": 40.0}, data)
