@@ -6,6 +6,7 @@ A command's module is imported when the command is called: `rig stop` shall not 
 
 from __future__ import annotations
 
+import os
 import sys
 from importlib import import_module
 from typing import Final, NamedTuple
@@ -13,6 +14,10 @@ from typing import Final, NamedTuple
 import click
 
 from rig.errors import RigError
+
+
+ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+"""What the libraries of linear algebra read when they are loaded."""
 
 
 class Entry(NamedTuple):
@@ -100,5 +105,11 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 def entry() -> None:
-    """The `rig` command."""
+    """The `rig` command, its children with it: linear algebra in one thread unless the environment says otherwise.
+
+    Its matrices are long and narrow: a second thread doubles the work (8.8 s of processors instead of 4.4 for a
+    diagnosis on two cores) and hardly shortens it; beside a control loop it is in the way.
+    """
+    for threads in ONE_THREAD:
+        os.environ.setdefault(threads, "1")
     sys.exit(main())
