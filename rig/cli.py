@@ -15,7 +15,6 @@ import click
 
 from rig.errors import RigError
 
-
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """What the libraries of linear algebra read when they are loaded."""
 
