@@ -16,7 +16,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from threading import Event, Thread
+from threading import Event, Lock, Thread
 from time import monotonic
 from typing import Any
 
@@ -52,6 +52,8 @@ class Child:
     process: subprocess.Popen[bytes] | None = None
     dismissed: bool = False
     """It is not asked any more."""
+    starting: Lock = field(default_factory=Lock, repr=False)
+    """So that none is started while it is dismissed: nobody would end it."""
 
     def ask(self, line: Mapping[str, Any], limit: float) -> None:
         """Raises Overdue after `limit` s without an answer, Ended when there will be none, BrokenOff when dismissed."""
@@ -64,7 +66,8 @@ class Child:
 
     def dismiss(self, patience: float = STOPPING) -> None:
         """End it for good, from any thread."""
-        self.dismissed = True
+        with self.starting:
+            self.dismissed = True
         self.close(patience)
 
     def _ask(self, line: Mapping[str, Any], limit: float) -> None:
@@ -104,20 +107,24 @@ class Child:
             process.stdout.close()
 
     def _running(self) -> subprocess.Popen[bytes]:
-        if self.dismissed:
-            raise BrokenOff
-        if self.process is None:
-            with self.log.open("ab") as log:
-                self.process = subprocess.Popen(
-                    self.command,
-                    stdin=subprocess.PIPE,
-                    stdout=subprocess.PIPE,
-                    stderr=log,
-                    env={**os.environ, **ONE_THREAD},
-                    bufsize=0,
-                    start_new_session=True,  # Ctrl+C in the terminal is for us: its death would be an answer
-                )
-        return self.process
+        with self.starting:
+            if self.dismissed:
+                raise BrokenOff
+            if self.process is None:
+                self.process = self._started()
+            return self.process
+
+    def _started(self) -> subprocess.Popen[bytes]:
+        with self.log.open("ab") as log:
+            return subprocess.Popen(
+                self.command,
+                stdin=subprocess.PIPE,
+                stdout=subprocess.PIPE,
+                stderr=log,
+                env={**os.environ, **ONE_THREAD},
+                bufsize=0,
+                start_new_session=True,  # Ctrl+C in the terminal is for us: its death would be an answer
+            )
 
     def _end(self) -> str:
         process = self.process
