@@ -18,8 +18,12 @@ LEAST_REACH = 0.05
 """sigma: a parameter that changes less within its bounds is left where it is."""
 SLOW_FALLS = 3.0
 """Further falls of the last size that a fit may be short of what is hoped for."""
-CLOSE = 1e-4
-"""Fall of chi-square at which a fit has ended; a difference of 1 is one sigma."""
+HARDER = 8.0
+"""By how much the damping grows where a step is no better."""
+LEAST_HARDER = 1e-2
+"""Damping of a second try at least: beside slopes of size 1 a smaller one changes no step."""
+CLOSE = 1e-2
+"""Fall of chi-square at which a fit has ended, or of which the slopes promise less; a difference of 1 is one sigma."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -53,30 +57,54 @@ def least_squares(
     residual, J = residual_of(at), slopes_of(at)
     damping = 1e-3
     for _ in range(most_steps):
-        go = _movable(at, J, residual, low, high)
-        size = np.linalg.norm(J[:, go], axis=0)
-        A = J[:, go] / size
-        gram, right = A.T @ A, A.T @ residual
         chi2 = float(residual @ residual)
-        for _ in range(MOST_TRIES):
-            moved = at.copy()
-            moved[go] += np.linalg.solve(gram + damping * np.eye(gram.shape[0]), right) / size
-            trial = np.clip(moved, low, high)
-            new = residual_of(trial)
-            fall = chi2 - float(new @ new)
-            if np.isfinite(fall) and fall > 0:
-                break
-            damping = max(damping, 1e-6) * 8
-        else:
+        close = CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1))
+        found = _step(residual_of, at, residual, J, low, high, damping, close)
+        if found is None:
             break
-        at, residual = trial, new
+        at, residual, damping = found
+        fall = chi2 - float(residual @ residual)
         if chi2 - (1 + SLOW_FALLS) * fall > hopeless:
             break
         damping = max(damping / 10, 1e-9)
         J = slopes_of(at)
-        if fall < CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1)):
+        if fall < close:
             break
     return Minimum(at, residual, J)
+
+
+def _step(
+    residual_of: Callable[[Floats], Floats],
+    at: Floats,
+    residual: Floats,
+    J: Floats,
+    low: Floats,
+    high: Floats,
+    damping: float,
+    close: float,
+) -> tuple[Floats, Floats, float] | None:
+    """Where the sum of squares is less, the residual there, and the damping that found it; None where there is nothing.
+
+    No step is tried of which the slopes themselves promise less than `close`.
+    """
+    go = _movable(at, J, residual, low, high)
+    size = np.linalg.norm(J[:, go], axis=0)
+    A = J[:, go] / size
+    gram, right = A.T @ A, A.T @ residual
+    chi2 = float(residual @ residual)
+    for _ in range(MOST_TRIES):
+        step = np.linalg.solve(gram + damping * np.eye(gram.shape[0]), right)
+        if float(step @ (2 * right - gram @ step)) < close:
+            return None
+        moved = at.copy()
+        moved[go] += step / size
+        trial = np.clip(moved, low, high)
+        new = residual_of(trial)
+        fall = chi2 - float(new @ new)
+        if np.isfinite(fall) and fall > 0:
+            return trial, new, damping
+        damping = max(HARDER * damping, LEAST_HARDER)
+    return None
 
 
 def _movable(at: Floats, J: Floats, residual: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:
