@@ -43,6 +43,28 @@ def _frozen(array: Floats) -> Floats:
     return out
 
 
+@dataclass(frozen=True, slots=True)
+class Acquisition:
+    """How values came to be and to be stamped, where a recording says so (recording-format.md); None: it does not."""
+
+    delay: float | None = None
+    """s from the quantity to its stamp: conversion, group delay of a filter, transport."""
+    delay_std: float | None = None
+    """s."""
+    window: float | None = None
+    """s that a value is averaged over, ending `delay` before its stamp."""
+    quantum: float | None = None
+    """Step of the values, in the channel's unit."""
+    hold: float | None = None
+    """s for which a slow device repeats a value at a faster rate."""
+    filter: str = ""
+    """Kind, order, corner."""
+    period: float | None = None
+    """s between two rows by the device's own clock, which the whole stream has."""
+    clock_drift_std: float | None = None
+    """Of that clock against the run's, relative."""
+
+
 @dataclass(frozen=True, eq=False)
 class Channel:
     """One measured quantity on its own clock.
@@ -63,6 +85,7 @@ class Channel:
     thruster: str | None = None
     axis: str | None = None
     description: str = ""
+    acquisition: Acquisition = field(default_factory=Acquisition)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "time", _frozen(self.time))

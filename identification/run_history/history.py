@@ -103,6 +103,8 @@ class History:
     """s between thrust samples."""
     jitter: float = 0.001
     """s by which the time stamps of the thrust may be off."""
+    delay_std: float = 0.0
+    """s by which all of them may be, against the driver, as the recording itself says."""
     rate_spacing: float = 1.0
     excess: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     """(M,) or (1,): mean of driver |driver| over the interval less that of the mean driver."""

@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.recording import QUANTITY_UNITS, Channel, Event, Recording, Step
+from identification.recording import Acquisition, QUANTITY_UNITS, Channel, Event, Recording, Step
 from rig.errors import RecordingError
 from rig.hdf5.layout import FORMAT, FORMAT_VERSION, text_of
 
@@ -192,7 +192,16 @@ def _channel(
         thruster=text_of(facts.get("thruster", "")) or None,
         axis=text_of(facts.get("axis", "")) or None,
         description=text_of(facts.get("description", "")),
+        acquisition=_acquisition(facts, item.parent.attrs),
     )
+
+
+def _acquisition(channel: Mapping[str, Any], stream: Mapping[str, Any]) -> Acquisition:
+    """What is said of it; a time or a step that is negative or not finite says nothing."""
+    said = {key: _number(channel.get(key)) for key in ("delay", "delay_std", "window", "quantum", "hold")}
+    said |= {key: _number(stream.get(key)) for key in ("period", "clock_drift_std")}
+    known = {key: value for key, value in said.items() if value is not None and np.isfinite(value) and value >= 0}
+    return Acquisition(**known, filter=text_of(channel.get("filter", "")))
 
 
 def _quantity(channel: str, facts: Mapping[str, Any], findings: Findings) -> tuple[str | None, str]:

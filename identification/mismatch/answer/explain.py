@@ -86,9 +86,10 @@ def _within(line: str) -> list[str]:
 
 
 def _prepare(trace: Trace) -> Iterator[str]:
-    pairs = [*zip(trace.prepared.recordings, trace.sound.histories, strict=True)]
-    for recording, history in pairs[:MOST_RUNS]:
+    pairs = [*zip(trace.prepared.recordings, trace.sound.histories, trace.prepared.moved, strict=True)]
+    for recording, history, moved in pairs[:MOST_RUNS]:
         yield from _run(recording, history)
+        yield from (f"  {told}" for told in moved)
     if len(pairs) > MOST_RUNS:
         yield f"... and {len(pairs) - MOST_RUNS} more recordings"
     for recording in trace.prepared.held_out:

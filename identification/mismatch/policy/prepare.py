@@ -213,3 +213,28 @@ JITTER_AFTER = Threshold(
     unit="s",
     reason="So long after a step a sample may still belong to the level before it.",
 )
+CLOCK_PAUSE = Threshold(
+    20.0,
+    unit="periods",
+    reason="A device that says nothing for so long may have been started again, with its clock at another phase.",
+)
+CLOCK_ROWS = Count(
+    200,
+    unit="rows",
+    reason="Among so many arrivals some come in time, and the line below them is that of the clock.",
+)
+CLOCK_RATE_ERROR = Threshold(
+    0.02,
+    unit="share of the rate",
+    reason="A device whose rate is further from what it says has another clock than it says, or none that is even.",
+)
+CLOCK_LATE_SHARE = Threshold(
+    0.9,
+    unit="share of the rows",
+    reason="Those that tell whether rows come as from an even clock: the rest may wait for a computer that was busy.",
+)
+CLOCK_LATEST = Threshold(
+    2.0,
+    unit="periods",
+    reason="Rows of an even clock of which every tenth is later than this are not told from rows that were lost.",
+)

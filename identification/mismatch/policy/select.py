@@ -194,6 +194,11 @@ CLOCK_DIFFERENCE = Threshold(
         "nuisance and no finding, unless stamps are dense and even."
     ),
 )
+STATED_DELAY_SIGMA = Threshold(
+    3.0,
+    unit="standard deviations",
+    reason="A delay that is stated with its error may be off by this much of it, which is fitted and no finding.",
+)
 PLAIN_JUMP_SIGMA = Threshold(
     5.0,
     unit="sigma",

@@ -165,6 +165,13 @@ def _within(time: Floats, value: Floats, edges: Floats, mean: Floats) -> Floats:
     return np.asarray(np.bincount(index, weights=squares, minlength=mean.size), dtype=np.float64)
 
 
+def _delay_std(recording: Recording, driver: Channel) -> float:
+    """S by which the recording itself is not sure how long after its driver the thrust was stamped."""
+    thrust = recording.first_of("thrust")
+    stated = [c.acquisition.delay_std or 0.0 for c in (thrust, driver) if c is not None]
+    return float(np.hypot(*stated)) if len(stated) == 2 else 0.0
+
+
 def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, time: Floats, force: Floats) -> History:
     _, whole, _ = _binned(time, force, edges)
     time, force = _clear_of_jumps(recording, time, force)
@@ -208,6 +215,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         rate_per_driver=per_driver,
         spacing=float(np.median(np.diff(time))),
         jitter=jitter_of(time),
+        delay_std=_delay_std(recording, driver),
         rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
         static=_is_table(held, time.size),
     )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from identification.mismatch.prepare.acquisition import as_sampled
 from identification.mismatch.prepare.admission import unfit
 from identification.mismatch.prepare.preparing import Refusal, history_of
 from identification.recording import Recording
@@ -21,10 +22,15 @@ class Prepared:
     held_out: tuple[Recording, ...]
     unseen: tuple[History, ...]
     """Of what is held out."""
+    moved: tuple[tuple[str, ...], ...] = ()
+    """Of each recording to be diagnosed, a sentence for each stream whose stamps were brought back to its samples."""
 
 
 def run(recordings: Sequence[Recording], holdout: Sequence[Recording], baseline: Twin | None) -> Prepared | Refusal:
     """Recordings of one thruster, driven by one quantity, that fit together and to the twin, if there is one."""
+    sampled = [as_sampled(recording) for recording in recordings]
+    recordings, moved = [each for each, _ in sampled], tuple(told for _, told in sampled)
+    holdout = [as_sampled(recording)[0] for recording in holdout]
     histories = histories_of(recordings)
     if isinstance(histories, Refusal):
         return histories
@@ -32,7 +38,7 @@ def run(recordings: Sequence[Recording], holdout: Sequence[Recording], baseline:
     if isinstance(unseen, Refusal):
         return unseen
     wrong = unfit(recordings, holdout, histories, unseen, baseline)
-    return wrong or Prepared(tuple(recordings), histories, tuple(holdout), unseen)
+    return wrong or Prepared(tuple(recordings), histories, tuple(holdout), unseen, moved)
 
 
 def histories_of(recordings: Sequence[Recording]) -> tuple[History, ...] | Refusal:

@@ -42,12 +42,18 @@ def start(histories: Sequence[History]) -> tuple[Data, Theta]:
     C = right / gram if gram > 0 else 0.0
     with_rate = all(h.rate is not None and h.rate_rows.size > policy.select.RATE_ROWS for h in histories)
     moving = histories[0].driver_quantity == "command_voltage" and not any(h.static for h in histories)
-    most = min(policy.select.CLOCK_DIFFERENCE, max(h.jitter for h in histories)) if moving else 0.0
+    most = _most_shift(histories) if moving else 0.0
     predictor = Predictor()
     scale = scale_of([predictor.run(h) for h in histories], C or 1e-12)
     data = Data(tuple(histories), scale, with_rate=with_rate, most_shift=most, predictor=predictor)
     data = replace(data, prior_factor=level_error_factor(data, C))
     return data, Theta(C, (), tuple(float(ym - C * fm) for fm, ym in means), k=_k(histories))
+
+
+def _most_shift(histories: Sequence[History]) -> float:
+    """S by which force and driver may be apart: what a recording says that it does not know of a delay counts whole."""
+    unsure = policy.select.STATED_DELAY_SIGMA * max(h.delay_std for h in histories)
+    return max(min(policy.select.CLOCK_DIFFERENCE, max(h.jitter for h in histories)), unsure)
 
 
 def level_error_factor(data: Data, C: float) -> PriorPredictionFactor | None:
