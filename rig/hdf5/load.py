@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.recording import Acquisition, QUANTITY_UNITS, Channel, Event, Recording, Step
+from identification.recording import QUANTITY_UNITS, Acquisition, Channel, Event, Recording, Step
 from rig.errors import RecordingError
 from rig.hdf5.layout import FORMAT, FORMAT_VERSION, text_of
 
