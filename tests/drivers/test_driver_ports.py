@@ -8,12 +8,12 @@ import threading
 import pytest
 from scripted_peer import Peer, wait_until
 
-from drivers.can_bus import CanBus, Frame
 from drivers.errors import LinkError
-from drivers.inbox import BadRecords, Inbox
-from drivers.lines import LineCutter
-from drivers.serial_port import SerialPort, SerialSettings
-from drivers.transcript import Chunk, Transcript, read_transcript
+from drivers.ports.can_bus import CanBus, Frame
+from drivers.ports.inbox import BadRecords, Inbox
+from drivers.ports.lines import LineCutter
+from drivers.ports.serial_port import SerialPort, SerialSettings
+from drivers.ports.transcript import Chunk, Transcript, read_transcript
 
 
 def quiet(peer, request):

@@ -13,6 +13,7 @@ from scripted_peer import Peer, wait_until
 
 from drivers import KINDS, keller, line_stream, nortek_nmea
 from drivers.errors import DeviceError, LinkError
+from drivers.ports.can_bus import CanBus
 from drivers.protocols import Instrument, MotorController
 
 FOLDER = Path(__file__).parents[1] / "frames"
@@ -323,7 +324,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands():
     }
     assert set(options) == set(KINDS)
     for name, kind in KINDS.items():
-        bus = (__import__("drivers.can_bus").can_bus.CanBus("virtual", "x", 1),) if kind.link == "can" else ()
+        bus = (CanBus("virtual", "x", 1),) if kind.link == "can" else ()
         device = kind.build(name, kind.options(**options[name]), *bus)
         assert isinstance(device, Instrument)
         assert isinstance(device, MotorController) == (name == "vesc_can")

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scripted_peer import Peer, wait_until
 
-from drivers.can_bus import CanBus, Frame
 from drivers.errors import DeviceError, LinkError
+from drivers.ports.can_bus import CanBus, Frame
 from drivers.vesc_can import Options, VescCan
 from drivers.vesc_frames import (
     FaultCode,

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_devices.process import ROOT, running
+from sim_devices.bench.process import ROOT, running
 
 pytestmark = pytest.mark.alone  # a bench of its own process, in real time
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sim_devices.settings import load
+from sim_devices.bench.settings import load
 from sim_devices.tables import WorldError
 
 GOOD = """

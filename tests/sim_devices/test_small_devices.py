@@ -5,11 +5,11 @@ from math import inf, nan
 
 import pytest
 
-from sim_devices.can_frame import CanFrame
-from sim_devices.keller import Keller, KellerOptions, crc16, framed
-from sim_devices.nortek import Nortek, NortekOptions, pnorc1, pnorc3, sentence
-from sim_devices.slcan import Adapter
+from sim_devices.instruments.keller import Keller, KellerOptions, crc16, framed
+from sim_devices.instruments.nortek import Nortek, NortekOptions, pnorc1, pnorc3, sentence
 from sim_devices.tables import WorldError
+from sim_devices.wires.can_frame import CanFrame
+from sim_devices.wires.slcan import Adapter
 
 
 def test_the_manuals_velocity_sentences():

@@ -4,10 +4,10 @@ import struct
 
 import pytest
 
-from sim_devices import vesc_codec as codec
-from sim_devices.can_frame import CanFrame
-from sim_devices.vesc import Vesc, VescOptions
-from sim_devices.vesc_codec import Telemetry
+from sim_devices.instruments import vesc_codec as codec
+from sim_devices.instruments.vesc import Vesc, VescOptions
+from sim_devices.instruments.vesc_codec import Telemetry
+from sim_devices.wires.can_frame import CanFrame
 
 # Vectors made by the firmware's own packet.c, crc.c and buffer.c, compiled with -fsingle-precision-constant.
 SHOWN = Telemetry(

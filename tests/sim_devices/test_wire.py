@@ -6,8 +6,8 @@ from math import inf
 import numpy as np
 import pytest
 
-from sim_devices.ports import PtyPort
-from sim_devices.wire import Wire
+from sim_devices.wires.ports import PtyPort
+from sim_devices.wires.serial_line import Wire
 
 
 def wire(baud=9600, seed=1):

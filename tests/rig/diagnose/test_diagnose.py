@@ -363,7 +363,7 @@ def test_a_file_by_plain_h5py_is_diagnosed(tmp_path):
 
 
 def test_the_simulated_bench_runs_on_a_twin(dead, tmp_path):
-    from sim_devices.settings import load as load_world
+    from sim_devices.bench.settings import load as load_world
     from sim_devices.world.headless import run as headless
     from sim_devices.world.noise import Noise
 

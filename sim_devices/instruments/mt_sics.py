@@ -11,7 +11,7 @@ from collections import deque
 from collections.abc import Callable
 from math import inf, isnan
 
-from sim_devices.mt_sics_options import UNITS, MtSicsOptions, line, shown
+from sim_devices.instruments.mt_sics_options import UNITS, MtSicsOptions, line, shown
 
 BALANCE_TIMEOUT = 30.0
 """s a command waits for stability."""

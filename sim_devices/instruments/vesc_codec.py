@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sim_devices.can_frame import CanFrame
+from sim_devices.wires.can_frame import CanFrame
 
 # CAN_PACKET_ID, datatypes.h
 SET_DUTY, SET_CURRENT, SET_CURRENT_BRAKE, SET_RPM, SET_POS = 0, 1, 2, 3, 4

@@ -22,9 +22,9 @@ import can
 from can.interfaces import VALID_INTERFACES
 
 from drivers.errors import LinkError
-from drivers.inbox import BadRecords, Inbox
+from drivers.ports.inbox import BadRecords, Inbox
+from drivers.ports.transcript import Transcript
 from drivers.protocols import LinkHealth
-from drivers.transcript import Transcript
 
 READ_TIMEOUT = 0.05
 """s; how soon an idle reader notices that it shall stop."""

@@ -11,20 +11,20 @@ from pathlib import Path
 
 import numpy as np
 
-from sim_devices.can_frame import CanFrame
-from sim_devices.control import clear, fault, obey
-from sim_devices.device import SerialDevice
-from sim_devices.keller import Keller, KellerOptions
-from sim_devices.motor_tap import MotorTap
-from sim_devices.mt_sics import MtSics
-from sim_devices.mt_sics_options import MtSicsOptions
-from sim_devices.nortek import Nortek, NortekOptions
-from sim_devices.ports import ControlSocket, PtyPort, wait
-from sim_devices.settings import BenchSettings, ScriptedFault, load
-from sim_devices.slcan import Adapter
-from sim_devices.truth import TruthLog, header_fields, state_fields
-from sim_devices.vesc import Vesc, VescOptions
-from sim_devices.wire import Wire
+from sim_devices.bench.control import clear, fault, obey
+from sim_devices.bench.settings import BenchSettings, ScriptedFault, load
+from sim_devices.bench.truth_log import TruthLog, header_fields, state_fields
+from sim_devices.instruments.keller import Keller, KellerOptions
+from sim_devices.instruments.motor_tap import MotorTap
+from sim_devices.instruments.mt_sics import MtSics
+from sim_devices.instruments.mt_sics_options import MtSicsOptions
+from sim_devices.instruments.nortek import Nortek, NortekOptions
+from sim_devices.instruments.serial_device import SerialDevice
+from sim_devices.instruments.vesc import Vesc, VescOptions
+from sim_devices.wires.can_frame import CanFrame
+from sim_devices.wires.ports import ControlSocket, PtyPort, wait
+from sim_devices.wires.serial_line import Wire
+from sim_devices.wires.slcan import Adapter
 from sim_devices.world import World
 from sim_devices.world.noise import Noise, Normals
 

@@ -17,7 +17,7 @@ from math import inf
 from pathlib import Path
 
 from sim_devices.tables import WorldError
-from sim_devices.wire import Wire
+from sim_devices.wires.serial_line import Wire
 
 READ_SIZE = 4096
 HOST_BUFFER = 4000

@@ -10,19 +10,49 @@ status                          JSON: thruster, rotation rate, thrust, messages 
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
+from typing import Protocol
 
+from sim_devices.bench.settings import BenchSettings
+from sim_devices.instruments.serial_device import SerialDevice
+from sim_devices.instruments.vesc import Vesc
 from sim_devices.tables import WorldError, check_known
-from sim_devices.wire import DEFAULT_AMOUNT, WIRE_FAULTS
-
-if TYPE_CHECKING:
-    from sim_devices.bench import Bench
-    from sim_devices.device import SerialDevice
-    from sim_devices.ports import PtyPort
-    from sim_devices.vesc import Vesc
+from sim_devices.wires.ports import PtyPort
+from sim_devices.wires.serial_line import DEFAULT_AMOUNT, WIRE_FAULTS
+from sim_devices.wires.slcan import Adapter
+from sim_devices.world import World
 
 
-def obey(bench: Bench, line: str) -> str:
+class ControlledBench(Protocol):
+    """What a command of the control port reaches of a bench, which makes and closes all of it."""
+
+    @property
+    def settings(self) -> BenchSettings: ...
+
+    @property
+    def world(self) -> World: ...
+
+    @property
+    def serial(self) -> Mapping[str, tuple[SerialDevice, PtyPort, float]]:
+        """Device name -> device, its port, its turnaround (s)."""
+
+    @property
+    def adapters(self) -> Mapping[str, tuple[Adapter, PtyPort]]: ...
+
+    @property
+    def vesc(self) -> Vesc | None: ...
+
+    @property
+    def ports(self) -> Sequence[PtyPort]: ...
+
+    def now(self) -> float:
+        """Time since the bench was started, s."""
+
+    def log(self, event: str, **fields: object) -> None:
+        """One line of the truth log, stamped now."""
+
+
+def obey(bench: ControlledBench, line: str) -> str:
     """Do what one line says; the answer says what was done, or why not."""
     try:
         return f"ok {_done(bench, line.split())}"
@@ -30,7 +60,7 @@ def obey(bench: Bench, line: str) -> str:
         return f"error {error}"
 
 
-def _done(bench: Bench, words: list[str]) -> str:
+def _done(bench: ControlledBench, words: list[str]) -> str:
     match words:
         case ["mount", thruster]:
             mount(bench, thruster)
@@ -53,13 +83,13 @@ def _done(bench: Bench, words: list[str]) -> str:
             )
 
 
-def mount(bench: Bench, thruster: str) -> None:
+def mount(bench: ControlledBench, thruster: str) -> None:
     """Put another thruster on. Raises ValueError while the rotor turns, WorldError for an unknown name."""
     bench.world.mount(thruster)
     bench.log("mount")
 
 
-def fault(bench: Bench, target: str, name: str, amount: float = DEFAULT_AMOUNT) -> None:
+def fault(bench: ControlledBench, target: str, name: str, amount: float = DEFAULT_AMOUNT) -> None:
     """A device, or the wire of a device or adapter, goes wrong from now on. Raises ValueError or WorldError.
 
     `pulled` takes the cable out. `amount` is a share (0..1) or, for `delayed`, seconds.
@@ -77,7 +107,7 @@ def fault(bench: Bench, target: str, name: str, amount: float = DEFAULT_AMOUNT) 
     bench.log("fault", target=target, fault=name, amount=amount)
 
 
-def clear(bench: Bench, target: str) -> None:
+def clear(bench: ControlledBench, target: str) -> None:
     """The target is in order again; a pulled cable is back, on a new pty under the same name."""
     port, device = _target(bench, target)
     if port is not None:
@@ -88,13 +118,13 @@ def clear(bench: Bench, target: str) -> None:
     bench.log("clear", target=target)
 
 
-def set_flow(bench: Bench, speed: float) -> None:
+def set_flow(bench: ControlledBench, speed: float) -> None:
     """Tunnel flow from now on, m/s."""
     bench.world.state.flow = speed
     bench.log("flow", speed=speed)
 
 
-def status(bench: Bench) -> dict[str, object]:
+def status(bench: ControlledBench) -> dict[str, object]:
     """Thruster on the bench, rotation in rev/s, thrust in N, flow in m/s, messages lost per port."""
     s = bench.world.state
     return {
@@ -106,7 +136,7 @@ def status(bench: Bench) -> dict[str, object]:
     }
 
 
-def _target(bench: Bench, name: str) -> tuple[PtyPort | None, SerialDevice | Vesc | None]:
+def _target(bench: ControlledBench, name: str) -> tuple[PtyPort | None, SerialDevice | Vesc | None]:
     check_known(name, [*bench.settings.devices, *bench.adapters], "target")
     if name in bench.adapters:
         return bench.adapters[name][1], None

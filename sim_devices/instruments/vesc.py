@@ -12,9 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import copysign, inf
 
-from sim_devices import vesc_codec as codec
-from sim_devices.can_frame import CanFrame
-from sim_devices.vesc_codec import Telemetry
+from sim_devices.instruments import vesc_codec as codec
+from sim_devices.instruments.vesc_codec import Telemetry
+from sim_devices.wires.can_frame import CanFrame
 
 BROADCAST = 255
 FAULT_ABS_OVER_CURRENT, FAULT_OVER_TEMP_MOTOR = 4, 6

@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sim_devices.keller import KellerOptions
-from sim_devices.mt_sics_options import MtSicsOptions
-from sim_devices.nortek import NortekOptions
+from sim_devices.instruments.keller import KellerOptions
+from sim_devices.instruments.mt_sics_options import MtSicsOptions
+from sim_devices.instruments.nortek import NortekOptions
+from sim_devices.instruments.vesc import VescOptions
 from sim_devices.tables import WorldError, build, check_known
-from sim_devices.vesc import VescOptions
 from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin
 

@@ -7,7 +7,7 @@ bit-rate changes after it, are refused.
 
 from __future__ import annotations
 
-from sim_devices.can_frame import CanFrame
+from sim_devices.wires.can_frame import CanFrame
 
 CR, BEL = b"\r", b"\a"
 MAX_LINE = 64

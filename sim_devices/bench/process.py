@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from sim_devices.ports import ask
+from sim_devices.wires.ports import ask
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 START_TIME = 30.0
 """s a bench may take until it says `ready`, on a machine that is busy."""
 STOP_TIME = 10.0

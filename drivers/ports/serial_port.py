@@ -15,9 +15,9 @@ from typing import Generic, TypeVar
 import serial
 
 from drivers.errors import LinkError
-from drivers.inbox import Inbox
-from drivers.lines import bits_per_character
-from drivers.transcript import Transcript
+from drivers.ports.inbox import Inbox
+from drivers.ports.lines import bits_per_character
+from drivers.ports.transcript import Transcript
 
 Record = TypeVar("Record")
 
