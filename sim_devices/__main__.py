@@ -18,7 +18,7 @@ from sim_devices.bench.bench import Bench, start
 from sim_devices.bench.process import running
 from sim_devices.bench.settings import load
 from sim_devices.bench.truth_table import SUSPICIOUS, compare, table
-from sim_devices.concealed.sealing import KINDS, conceal
+from sim_devices.concealed.sealing.on_disc import KINDS, conceal
 from sim_devices.tables import WorldError
 from sim_devices.vehicle.documents import held_out, recorded, trials, truth, tunnel
 from sim_devices.vehicle.settings import load as load_vehicle

@@ -22,15 +22,16 @@ and does nothing.
 This package knows nothing of identification or rig; `tests/concealed/recordings.py` makes Recordings of the rows.
 """
 
-from sim_devices.concealed.definition import Case
+from sim_devices.concealed.cases.definition import Case
+from sim_devices.concealed.cases.faults import KINDS as LIES
+from sim_devices.concealed.cases.faults import Column
+from sim_devices.concealed.cases.forms import FORMS, VARIANTS
+from sim_devices.concealed.cases.plans import KINDS as PLAN_KINDS
+from sim_devices.concealed.cases.shapes import SHAPES
 from sim_devices.concealed.draw import NOISE_KINDS, case
-from sim_devices.concealed.faults import KINDS as LIES
-from sim_devices.concealed.faults import Column
-from sim_devices.concealed.oracle import OutOfReach, scaled_to, strength
-from sim_devices.concealed.plans import KINDS as PLAN_KINDS
-from sim_devices.concealed.records import Rows, rows, truth
-from sim_devices.concealed.rivals import twins
-from sim_devices.concealed.shapes import FORMS, SHAPES, VARIANTS
+from sim_devices.concealed.sealing.records import Rows, rows, truth
+from sim_devices.concealed.visibility.oracle import OutOfReach, scaled_to, strength
+from sim_devices.concealed.visibility.rivals import twins
 
 __all__ = [
     "FORMS",

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 
 from sim_devices import concealed
-from sim_devices.concealed.bystanders import WARMING, WITH_NEIGHBOUR, WITH_THERMOMETER
-from sim_devices.concealed.definition import history, thrust_of
+from sim_devices.concealed.cases.bystanders import WARMING, WITH_NEIGHBOUR, WITH_THERMOMETER
+from sim_devices.concealed.cases.definition import history, thrust_of
 
 DRAWN = 120
 

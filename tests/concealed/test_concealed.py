@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from sim_devices import concealed
-from sim_devices.concealed.definition import history
-from sim_devices.concealed.oracle import with_amount
-from sim_devices.concealed.plans import held, profile
-from sim_devices.concealed.projection import history_volts
-from sim_devices.concealed.whitening import Whitening
+from sim_devices.concealed.cases.definition import history
+from sim_devices.concealed.cases.plans import held, profile
+from sim_devices.concealed.visibility.oracle import with_amount
+from sim_devices.concealed.visibility.projection import history_volts
+from sim_devices.concealed.visibility.whitening import Whitening
 from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, drawn, peak_coefficients
 from tests.concealed.recordings import recording, recordings
 

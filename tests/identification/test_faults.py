@@ -11,7 +11,7 @@ import pytest
 from identification.mismatch.faults.channel_faults import Fault, find_faults, repaired
 from identification.recording import Channel, Floats, Recording
 from sim_devices import concealed
-from sim_devices.concealed.shapes import SHAPES
+from sim_devices.concealed.cases.shapes import SHAPES
 from tests.concealed.recordings import recordings
 
 SEEDS = 6

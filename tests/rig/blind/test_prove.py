@@ -30,7 +30,7 @@ from rig.blind.scoring.tables import confusion, tables, twins, worst
 from rig.blind.store import ProofError, Store, version_of_diagnosis
 from rig.blind.workers import STOPPING, BrokenOff, Child, Ended, Lane, Overdue, carry_out, concealable
 from rig.report.page import html
-from sim_devices.concealed.sealing import conceal
+from sim_devices.concealed.sealing.on_disc import conceal
 from sim_devices.tables import WorldError
 from tests.rig.blind_scores import CATALOGUE, WORLD, answer, finding, order, truth, whole_proof
 from tests.rig.report_reading import open_fonts

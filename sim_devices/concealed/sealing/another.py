@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_devices.concealed.definition import Case, Run, history, thrust_of
-from sim_devices.concealed.draw import NEEDS_REVERSED_FLOW, NEEDS_SLEW, flow_steps
-from sim_devices.concealed.plans import KINDS, profile
-from sim_devices.concealed.records import Rows, rows
+from sim_devices.concealed.cases.definition import Case, Run, history, thrust_of
+from sim_devices.concealed.cases.needs import NEEDS_REVERSED_FLOW, NEEDS_SLEW
+from sim_devices.concealed.cases.plans import KINDS, profile
+from sim_devices.concealed.draw import flow_steps
+from sim_devices.concealed.sealing.records import Rows, rows
 
 Floats = NDArray[np.float64]
 

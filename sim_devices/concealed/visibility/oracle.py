@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_devices.concealed.definition import Case, Concealed
-from sim_devices.concealed.projection import Projection, Screen, signals
-from sim_devices.concealed.shapes import LEAST
+from sim_devices.concealed.cases.definition import Case, Concealed
+from sim_devices.concealed.cases.shapes import LEAST
+from sim_devices.concealed.visibility.projection import Projection, Screen, signals
 from sim_devices.world.noise_law import scaled
 
 Floats = NDArray[np.float64]

@@ -9,10 +9,10 @@ from uuid import UUID
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_devices.concealed.definition import Case, Run, Sensor, history, settings, thrust_of
-from sim_devices.concealed.faults import Column, lying
-from sim_devices.concealed.oracle import strength
-from sim_devices.concealed.plans import Step
+from sim_devices.concealed.cases.definition import Case, Run, Sensor, history, settings, thrust_of
+from sim_devices.concealed.cases.faults import Column, lying
+from sim_devices.concealed.cases.plans import Step
+from sim_devices.concealed.visibility.oracle import strength
 from sim_devices.world.history import History, clock
 from sim_devices.world.noise_law import drawn
 

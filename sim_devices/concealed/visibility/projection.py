@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
 
-from sim_devices.concealed.definition import Case, history, thrust_of
-from sim_devices.concealed.plans import held
-from sim_devices.concealed.whitening import Whitening
+from sim_devices.concealed.cases.definition import Case, history, thrust_of
+from sim_devices.concealed.cases.plans import held
+from sim_devices.concealed.visibility.whitening import Whitening
 from sim_devices.world.history import clock
 from sim_devices.world.noise_law import spectrum
 

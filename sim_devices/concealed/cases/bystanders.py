@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim_devices.concealed.definition import Case, Sensor
+from sim_devices.concealed.cases.definition import Case, Sensor
 from sim_devices.world.noise_law import NoiseLaw
 
 Rng = np.random.Generator

@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from sim_devices.concealed.cases.forms import FORMS, NEIGHBOURS, VARIANTS
+
 Rng = np.random.Generator
 
 
@@ -81,44 +83,6 @@ def shape(effect: str, scale: Scale, rng: Rng, form: str = "") -> Shape:
     if form and form not in known:
         raise ValueError(f"form of {effect} must be one of {', '.join(known)}, got {form!r}")
     return SHAPES[effect](scale, rng, form or str(rng.choice(forms)))
-
-
-FORMS: dict[str, tuple[str, ...]] = {
-    "dead_band": ("shrink", "jump"),
-    "motor_lag": ("first_order", "quadratic"),
-    "exponent": ("below", "above"),
-    "asymmetry": ("weak_reverse", "strong_reverse"),
-    "heating": ("winding", "magnet"),
-    "recirculation": ("rate", "thrust"),
-    "load_cell_creep": ("one_constant", "two_constants"),
-    "load_cell_nonlinearity": ("quadratic", "cubic"),
-    "cavitation": ("linear", "square"),
-    "zero_drift": ("rate", "exponential"),
-    "torque_crosstalk": ("even",),
-    "periodic_disturbance": ("frequency", "blades"),
-    "supply_sag": ("resistance", "discharge"),
-}
-
-
-NEIGHBOURS: dict[str, tuple[str, ...]] = {
-    "command_saturation": ("knee",),
-    "load_cell_saturation": ("knee",),
-    "recirculation": ("circuit",),
-}
-"""Forms that are never concealed, but what is concealed may be mistaken for them: tried as rivals beside FORMS."""
-
-
-VARIANTS: dict[str, tuple[str, ...]] = {
-    "dead_band": ("smooth",),
-    "command_saturation": ("soft",),
-    "winding_resistance": ("linearised",),
-    "motor_lag": ("two_lags",),
-    "cavitation": ("exponential",),
-    "recirculation": ("late",),
-    "zero_drift": ("root",),
-    "load_cell_saturation": ("soft",),
-}
-"""Further textbook forms, there when asked for by name only: the same physics in other words."""
 
 
 def _log(rng: Rng, low: float, high: float) -> float:

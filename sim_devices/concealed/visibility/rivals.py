@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_devices.concealed.definition import Case, Concealed
-from sim_devices.concealed.draw import NEEDS_DRIFT, NEEDS_FLOW
-from sim_devices.concealed.projection import Screen, signals
-from sim_devices.concealed.shapes import FORMS, NEIGHBOURS, Shape, shape
+from sim_devices.concealed.cases.definition import Case, Concealed
+from sim_devices.concealed.cases.forms import FORMS, NEIGHBOURS
+from sim_devices.concealed.cases.needs import NEEDS_DRIFT, NEEDS_FLOW
+from sim_devices.concealed.cases.shapes import Shape, shape
+from sim_devices.concealed.visibility.projection import Screen, signals
 
 Floats = NDArray[np.float64]
 

@@ -22,15 +22,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sim_devices.concealed.another import another
+from sim_devices.concealed.cases.faults import KINDS as LIES
+from sim_devices.concealed.cases.forms import FORMS, VARIANTS
+from sim_devices.concealed.cases.shapes import SHAPES
 from sim_devices.concealed.draw import NOISE_KINDS
 from sim_devices.concealed.draw import case as drawn
-from sim_devices.concealed.faults import KINDS as LIES
-from sim_devices.concealed.oracle import OutOfReach
-from sim_devices.concealed.records import Rows, rows, truth
-from sim_devices.concealed.rivals import twins
-from sim_devices.concealed.shapes import FORMS, SHAPES, VARIANTS
+from sim_devices.concealed.sealing.another import another
+from sim_devices.concealed.sealing.records import Rows, rows, truth
 from sim_devices.concealed.version import version
+from sim_devices.concealed.visibility.oracle import OutOfReach
+from sim_devices.concealed.visibility.rivals import twins
 from sim_devices.tables import WorldError
 
 Floats = NDArray[np.float64]
