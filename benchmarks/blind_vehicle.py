@@ -17,8 +17,8 @@ from time import process_time
 import numpy as np
 from scipy.stats import chi2
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "identification"))
-from vehicle_world import AXES, DRAWN, compared, distance, drawn, identify, truth_of
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tests.identification.vehicle.vehicle_world import AXES, DRAWN, compared, distance, drawn, identify, truth_of
 
 SHOWN = ("m", "k", "k2", "eta_hull", "eta_pair", "current_north", "current_east", "buoyancy[heave-1]")
 

@@ -5,8 +5,8 @@
 RUNS (2000) data sets each, more where they are cheap. What was drawn is kept in build/estimators, so that a run that
 was broken off goes on where it was, and a larger RUNS adds to a smaller one. `--only` takes a part of a name. `var/CRB`
 and the coverages are taken from pairs: the estimator beside the one that attains the bound, on the same data
-(tests/identification/monte_carlo.py); `alone` is the ratio without that help. `*` marks what misses the goal (ratio
-above 1.02, coverage off by more than one point) by more than two standard errors of the Monte Carlo itself.
+(tests/identification/estimation/monte_carlo.py); `alone` is the ratio without that help. `*` marks what misses the goal
+(ratio above 1.02, coverage off by more than one point) by more than two standard errors of the Monte Carlo itself.
 """
 
 from __future__ import annotations
@@ -19,10 +19,10 @@ from time import monotonic
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "identification"))
-from linear_cases import cases as linear_cases
-from monte_carlo import LEVELS, Case, Result, Sample, results, sample
-from vehicle_cases import cases as vehicle_cases
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+from tests.identification.estimation.linear_cases import cases as linear_cases
+from tests.identification.estimation.monte_carlo import LEVELS, Case, Result, Sample, results, sample
+from tests.identification.vehicle.vehicle_cases import cases as vehicle_cases
 
 STORE = Path(__file__).resolve().parents[1] / "build" / "estimators"
 BATCH = 100

@@ -15,11 +15,10 @@ from time import process_time
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests" / "identification"))
-from thrust_runs import ar1, flicker, level_table, sine, staircase, white
-
+sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from identification.recording import Recording
 from identification.thruster.thrust import ThrustFit, fit_thrust
+from tests.identification.thrust_runs import ar1, flicker, level_table, sine, staircase, white
 
 LEVELS = (0.0, 9.0, -9.0, 18.0, -18.0, 0.0, 13.0, -13.0)
 TRUTH = 0.4

@@ -17,9 +17,9 @@ from time import monotonic_ns
 import numpy as np
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from tests.console.terminal import on_terminal
 from tests.reliability.live import LiveBench, live_bench, zero_after
 from tests.reliability.test_console_stop import CTRL_C, F9, RIG, leave, start_from
+from tests.rig.console.terminal import on_terminal
 
 PROMISE = 0.1
 """s, p99 of 100 presses (docs/reliability.md, promise 4)."""

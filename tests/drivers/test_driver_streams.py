@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scripted_peer import Peer, wait_until
 
 from drivers import KINDS, keller, line_stream, nortek_nmea
 from drivers.errors import DeviceError, LinkError
 from drivers.ports.can_bus import CanBus
 from drivers.protocols import Instrument, MotorController
+from tests.drivers.scripted_peer import Peer, wait_until
 
 FOLDER = Path(__file__).parents[1] / "frames"
 NORTEK = tomllib.loads((FOLDER / "nortek_nmea.toml").read_text())
