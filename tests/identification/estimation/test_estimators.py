@@ -1,5 +1,5 @@
 """A short Monte Carlo of the linear estimators, the thruster fit and the velocity; the long one, vehicle and all, is
-benchmarks/estimators.py.
+benchmarks/estimation/estimators.py.
 
 Ratios come from pairs (the estimator beside the one that attains the bound, on the same data), so a few hundred runs
 tell 2 % of variance; see monte_carlo.py.
