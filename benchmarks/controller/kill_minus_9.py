@@ -1,6 +1,6 @@
 """kill -9 of the controller at random instants of a sweep: does the motor stop, does the file open, what is lost?
 
-    python benchmarks/kill_minus_9.py [KILLS]
+    python benchmarks/controller/kill_minus_9.py [KILLS]
 
 Times are those of the simulated bench's truth log, in another process.
 """
@@ -12,7 +12,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.reliability.live import SLACK, TICK, WATCHDOG, Killed, kill_once, live_bench
 
 

@@ -1,6 +1,6 @@
 """How late is the control loop while a console redraws beside it? At 50 Hz and at 1 kHz, on the simulated bench.
 
-    python benchmarks/loop_lateness.py [RATE ...]
+    python benchmarks/controller/loop_lateness.py [RATE ...]
 
 The console runs in a terminal of its own (a pty) on the same machine. Figures are those that each recording carries
 among its events, and the controller's processor time per tick.
@@ -18,7 +18,7 @@ import threading
 from functools import partial
 from pathlib import Path
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from rig.hdf5 import load
 from rig.link.live_runs import Run
 from tests.reliability.live import attach, live_bench

@@ -1,6 +1,6 @@
 """From the operator's stop key to command 0 at the motor, end to end, many times.
 
-    python benchmarks/stop_latency.py [PRESSES]
+    python benchmarks/controller/stop_latency.py [PRESSES]
 
 Each press is a campaign of its own: `rig console` on a pty, a controller process and a simulated bench in a third
 process, whose truth log has the clock of this machine. The key is written to the pty somewhere in a hold, on one of the
@@ -16,7 +16,7 @@ from time import monotonic_ns
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.reliability.live import LiveBench, live_bench, zero_after
 from tests.reliability.test_console_stop import CTRL_C, F9, RIG, leave, start_from
 from tests.rig.console.terminal import on_terminal

@@ -1,7 +1,7 @@
 """Time and memory of `rig diagnose` as a process, on ten minutes at 100 Hz with the whole catalogue.
 
-    python benchmarks/diagnose_speed.py [SEEDS]           three kinds of recording, SEEDS of each (default 3)
-    python benchmarks/diagnose_speed.py --profile         what the time goes into: functions and imports
+    python benchmarks/diagnosis/diagnose_speed.py [SEEDS]           three kinds of recording, SEEDS of each (default 3)
+    python benchmarks/diagnosis/diagnose_speed.py --profile         what the time goes into: functions and imports
 
 Recordings of `sim_devices.concealed`, every explaining channel recorded: nothing concealed, one effect, two effects at
 plain strength. Each is diagnosed by a process of its own, start included, on one core and with one BLAS thread. The

@@ -1,6 +1,6 @@
 """Vehicles with one effect concealed, and clean ones, diagnosed from their recordings alone; truth apart.
 
-    python benchmarks/diagnose_vehicle.py [SEEDS [STRENGTH [EFFECT ...]]]
+    python benchmarks/diagnosis/diagnose_vehicle.py [SEEDS [STRENGTH [EFFECT ...]]]
 
 Each effect once per seed at STRENGTH times its plain strength (tests/concealed/vehicles.py). `named`: among the
 findings and no other effect beside it; `with more`: beside others; `rival`: only among the rivals; `wrong`: another
@@ -16,7 +16,7 @@ from time import process_time
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.vehicle.diagnose import diagnose_vehicle

@@ -1,6 +1,6 @@
 """What a term gains that is told from noise only by estimating both: on clean recordings, and where it is concealed.
 
-    python benchmarks/hidden_gains.py [N [EFFECT [SIGMA]]]    # 8 recordings of each kind of noise, zero_drift, 8
+    python benchmarks/diagnosis/hidden_gains.py [N [EFFECT [SIGMA]]]  # 8 of each kind of noise, zero_drift, 8
 
 The search tries a term that no screening finds by estimating term and noise together (`forward_selection._hidden`), and
 believes it from a gain in deviance on; those prices (STEADY_TERM_FALSE_ALARM, HIDDEN_OFFSET_PRICE and HIDDEN_TERM_PRICE
@@ -25,7 +25,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 
 from identification.mismatch import policy

@@ -1,6 +1,6 @@
 """Two sets of answers of the blind proof, case by case: which verdicts, names and figures differ.
 
-    python benchmarks/same_answers.py BEFORE.jsonl.gz AFTER.jsonl.gz [--figures]
+    python benchmarks/diagnosis/same_answers.py BEFORE.jsonl.gz AFTER.jsonl.gz [--figures]
 
 Both are files that `rig prove --scores` wrote, of the same draw. A change of the code that means to change no answer is
 held to this: of the cases that both hold it prints each in which verdict, findings, stated rivals or the place of what

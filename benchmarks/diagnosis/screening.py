@@ -1,6 +1,6 @@
 """Which of 200 and more candidates would help, on 10^6 samples: our screening against refitting each candidate.
 
-    python benchmarks/screening.py [SECONDS]        of one recording at 1 kHz, default 1000
+    python benchmarks/diagnosis/screening.py [SECONDS]        of one recording at 1 kHz, default 1000
 
 Candidates are all trials of all terms of the catalogue (every channel recorded). The noise is estimated once and is the
 same for all. Three ways to the same sigmas of each candidate:

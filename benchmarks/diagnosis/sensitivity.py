@@ -1,14 +1,14 @@
 """What half and double of the thresholds that matter most would change in the answers.
 
-    python benchmarks/sensitivity.py [--jobs 2] [--out build/sensitivity.jsonl] [--cases N] [--only THRESHOLD ...]
-    python benchmarks/sensitivity.py --table              # of what is in the file
-    python benchmarks/sensitivity.py --choose             # the fixed set anew, from benchmarks/proof/scores.jsonl.gz
+    python benchmarks/diagnosis/sensitivity.py [--jobs 2] [--out build/sensitivity.jsonl] [--cases N] [--only NAME ...]
+    python benchmarks/diagnosis/sensitivity.py --table       # of what is in the file
+    python benchmarks/diagnosis/sensitivity.py --choose      # the fixed set anew, from benchmarks/proof/scores.jsonl.gz
 
 Each of the thresholds in ASKED is put at half and at double, one at a time (`policy.overridden`), and every case of a
 fixed set is answered as in the blind proof: `python -m sim_devices conceal` makes recordings and seals the truth,
-`rig.blind.answering.answered` diagnoses, `rig.blind.scoring` puts both side by side. The set is
-benchmarks/sensitivity_cases.txt: cases of draw 2026-11-24 that took a few seconds, so that its rates are no figures of
-the proof; differences within the table are what it tells. All settings of one case are answered one after the other,
+`rig.blind.answering.answered` diagnoses, `rig.blind.scoring` puts both side by side. The set is in
+sensitivity_cases.txt: cases of draw 2026-11-24 that took a few seconds, so that its rates are no figures of the proof;
+differences within the table are what it tells. All settings of one case are answered one after the other,
 and cases are interleaved over the lanes: whatever is done when it is broken off is even. The same command goes on
 where it ended, with the same version of the diagnosis.
 
@@ -35,7 +35,7 @@ from pathlib import Path
 from shutil import rmtree
 from typing import Any
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from identification.mismatch import policy
 from rig.blind.answering import answered
 from rig.blind.command import designed
@@ -43,10 +43,10 @@ from rig.blind.score_file import read
 from rig.blind.scoring.score import LOCATED, OPEN_CELLS, scored
 from rig.blind.store import Store, version_of_diagnosis
 
-ROOT = Path(__file__).resolve().parents[1]
+ROOT = Path(__file__).resolve().parents[2]
 DRAW = "2026-11-24"
 SCORES = ROOT / "benchmarks" / "proof" / "scores.jsonl.gz"
-CASES = ROOT / "benchmarks" / "sensitivity_cases.txt"
+CASES = Path(__file__).with_name("sensitivity_cases.txt")
 LANES = {
     "faint": 54,
     "clear": 54,

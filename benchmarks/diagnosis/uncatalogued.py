@@ -1,6 +1,6 @@
 """Effects that stand in no catalogue: located, shape shown, fit improved on held-out data, no wrong name.
 
-    python benchmarks/uncatalogued.py [SEED [SIGMA [EFFECT ...]]]    # 5, 40, all eleven
+    python benchmarks/diagnosis/uncatalogued.py [SEED [SIGMA [EFFECT ...]]]    # 5, 40, all eleven
 
 Each effect is concealed in a recording drawn at random (sim_devices.concealed: thruster, plan, sampling, noise and
 channels), as strong as an oracle sees it at so many sigma that knows its shape. For each: the truth, the verdict, names
@@ -20,7 +20,7 @@ from math import isfinite
 from pathlib import Path
 from time import process_time
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import numpy as np
 
 from identification.mismatch.diagnosis import Diagnosis

@@ -1,6 +1,6 @@
 """Ten simulated vehicles, parameters drawn at random, identified from their recordings alone.
 
-    python benchmarks/blind_vehicle.py [VEHICLES [SEED]]
+    python benchmarks/estimation/blind_vehicle.py [VEHICLES [SEED]]
 
 z = (estimate - truth) / stated standard deviation. Parameters of one fit are correlated, so the sum that has a
 chi-square law is the squared Mahalanobis distance of a fit; axes of one vehicle share thrusters and the gain of the
@@ -17,7 +17,7 @@ from time import process_time
 import numpy as np
 from scipy.stats import chi2
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.identification.vehicle.vehicle_world import AXES, DRAWN, compared, distance, drawn, identify, truth_of
 
 SHOWN = ("m", "k", "k2", "eta_hull", "eta_pair", "current_north", "current_east", "buoyancy[heave-1]")

@@ -1,6 +1,6 @@
 """Monte Carlo of every estimator: bias, variance over the Cramér-Rao bound, coverage of the 68 and 95 % intervals.
 
-    python benchmarks/estimators.py [RUNS] [--only NAME] [--noise NAME] [--list] [--markdown] [--stored]
+    python benchmarks/estimation/estimators.py [RUNS] [--only NAME] [--noise NAME] [--list] [--markdown] [--stored]
 
 RUNS (2000) data sets each, more where they are cheap. What was drawn is kept in build/estimators, so that a run that
 was broken off goes on where it was, and a larger RUNS adds to a smaller one. `--only` takes a part of a name. `var/CRB`
@@ -19,12 +19,12 @@ from time import monotonic
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from tests.identification.estimation.linear_cases import cases as linear_cases
 from tests.identification.estimation.monte_carlo import LEVELS, Case, Result, Sample, results, sample
 from tests.identification.vehicle.vehicle_cases import cases as vehicle_cases
 
-STORE = Path(__file__).resolve().parents[1] / "build" / "estimators"
+STORE = Path(__file__).resolve().parents[2] / "build" / "estimators"
 BATCH = 100
 SEED = 2026
 RATIO, OFF = 1.02, 0.01

@@ -1,6 +1,6 @@
 """Monte Carlo figures of `rig fit`: does the 95 % interval of C cover, how often is a true model called underfitted?
 
-    python benchmarks/fit_coverage.py [RUNS]
+    python benchmarks/estimation/fit_coverage.py [RUNS]
 
 Beside it the coverage of the plain alternative (s / sqrt(n) per hold, `numpy.linalg.lstsq`) and the CPU time of a fit.
 """
@@ -15,7 +15,7 @@ from time import process_time
 
 import numpy as np
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from identification.recording import Recording
 from identification.thruster.thrust import ThrustFit, fit_thrust
 from tests.identification.thrust_runs import ar1, flicker, level_table, sine, staircase, white

@@ -1,6 +1,6 @@
 """Least squares of 10^7 samples from an HDF5 file: ours in one pass, against numpy and statsmodels in memory.
 
-    pip install -e '.[benchmark]'; python benchmarks/least_squares.py [SAMPLES]
+    pip install -e '.[benchmark]'; python benchmarks/estimation/least_squares.py [SAMPLES]
 
 Every row of the table is a process of its own: CPU time, and peak memory above that of the started process with the
 file open. The peers get the data loaded into memory first; the loading is in their time and memory, as it is in ours.

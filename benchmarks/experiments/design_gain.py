@@ -1,6 +1,6 @@
 """What `rig design` gains: designed against plain plans of the same time on the simulated bench, in virtual time.
 
-    python benchmarks/design_gain.py [runs] [drift in N an hour]
+    python benchmarks/experiments/design_gain.py [runs] [drift in N an hour]
 
 Each plan is run with other noise `runs` times and fitted as `rig fit` does; the scatter of C is compared with the
 promise. The drift is added to the thrust as a straight line, whose sign changes from run to run.
@@ -28,7 +28,7 @@ from rig.design.plan import choose
 from sim_devices.world.headless import run
 from sim_devices.world.settings import WorldSettings, read_world
 
-WORLD = Path(__file__).parents[1] / "benches" / "simulated" / "world.toml"
+WORLD = Path(__file__).parents[2] / "benches" / "simulated" / "world.toml"
 RAMP = 0.02
 """s between commands in a ramp: the loop's period."""
 

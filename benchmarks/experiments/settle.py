@@ -1,6 +1,6 @@
 """Ambiguous designs settled on the simulated bench, in virtual time: staircase up only, flow that follows, no rest.
 
-    python benchmarks/settle.py [RUNS] [--run K] [--budget MIN] [--design NAME] [--effect ID] [--verbose]
+    python benchmarks/experiments/settle.py [RUNS] [--run K] [--budget MIN] [--design NAME] [--effect ID] [--verbose]
 
 Each run draws a thruster, its scales, noise and channels, conceals one effect at 12 to 40 sigma, and records the
 design; drawn anew until an oracle, too, could take another effect for it (less than 2 sigma would be left). Then it
@@ -15,7 +15,7 @@ from collections import Counter
 from pathlib import Path
 from time import process_time
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from identification.mismatch.next_experiment.sequential_experiment import Course, End, round_line
 from rig.diagnose.text import diagnosis_text
 from tests.concealed.ambiguous import Bench, drawn
