@@ -82,7 +82,7 @@ def _between(column: concealed.Column, start: float, end: float) -> tuple[Floats
 
 
 def shape(effect: str, s: Scale, start: float, rng: np.random.Generator) -> Shape:
-    """One that begins at `start` (s); as in concealed.shapes otherwise."""
+    """One that begins at `start` (s); as in concealed.cases.shapes otherwise."""
     if effect == "zero_drift":
         sign = float(rng.choice((-1.0, 1.0)))
         return Shape("zero_drift", "rate", 0.5, sign * s.thrust / s.duration, fixed={"start": start})

@@ -13,7 +13,7 @@
 
 `strength` is d': the sigma at which an oracle sees the effect that knows it, its shape and the noise (`oracle`).
 `concealed.twins(case, effect, rivals, rng)`: how many sigma each rival would leave in place of the effect.
-Effects are the ids of `shapes.SHAPES`: the world's catalogue, and those of `world.effects.uncatalogued`.
+Effects are the ids of `cases.shapes.SHAPES`: the world's catalogue, and those of `world.effects.uncatalogued`.
 
 What a clean recording still holds: thrust C V|V| of the command in force at each sample, at once (rotor
 "instant"), one zero per run, the noise of its law. Beside it n = k V, the current drag n|n| / torque_acceleration,
