@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from drivers.errors import DeviceError, LinkError
-from drivers.inbox import BadRecords, Inbox
-from drivers.lines import check_line_rate
+from drivers.ports.inbox import BadRecords, Inbox
+from drivers.ports.lines import check_line_rate
 from drivers.protocols import Channel, LinkHealth, Sample, Stream
 
 if TYPE_CHECKING:

@@ -15,10 +15,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from drivers.errors import DeviceError, LinkError
-from drivers.inbox import BadRecords
-from drivers.lines import LineCutter, check_line_rate, printable
+from drivers.ports.inbox import BadRecords
+from drivers.ports.lines import LineCutter, check_line_rate, printable
+from drivers.ports.serial_port import SerialPort, SerialSettings
 from drivers.protocols import Channel, LinkHealth, Sample, Stream
-from drivers.serial_port import SerialPort, SerialSettings
 
 GROUPS = frozenset(("value", "raw", "unit", "t"))
 

@@ -14,8 +14,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 from drivers.errors import DeviceError, LinkError
-from drivers.inbox import BadRecords
-from drivers.lines import check_line_rate, printable
 from drivers.mt_sics_lines import (
     INTERNAL_FAULTS,
     LINE_CHARACTERS,
@@ -29,8 +27,10 @@ from drivers.mt_sics_lines import (
     encode,
     number,
 )
+from drivers.ports.inbox import BadRecords
+from drivers.ports.lines import check_line_rate, printable
+from drivers.ports.serial_port import SerialPort, SerialSettings
 from drivers.protocols import Channel, LinkHealth, Sample, Stream
-from drivers.serial_port import SerialPort, SerialSettings
 
 RATE_TOLERANCE = 0.25
 """A module rounds UPD to the nearest rate it can do; a rate read back further off than this is refused."""

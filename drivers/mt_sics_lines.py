@@ -11,7 +11,7 @@ import math
 import re
 from typing import NamedTuple
 
-from drivers.lines import LineCutter, printable
+from drivers.ports.lines import LineCutter, printable
 
 STANDARD_GRAVITY = 9.80665
 """m/s^2, exact by definition (BIPM SI brochure, 9th ed., CGPM 1901): what balances are adjusted with."""

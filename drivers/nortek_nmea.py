@@ -16,10 +16,10 @@ from operator import xor
 from typing import Literal, NamedTuple
 
 from drivers.errors import DeviceError
-from drivers.inbox import BadRecords
-from drivers.lines import LineCutter, check_line_rate, printable
+from drivers.ports.inbox import BadRecords
+from drivers.ports.lines import LineCutter, check_line_rate, printable
+from drivers.ports.serial_port import SerialPort, SerialSettings
 from drivers.protocols import Channel, LinkHealth, Sample, Stream
-from drivers.serial_port import SerialPort, SerialSettings
 
 LINE_CHARACTERS = 92
 """A `$PNORC1` of a four-beam instrument with CR LF."""

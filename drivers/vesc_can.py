@@ -13,9 +13,9 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from drivers.can_bus import CanBus, Frame
 from drivers.errors import DeviceError, LinkError
-from drivers.inbox import BadRecords, Inbox
+from drivers.ports.can_bus import CanBus, Frame
+from drivers.ports.inbox import BadRecords, Inbox
 from drivers.protocols import Channel, LinkHealth, Sample, Stream, Watchdog
 from drivers.vesc_frames import (
     FAULTS,

@@ -14,17 +14,17 @@ from typing import NoReturn, TextIO
 import click
 import numpy as np
 
-from sim_devices.bench import Bench, start
-from sim_devices.concealed.sealing import KINDS, conceal
-from sim_devices.ports import ask
-from sim_devices.process import running
-from sim_devices.settings import load
+from sim_devices.bench.bench import Bench, start
+from sim_devices.bench.process import running
+from sim_devices.bench.settings import load
+from sim_devices.bench.truth_table import SUSPICIOUS, compare, table
+from sim_devices.concealed.sealing.on_disc import KINDS, conceal
 from sim_devices.tables import WorldError
-from sim_devices.truth_table import SUSPICIOUS, compare, table
 from sim_devices.vehicle.documents import held_out, recorded, trials, truth, tunnel
 from sim_devices.vehicle.settings import load as load_vehicle
 from sim_devices.vehicle.truth_table import compare as compare_answer
 from sim_devices.vehicle.truth_table import table as vehicle_table
+from sim_devices.wires.ports import ask
 
 FILE = click.Path(path_type=Path)
 FITS = "fits.json"

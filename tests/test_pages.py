@@ -25,13 +25,14 @@ from rig.console.view_model.tables import STATE_STYLES
 from rig.console.view_model.wording import STATE_WORDS
 from rig.operate.check import check_campaign
 from sim_devices import __main__ as simulator
-from sim_devices import control, keller, mt_sics, nortek, vesc
-from sim_devices.settings import KEYS, CanBus, ScriptedFault, load
-from sim_devices.settings import KINDS as SIMULATED
+from sim_devices.bench import control
+from sim_devices.bench.settings import KEYS, CanBus, ScriptedFault, load
+from sim_devices.bench.settings import KINDS as SIMULATED
+from sim_devices.instruments import keller, mt_sics, nortek, vesc
 from sim_devices.vehicle.body import AXES, Body
 from sim_devices.vehicle.settings import Noise as VehicleNoise
 from sim_devices.vehicle.settings import Scalars
-from sim_devices.wire import DEFAULT_AMOUNT, WIRE_FAULTS
+from sim_devices.wires.serial_line import DEFAULT_AMOUNT, WIRE_FAULTS
 from sim_devices.world.effects import EFFECTS
 from sim_devices.world.effects.channel import KINDS as LIES
 from sim_devices.world.effects.uncatalogued import UNCATALOGUED

@@ -9,9 +9,9 @@ import numpy as np
 from identification.physics.catalogue import CATALOGUE
 from identification.recording import Channel, Recording, Step
 from sim_devices import concealed
-from sim_devices.concealed.definition import Case, Run, history, thrust_of
-from sim_devices.concealed.draw import NEEDS_SLEW
-from sim_devices.concealed.plans import profile
+from sim_devices.concealed.cases.definition import Case, Run, history, thrust_of
+from sim_devices.concealed.cases.needs import NEEDS_SLEW
+from sim_devices.concealed.cases.plans import profile
 
 EFFECTS = tuple(sorted({t.id for t in CATALOGUE if "rotation_rate" not in t.needs} & set(concealed.SHAPES)))
 """Those that have columns (see columns.py); a periodic disturbance has none, ours looks for it in the spectrum."""

@@ -24,7 +24,7 @@ SHARES = (0.0, 0.01, 0.03, 0.1, 0.3, 0.6, 0.85, 0.97, 1.0)
 FLICKER = 0.2
 """Share of the prior of correlated noise that flicker has. More of it overstates the error of a mean under first-order
 noise (0.5 of it: by 4 %, coverage 98 for 95 % with 120 samples at a lag-1 correlation of 0.5) and gains nothing under
-1/f noise (benchmarks/estimators.py)."""
+1/f noise (benchmarks/estimation/estimators.py)."""
 TAU_MIN = 0.5
 """Samples; the grid of time constants goes up by sqrt(2)."""
 TAU_MAX = 0.4

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 from math import inf
 
 from drivers import KINDS
-from drivers.can_bus import CanBus
 from drivers.errors import DeviceError as DriverDeviceError
 from drivers.errors import LinkError as DriverLinkError
+from drivers.ports.can_bus import CanBus
 from drivers.protocols import Instrument, MotorController, Sample, Stream
 from rig.campaign.config import BenchConfig, CanBusConfig
 from rig.errors import ConfigError, DeviceError, LinkError

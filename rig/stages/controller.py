@@ -53,7 +53,7 @@ def stop_on_signals(session: Session) -> None:
 
 
 def real_time() -> str:
-    """Ask for real-time scheduling of this thread; says what came of it (`benchmarks/loop_lateness.py`)."""
+    """Ask for real-time scheduling of this thread; says what came of it (`benchmarks/controller/loop_lateness.py`)."""
     gc.collect()
     gc.freeze()
     try:

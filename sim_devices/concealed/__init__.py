@@ -13,7 +13,7 @@
 
 `strength` is d': the sigma at which an oracle sees the effect that knows it, its shape and the noise (`oracle`).
 `concealed.twins(case, effect, rivals, rng)`: how many sigma each rival would leave in place of the effect.
-Effects are the ids of `shapes.SHAPES`: the world's catalogue, and those of `world.effects.uncatalogued`.
+Effects are the ids of `cases.shapes.SHAPES`: the world's catalogue, and those of `world.effects.uncatalogued`.
 
 What a clean recording still holds: thrust C V|V| of the command in force at each sample, at once (rotor
 "instant"), one zero per run, the noise of its law. Beside it n = k V, the current drag n|n| / torque_acceleration,
@@ -22,15 +22,16 @@ and does nothing.
 This package knows nothing of identification or rig; `tests/concealed/recordings.py` makes Recordings of the rows.
 """
 
-from sim_devices.concealed.definition import Case
+from sim_devices.concealed.cases.definition import Case
+from sim_devices.concealed.cases.faults import KINDS as LIES
+from sim_devices.concealed.cases.faults import Column
+from sim_devices.concealed.cases.forms import FORMS, VARIANTS
+from sim_devices.concealed.cases.plans import KINDS as PLAN_KINDS
+from sim_devices.concealed.cases.shapes import SHAPES
 from sim_devices.concealed.draw import NOISE_KINDS, case
-from sim_devices.concealed.faults import KINDS as LIES
-from sim_devices.concealed.faults import Column
-from sim_devices.concealed.oracle import OutOfReach, scaled_to, strength
-from sim_devices.concealed.plans import KINDS as PLAN_KINDS
-from sim_devices.concealed.records import Rows, rows, truth
-from sim_devices.concealed.rivals import twins
-from sim_devices.concealed.shapes import FORMS, SHAPES, VARIANTS
+from sim_devices.concealed.sealing.records import Rows, rows, truth
+from sim_devices.concealed.visibility.oracle import OutOfReach, scaled_to, strength
+from sim_devices.concealed.visibility.rivals import twins
 
 __all__ = [
     "FORMS",

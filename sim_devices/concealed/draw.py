@@ -7,12 +7,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from sim_devices.concealed.bystanders import with_bystanders
-from sim_devices.concealed.definition import Case, Concealed, Run, Sensor
-from sim_devices.concealed.faults import fault
-from sim_devices.concealed.oracle import OutOfReach, levelled, scaled_to
-from sim_devices.concealed.plans import KINDS, profile
-from sim_devices.concealed.shapes import Scale, shape
+from sim_devices.concealed.cases.bystanders import with_bystanders
+from sim_devices.concealed.cases.definition import Case, Concealed, Run, Sensor
+from sim_devices.concealed.cases.faults import fault
+from sim_devices.concealed.cases.needs import NEEDS_DRIFT, NEEDS_FLOW, NEEDS_REVERSED_FLOW, NEEDS_ROTATION, NEEDS_SLEW
+from sim_devices.concealed.cases.plans import KINDS, profile
+from sim_devices.concealed.cases.shapes import Scale, shape
+from sim_devices.concealed.visibility.oracle import OutOfReach, levelled, scaled_to
 from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, flicker
 from sim_devices.world.settings import Thruster
 
@@ -22,12 +23,6 @@ NOISE_KINDS = ("white", "mixed", "flicker", "slow", "heavy_tailed", "resonant")
 """white; white + correlated + proportional to |thrust|; 1/f; slower than a hold; Student t; a narrow AR(2) peak."""
 CHANNELS = ("rotation_rate", "current", "bus_voltage", "motor_temperature", "flow_speed")
 """Present or missing at random."""
-NEEDS_FLOW = frozenset({"speed_of_advance", "strut_drag", "reversed_flow_loss", "crossed_flow_loss"})
-NEEDS_REVERSED_FLOW = frozenset({"reversed_flow_loss"})
-NEEDS_ROTATION = frozenset({"rotation_coupling"})
-NEEDS_SLEW = frozenset({"motor_lag", "time_skew", "stand_resonance"})
-"""Where steps come at once a millisecond of these is plain to see: they would never be faint."""
-NEEDS_DRIFT = frozenset({"temperature_squared"})
 TRIES = 30
 """Cases drawn before a strength is given up."""
 

@@ -14,8 +14,8 @@ from identification.mismatch.next_experiment.sweeps import Limits
 from identification.mismatch.pipeline import diagnose
 from identification.recording import Recording
 from sim_devices import concealed
-from sim_devices.concealed.definition import Case, Run
-from sim_devices.concealed.plans import Profile, Step
+from sim_devices.concealed.cases.definition import Case, Run
+from sim_devices.concealed.cases.plans import Profile, Step
 from tests.concealed.recordings import recordings
 
 STATIC = ("dead_band", "exponent", "linear_term", "winding_resistance", "cavitation", "load_cell_nonlinearity")

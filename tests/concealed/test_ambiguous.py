@@ -1,6 +1,6 @@
 """A recording that cannot tell two effects, and one more from the same bench: the loop of `rig settle` in virtual time.
 
-How often the answer is right is the matter of benchmarks/settle.py.
+How often the answer is right is the matter of benchmarks/experiments/settle.py.
 """
 
 import numpy as np

@@ -9,11 +9,11 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scripted_peer import Peer, answering, wait_until
 
 from drivers.errors import DeviceError, LinkError
 from drivers.mt_sics import MtSics, Options
 from drivers.mt_sics_lines import NEWTONS_PER_UNIT, Decoder, Fault, Reply, Unreadable, Weight, decode, encode
+from tests.drivers.scripted_peer import Peer, answering, wait_until
 
 FRAMES = tomllib.loads((Path(__file__).parents[1] / "frames" / "mt_sics.toml").read_text())
 

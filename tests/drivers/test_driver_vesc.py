@@ -10,10 +10,9 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scripted_peer import Peer, wait_until
 
-from drivers.can_bus import CanBus, Frame
 from drivers.errors import DeviceError, LinkError
+from drivers.ports.can_bus import CanBus, Frame
 from drivers.vesc_can import Options, VescCan
 from drivers.vesc_frames import (
     FaultCode,
@@ -28,6 +27,7 @@ from drivers.vesc_frames import (
     set_current,
     set_duty,
 )
+from tests.drivers.scripted_peer import Peer, wait_until
 
 FRAMES = tomllib.loads((Path(__file__).parents[1] / "frames" / "vesc_can.toml").read_text())
 

@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import asyncio
 import os
-import sys
 import threading
 import tty
 import warnings
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "drivers"))
-
-from scripted_peer import Peer, wait_until
 
 from drivers import keller
 from drivers.mt_sics import MtSics, Options
 from drivers.vesc_frames import set_current, set_duty
+from tests.drivers.scripted_peer import Peer, wait_until
 
 pytestmark = pytest.mark.interop
 

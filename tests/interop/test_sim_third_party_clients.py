@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from sim_devices.process import running
+from sim_devices.bench.process import running
 
 WORLD = Path(__file__).parents[2] / "benches" / "simulated" / "world.toml"
 pytestmark = pytest.mark.interop

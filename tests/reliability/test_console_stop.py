@@ -15,8 +15,8 @@ import pytest
 
 from rig.hdf5 import load
 from rig.link.live_runs import Run
-from tests.console.terminal import Terminal, on_terminal
 from tests.reliability.live import LiveBench, at_rest, live_bench, zero_after
+from tests.rig.console.terminal import Terminal, on_terminal
 
 pytestmark = [pytest.mark.reliability, pytest.mark.timeout(90)]
 

@@ -84,7 +84,7 @@ def test_sensor_that_lies(tmp_path, report, prompt, device, fault, amount, cause
 
 
 def test_kill_9_at_random_instants(tmp_path, report, prompt):
-    """Promise 1; twenty and more of them: benchmarks/kill_minus_9.py."""
+    """Promise 1; twenty and more of them: benchmarks/controller/kill_minus_9.py."""
     chance, worst = random.Random(15), 0.0
     with live_bench(tmp_path) as bench:
         for _ in range(5):

@@ -41,7 +41,7 @@ SLOW_CHANGE_FALSE_ALARM = Threshold(
         "The likelihood ratio of noise models is no exact chi-square, so a change of zero or gain that "
         "wanders over the run is told only far beyond what clean recordings reach."
     ),
-    evidence="benchmarks/hidden_gains.py prints the smallest p-values on clean recordings.",
+    evidence="benchmarks/diagnosis/hidden_gains.py prints the smallest p-values on clean recordings.",
 )
 PULSES = Count(
     4,

@@ -17,7 +17,7 @@ SWEEP_DECIDES = Threshold(
     0.95,
     unit="probability of a right decision",
     reason="At this a sweep is long enough: a longer one costs water time and warms the motor.",
-    evidence="docs/howto/settle.md: fifty ambiguous designs on the simulated bench (benchmarks/settle.py).",
+    evidence="docs/howto/settle.md: fifty ambiguous designs on the simulated bench (benchmarks/experiments/settle.py).",
 )
 PAIR_HARDLY_TOLD = Threshold(
     0.5,
@@ -54,7 +54,7 @@ SAME_DOUBT_ROUNDS = Count(
     2,
     unit="rounds",
     reason="Rounds that one doubt may survive: a third of the same kind would not settle it either.",
-    evidence="docs/howto/settle.md: fifty ambiguous designs on the simulated bench (benchmarks/settle.py).",
+    evidence="docs/howto/settle.md: fifty ambiguous designs on the simulated bench (benchmarks/experiments/settle.py).",
 )
 HOPELESS_POWER = Threshold(
     0.05,

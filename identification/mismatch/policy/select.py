@@ -12,7 +12,7 @@ SCREENING_FALSE_ALARM = Threshold(
         "reaches in one clean recording of a hundred."
     ),
     evidence=(
-        "2 of 648 clean recordings of benchmarks/hidden_gains.py pass it; docs/howto/diagnose.md: in the "
+        "2 of 648 clean recordings of benchmarks/diagnosis/hidden_gains.py pass it; docs/howto/diagnose.md: in the "
         "proof 3 of 1,002 passed it and were given a name."
     ),
 )
@@ -39,7 +39,7 @@ HIDDEN_SIGMA = Threshold(
         "Where no term passes, one along a slow covariate may have been taken for noise; below two sigma "
         "there is nothing to try."
     ),
-    evidence="benchmarks/hidden_gains.py tells the gains from 1.5 sigma on.",
+    evidence="benchmarks/diagnosis/hidden_gains.py tells the gains from 1.5 sigma on.",
 )
 HIDDEN_FIRST_TERM_SIGMA = Threshold(
     3.0,
@@ -53,14 +53,14 @@ HIDDEN_TERM_PRICE = Threshold(
         "A term that is told from noise by estimating both has passed no screening, so half of its "
         "parameters' price is asked beside the family-wise threshold."
     ),
-    evidence="benchmarks/hidden_gains.py prints the gains on clean recordings beside what is asked.",
+    evidence="benchmarks/diagnosis/hidden_gains.py prints the gains on clean recordings beside what is asked.",
 )
 HIDDEN_OFFSET_PRICE = Threshold(
     0.35,
     unit="share of the BIC price",
     reason="The price of a jump of the zero, whose instant is one of a few that the data point to and not any.",
     evidence=(
-        "benchmarks/hidden_gains.py: of 336 clean recordings one gained more and was named. "
+        "benchmarks/diagnosis/hidden_gains.py: of 336 clean recordings one gained more and was named. "
         "docs/howto/diagnose.md: so were 2 of 1,002."
     ),
 )
@@ -233,8 +233,8 @@ STEADY_TERM_FALSE_ALARM = Threshold(
         "told from noise by estimating both."
     ),
     evidence=(
-        "benchmarks/hidden_gains.py: on 336 clean recordings of six kinds of noise the largest gain was 11.3; "
-        "of a drift that an oracle sees at 8 sigma half gain more than 15. docs/howto/diagnose.md: 1 of 1,002 "
+        "benchmarks/diagnosis/hidden_gains.py: on 336 clean recordings of six kinds of noise the largest gain was "
+        "11.3; of a drift that an oracle sees at 8 sigma half gain more than 15. docs/howto/diagnose.md: 1 of 1,002 "
         "clean recordings was given a drift."
     ),
 )

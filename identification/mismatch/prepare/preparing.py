@@ -168,8 +168,8 @@ def _within(time: Floats, value: Floats, edges: Floats, mean: Floats) -> Floats:
 def _delay_std(recording: Recording, driver: Channel) -> float:
     """S by which the recording itself is not sure how long after its driver the thrust was stamped."""
     thrust = recording.first_of("thrust")
-    stated = [c.acquisition.delay_std or 0.0 for c in (thrust, driver) if c is not None]
-    return float(np.hypot(*stated)) if len(stated) == 2 else 0.0
+    assert thrust is not None
+    return float(np.hypot(thrust.acquisition.delay_std or 0.0, driver.acquisition.delay_std or 0.0))
 
 
 def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, time: Floats, force: Floats) -> History:

@@ -23,7 +23,9 @@ def sample_times(arrival: Floats, period: float) -> Floats | None:
     """
     pauses = np.flatnonzero(np.diff(arrival) > policy.prepare.CLOCK_PAUSE * period) + 1
     parts = np.split(arrival, pauses)
-    found = [_of_one_clock(part, period) if part.size >= policy.prepare.CLOCK_ROWS else part for part in parts]
+    found: list[Floats | None] = [
+        _of_one_clock(part, period) if part.size >= policy.prepare.CLOCK_ROWS else part for part in parts
+    ]
     if any(part is None for part in found) or max(part.size for part in parts) < policy.prepare.CLOCK_ROWS:
         return None
     out: Floats = np.maximum.accumulate(np.concatenate([part for part in found if part is not None]))
@@ -39,7 +41,7 @@ def _of_one_clock(arrival: Floats, period: float) -> Floats | None:
         return None
     index = rows + _lost(arrival - tick * rows, tick)
     begin, tick = _line_below(index, arrival)
-    clock = begin + tick * index
+    clock = np.asarray(begin + tick * index, dtype=np.float64)
     usual = float(np.quantile(arrival - clock, policy.prepare.CLOCK_LATE_SHARE))
     return clock if usual < policy.prepare.CLOCK_LATEST * tick else None
 
@@ -49,7 +51,8 @@ def _lost(late: Floats, tick: float) -> NDArray[np.intp]:
     least = late.copy()
     least[-TAIL:] = np.min(late[-TAIL:])
     least = np.minimum.accumulate(least[::-1])[::-1]
-    return np.round((least - least[0]) / tick).astype(np.intp)
+    out: NDArray[np.intp] = np.round((least - least[0]) / tick).astype(np.intp)
+    return out
 
 
 def _line_below(x: NDArray[np.intp], y: Floats) -> tuple[float, float]:

@@ -31,7 +31,6 @@ from rig.blind.scoring.tables import tables
 from rig.blind.store import ProofError
 from rig.report.page import html
 from tests.rig.blind_scores import whole_proof
-from tests.rig.report_reading import open_fonts
 
 ROOT = Path(__file__).parents[3]
 METHODS = (
@@ -59,11 +58,6 @@ TANK = RealCase(
     HeldOut(4.31234, 1.2, None, "other runs"),
 )
 REAL = RealRecordings("abc", (TANK, RealCase("pool", "refused", "pool.csv has no thrust")))
-
-
-@pytest.fixture(autouse=True, scope="module")
-def fonts():
-    open_fonts()
 
 
 def loaded(path: Path):

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from drivers.can_bus import Frame
-from drivers.transcript import read_transcript
+from drivers.ports.can_bus import Frame
+from drivers.ports.transcript import read_transcript
 from rig.campaign.bench import build
 from rig.campaign.loading import load_bench, load_campaign
 from rig.campaign.plan import FixedDwell, SteadyDwell

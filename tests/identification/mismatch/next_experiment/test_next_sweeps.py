@@ -1,4 +1,4 @@
-"""The sweep that tells rivals apart: its pieces, what they tell beside dense algebra, and the course it is part of."""
+"""The sweep that tells rivals apart: its pieces, and what they tell beside dense algebra."""
 
 from __future__ import annotations
 
@@ -13,18 +13,7 @@ from scipy.stats import norm
 
 from identification.mismatch import policy
 from identification.mismatch.diagnosis import (
-    Adequate,
-    Ambiguous,
-    Diagnosis,
-    Explained,
-    Finding,
-    HeldOutRmse,
-    NextExperiment,
     PlanStep,
-    Remainder,
-    RivalFinding,
-    Rmse,
-    Unexplained,
 )
 from identification.mismatch.model.parameters import Layout
 from identification.mismatch.name.naming import name
@@ -32,18 +21,9 @@ from identification.mismatch.next_experiment import stage
 from identification.mismatch.next_experiment.discrimination import distances, pieces, power
 from identification.mismatch.next_experiment.predicted_response import Bench, PredictedResponse, ending, intervals
 from identification.mismatch.next_experiment.proposal import largest_level, propose, rivals_of
-from identification.mismatch.next_experiment.sequential_experiment import (
-    Course,
-    End,
-    allowance,
-    belief,
-    course_json,
-    next_step,
-)
 from identification.mismatch.next_experiment.sweeps import BUDGET, REST, Limits, blocks, put_together, round_level
 from identification.mismatch.next_experiment.two_levels import SECOND_LEVEL, two_levels
 from identification.mismatch.periodic.periodic_disturbances import Line
-from identification.mismatch.value import Where
 from identification.physics.asymmetry import Asymmetry
 from identification.physics.dead_band import DeadBand
 from identification.physics.linear_term import LinearTerm
@@ -52,10 +32,9 @@ from tests.identification.diagnosed_runs import TOP
 from tests.identification.mismatch.small import known_noise, rng, short
 
 UNEVEN, TWIST = Asymmetry(), TorqueCrosstalk()
+
+
 EQUAL = policy.select.RIVALS_EQUAL_BIC
-
-
-# ---------------------------------------------------------------- what a sweep tells
 
 
 def view(seed, n=60, q=3):
@@ -112,9 +91,6 @@ def test_what_the_wrong_model_can_follow_is_no_power():
     assert power(replace(true, cov=np.zeros((3, 3))), sure, EQUAL) > 0.95
 
 
-# ---------------------------------------------------------------- the pieces
-
-
 @settings(max_examples=60, deadline=None)
 @given(st.floats(0.01, 1e4), st.floats(-1.0, 1.0))
 def test_levels_are_round_and_within(largest, share):
@@ -156,9 +132,6 @@ def test_a_plan_takes_its_holds_and_the_ways_between():
     assert dt.sum() == pytest.approx(13.0)
     assert float(driver @ dt) == pytest.approx(10 * 2.0 + 0.5 * 10 * 2 - 10 * 2.0)
     assert np.all(dt[blind] < 0.004)
-
-
-# ---------------------------------------------------------------- the proposal
 
 
 @pytest.fixture(scope="module")
@@ -235,9 +208,6 @@ def test_a_rehearsal_is_a_run_of_the_plan_without_measurements(rivals):
     assert where[:, 1] == pytest.approx(h.middle[h.rows])
 
 
-# ---------------------------------------------------------------- two levels
-
-
 def line(gain, rival_gain):
     other = None if rival_gain is None else line(rival_gain, None)
     return Line("fixed", 20.0, 0.01, None, None, 1.0, 0.1, None, None, 1e-9, gain, "", rival=other)
@@ -267,78 +237,3 @@ def test_the_stage_asks_for_names_first_then_for_lines(rivals):
     lines = stage.run(estimate, data, [replace(n, rivals=()) for n in named], [line(100.0, 99.0)], None)
     assert lines.why.startswith("separates a line at 20 Hz")
     assert stage.run(estimate, data, [], [line(100.0, 10.0), line(100.0, None)], None) is None
-
-
-# ---------------------------------------------------------------- the course
-
-
-def sweep(power_=0.9):
-    return NextExperiment("separates a from b", (PlanStep(5.0, 60.0),), power_)
-
-
-def diagnosis(answer):
-    held, train = HeldOutRmse(1.0, 1.0, 1.0, ""), Rmse(1.0, 1.0)
-    return Diagnosis(("r",), "T1", answer, "C V|V|", {}, (), (), {}, train, held, 1.0, 0.5)
-
-
-def doubtful(*effects, power_=0.9):
-    rivals_ = tuple(RivalFinding(e, "", {}, 0.1, "") for e in effects[1:])
-    return diagnosis(Ambiguous((Finding(effects[0], "", "", {}, 1e-9, 9.0, 0.5, rivals_),), sweep(power_)))
-
-
-LEFT = Remainder(Where("time", 0.0, 1.0, "s"), 0.5, 1e-9, (), "")
-
-
-def course(*found, budget=1000.0):
-    now = Course(budget, belief(found[0]), 10.0)
-    for i, each in enumerate(found[1:]):
-        now = now.after(60.0, 100.0 * (i + 1), each)
-    return now
-
-
-@pytest.mark.parametrize(
-    ("now", "needs", "ends"),
-    [
-        (course(diagnosis(Adequate())), 10.0, "settled"),
-        (course(diagnosis(Explained((Finding("a", "", "", {}, 0.0, 1.0, 1.0, ()),)))), 10.0, "settled"),
-        (course(diagnosis(Unexplained((), LEFT, None))), 10.0, "unexplained"),
-        (course(doubtful("a", "b")), 10.0, None),
-        (course(doubtful("a", "b", power_=0.01)), 10.0, "hopeless"),
-        (course(doubtful("a", "b"), budget=50.0), 60.0, "budget"),
-        (course(doubtful("a", "b"), doubtful("b", "a"), doubtful("a", "b")), 10.0, "same_doubt"),
-        (course(doubtful("a", "b"), doubtful("a", "c"), doubtful("a", "b")), 10.0, None),
-    ],
-)
-def test_the_next_step_by_table(now, needs, ends):
-    step = next_step(now, needs)
-    if ends is None:
-        assert step == now.now.experiment
-    else:
-        assert isinstance(step, End)
-        assert step.reason == ends
-
-
-def test_a_round_without_an_experiment_is_a_mistake():
-    with pytest.raises(ValueError, match="needs an experiment"):
-        course(diagnosis(Adequate()), diagnosis(Adequate()))
-
-
-def test_a_course_counts_its_time_and_tells_its_rounds():
-    now = course(doubtful("a", "b"), doubtful("a", "c"), diagnosis(Adequate()))
-    assert (now.on_bench, now.spent) == (120.0, 200.0)
-    told = course_json(now, End("settled", "done"))
-    assert [r["believed"] for r in told["rounds"]] == ["a or c", "nothing is missing"]
-    assert told["first"] == {"verdict": "ambiguous", "believed": "a or b"}
-    assert belief(diagnosis(Unexplained((), LEFT, None))).doubt == {frozenset({"unexplained at time"})}
-
-
-@settings(max_examples=50, deadline=None)
-@given(st.floats(0, 5000), st.floats(0, 100))
-def test_half_of_what_is_left_while_a_second_sweep_fits_into_the_other_half(left, overhead):
-    found = allowance(left, overhead)
-    least = policy.next_experiment.SHORTEST_SWEEP
-    assert found >= least
-    if left - overhead > 2 * BUDGET:
-        assert found == pytest.approx((left - overhead) / 2)
-    elif left - overhead > least:
-        assert found == pytest.approx(left - overhead)

@@ -1,0 +1,238 @@
+"""A desk-top bench: the world, the devices on their ports, the truth log, kept in step with the wall clock."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from datetime import UTC, datetime
+from math import inf
+from pathlib import Path
+
+import numpy as np
+
+from sim_devices.bench.control import clear, fault, obey
+from sim_devices.bench.settings import BenchSettings, ScriptedFault, load
+from sim_devices.bench.truth_log import TruthLog, header_fields, state_fields
+from sim_devices.instruments.keller import Keller, KellerOptions
+from sim_devices.instruments.motor_tap import MotorTap
+from sim_devices.instruments.mt_sics import MtSics
+from sim_devices.instruments.mt_sics_options import MtSicsOptions
+from sim_devices.instruments.nortek import Nortek, NortekOptions
+from sim_devices.instruments.serial_device import SerialDevice
+from sim_devices.instruments.vesc import Vesc, VescOptions
+from sim_devices.wires.can_frame import CanFrame
+from sim_devices.wires.ports import ControlSocket, PtyPort, wait
+from sim_devices.wires.serial_line import Wire
+from sim_devices.wires.slcan import Adapter
+from sim_devices.world import World
+from sim_devices.world.noise import Noise, Normals
+
+LONGEST_SLEEP = 0.01
+"""s between two looks at the clock and the stop request."""
+STALL = 0.1
+"""s: after a gap like this the simulator itself stood still; what the host sent meanwhile is heard first."""
+STATE_PERIOD = 0.01
+"""s between two `state` lines of the truth log while the rotor turns; ten times that at rest."""
+AT_REST = 0.01
+"""rev/s: a rotor slower than this is logged less often."""
+
+
+def start(world_toml: Path, links: Path | None = None, truth: Path | None = None, seed: int | None = None) -> Bench:
+    """Open a bench: ports are there when this returns. Raises WorldError for a world file that cannot be run."""
+    settings = load(world_toml)
+    settings = replace(
+        settings,
+        links=links.absolute() if links else settings.links,
+        truth=truth.absolute() if truth else settings.truth,
+        seed=settings.seed if seed is None else seed,
+    )
+    return Bench(settings)
+
+
+class Bench:
+    """Open from construction to `close`. `run` is the whole life of it; one thread."""
+
+    def __init__(self, settings: BenchSettings) -> None:
+        self.settings = settings
+        world_rng, wire_rng, self._cross_rng = np.random.default_rng(settings.seed).spawn(3)
+        self._wire_rng = wire_rng
+        self.world = World(settings.world, world_rng)
+        self.control = ControlSocket(settings.links / "control")  # first: it refuses a second bench on these links
+        self._start_ns = time.monotonic_ns()
+        self._epoch = datetime.now(UTC)
+        self._steps = 0
+        self._heard_at = 0.0
+        self._next_state = 0.0
+        self.truth = TruthLog(settings.truth)
+        self.vesc: Vesc | None = None
+        self.tap: MotorTap | None = None
+        self.serial: dict[str, tuple[SerialDevice, PtyPort, float]] = {}
+        """device name -> device, its port, its turnaround (s)."""
+        self.adapters = {name: (Adapter(), self._port(name, None)) for name in settings.can.adapters}
+        for name, options in settings.devices.items():
+            self._add(name, options)
+        self._script = _script(settings.faults)
+        self.log("header", seed=settings.seed, **header_fields(settings.world))
+
+    def _port(self, name: str, baud: int | None) -> PtyPort:
+        return PtyPort(self.settings.links / name, Wire(baud, self._wire_rng))
+
+    def _add(self, name: str, options: object) -> None:
+        world = self.world
+        match options:
+            case MtSicsOptions():
+                device = MtSics(options, lambda: world.sample("thrust"))
+                self.serial[name] = (device, self._port(options.port, options.baud), 0.0)
+            case NortekOptions():
+                std = self.settings.world.noise.get("flow_speed", Noise()).white
+                cross = Normals(self._cross_rng)
+                meter = Nortek(options, lambda: world.sample("flow_speed"), lambda: std * cross.draw(), self._epoch)
+                self.serial[name] = (meter, self._port(options.port, options.baud), 0.0)
+            case KellerOptions():
+                slave = Keller(options, lambda: world.sample("pressure"), lambda: world.sample("water_temperature"))
+                self.serial[name] = (slave, self._port(options.port, options.baud), options.turnaround)
+            case VescOptions():
+                self.tap = MotorTap(world, options.pole_pairs, options.vesc_id)
+                self.vesc = Vesc(options, self.settings.world.supply.voltage, self.tap.telemetry, self.log)
+                self.tap.vesc = self.vesc
+
+    # -- time --------------------------------------------------------------------------------------------------------
+
+    def now(self) -> float:
+        """S since the bench was started."""
+        return (time.monotonic_ns() - self._start_ns) * 1e-9
+
+    def run(self, stop: Callable[[], bool]) -> None:
+        """Live until `stop()` is true."""
+        while not stop():
+            self.turn(self.now())
+            wait(self.ports, self.control, min(max(self._due() - self.now(), 0.0), LONGEST_SLEEP))
+
+    def turn(self, t: float) -> None:
+        """Bring everything up to t (s)."""
+        if t - self._heard_at > STALL:
+            self._listen(t)
+        self._run_script(t)
+        self._advance(t)
+        self._listen(t)
+        self._heard_at = t
+        for port in self.ports:
+            if port.due <= t:
+                port.flush(t)
+
+    @property
+    def ports(self) -> list[PtyPort]:
+        return [port for _, port in self.adapters.values()] + [port for _, port, _ in self.serial.values()]
+
+    def _due(self) -> float:
+        devices = [device.due for device, _, _ in self.serial.values()]
+        wires = [port.due for port in self.ports]
+        return min([*devices, *wires, self.vesc.due if self.vesc else inf])
+
+    def _advance(self, t: float) -> None:
+        """World and devices to t, device by device in the order in which they are due."""
+        while True:
+            due = min([device.due for device, _, _ in self.serial.values()] + [self.vesc.due if self.vesc else inf])
+            self._step_world(min(due, t))
+            if due > t:
+                return
+            self._tick(due)
+
+    def _tick(self, t: float) -> None:
+        if self.vesc is not None and self.vesc.due <= t:
+            for frame in self.vesc.tick(t):
+                self._broadcast(frame, t, None)
+        for device, port, _ in self.serial.values():
+            if device.due <= t:
+                _say(port, device.tick(t), t, 0.0)
+
+    def _step_world(self, t: float) -> None:
+        dt, world, vesc, tap = self.settings.step, self.world, self.vesc, self.tap
+        s = world.state
+        while (self._steps + 1) * dt <= t:
+            self._steps += 1
+            volts, amps = vesc.drive(s.n, dt) if vesc else (None, 0.0)
+            world.step(dt, volts, amps)
+            if tap:
+                tap.after_step(dt)
+            if s.t >= self._next_state:
+                self._log_state()
+
+    # -- bytes -------------------------------------------------------------------------------------------------------
+
+    def _listen(self, t: float) -> None:
+        for adapter, port in self.adapters.values():
+            data = port.read()
+            if not data:
+                continue
+            answer, frames = adapter.feed(data)
+            if answer:
+                port.wire.put(answer, t)
+            for frame in frames:
+                self._broadcast(frame, t, port)
+        for device, port, turnaround in self.serial.values():
+            data = port.read()
+            if data:
+                _say(port, device.feed(data, t), t, turnaround)
+        self.control.serve(lambda line: obey(self, line))
+
+    def _broadcast(self, frame: CanFrame, t: float, sender: PtyPort | None) -> None:
+        """A frame on the bus: every other node hears it; sender None: the motor controller."""
+        for adapter, port in self.adapters.values():
+            if port is not sender and port.plugged:
+                line = adapter.deliver(frame)
+                if line:
+                    port.wire.put(line, t)
+        if sender is not None and self.vesc is not None:
+            for answer in self.vesc.receive(frame, t):
+                self._broadcast(answer, t, None)
+
+    def _run_script(self, t: float) -> None:
+        while self._script and self._script[0][0] <= t:
+            _, begins, entry = self._script.pop(0)
+            if begins:
+                fault(self, entry.device, entry.fault, entry.amount)
+            else:
+                clear(self, entry.device)
+
+    # -- truth -------------------------------------------------------------------------------------------------------
+
+    def log(self, event: str, **fields: object) -> None:
+        """One line of the truth log, stamped now."""
+        self.truth.write(event, time.monotonic_ns(), self.world.mounted, **fields)
+
+    def _log_state(self) -> None:
+        s = self.world.state
+        turning = abs(s.n) > AT_REST or s.command != 0.0
+        self._next_state = s.t + (STATE_PERIOD if turning else 10.0 * STATE_PERIOD)
+        stamp = self._start_ns + round(s.t * 1e9)
+        self.truth.write("state", stamp, self.world.mounted, **state_fields(s))
+
+    def listing(self) -> list[str]:
+        """One line per port: name, path the rig opens, device behind it."""
+        lines = [f"{port.link.name} {port.link} {port.device}" for port in self.ports if port.plugged]
+        return [*lines, f"control {self.control.link} {self.control.path}"]
+
+    def close(self) -> None:
+        """Ports and links are gone afterwards."""
+        for port in self.ports:
+            port.pull()
+        self.control.close()
+        self.truth.close()
+
+
+def _script(faults: tuple[ScriptedFault, ...]) -> list[tuple[float, bool, ScriptedFault]]:
+    """(s, begins, fault) in order of time."""
+    begins = [(each.at, True, each) for each in faults]
+    ends = [(each.at + each.duration, False, each) for each in faults if each.duration > 0]
+    return sorted(begins + ends, key=lambda entry: entry[0])
+
+
+def _say(port: PtyPort, data: bytes, t: float, turnaround: float) -> None:
+    """Hand a device's words to its wire: lines one by one, anything else whole."""
+    if data.endswith(b"\r\n"):
+        for line in data.splitlines(keepends=True):
+            port.wire.put(line, t, turnaround)
+    elif data:
+        port.wire.put(data, t, turnaround)

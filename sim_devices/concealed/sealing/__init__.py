@@ -1,0 +1,1 @@
+"""What is handed out and what is sealed: a case goes in; recorded rows, another run and the truth come out."""

@@ -1,0 +1,109 @@
+"""Cases on disc: recordings that anybody may open, and beside them, in a folder of its own, the sealed truth.
+
+    OUT/open/<token>/0.npz, 1.npz ...   one recording each: `about` (JSON text), `time0`, `value0`, `time1` ...
+    OUT/open/<token>/drive.npz          another run without its thrust, for a prediction at the times `at`
+    OUT/sealed/<token>.json             what was concealed; `error` where no such case could be drawn
+    OUT/sealed/<token>.npz              `thrust` and `measured` of that other run at the times `at`
+
+A case is asked for by a table: `token` (its name, which should tell nothing), `seed` (integers), and what is not to be
+left to chance: `effects`, `strength`, `forms`, `noise`, `plan`, `lie`, `runs`, `sampling`, `duration` as of
+`concealed.case`; `rivals`: names whose likeness to the first effect goes into the seal (`concealed.twins`);
+`world`: the version that is to make it, where that matters.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sim_devices.concealed.cases.faults import KINDS as LIES
+from sim_devices.concealed.cases.forms import FORMS, VARIANTS
+from sim_devices.concealed.cases.shapes import SHAPES
+from sim_devices.concealed.draw import NOISE_KINDS
+from sim_devices.concealed.draw import case as drawn
+from sim_devices.concealed.sealing.another import another
+from sim_devices.concealed.sealing.records import Rows, rows, truth
+from sim_devices.concealed.version import version
+from sim_devices.concealed.visibility.oracle import OutOfReach
+from sim_devices.concealed.visibility.rivals import twins
+from sim_devices.tables import WorldError
+
+Floats = NDArray[np.float64]
+
+KINDS: Mapping[str, Any] = {
+    "effects": list(SHAPES),
+    "forms": {effect: list(forms) for effect, forms in FORMS.items()},
+    "variants": {effect: list(forms) for effect, forms in VARIANTS.items()},
+    "lies": list(LIES),
+    "noise": list(NOISE_KINDS),
+    "version": version(),
+}
+"""What may be asked for, and of what world."""
+CHOSEN = ("effects", "strength", "forms", "noise", "plan", "lie", "runs", "sampling", "duration")
+KNOWN = frozenset({"token", "seed", "world", "rivals", *CHOSEN})
+NEAREST = 5
+"""Twins that go into the seal."""
+
+
+def conceal(asked: Mapping[str, Any], out: Path) -> None:
+    """Make one case. A folder that is there is written anew. Raises WorldError for a table that cannot be read."""
+    unknown = sorted(set(asked) - KNOWN)
+    if unknown or not {"token", "seed"} <= set(asked):
+        raise WorldError(f"case: expected token, seed and some of {', '.join(sorted(KNOWN))}; got {sorted(asked)}")
+    if asked.get("world") not in (None, "", KINDS["version"]):
+        raise WorldError(f"case: this is world {KINDS['version']}, asked was {asked['world']}")
+    token, seed = str(asked["token"]), list(asked["seed"])
+    sealed = out / "sealed"
+    sealed.mkdir(parents=True, exist_ok=True)
+    chosen = {name: asked[name] for name in CHOSEN if name in asked}
+    try:
+        case = drawn(np.random.default_rng(seed), **chosen)
+    except OutOfReach as error:
+        _write_json(sealed / f"{token}.json", {"asked": dict(asked), "error": str(error)})
+        return
+    except (TypeError, ValueError) as error:
+        raise WorldError(f"case {token}: {error}") from error
+    folder = out / "open" / token
+    folder.mkdir(parents=True, exist_ok=True)
+    for i, found in enumerate(rows(case)):
+        _write_rows(folder / f"{i}.npz", found)
+    told = truth(case) | {"asked": dict(asked), "thruster": asdict(case.thruster), "error": None}
+    if asked.get("rivals") and case.effects:
+        near = twins(case, case.effects[0].effect, list(asked["rivals"]), np.random.default_rng([*seed, 1]))
+        told["twins"] = [asdict(twin) for twin in near[:NEAREST]]
+    if case.fault is None:
+        other = another(case, np.random.default_rng([*seed, 2]))
+        _write_rows(folder / "drive.npz", other.drive, at=other.at)
+        exact, seen = other.thrust.astype(np.float32), other.measured.astype(np.float32)
+        np.savez_compressed(sealed / f"{token}.npz", thrust=exact, measured=seen)
+    _write_json(sealed / f"{token}.json", told)  # last: a seal stands for a case that is complete
+
+
+def _write_rows(path: Path, found: Rows, at: Floats | None = None) -> None:
+    about = {
+        "recording_id": found.recording_id,
+        "thruster": found.thruster,
+        "columns": [
+            {"stream": c.stream, "name": c.name, "quantity": c.quantity, "unit": c.unit, "thruster": c.thruster}
+            for c in found.columns
+        ],
+        "steps": [asdict(step) for step in found.steps],
+        "duration": found.duration,
+    }
+    arrays: dict[str, Any] = {"about": np.array(json.dumps(about))}
+    for i, column in enumerate(found.columns):
+        arrays |= {f"time{i}": column.time, f"value{i}": column.value}
+    np.savez(path, **(arrays if at is None else arrays | {"at": at}))
+
+
+def _write_json(path: Path, table: Mapping[str, Any]) -> None:
+    """Whole or not at all."""
+    part = path.with_name(path.name + ".part")
+    part.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
+    part.replace(path)

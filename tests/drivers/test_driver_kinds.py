@@ -1,0 +1,26 @@
+"""Every kind of device that a bench file can name."""
+
+from __future__ import annotations
+
+from drivers import KINDS
+from drivers.ports.can_bus import CanBus
+from drivers.protocols import Instrument, MotorController
+
+
+def test_every_kind_is_an_instrument_and_only_the_motor_commands():
+    options = {
+        "mt_sics": {"port": "p", "rate": 10.0},
+        "line_stream": {"port": "p", "pattern": r"(?P<value>\d+)", "rate": 10.0, "line_characters": 10},
+        "nortek_nmea": {"port": "p", "rate": 4.0},
+        "keller": {"port": "p"},
+        "vesc_can": {"bus": "b", "vesc_id": 1, "pole_pairs": 7, "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5},
+    }
+    assert set(options) == set(KINDS)
+    for name, kind in KINDS.items():
+        bus = (CanBus("virtual", "x", 1),) if kind.link == "can" else ()
+        device = kind.build(name, kind.options(**options[name]), *bus)
+        assert isinstance(device, Instrument)
+        assert isinstance(device, MotorController) == (name == "vesc_can")
+        assert device.drain() == []
+        assert not device.health().alive
+        device.close()

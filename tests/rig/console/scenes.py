@@ -1,0 +1,93 @@
+"""What is on the pictures: a feed played up to a moment, the keys pressed then, and how long nothing came after."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, replace
+
+from textual.pilot import Pilot
+
+from rig.console.app import ConsoleApp
+from rig.link.front_end_messages import LogLine, Progress, Snapshot
+from tests.rig.console.feeds import CHECKS, LOG, ManualClock, PlayedFeed, campaign, running, snapshot
+
+
+@dataclass(frozen=True)
+class Scene:
+    snapshots: tuple[Snapshot, ...]
+    keys: tuple[str, ...] = ()
+    gone: bool = False
+    silence: float = 0.0
+    """s between the last snapshot and the picture."""
+
+
+NO_ANSWER = "no answer on ports/flow within 2.0 s; is it powered?"
+FAILED = tuple(replace(c, verdict="failed", text=NO_ANSWER) if c.name == "flow" else c for c in CHECKS)
+STALE = tuple(
+    replace(r, state="stale", age=1.9) if r.channel == "flow.flow_speed"
+    else replace(r, state="limit", value=41.2) if r.channel == "motor.current" else r
+    for r in running().readings
+)  # fmt: skip
+
+HEADLINE = "thrust -2.6 % (-4.3 N) while running, in both directions, since 32 s"
+MISMATCH = LogLine(
+    46.2,
+    "warning",
+    f"mismatch: {HEADLINE} (between 30 and 36 s), ± 0.3 N; e-value 4.8e+04; look at the propeller and at what drives "
+    "it; the zero at rest has not moved with it",
+)
+
+SCENES = {
+    "preflight": Scene((snapshot("preflight"),)),
+    "preflight_failed": Scene((snapshot("preflight", checks=FAILED),)),
+    "sweep": Scene((running(),)),
+    "fit": Scene((running(),), keys=("2",)),
+    "time": Scene((running(),), keys=("3",)),
+    "events": Scene((running(),), keys=("4",)),
+    "limit": Scene((running(readings=STALE),)),
+    "mismatch": Scene((running(log=(*LOG, MISMATCH), log_count=len(LOG) + 1, mismatch=HEADLINE),)),
+    "mount": Scene((
+        running("mount", thruster="T3", command=0.0, points=(), trace=(), mounted_by_hand=True,
+                progress=Progress(0, 0, 0.0, 0.0, 1, 2, 60.0, 241.0, 0.2)),)),
+    "note": Scene((running(),), keys=("n", *"weed on duct")),
+    "leave": Scene((running(),), keys=("d",)),
+    "leave_attended": Scene((running(attended=True),), keys=("d",)),
+    "disconnected": Scene((running(),), gone=True, silence=14.3),
+    "stop_not_confirmed": Scene((running("stopping", command=0.0, stop_confirmed=False),)),
+    "end": Scene(campaign()),
+    "tripped": Scene((running("done", outcome="tripped", stop_confirmed=True, command=0.0,
+                              cause="motor.current 41.2 A is above its limit of 40 A."),)),
+}  # fmt: skip
+
+
+def prepare(scene: Scene) -> tuple[ConsoleApp, Callable[[Pilot[None]], Awaitable[None]]]:
+    """The application, and what has to be awaited until it shows the scene."""
+    feed, clock = PlayedFeed(*scene.snapshots), ManualClock()
+    app = ConsoleApp(feed, clock, "rig console recordings/2026-11-21_1502")
+
+    async def play(pilot: Pilot[None]) -> None:
+        await settle(pilot, lambda: app.state.snapshot is scene.snapshots[-1])
+        await pilot.press(*scene.keys)
+        if scene.gone:
+            feed.end()
+            await settle(pilot, lambda: not app.state.connected)
+        clock.now += scene.silence
+        await show(pilot, app)
+
+    return app, play
+
+
+async def settle(pilot: Pilot[None], reached: Callable[[], bool]) -> None:
+    """Let the application's messages run until `reached`; the test's own timeout ends it otherwise."""
+    while not reached():
+        await pilot.pause(0.01)
+
+
+async def show(pilot: Pilot[None], app: ConsoleApp) -> None:
+    """Draw now instead of at the next tick: pages first, and again when they have their sizes."""
+    for _ in range(3):
+        app.show_text()
+        app.show_plots()
+        await pilot.pause()
+    await pilot.wait_for_scheduled_animations()
+    await pilot.pause()

@@ -1,0 +1,49 @@
+"""Signals to a console in a real terminal: it goes, its link is closed, and an interrupt is the stop key."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.rig.console.terminal import Terminal, on_terminal
+
+
+@contextmanager
+def seated(out: Path) -> Iterator[tuple[subprocess.Popen[bytes], Terminal]]:
+    """A console process that has drawn its first screen."""
+    with on_terminal(
+        "import runpy; runpy.run_module('tests.rig.console.seated', run_name='__main__')", str(out)
+    ) as seat:
+        seat[1].until(b"T1 hold")
+        yield seat
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP])
+def test_it_goes_and_its_link_is_closed(tmp_path, number):
+    with seated(tmp_path / "out") as (process, _):
+        process.send_signal(number)
+    assert process.returncode == 128 + number
+    assert (tmp_path / "out").read_text() == f"{128 + number} True"
+
+
+@pytest.mark.parametrize("keys", [b"\x03", b"\x1b[20~"], ids=["ctrl+c", "f9 as xterm sends it"])
+def test_the_stop_key_in_a_real_terminal(tmp_path, keys):
+    with seated(tmp_path / "out") as (process, terminal):
+        terminal.press(keys)
+        terminal.until(b"STOP SENT")
+        process.send_signal(signal.SIGTERM)
+    assert (tmp_path / "out").read_text() == "143 True stop"
+
+
+def test_an_interrupt_from_outside_is_the_stop_key(tmp_path):
+    with seated(tmp_path / "out") as (process, terminal):
+        process.send_signal(signal.SIGINT)
+        terminal.until(b"STOP SENT")
+        assert process.poll() is None
+        process.send_signal(signal.SIGTERM)
+    assert (tmp_path / "out").read_text() == "143 True stop"
