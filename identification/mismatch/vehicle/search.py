@@ -11,7 +11,7 @@ from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
-from identification.mismatch.select.forward_selection import least_earned, preferred
+from identification.mismatch.select.stepwise import least_earned, preferred
 from identification.mismatch.vehicle.fitting import Fit, at_bound, fit, noise_of, weights
 from identification.mismatch.vehicle.model import Layout, VehicleModel, begin, layout_of, with_term, without_term
 from identification.mismatch.vehicle.runs import Prepared
