@@ -17,13 +17,6 @@ ROUNDS = 3
 """Exchanges of a term for a rival, at most: more would go in circles."""
 
 
-class Layout(Protocol):
-    """Where parameters stand in a vector."""
-
-    def of(self, term: Any, /) -> slice:
-        """Those of a term."""
-
-
 class Fitted(Protocol):
     """A model at its best values."""
 
@@ -43,7 +36,8 @@ class Fitted(Protocol):
         """Standard errors of all parameters, in the order of `layout`."""
 
     @property
-    def layout(self) -> Layout: ...
+    def layout(self) -> Any:
+        """Where the parameters of each term stand among all: `layout.of(term)`."""
 
 
 class Weighed(Protocol):
@@ -120,8 +114,10 @@ def forward(
         full = len(inside) >= most
         found = [] if full else system.additions(state, judged)
         told, larger = None, _lasting(system, state, found, seen)
-        if larger is None and not full:
-            told, larger = _unhidden(system, state, judged, seen)
+        if larger is None and not full and (hidden := system.unhidden(state, judged)) is not None:
+            beside = pruned(system, hidden[1])
+            if frozenset(beside.fit.values) not in seen:
+                told, larger = hidden[0], beside
         fitted = tuple(candidate for candidate, _ in found)
         rounds.append(Round(inside, judged, fitted, told, None if larger is None else tuple(larger.fit.values)))
         if larger is None:
@@ -147,54 +143,29 @@ def _lasting(
     return None
 
 
-def _unhidden(
-    system: System[T, F, S, Judged], state: S, judged: Judged, seen: Collection[frozenset[T]]
-) -> tuple[Unhidden | None, S | None]:
-    hidden = system.unhidden(state, judged)
-    if hidden is None:
-        return None, None
-    told, beside = hidden
-    larger = pruned(system, beside)
-    return (None, None) if frozenset(larger.fit.values) in seen else (told, larger)
-
-
 def _best(found: Sequence[tuple[Candidate[T], F]]) -> F:
-    gains = [candidate.chi2_gain - candidate.price for candidate, _ in found]
-    sizes = [len(fitted.values[candidate.term]) for candidate, fitted in found]
-    return found[preferred(gains, sizes, [candidate.at_bound for candidate, _ in found])][1]
+    """The best gain beyond its price, or a simpler term that gains nearly as much; first what is possible."""
+    possible = [each for each in found if not each[0].at_bound] or found
+    most = max(candidate.chi2_gain - candidate.price for candidate, _ in possible)
 
+    def simplest(each: tuple[Candidate[T], F]) -> tuple[int, float]:
+        candidate, fitted = each
+        return len(fitted.values[candidate.term]), candidate.price - candidate.chi2_gain
 
-def preferred(gains: Sequence[float], sizes: Sequence[int], pressed: Sequence[bool]) -> int:
-    """Which addition goes first: the best gain beyond its price, or a simpler one that gains nearly as much.
-
-    `sizes`: the number of parameters of each; `pressed`: against the end of what is possible, so that others go before.
-    """
-    possible = [j for j, ended in enumerate(pressed) if not ended] or range(len(gains))
-    most = max(gains[j] for j in possible)
-    near = [j for j in possible if gains[j] >= policy.select.SIMPLER_TERM_GAIN * most]
-    return min(near, key=lambda j: (sizes[j], -gains[j]))
+    near = [c for c in possible if c[0].chi2_gain - c[0].price >= policy.select.SIMPLER_TERM_GAIN * most]
+    return min(near, key=simplest)[1]
 
 
 def pruned(system: System[T, F, S, Judged], state: S) -> S:
-    """Without terms that no longer earn their place, worst first."""
-    while terms := tuple(state.fit.values):
-        less = [system.without(state, term) for term in terms]
-        losses = [each.chi2 - state.fit.chi2 for each in less]
-        worst = least_earned(losses, [len(values) for values in state.fit.values.values()])
-        if worst is None:
+    """Without terms that give less than their price, worst first."""
+    while state.fit.values:
+        less = [system.without(state, term) for term in state.fit.values]
+        sizes = map(len, state.fit.values.values())
+        short = [each.chi2 - state.fit.chi2 - accept_threshold(size) for each, size in zip(less, sizes, strict=True)]
+        if min(short) > 0:
             break
-        state = system.replaced(state, less[worst])
+        state = system.replaced(state, less[short.index(min(short))])
     return state
-
-
-def least_earned(losses: Sequence[float], sizes: Sequence[int]) -> int | None:
-    """Which term gives the model least beside its price; None where all earn their place.
-
-    `losses`: of chi-square without each; `sizes`: the number of parameters of each.
-    """
-    short = [loss - accept_threshold(size) for loss, size in zip(losses, sizes, strict=True)]
-    worst = short.index(min(short))
-    return None if short[worst] > 0 else worst
 
 
 def accept_threshold(extra: int) -> float:

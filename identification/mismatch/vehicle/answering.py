@@ -16,7 +16,7 @@ from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.free_force import BACK, Left, Structure, place_of
 from identification.mismatch.vehicle.naming import Named
 from identification.mismatch.vehicle.runs import Prepared
-from identification.mismatch.vehicle.search import Found, State
+from identification.mismatch.vehicle.search import State
 
 
 def baseline_words(data: Prepared) -> str:
@@ -73,17 +73,17 @@ def places_of(left: Left, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
     return tuple(out)
 
 
-def place_of_findings(left: Left, found: Found, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
+def place_of_findings(left: Left, before: State, after: State, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
     """Where no free force shows through slow noise, but named terms do: over the covariate that the first shows in."""
-    own = found.after.terms[0].covariates
+    own = after.terms[0].covariates
     structure = next((s for s in left.structures if s.covariate.quantity in own), None)
     structure = structure or next(iter(left.structures), None)
     if structure is None:
         return ()
-    gain = found.before.fit.chi2 - found.after.fit.chi2
-    count = sum(map(len, found.after.fit.values.values()))
+    gain = before.fit.chi2 - after.fit.chi2
+    count = sum(map(len, after.fit.values.values()))
     p = max(float(chi2_sf(gain, count)), BACK)
-    where, share = where_of(structure), gain / found.before.fit.chi2
+    where, share = where_of(structure), gain / before.fit.chi2
     says = (
         f"What was found explains {100 * share:.2g} % of the whitened residual together; of a free force over "
         f"{structure.covariate.quantity} most would act at {_place(where, data)}."

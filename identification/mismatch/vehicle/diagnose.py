@@ -30,7 +30,7 @@ from identification.mismatch.vehicle.judging import better_predicting, held_out,
 from identification.mismatch.vehicle.naming import Named, name
 from identification.mismatch.vehicle.runs import Prepared, prepare
 from identification.mismatch.vehicle.screening import applicable
-from identification.mismatch.vehicle.search import Found, State, Vehicle, search
+from identification.mismatch.vehicle.search import State, Vehicle, search
 from identification.mismatch.vehicle.setup import VehicleSetup, axis_of, straight_ahead
 from identification.recording import Recording
 
@@ -91,19 +91,18 @@ def _diagnosed(
 ) -> Diagnosis:
     candidates, unseen_effects = applicable(data, without)
     vehicle = Vehicle(data, candidates)
-    found = search(vehicle, rng)
-    after, named = name(found.after, vehicle)
-    found = replace(found, after=after)
+    before, found = search(vehicle, rng)
+    after, named = name(found, vehicle)
     left = judge_left(after.fit, after.white, data, rng)
-    held, last = held_out(found.before, after, data, unseen), after
+    held, last = held_out(before, after, data, unseen), after
     if left.p_value < policy.locate.RESIDUAL_FALSE_ALARM:
         free = pruned(vehicle, with_free_force(after, data, left.structures[0]))
-        held, last = better_predicting(found.before, (held, after), free, data, unseen)
+        held, last = better_predicting(before, (held, after), free, data, unseen)
     standing = [_beside(n, last, left) for n in named]
     unearned = [n for n in standing if n.failed_checks]
     unnamed = [n.term for n in unearned if n.term in last.terms]
     if unnamed:
-        held, last = better_predicting(found.before, (held, last), vehicle.less(last, unnamed), data, unseen)
+        held, last = better_predicting(before, (held, last), vehicle.less(last, unnamed), data, unseen)
     earned = [_beside(n, last, left) for n in standing if not n.failed_checks]
     unexplained = unexplained_of(_as_fitted(left, last), unearned, data)
     experiment = propose(after, earned, data) if unexplained is None else None
@@ -115,19 +114,19 @@ def _diagnosed(
         thruster=recordings[0].thruster,
         answer=decided(findings, unexplained, experiment),
         baseline_model=baseline_words(data),
-        baseline=values_of(found.before.fit, data),
-        mismatch=_places(found, data, channel, left, rng),
+        baseline=values_of(before.fit, data),
+        mismatch=_places(before, after, data, left, rng),
         model_terms=tuple(term.id for term in last.terms),
         model=values_of(last.fit, data),
         train=Rmse(
-            rms(residuals(found.before.fit, data)),
+            rms(residuals(before.fit, data)),
             rms(residuals(last.fit, data)),
         ),
         heldout=held,
         chi2_per_dof=last.fit.chi2 / max(n - p, 1),
         whiteness_p=state_whiteness(last),
         notes=(*ties(data, last.fit, unseen_effects), *_noise_note(last, data)),
-        curves=curves_of(found.before.fit, last.fit, data),
+        curves=curves_of(before.fit, last.fit, data),
         response=channel,
         unit=data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit,
         force_unit=data.scale.force_unit,
@@ -162,12 +161,13 @@ def _channel(data: Prepared) -> str:
     return {"heave": "depth", "yaw": "heading"}.get(data.scale.axis, "position")
 
 
-def _places(found: Found, data: Prepared, channel: str, left: Left, rng: np.random.Generator) -> tuple[Mismatch, ...]:
+def _places(before: State, after: State, data: Prepared, left: Left, rng: np.random.Generator) -> tuple[Mismatch, ...]:
     """Where the baseline fails; nothing when nothing was found and nothing is left."""
-    if not found.after.terms:
+    channel = _channel(data)
+    if not after.terms:
         return places_of(left, data, channel)
-    seen = judge_left(found.before.fit, found.before.white, data, rng)
-    return places_of(seen, data, channel) or place_of_findings(seen, found, data, channel)
+    seen = judge_left(before.fit, before.white, data, rng)
+    return places_of(seen, data, channel) or place_of_findings(seen, before, after, data, channel)
 
 
 def _noise_note(after: State, data: Prepared) -> tuple[str, ...]:

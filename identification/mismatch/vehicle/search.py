@@ -45,12 +45,6 @@ class State:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    before: State
-    after: State
-
-
-@dataclass(frozen=True, eq=False)
 class Vehicle:
     """Runs of a vehicle, and terms that may explain them: a `System` of stepwise selection."""
 
@@ -129,11 +123,11 @@ class Vehicle:
         return best
 
 
-def search(vehicle: Vehicle, rng: np.random.Generator) -> Found:
+def search(vehicle: Vehicle, rng: np.random.Generator) -> tuple[State, State]:
     """The baseline, and the model that nothing in the catalogue improves any more."""
     first = _baseline(vehicle.data, vehicle.terms)
     last, _ = forward(vehicle, first, policy.vehicle.VEHICLE_MODEL_TERMS, rng)
-    return Found(_under(first, last, vehicle.data), last)
+    return _under(first, last, vehicle.data), last
 
 
 def _baseline(data: Prepared, candidates: Sequence[VehicleTerm]) -> State:
