@@ -22,6 +22,8 @@ LEAST_P = 1e-12
 MOST_TARES = 6
 """Tares that are shown, those of the first recordings."""
 
+Rounds = tuple[Round[Term, Screening], ...]
+
 
 def label(term: Term) -> str:
     """Effect and form."""
@@ -42,7 +44,7 @@ def values_text(term: Term, values: Sequence[float], data: Data, std: Sequence[f
     return ", ".join(told)
 
 
-def searches(selected: Selected) -> tuple[tuple[Round, ...], tuple[Round, ...]]:
+def searches(selected: Selected) -> tuple[Rounds, Rounds]:
     """Rounds of the search, and of the one that was resumed: a search ends where nothing lasts."""
     first = next(i for i, one in enumerate(selected.rounds) if one.after is None)
     return selected.rounds[: first + 1], selected.rounds[first + 1 :]
@@ -71,7 +73,7 @@ def noise_lines(noise: Noise, data: Data) -> Iterator[str]:
     yield f"  together {np.sqrt(rest):.3g} N at rest, {np.sqrt(full):.3g} N at C driver^2"
 
 
-def round_lines(one: Round) -> Iterator[str]:
+def round_lines(one: Round[Term, Screening]) -> Iterator[str]:
     """A screening, what was fitted, and what became of it."""
     judged = one.screening
     yield f"model: {' + '.join(['C x|x|', *map(label, one.model)])}"
@@ -103,7 +105,7 @@ def best_trials(judged: Screening) -> list[tuple[Term, float, float]]:
     return out
 
 
-def _became(one: Round) -> str:
+def _became(one: Round[Term, Screening]) -> str:
     if one.after is None:
         full = len(one.model) >= policy.select.MODEL_TERMS
         return "the search ends: the model is full" if full else "the search ends: nothing that lasts can be added"

@@ -10,7 +10,7 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.diagnosis import Finding, Mismatch, RivalFinding
-from identification.mismatch.name.naming import probability_beside
+from identification.mismatch.name.named_term import probability_beside
 from identification.mismatch.periodic.periodic_disturbances import EFFECT, Line
 from identification.mismatch.value import Value, Where
 from identification.twin import Twin, TwinLine

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 from identification.mismatch.diagnosis import Curves, Finding, RivalFinding
 from identification.mismatch.estimate.confidence_intervals import Interval
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
-from identification.mismatch.name.naming import Named
-from identification.mismatch.select.forward_selection import Rival
+from identification.mismatch.name.named_term import NamedTerm
+from identification.mismatch.select.rounds import T
+from identification.mismatch.select.stepwise import F, RivalTerm
 from identification.mismatch.value import QUANTILE, Value
 from identification.physics.term import Term
 
@@ -24,7 +26,7 @@ def values_of(fitted: Fit, data: Data, known: Intervals | None = None) -> dict[s
     out = {"C": Value(fitted.theta.C, float(std[0]), f"N/{unit}^2" if unit == "V" else "N s^2/rev^2")}
     at = fitted.layout
     for term, values in fitted.values.items():
-        told = _term_values(term, values, std[at.of(term)].tolist(), data, (known or {}).get(term))
+        told = values_told(term, values, std[at.of(term)].tolist(), data.scale, (known or {}).get(term))
         out |= {f"{term.id}.{name}": value for name, value in told.items()}
     for run, (history, tare) in enumerate(zip(data.histories, fitted.theta.tares, strict=True)):
         key = "tare" if len(data.histories) == 1 else f"tare[{history.recording_id}]"
@@ -32,14 +34,10 @@ def values_of(fitted: Fit, data: Data, known: Intervals | None = None) -> dict[s
     return out
 
 
-def _term_values(
-    term: Term,
-    theta: Sequence[float],
-    std: Sequence[float],
-    data: Data,
-    known: Sequence[Interval] | None = None,
+def values_told(
+    term: T, theta: Sequence[float], std: Sequence[float], scale: Any, known: Sequence[Interval] | None = None
 ) -> dict[str, Value]:
-    told = term.parameters(data.scale)
+    told = term.parameters(scale)
     if known is None:
         return {p.name: Value(v, s, p.unit) for p, v, s in zip(told, theta, std, strict=True)}
     return {p.name: _within(v, p.unit, i) for p, v, i in zip(told, theta, known, strict=True)}
@@ -50,24 +48,25 @@ def _within(value: float, unit: str, interval: Interval) -> Value:
     return Value(value, far / QUANTILE, unit, (interval.low, interval.high))
 
 
-def finding_of(named: Named, data: Data, known: Intervals) -> Finding:
+def finding_of(named: NamedTerm[T, F], scale: Any, known: Mapping[T, tuple[Interval, ...]]) -> Finding:
+    """Of any term, a thruster's or a vehicle's; `scale`: what its parameters refer to; `known`: intervals, if any."""
     return Finding(
         named.term.id,
         named.term.form,
-        named.term.statement(named.theta, data.scale),
-        _term_values(named.term, named.theta, named.std, data, known.get(named.term)),
+        named.term.statement(named.theta, scale),
+        values_told(named.term, named.theta, named.std, scale, known.get(named.term)),
         named.p_value,
         named.bic_gain,
         named.probability,
-        tuple(_rival(r, data) for r in named.rivals),
+        tuple(_rival(r, scale) for r in named.rivals),
     )
 
 
-def _rival(rival: Rival, data: Data) -> RivalFinding:
+def _rival(rival: RivalTerm[T, F], scale: Any) -> RivalFinding:
     term, values = rival.term, rival.fit.values[rival.term]
     std = rival.fit.std[rival.fit.layout.of(term)].tolist()
-    known = _term_values(term, values, std, data)
-    return RivalFinding(term.id, term.form, known, rival.bic_loss, term.statement(values, data.scale))
+    known = values_told(term, values, std, scale)
+    return RivalFinding(term.id, term.form, known, rival.bic_loss, term.statement(values, scale))
 
 
 def curves_of(before: Estimate, after: Estimate, data: Data) -> tuple[Curves, ...]:

@@ -69,7 +69,7 @@ def run(
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
         mismatch=places_of(selected, after, rng, pulsing=located.left.pulses is not None),
-        findings=tuple(finding_of(n, data, completed.intervals) for n in completed.earned),
+        findings=tuple(finding_of(n, data.scale, completed.intervals) for n in completed.earned),
         model_terms=tuple(t.id for t in after.fit.model.terms),
         model=values_of(after.fit, data, completed.intervals),
     )

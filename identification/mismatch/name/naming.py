@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 
-from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, fit_without
 from identification.mismatch.estimate.fitting import Fit, at_bound
@@ -17,52 +16,16 @@ from identification.mismatch.locate.residual_structure_test import ResidualStruc
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.whitening import Weights
+from identification.mismatch.name.named_term import Check, NamedTerm, named_term, part_check
 from identification.mismatch.prepare.preparing import DRIVERS
 from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.flatness import noise_goes_on
-from identification.mismatch.select.forward_selection import STATIC, Rival, SwapTest, static_curve
-from identification.mismatch.select.rivals import swaps
+from identification.mismatch.select.forward_selection import STATIC, SwapTest, Thruster, static_curve
+from identification.mismatch.select.stepwise import stands
 from identification.physics.term import Term
 from identification.recording import Floats
 
-
-@dataclass(frozen=True, slots=True)
-class Check:
-    """One thing that a name is asked."""
-
-    asked: str
-    failed: str = ""
-    """Why the name is not earned; empty where it passes."""
-    told: str = ""
-    """Its figures, or why it says nothing here."""
-    silent: bool = False
-    """Whether it says nothing here."""
-
-
-@dataclass(frozen=True, eq=False)
-class Named:
-    """One term of the final model and what speaks for its name."""
-
-    term: Term
-    theta: tuple[float, ...]
-    std: tuple[float, ...]
-    chi2_gain: float
-    bic_gain: float
-    p_value: float
-    probability: float
-    rivals: tuple[Rival, ...]
-    """Other effects within RIVAL_STATED_BIC, best first."""
-    checks: tuple[Check, ...]
-    """All that it was asked."""
-
-    @property
-    def failed_checks(self) -> tuple[str, ...]:
-        """Why the name is not earned; empty when it is."""
-        return tuple(check.failed for check in self.checks if check.failed)
-
-    def asked(self, *more: Check) -> Named:
-        """The same with further checks."""
-        return replace(self, checks=(*self.checks, *more))
+Named = NamedTerm[Term, Fit]
 
 
 def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check, ...]:
@@ -105,63 +68,16 @@ def _constancy(estimate: Estimate, change: list[Floats], data: Data, many: int) 
     weights = Weights(estimate.weights.thrust)
     whole = float(np.linalg.norm(weights.whiten(change, [])))
     for what, masks in splits.items():
-        asked = f"the same {what}"
         column = weights.whiten([c * m for c, m in zip(change, masks, strict=True)], [])
         if (
             not policy.name.PART_SIZE
             < float(np.linalg.norm(column)) / max(whole, 1e-300)
             < 1 - policy.name.PART_SIZE**2
         ):
-            yield Check(asked, told="nearly all of it is in one part", silent=True)
+            yield Check(f"the same {what}", told="nearly all of it is in one part", silent=True)
             continue
-        apart = part_difference(column, basis, estimate.fit.residual[:n], policy.name.PART_DIFFERENCE)
-        if apart is None:
-            yield Check(asked, told="the parts tell too little", silent=True)
-            continue
-        p = apart.p_value * len(splits) * many
-        says = f"{100 * apart.share:.0f} % apart"
-        failed = f"its parameter is not the same {what} ({says})" if p < policy.name.INCONSTANT_P else ""
-        yield Check(asked, failed, f"{says}, +- {100 * apart.error:.0f} %; p {min(p, 1.0):.2g}")
-
-
-@dataclass(frozen=True, slots=True)
-class PartDifference:
-    """Of an effect in one part of the recordings, as a share of itself."""
-
-    share: float
-    error: float
-    """Standard error."""
-    p_value: float
-    """That it is no more than what is spared."""
-
-
-def part_difference(column: Floats, basis: Floats, residual: Floats, spared: float) -> PartDifference | None:
-    """By how much an effect differs there; None where that part tells too little.
-
-    `column` (n,): all that it does there, whitened; `basis` (n, p): orthonormal, what the model can follow. A share of
-    `spared` counts as the same.
-    """
-    rest = column - basis @ (basis.T @ column)
-    size = float(np.linalg.norm(rest))
-    if size < 1e-3 * float(np.linalg.norm(column)) or size < policy.name.PART_SIGMA:
-        return None
-    score = float(rest @ residual) / size
-    p = float(noncentral_chi2_sf(score**2, 1, (spared * size) ** 2))
-    return PartDifference(abs(score) / size, 1 / size, p)
-
-
-def difference(column: Floats, basis: Floats, residual: Floats, spared: float, tests: int) -> float | None:
-    """By what share of itself an effect differs in one part of the recordings; None: by no more than chance.
-
-    As of `part_difference`; chance has `tests` trials.
-    """
-    found = part_difference(column, basis, residual, spared)
-    return found.share if found is not None and found.p_value * tests < policy.name.INCONSTANT_P else None
-
-
-def probability_beside(losses: Sequence[float]) -> float:
-    """Of a name beside rivals whose BIC is worse by these."""
-    return float(1.0 / (1.0 + sum(np.exp(-0.5 * max(loss, 0.0)) for loss in losses)))
+        residual, tests = estimate.fit.residual[:n], len(splits) * many
+        yield part_check(what, column, basis, residual, policy.name.PART_DIFFERENCE, tests)
 
 
 def _unseen(now: Fit, term: Term, data: Data) -> bool:
@@ -193,11 +109,6 @@ def _raw_effect(now: Fit, terms: tuple[Term, ...], data: Data) -> list[Floats]:
         less, _ = predict(*smaller, run, data.scale, tare)
         out.append((full - less)[r])
     return out
-
-
-def _standing(estimate: Estimate, term: Term, data: Data, terms: Sequence[Term]) -> SwapTest:
-    less = fit_without(estimate, term, data)
-    return less, swaps(estimate, term, less, data, terms)
 
 
 def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[Term, tuple[str, ...]]:
@@ -234,36 +145,14 @@ def name(
     estimate: Estimate, data: Data, terms: Sequence[Term], standing: Mapping[Term, SwapTest] | None = None
 ) -> tuple[Named, ...]:
     """Every term of the model with its rivals and checks, the largest gain first."""
-    out = []
-    logn = float(np.log(max(estimate.fit.residual.size, 2)))
-    std = estimate.fit.std
     many = max(len(estimate.fit.model.terms), 1)
-    stands = {
-        term: (standing or {}).get(term) or _standing(estimate, term, data, terms) for term in estimate.fit.model.terms
-    }
-    repaired = _repaired(estimate, data, {term: less for term, (less, _) in stands.items()})
-    for term, values in estimate.fit.values.items():
-        less, others = stands[term]
-        gain = less.chi2 - estimate.fit.chi2
-        close = [
-            r for r in others if min(r.bic_loss, r.aic_loss) < policy.select.RIVAL_STATED_BIC and r.term.id != term.id
-        ]
-        unique: dict[str, Rival] = {}
-        for r in close:
-            unique.setdefault(r.term.id, r)
-        out.append(
-            Named(
-                term,
-                values,
-                tuple(map(float, std[estimate.fit.layout.of(term)])),
-                gain,
-                gain - len(values) * logn,
-                max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
-                probability_beside([r.bic_loss for r in unique.values()]),
-                tuple(unique.values()),
-                (*checks(estimate, term, data, many), *_not_repaired(repaired.get(term, ()))),
-            )
-        )
+    system = Thruster(data, tuple(terms))
+    standing = {term: (standing or {}).get(term) or stands(system, estimate, term) for term in estimate.fit.model.terms}
+    repaired = _repaired(estimate, data, {term: less for term, (less, _) in standing.items()})
+    out = []
+    for term, stand in standing.items():
+        asked = (*checks(estimate, term, data, many), *_not_repaired(repaired.get(term, ())))
+        out.append(named_term(term, estimate.fit, stand, asked))
     return tuple(sorted(out, key=lambda n: -n.chi2_gain))
 
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch import policy
 from identification.mismatch.next_experiment.predicted_response import PredictedResponse
 from identification.recording import Floats
 
@@ -93,6 +94,15 @@ def power(true: PredictedResponse, wrong: PredictedResponse, needed: float) -> f
     y = d[:, None] + A @ rng.standard_normal((A.shape[1], DRAWS)) + rng.standard_normal((d.size, DRAWS))
     fall = _cost(y, B) - _cost(y - d[:, None], A)
     return float(np.mean(fall > needed))
+
+
+def needed(loss: float, more: int, rows: int, new: int) -> float:
+    """Chi-square that `new` rows have to add for a model to be RIVALS_EQUAL_BIC worse than another.
+
+    So far, on `rows`, its BIC is worse by `loss`; it has `more` parameters than the other.
+    """
+    grown = np.log(rows + new) - np.log(max(rows, 2))
+    return float(policy.select.RIVALS_EQUAL_BIC - (loss + more * grown))
 
 
 def _cost(y: Floats, columns: Floats) -> Floats:

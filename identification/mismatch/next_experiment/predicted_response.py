@@ -47,8 +47,8 @@ class PredictedResponse:
     """(n, q) over its parameters."""
     cov: Floats
     """(q, q) of the parameters of `slopes`; 0 where they are known or not free."""
-    layout: Layout
-    """Of these."""
+    layout: Layout | None = None
+    """Of these; None where there are no zeros to be shared."""
 
     @cached_property
     def root(self) -> Floats:
@@ -205,6 +205,7 @@ def ending(steps: Sequence[PlanStep], slew: float) -> Floats:
 def one_zero(view: PredictedResponse) -> PredictedResponse:
     """The same with one zero for all runs: blocks of one sweep share it."""
     at = view.layout
+    assert at is not None
     zero = view.slopes[:, at.tares].sum(axis=1, keepdims=True)
     slopes = np.column_stack([view.slopes[:, : at.tare(0)], zero, view.slopes[:, at.shift :]])
     keep = np.delete(np.arange(at.size), np.arange(at.tare(1), at.shift))
@@ -233,16 +234,21 @@ def open_ends(fitted: Fit, theta: Theta, data: Data) -> Floats:
     """
     here, there = fitted.layout, fitted.model.layout(theta)
     low, high, _ = bounds_of(fitted.model, data, fitted.theta)
-    known = np.where(np.isfinite(high - low) & (high > low), 4.0 / np.maximum(high - low, 1e-300), 0.0)
+    known = known_from_bounds(low, high)
     old = np.zeros((here.size, here.size))
-    old[np.ix_(fitted.free, fitted.free)] = _inverse(fitted.jacobian, known[fitted.free])
+    old[np.ix_(fitted.free, fitted.free)] = inverse_information(fitted.jacobian, known[fitted.free])
     out = np.diag(np.full(there.size, (TARE * data.scale.thrust) ** 2))
     shared, keep = (np.delete(np.arange(at.size), at.tares) for at in (here, there))
     out[np.ix_(keep, keep)] = old[np.ix_(shared, shared)]
     return out
 
 
-def _inverse(columns: Floats, known: Floats) -> Floats:
+def known_from_bounds(low: Floats, high: Floats) -> Floats:
+    """(q,) 1/standard deviation of parameters that the data hardly fix: a quarter of the span of their bounds."""
+    return np.where(np.isfinite(high - low) & (high > low), 4.0 / np.maximum(high - low, 1e-300), 0.0)
+
+
+def inverse_information(columns: Floats, known: Floats) -> Floats:
     """Inverse of columns' columns + diag(known^2), each parameter scaled to its own size."""
     both = np.concatenate([columns, np.diag(known)])
     size = np.linalg.norm(both, axis=0)

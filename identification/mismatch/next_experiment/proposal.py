@@ -20,7 +20,7 @@ from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
-from identification.mismatch.next_experiment.discrimination import Pieces, distances, pieces, power
+from identification.mismatch.next_experiment.discrimination import Pieces, distances, needed, pieces, power
 from identification.mismatch.next_experiment.predicted_response import (
     Bench,
     PredictedResponse,
@@ -201,9 +201,8 @@ class _Tried:
         """Chi-square that the sweep has to add for the wrong model to be RIVALS_EQUAL_BIC worse."""
         n = self.contest.fits[0].residual.size
         sizes = [int(fit.free.sum()) for fit in self.contest.fits]
-        grown = np.log(n + views[0].value.size) - np.log(max(n, 2))
-        known = self.contest.losses[wrong] - self.contest.losses[true] + (sizes[wrong] - sizes[true]) * grown
-        return float(policy.select.RIVALS_EQUAL_BIC - known)
+        loss = self.contest.losses[wrong] - self.contest.losses[true]
+        return needed(loss, sizes[wrong] - sizes[true], n, views[0].value.size)
 
     def _shortened(self, chosen: Sequence[int]) -> list[int]:
         """Without the blocks that are not needed, the longest tried first."""

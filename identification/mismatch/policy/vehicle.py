@@ -32,11 +32,6 @@ VEHICLE_SWEEP_POWER = Threshold(
     unit="probability of a right decision",
     reason="Below it no free run tells the two apart, and mooring to a force gauge is proposed.",
 )
-VEHICLE_SWEEP_FALSE_ALARM = Threshold(
-    0.01,
-    unit="probability",
-    reason="At this false-alarm rate the power of a proposed run is told.",
-)
 VEHICLE_RUNS = Count(
     3,
     unit="runs",

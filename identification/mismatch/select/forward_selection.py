@@ -16,6 +16,8 @@ from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
+from identification.mismatch.select.flatness import noise_goes_on
+from identification.mismatch.select.rivals import one_for_two, swaps
 from identification.mismatch.select.rounds import Candidate, Round, Unhidden
 from identification.mismatch.select.screening import (
     Screening,
@@ -24,6 +26,7 @@ from identification.mismatch.select.screening import (
     screen,
 )
 from identification.mismatch.select.shape_error import allowed, corrections
+from identification.mismatch.select.stepwise import RivalTerm, Standing, forward, pruned
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.term import Term
 from identification.run_history.history import History
@@ -64,20 +67,8 @@ def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
     return tuple(out)
 
 
-@dataclass(frozen=True, eq=False, slots=True)
-class Rival:
-    """Another term in the place of one, refitted."""
-
-    term: Term
-    fit: Fit
-    bic_loss: float
-    """By how much its BIC is worse."""
-    aic_loss: float
-    """By how much its AIC is worse: BIC alone would hide a rival with more parameters than the data can tell apart."""
-
-
-SwapTest = tuple[Fit, list[Rival]]
-"""The fit without a term, and the rivals in its place."""
+Rival = RivalTerm[Term, Fit]
+SwapTest = Standing[Fit, Term]
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +81,7 @@ class Selected:
     before: Estimate
     """The baseline."""
     after: Estimate
-    rounds: tuple[Round, ...]
+    rounds: tuple[Round[Term, Screening], ...]
     """Of the search, and of one that was resumed: then it begins with a model that is not the last that lasted."""
     last: Screening | None
     """Of the model `after`; None once it was exchanged for another."""
@@ -103,10 +94,6 @@ def static_curve(term: Term, *, measured: bool) -> str:
     if not set(term.covariates) <= set(STATIC):
         return ""
     return "rate" if measured and term.stage in ("command", "rotor") else "thrust"
-
-
-def accept_threshold(extra: int) -> float:
-    return chi2_isf(policy.select.KEPT_TERM_FALSE_ALARM, extra)
 
 
 def search(
@@ -137,85 +124,89 @@ def resumed(found: Selected, estimate: Estimate, rng: np.random.Generator) -> Se
 
 def _forward(
     data: Data,
-    terms: Sequence[Term],
+    terms: tuple[Term, ...],
     before: Estimate,
     estimate: Estimate,
     rng: np.random.Generator,
     *known: frozenset[Term],
 ) -> Selected:
     """Larger models from `estimate` on while something passes, none of those that are `known`."""
-    rounds = []
-    seen = {frozenset(estimate.fit.model.terms), *known}
-    while True:
-        inside = estimate.fit.model.terms
-        judged = _screened(estimate, data, terms, rng)
-        full = len({t.id for t in inside}) >= policy.select.MODEL_TERMS
-        larger = _Lasting(None) if full else _lasting(estimate, judged, data, terms, seen)
-        found = larger.estimate
-        after = None if found is None else found.fit.model.terms
-        rounds.append(Round(inside, judged, larger.fitted, larger.hidden, after))
-        if found is None:
-            break
-        estimate = found
-        seen.add(frozenset(estimate.fit.model.terms))
-    return Selected(data, tuple(terms), before, estimate, tuple(rounds), judged)
+    after, rounds = forward(Thruster(data, terms), estimate, policy.select.MODEL_TERMS, rng, known)
+    return Selected(data, terms, before, after, rounds, rounds[-1].screening)
 
 
-def _screened(estimate: Estimate, data: Data, terms: Sequence[Term], rng: np.random.Generator) -> Screening:
-    """What may still be added to the model, judged."""
-    inside = estimate.fit.model.terms
-    ids = {t.id for t in inside}
-    shapes = Counter(static_curve(t, measured=data.with_rate) for t in inside)
-    left = [t for t in terms if t.id not in ids]
-    left = [
-        t
-        for t in left
-        if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < policy.select.STATIC_CURVE_TERMS
-    ]
-    if data.scale.torque <= 0 and any(t.traits.even for t in inside):
-        left = [t for t in left if not t.traits.even]
-    found = directions(estimate.fit, data, estimate.weights, left)
-    changes = corrections(estimate.fit, data, estimate.weights)
-    spared = allowed(changes, found.columns, policy.select.NEXT_TERM_SHAPE_ERROR)
-    return screen(estimate.fit, found, rng, spared)
+def prune(estimate: Estimate, data: Data) -> Estimate:
+    """Drop terms that no longer earn their place."""
+    return pruned(Thruster(data, ()), estimate)
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class _Lasting:
-    """A larger model, and as of Round how it was found."""
+class Thruster:
+    """Runs of a thruster, and terms that may explain them: a `System` of stepwise selection."""
 
-    estimate: Estimate | None
-    fitted: tuple[Candidate, ...] = ()
-    hidden: Unhidden | None = None
+    data: Data
+    terms: tuple[Term, ...]
 
+    def judged(self, estimate: Estimate, rng: np.random.Generator) -> Screening:
+        """What may still be added to the model, judged."""
+        data, inside = self.data, estimate.fit.model.terms
+        ids = {t.id for t in inside}
+        shapes = Counter(static_curve(t, measured=data.with_rate) for t in inside)
+        left = [t for t in self.terms if t.id not in ids]
+        left = [
+            t
+            for t in left
+            if not (on := static_curve(t, measured=data.with_rate)) or shapes[on] < policy.select.STATIC_CURVE_TERMS
+        ]
+        if data.scale.torque <= 0 and any(t.traits.even for t in inside):
+            left = [t for t in left if not t.traits.even]
+        found = directions(estimate.fit, data, estimate.weights, left)
+        changes = corrections(estimate.fit, data, estimate.weights)
+        spared = allowed(changes, found.columns, policy.select.NEXT_TERM_SHAPE_ERROR)
+        return screen(estimate.fit, found, rng, spared)
 
-def _lasting(
-    estimate: Estimate, judged: Screening, data: Data, terms: Sequence[Term], seen: Collection[frozenset[Term]]
-) -> _Lasting:
-    """The larger model, pruned; of additions that are dropped again the next best. Without one where none lasts."""
-    found = _additions(estimate, judged, data) if judged.largest > judged.threshold else []
-    fitted = tuple(candidate for candidate, _ in found)
-    while found:
-        larger = _larger(estimate, _best(found), data, terms)
-        pruned = prune(larger, data)
-        if frozenset(pruned.fit.model.terms) not in seen:
-            return _Lasting(pruned, fitted)
-        refused = set(larger.fit.model.terms) - set(estimate.fit.model.terms)
-        found = [each for each in found if each[0].term not in refused]
-    hidden = _hidden(estimate, judged, data)
-    if hidden is None:
-        return _Lasting(None, fitted)
-    told, beside = hidden
-    pruned = prune(beside, data)
-    last = None if frozenset(pruned.fit.model.terms) in seen else pruned
-    return _Lasting(last, fitted, None if last is None else told)
+    def additions(self, estimate: Estimate, judged: Screening) -> list[tuple[Candidate[Term], Fit]]:
+        """Candidates, fitted, that gain more than their parameters cost."""
+        found: list[tuple[Candidate[Term], Fit]] = []
+        if judged.largest <= judged.threshold:
+            return found
+        data, weights = self.data, estimate.weights
+        for term, values in _candidates(judged, data):
+            bigger, theta = estimate.fit.more(term, refined(estimate.fit, data, weights, term, values))
+            new = fit(bigger, theta, data, weights)
+            gain = estimate.fit.chi2 - new.chi2
+            logn = float(np.log(new.residual.size))
+            cost = price(term, data) * logn
+            if gain > max(cost, logn):
+                found.append((Candidate(term, gain, cost, at_bound(term, new, data, weights)), new))
+        return found
 
+    def enlarged(self, estimate: Estimate, best: Fit) -> Estimate:
+        """The model with one more term, as fitted, its noise estimated anew."""
+        remaining = [t for t in self.terms if t.id not in {u.id for u in best.model.terms}]
+        plain = plain_shapes(best, self.data, estimate.weights, every_shape(best, self.data, remaining))
+        return refresh(best.model, best.theta, self.data, plain, estimate)
 
-def _larger(estimate: Estimate, best: Fit, data: Data, terms: Sequence[Term]) -> Estimate:
-    """The model with one more term, as fitted, its noise estimated anew."""
-    remaining = [t for t in terms if t.id not in {u.id for u in best.model.terms}]
-    plain = plain_shapes(best, data, estimate.weights, every_shape(best, data, remaining))
-    return refresh(best.model, best.theta, data, plain, estimate)
+    def unhidden(self, estimate: Estimate, judged: Screening) -> tuple[Unhidden, Estimate] | None:
+        return _hidden(estimate, judged, self.data)
+
+    def without(self, estimate: Estimate, term: Term) -> Fit:
+        return fit_without(estimate, term, self.data)
+
+    def replaced(self, estimate: Estimate, other: Fit) -> Estimate:
+        return refresh(other.model, other.theta, self.data, None, estimate)
+
+    def rivals(self, estimate: Estimate, term: Term, less: Fit) -> list[Rival]:
+        return swaps(estimate, term, less, self.data, self.terms)
+
+    def impossible(self, estimate: Estimate, term: Term) -> bool:
+        """Its values end at what is possible, or noise goes on where it clips."""
+        return at_bound(term, estimate.fit, self.data, estimate.weights) or noise_goes_on(
+            estimate.fit, term, estimate.noise, self.data
+        )
+
+    def merged(self, estimate: Estimate, best: tuple[float, Fit] | None) -> tuple[float, Fit] | None:
+        return one_for_two(estimate, self.data, self.terms, best)
 
 
 def _hidden(estimate: Estimate, judged: Screening, data: Data) -> tuple[Unhidden, Estimate] | None:
@@ -288,57 +279,3 @@ def _candidates(judged: Screening, data: Data) -> list[tuple[Term, tuple[float, 
         if told and z > judged.threshold and len(likely) < most:
             likely.setdefault(term, values)
     return list(likely.items())
-
-
-def _additions(estimate: Estimate, judged: Screening, data: Data) -> list[tuple[Candidate, Fit]]:
-    """Candidates, fitted, that gain more than their parameters cost."""
-    found = []
-    for term, values in _candidates(judged, data):
-        begin = refined(estimate.fit, data, estimate.weights, term, values)
-        bigger, theta = estimate.fit.more(term, begin)
-        new = fit(bigger, theta, data, estimate.weights)
-        gain = estimate.fit.chi2 - new.chi2
-        logn = float(np.log(new.residual.size))
-        cost = price(term, data) * logn
-        if gain > max(cost, logn):
-            found.append((Candidate(term, gain, cost, at_bound(term, new, data, estimate.weights)), new))
-    return found
-
-
-def _best(found: Sequence[tuple[Candidate, Fit]]) -> Fit:
-    gains = [candidate.chi2_gain - candidate.price for candidate, _ in found]
-    sizes = [len(fitted.values[candidate.term]) for candidate, fitted in found]
-    return found[preferred(gains, sizes, [candidate.at_bound for candidate, _ in found])][1]
-
-
-def preferred(gains: Sequence[float], sizes: Sequence[int], pressed: Sequence[bool]) -> int:
-    """Which addition goes first: the best gain beyond its price, or a simpler one that gains nearly as much.
-
-    `sizes`: the number of parameters of each; `pressed`: against the end of what is possible, so that others go before.
-    """
-    possible = [j for j, ended in enumerate(pressed) if not ended] or range(len(gains))
-    most = max(gains[j] for j in possible)
-    near = [j for j in possible if gains[j] >= policy.select.SIMPLER_TERM_GAIN * most]
-    return min(near, key=lambda j: (sizes[j], -gains[j]))
-
-
-def prune(estimate: Estimate, data: Data) -> Estimate:
-    """Drop terms that no longer earn their place."""
-    while estimate.fit.model.terms:
-        less = [fit_without(estimate, term, data) for term in estimate.fit.model.terms]
-        losses = [each.chi2 - estimate.fit.chi2 for each in less]
-        worst = least_earned(losses, [len(values) for values in estimate.fit.values.values()])
-        if worst is None:
-            break
-        estimate = refresh(less[worst].model, less[worst].theta, data, None, estimate)
-    return estimate
-
-
-def least_earned(losses: Sequence[float], sizes: Sequence[int]) -> int | None:
-    """Which term gives the model least beside its price; None where all earn their place.
-
-    `losses`: of chi-square without each; `sizes`: the number of parameters of each.
-    """
-    short = [loss - accept_threshold(size) for loss, size in zip(losses, sizes, strict=True)]
-    worst = short.index(min(short))
-    return None if short[worst] > 0 else worst

@@ -9,13 +9,13 @@ from itertools import combinations
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
+from identification.mismatch.estimate.estimate import Estimate, fit_without
 from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, fit
 from identification.mismatch.model.data import Data, price
 from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.flatness import noise_goes_on
-from identification.mismatch.select.forward_selection import Rival, SwapTest, accept_threshold
 from identification.mismatch.select.screening import directions, refined
+from identification.mismatch.select.stepwise import RivalTerm
 from identification.physics.term import Term
 from identification.recording import Floats
 
@@ -25,37 +25,9 @@ RIVAL_STEPS = 15
 """Steps of the fit of a rival: what is not near by then is no rival."""
 MOST_REFITS = 7
 """Rivals of one term that are refitted, the most alike first: each costs a fit."""
-ROUNDS = 3
-"""Exchanges of a term for a rival, at most: more would go in circles."""
 
 
-def swap_tests(estimate: Estimate, data: Data, terms: Sequence[Term]) -> tuple[Estimate, dict[Term, SwapTest] | None]:
-    """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end."""
-    for _ in range(ROUNDS):
-        best: tuple[float, Fit] | None = None
-        standing: dict[Term, SwapTest] = {}
-        for term in estimate.fit.model.terms:
-            less = fit_without(estimate, term, data)
-            standing[term] = (less, swaps(estimate, term, less, data, terms))
-            # a value that is not possible explains nothing: whatever does nearly as well goes before it
-            price = 0.0
-            if at_bound(term, estimate.fit, data, estimate.weights) or noise_goes_on(
-                estimate.fit, term, estimate.noise, data
-            ):
-                price = policy.select.PRESSED_TERM_HANDICAP * (less.chi2 - estimate.fit.chi2)
-            for rival in standing[term][1]:
-                loss = rival.bic_loss - price
-                lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.term.parameters(data.scale)))
-                if lasts and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):
-                    best = (loss, rival.fit)
-        best = _one_for_two(estimate, data, terms, best)
-        if best is None:
-            return estimate, standing
-        estimate = refresh(best[1].model, best[1].theta, data, None, estimate)
-    return estimate, None
-
-
-def _one_for_two(
+def one_for_two(
     estimate: Estimate, data: Data, terms: Sequence[Term], best: tuple[float, Fit] | None
 ) -> tuple[float, Fit] | None:
     """The better of `best` and one term in the place of two: a search that goes step by step may miss it."""
@@ -94,7 +66,7 @@ def _one_for_two(
     return best
 
 
-def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> list[Rival]:
+def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> list[RivalTerm[Term, Fit]]:
     """Every other term (and form) that could do what this one does, refitted in its place; best first."""
     now = estimate.fit
     gain = less.chi2 - now.chi2
@@ -141,7 +113,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
         if at_bound(other, new, data, estimate.weights) or noise_goes_on(new, other, estimate.noise, data):
             continue
         loss = new.chi2 - now.chi2 + extra
-        out.append(Rival(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))
+        out.append(RivalTerm(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))
     return sorted(out, key=lambda rival: rival.bic_loss)
 
 

@@ -3,16 +3,35 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
 
-from identification.mismatch.select.screening import Screening
-from identification.physics.term import Term
+
+class Effect(Protocol):
+    """A term as a search knows it: an effect in one textbook form."""
+
+    @property
+    def id(self) -> str: ...
+
+    @property
+    def form(self) -> str: ...
+
+    def parameters(self, scale: Any, /) -> Any:
+        """In the order of its values."""
+
+    def statement(self, theta: tuple[float, ...], scale: Any, /) -> str:
+        """One sentence a person can act on."""
+
+
+T = TypeVar("T", bound=Effect)
+Judged = TypeVar("Judged")
+"""What a screening says."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Candidate:
+class Candidate(Generic[T]):
     """A term that was fitted beside a model."""
 
-    term: Term
+    term: T
     chi2_gain: float
     price: float
     """In chi-square: log n for each parameter."""
@@ -31,14 +50,14 @@ class Unhidden:
 
 
 @dataclass(frozen=True, eq=False, slots=True)
-class Round:
+class Round(Generic[T, Judged]):
     """One round of the search: a model, what could be added to it, and what became of it."""
 
-    model: tuple[Term, ...]
-    screening: Screening
-    fitted: tuple[Candidate, ...]
+    model: tuple[T, ...]
+    screening: Judged
+    fitted: tuple[Candidate[T], ...]
     """Those that passed and earn their parameters; of several tries those of the first."""
     hidden: Unhidden | None
     """Of what was added, where it passed no screening, for the noise had taken it for its own."""
-    after: tuple[Term, ...] | None
+    after: tuple[T, ...] | None
     """The model that lasts, after pruning; None where nothing lasted."""

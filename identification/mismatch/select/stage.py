@@ -8,8 +8,8 @@ import numpy as np
 
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.select.aliases import within_samples
-from identification.mismatch.select.forward_selection import Selected, SwapTest, prune, resumed
-from identification.mismatch.select.rivals import swap_tests
+from identification.mismatch.select.forward_selection import Selected, SwapTest, Thruster, prune, resumed
+from identification.mismatch.select.stepwise import exchanged
 from identification.physics.term import Term
 
 
@@ -33,7 +33,7 @@ def _settled(found: Selected, after: Estimate, standing: dict[Term, SwapTest] | 
 
 def _exchanged(found: Selected) -> tuple[Estimate, dict[Term, SwapTest] | None]:
     """With rivals exchanged, pruned as a search ends; as found where what was exchanged for a term is dropped again."""
-    after, standing = swap_tests(found.after, found.data, found.terms)
+    after, standing = exchanged(Thruster(found.data, found.terms), found.after)
     slower = within_samples(after, found.data)
     if slower is not after:
         return slower, None
@@ -42,5 +42,5 @@ def _exchanged(found: Selected) -> tuple[Estimate, dict[Term, SwapTest] | None]:
     pruned = prune(after, found.data)
     if pruned is after:
         return after, standing
-    exchanged = set(after.fit.model.terms) - set(found.after.fit.model.terms)
-    return (pruned if exchanged <= set(pruned.fit.model.terms) else found.after), None
+    new = set(after.fit.model.terms) - set(found.after.fit.model.terms)
+    return (pruned if new <= set(pruned.fit.model.terms) else found.after), None

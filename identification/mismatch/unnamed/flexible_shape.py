@@ -9,15 +9,12 @@ import numpy as np
 
 from identification.flexible_terms.flexible import WORDS, Flexible, Multiplier
 from identification.mismatch.diagnosis import FlexibleShape, HeldOutRmse, Remainder, Spline
-from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
-from identification.mismatch.name.naming import Named
 from identification.mismatch.unnamed.flexible import Extended
 from identification.mismatch.unnamed.flexible_knots import seen_at
 from identification.mismatch.unnamed.formula import find_formula
-from identification.mismatch.validate.held_out import HeldOut
 from identification.mismatch.value import Value
 from identification.physics.term import Term
 from identification.recording import Floats
@@ -162,21 +159,12 @@ def with_flexible(found: Remainder, extended: Extended | None, data: Data, other
     )
 
 
-def with_held(held: HeldOut, extended: Extended | None) -> HeldOutRmse:
+def with_held(held: HeldOutRmse, extended: Extended | None) -> HeldOutRmse:
     """The error on what was not fitted; flexible terms were chosen without the data that judge them."""
     if extended is None:
-        return HeldOutRmse(held.before, held.after, held.noise, held.what)
+        return held
     what = f"{held.what}; the flexible terms were chosen and fitted without the data that judge them"
-    return HeldOutRmse(held.before, extended.held, held.noise, what)
-
-
-def refitted_names(named: Sequence[Named], final: Estimate) -> list[Named]:
-    """Terms whose names were earned with their values in the final model."""
-    values, at, std = final.fit.values, final.fit.layout, final.fit.std
-    return [
-        replace(n, theta=values[n.term], std=tuple(map(float, std[at.of(n.term)]))) if n.term in values else n
-        for n in named
-    ]
+    return replace(held, after=extended.held, what=what)
 
 
 def shared(terms: Sequence[Term], extended: Extended) -> list[Term]:

@@ -14,10 +14,11 @@ from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.locate.residual_structure_test import ResidualStructure, residual_structure
 from identification.mismatch.locate.stage import Located
 from identification.mismatch.model.data import Data
-from identification.mismatch.name.naming import Check, Named
+from identification.mismatch.name.named_term import Check, restated
+from identification.mismatch.name.naming import Named
 from identification.mismatch.select.forward_selection import STATIC, Selected
 from identification.mismatch.unnamed.flexible import Extended, extend
-from identification.mismatch.unnamed.flexible_shape import refitted_names, shared
+from identification.mismatch.unnamed.flexible_shape import shared
 from identification.mismatch.validate.prediction import predicting, predicts
 from identification.mismatch.validate.stage import Validated
 from identification.physics.term import Term
@@ -98,10 +99,10 @@ def _with_values(
     """Names with their values and intervals in the final model, `after`; of those that share a covariate with a
     flexible term in the model without any."""
     alone = shared([n.term for n in earned], free) if free is not None else []
-    named = refitted_names([n for n in earned if n.term not in alone], after)
+    named = restated([n for n in earned if n.term not in alone], after.fit)
     known = intervals(after.fit, data, after.weights, [n.term for n in named])
     if free is not None and alone:
         bare = refresh(*before.fit.less(*free.dropped), data, None, None)  # what it leaves is noise to it
-        named += refitted_names([n for n in earned if n.term in alone], bare)
+        named += restated([n for n in earned if n.term in alone], bare.fit)
         known |= intervals(bare.fit, data, bare.weights, alone)
     return tuple(sorted(named, key=lambda n: -n.chi2_gain)), known

@@ -8,12 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from identification.mismatch import policy
+from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
-from identification.mismatch.validate.held_out import HeldOut, by_blocks, least_noise, rmse, with_tares
+from identification.mismatch.validate.held_out import by_blocks, least_noise, rmse, with_tares
 
 FOLDS = 4
 """Runs are left out one by one, or in as many groups: each costs two fits."""
@@ -28,7 +29,7 @@ def folds(runs: int) -> list[list[int]]:
     return [fold.tolist() for fold in np.array_split(np.arange(runs), min(runs, FOLDS))]
 
 
-def by_folds(before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise) -> HeldOut:
+def by_folds(before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise) -> HeldOutRmse:
     """Both models fitted without a run and judged on it, every run in turn; of the run itself only its tare is fitted.
 
     By blocks of time where there is one run, or one that is no match for the others. Arguments as of `by_blocks`.
@@ -43,7 +44,7 @@ def by_folds(before: Estimate, after: Estimate, data: Data, measured: Data, quie
     noise = least_noise(after.fit, (after.noise, quiet), data, keep)
     each = "each run" if len(left_out) == R else f"each of {len(left_out)} groups of runs"
     what = f"{each} by a model fitted to the others, its own tare fitted; terms were chosen on all of them"
-    return HeldOut(_together(old), _together(new), noise, what)
+    return HeldOutRmse(_together(old), _together(new), noise, what)
 
 
 def _alike(data: Data) -> bool:

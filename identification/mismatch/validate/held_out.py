@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit, raw
 from identification.mismatch.model.data import Data
@@ -32,14 +33,6 @@ class Error:
 
     before: float
     after: float
-
-
-@dataclass(frozen=True, slots=True)
-class HeldOut:
-    before: float
-    after: float
-    noise: float
-    what: str
 
 
 def blocks(history: History) -> NDArray[np.bool_]:
@@ -99,7 +92,7 @@ def refitted(estimate: Estimate, data: Data, keep: Sequence[NDArray[np.bool_]]) 
     return fit(estimate.fit.model, estimate.fit.theta, part, w)
 
 
-def by_blocks(before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise) -> HeldOut:
+def by_blocks(before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise) -> HeldOutRmse:
     """Parameters of both models without every fourth block, judged on those blocks.
 
     `measured`: the same runs with the periodic disturbances still in them, for the model before. `quiet`: noise of
@@ -111,10 +104,10 @@ def by_blocks(before: Estimate, after: Estimate, data: Data, measured: Data, qui
     noise = least_noise(new, (after.noise, quiet), data, keep)
     held = "levels" if data.histories[0].static else "blocks of time"
     what = f"every fourth of the {held}, {sum(int(b.sum()) for b in back)} rows; terms were chosen on all of them"
-    return HeldOut(rmse(old.model, old.theta, measured, back), rmse(new.model, new.theta, data, back), noise, what)
+    return HeldOutRmse(rmse(old.model, old.theta, measured, back), rmse(new.model, new.theta, data, back), noise, what)
 
 
-def by_runs(before: Estimate, after: Estimate, data: Data, others: Sequence[History], quiet: Noise) -> HeldOut:
+def by_runs(before: Estimate, after: Estimate, data: Data, others: Sequence[History], quiet: Noise) -> HeldOutRmse:
     """Both models on whole runs that were not fitted; of these only the tare is. `quiet` as in `by_blocks`."""
     unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
@@ -124,7 +117,7 @@ def by_runs(before: Estimate, after: Estimate, data: Data, others: Sequence[Hist
         errors.append(rmse(estimate.fit.model, theta, unseen, every))
     noise = least_noise(after.fit, (after.noise, quiet), data, [np.ones(r.size, dtype=bool) for r in data.rows])
     names = ", ".join(h.recording_id for h in others)
-    return HeldOut(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
+    return HeldOutRmse(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.model.data import Data
-from identification.mismatch.name.naming import Check, Named
+from identification.mismatch.name.named_term import Check
+from identification.mismatch.name.naming import Named
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.validate.cross_validation import by_folds
-from identification.mismatch.validate.held_out import HeldOut, by_blocks, by_runs
+from identification.mismatch.validate.held_out import by_blocks, by_runs
 from identification.mismatch.validate.prediction import WithoutEach, without_each, worse_predicted
 from identification.mismatch.validate.train_test_split import TrainTestSplit, train_test_split
 from identification.run_history.history import History
@@ -60,7 +62,7 @@ def score(
     quiet: Noise,
     *,
     flexible: bool,
-) -> HeldOut:
+) -> HeldOutRmse:
     """Errors on the runs held out; where none are on each run in turn; on blocks of time where one run is all there is,
     and where flexible terms were chosen on the rest of these.
 

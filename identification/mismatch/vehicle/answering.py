@@ -8,14 +8,15 @@ import numpy as np
 
 from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
-from identification.mismatch.diagnosis import Curves, Finding, Mismatch, Remainder, RivalFinding
+from identification.mismatch.answer.report_assembly import values_told
+from identification.mismatch.diagnosis import Curves, Mismatch, Remainder
 from identification.mismatch.noise.whiteness import whiteness
 from identification.mismatch.value import Value, Where
 from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.free_force import BACK, Left, Structure, place_of
 from identification.mismatch.vehicle.naming import Named
 from identification.mismatch.vehicle.runs import Prepared
-from identification.mismatch.vehicle.search import Found, State
+from identification.mismatch.vehicle.search import State
 
 
 def baseline_words(data: Prepared) -> str:
@@ -26,15 +27,14 @@ def baseline_words(data: Prepared) -> str:
 
 def values_of(fitted: Fit, data: Prepared) -> dict[str, Value]:
     """Every parameter but the starts of the runs; thrusters' constants in their own unit."""
-    std = np.sqrt(np.diag(fitted.cov))
+    std = fitted.std
     out = {}
     for i, p in enumerate(fitted.layout.base):
         factor, unit = _of_thruster(p.name, data) if p.name.startswith("C[") else (1.0, p.unit)
         out[p.name] = Value(float(fitted.theta[i]) * factor, float(std[i]) * abs(factor), unit)
-    for i, term in enumerate(fitted.layout.model.terms):
-        for k, p in enumerate(fitted.layout.parts[i]):
-            at = fitted.layout.first_of[i] + k
-            out[f"{term.id}.{p.name}"] = Value(float(fitted.theta[at]), float(std[at]), p.unit)
+    for term, values in fitted.values.items():
+        told = values_told(term, values, std[fitted.layout.of(term)].tolist(), data.scale)
+        out |= {f"{term.id}.{name}": value for name, value in told.items()}
     return out
 
 
@@ -43,43 +43,6 @@ def _of_thruster(name: str, data: Prepared) -> tuple[float, str]:
     if thruster.levels is None and thruster.coefficients.size == 1:
         return float(thruster.coefficients[0]), "N/V^2" + (" per kg" if data.scale.per_kg else "")
     return 1.0, "1"
-
-
-def _parameters(fitted: Fit, i: int) -> dict[str, Value]:
-    begin, std = fitted.layout.first_of[i], np.sqrt(np.diag(fitted.cov))
-    return {
-        p.name: Value(float(fitted.theta[begin + k]), float(std[begin + k]), p.unit)
-        for k, p in enumerate(fitted.layout.parts[i])
-    }
-
-
-def findings_of(named: Sequence[Named], state: State, data: Prepared) -> tuple[Finding, ...]:
-    return tuple(_finding(n, state, data) for n in named)
-
-
-def _finding(n: Named, state: State, data: Prepared) -> Finding:
-    index = state.terms.index(n.term)
-    values = state.fit.layout.of(index, state.fit.theta)
-    rivals = tuple(
-        RivalFinding(
-            r.term.id,
-            r.term.form,
-            _parameters(r.fit, len(r.fit.layout.model.terms) - 1),
-            r.bic_loss,
-            r.term.statement(r.fit.layout.of(len(r.fit.layout.model.terms) - 1, r.fit.theta), data.scale),
-        )
-        for r in n.rivals
-    )
-    return Finding(
-        n.term.id,
-        n.term.form,
-        n.term.statement(values, data.scale),
-        _parameters(state.fit, index),
-        n.p_value,
-        n.bic_gain,
-        n.probability,
-        rivals,
-    )
 
 
 def where_of(structure: Structure) -> Where:
@@ -110,17 +73,17 @@ def places_of(left: Left, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
     return tuple(out)
 
 
-def place_of_findings(left: Left, found: Found, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
+def place_of_findings(left: Left, before: State, after: State, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
     """Where no free force shows through slow noise, but named terms do: over the covariate that the first shows in."""
-    own = found.after.terms[0].covariates
+    own = after.terms[0].covariates
     structure = next((s for s in left.structures if s.covariate.quantity in own), None)
     structure = structure or next(iter(left.structures), None)
     if structure is None:
         return ()
-    gain = found.before.fit.chi2 - found.after.fit.chi2
-    count = sum(map(len, found.after.fit.layout.parts))
+    gain = before.fit.chi2 - after.fit.chi2
+    count = sum(map(len, after.fit.values.values()))
     p = max(float(chi2_sf(gain, count)), BACK)
-    where, share = where_of(structure), gain / found.before.fit.chi2
+    where, share = where_of(structure), gain / before.fit.chi2
     says = (
         f"What was found explains {100 * share:.2g} % of the whitened residual together; of a free force over "
         f"{structure.covariate.quantity} most would act at {_place(where, data)}."
@@ -194,10 +157,10 @@ def _per_mass(data: Prepared, fitted: Fit) -> list[str]:
     layout = fitted.layout
     names = [p.name for p in layout.base]
     out = []
-    for i, term in enumerate(layout.model.terms):
+    for term, part in layout.parts.items():
         if term.id != "installation_efficiency" or term.form != "overall" or data.mass is None:
             continue
-        at = layout.first_of[i]
+        at = layout.of(term).start
         eta = float(fitted.theta[at])
         m = float(fitted.theta[names.index("m")]) if "m" in names else data.mass.value
         slope = np.zeros(layout.size)
@@ -205,6 +168,6 @@ def _per_mass(data: Prepared, fitted: Fit) -> list[str]:
         if "m" in names:
             slope[names.index("m")] = -eta / m**2
         std = float(np.sqrt(slope @ np.nan_to_num(fitted.cov) @ slope))
-        name = layout.parts[i][0].name
+        name = part[0].name
         out.append(f"what the motion shows is {name}/m = {eta / m:.4g} +- {std:.2g} 1/{data.scale.mass_unit}")
     return out

@@ -8,13 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from identification.mismatch import policy
+from identification.mismatch.answer.report_assembly import finding_of
 from identification.mismatch.answer.verdict import decided
 from identification.mismatch.diagnosis import Diagnosis, Mismatch, Rmse
+from identification.mismatch.name.named_term import Check, restated
 from identification.mismatch.prepare.preparing import Refusal
+from identification.mismatch.select.stepwise import pruned
 from identification.mismatch.vehicle.answering import (
     baseline_words,
     curves_of,
-    findings_of,
     place_of_findings,
     places_of,
     state_whiteness,
@@ -23,12 +25,12 @@ from identification.mismatch.vehicle.answering import (
     values_of,
 )
 from identification.mismatch.vehicle.experiment import propose
-from identification.mismatch.vehicle.free_force import FreeForce, Left, free_index, judge_left, with_free_force
+from identification.mismatch.vehicle.free_force import Left, free_force_of, judge_left, with_free_force
 from identification.mismatch.vehicle.judging import better_predicting, held_out, only, residuals, rms
 from identification.mismatch.vehicle.naming import Named, name
 from identification.mismatch.vehicle.runs import Prepared, prepare
 from identification.mismatch.vehicle.screening import applicable
-from identification.mismatch.vehicle.search import Found, State, less, pruned, search
+from identification.mismatch.vehicle.search import State, Vehicle, search
 from identification.mismatch.vehicle.setup import VehicleSetup, axis_of, straight_ahead
 from identification.recording import Recording
 
@@ -88,42 +90,43 @@ def _diagnosed(
     without: Sequence[str],
 ) -> Diagnosis:
     candidates, unseen_effects = applicable(data, without)
-    found = search(data, candidates, rng)
-    after, named = name(found.after, data, candidates, rng)
-    found = replace(found, after=after)
+    vehicle = Vehicle(data, candidates)
+    before, found = search(vehicle, rng)
+    after, named = name(found, vehicle)
     left = judge_left(after.fit, after.white, data, rng)
-    held, last = held_out(found.before, after, data, unseen), after
+    held, last = held_out(before, after, data, unseen), after
     if left.p_value < policy.locate.RESIDUAL_FALSE_ALARM:
-        free = pruned(with_free_force(after, data, left.structures[0]), data)
-        held, last = better_predicting(found.before, (held, after), free, data, unseen)
+        free = pruned(vehicle, with_free_force(after, data, left.structures[0]))
+        held, last = better_predicting(before, (held, after), free, data, unseen)
     standing = [_beside(n, last, left) for n in named]
     unearned = [n for n in standing if n.failed_checks]
     unnamed = [n.term for n in unearned if n.term in last.terms]
     if unnamed:
-        held, last = better_predicting(found.before, (held, last), less(last, data, unnamed), data, unseen)
+        held, last = better_predicting(before, (held, last), vehicle.less(last, unnamed), data, unseen)
     earned = [_beside(n, last, left) for n in standing if not n.failed_checks]
     unexplained = unexplained_of(_as_fitted(left, last), unearned, data)
     experiment = propose(after, earned, data) if unexplained is None else None
+    findings = tuple(finding_of(n, data.scale, {}) for n in restated(earned, last.fit))
     n, p = last.fit.residual.size, int(np.sum(last.fit.free))
     channel = _channel(data)
     return Diagnosis(
         recordings=tuple(r.recording_id for r in recordings),
         thruster=recordings[0].thruster,
-        answer=decided(findings_of(earned, last, data), unexplained, experiment),
+        answer=decided(findings, unexplained, experiment),
         baseline_model=baseline_words(data),
-        baseline=values_of(found.before.fit, data),
-        mismatch=_places(found, data, channel, left, rng),
+        baseline=values_of(before.fit, data),
+        mismatch=_places(before, after, data, left, rng),
         model_terms=tuple(term.id for term in last.terms),
         model=values_of(last.fit, data),
         train=Rmse(
-            rms(residuals(found.before.fit, data)),
+            rms(residuals(before.fit, data)),
             rms(residuals(last.fit, data)),
         ),
         heldout=held,
         chi2_per_dof=last.fit.chi2 / max(n - p, 1),
         whiteness_p=state_whiteness(last),
         notes=(*ties(data, last.fit, unseen_effects), *_noise_note(last, data)),
-        curves=curves_of(found.before.fit, last.fit, data),
+        curves=curves_of(before.fit, last.fit, data),
         response=channel,
         unit=data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit,
         force_unit=data.scale.force_unit,
@@ -135,19 +138,17 @@ def _beside(n: Named, last: State, left: Left) -> Named:
     if n.term in last.terms:
         return n
     instead = f"a free force over {left.structures[0].covariate.quantity} takes its place"
-    return replace(n, failed_checks=(*n.failed_checks, instead))
+    return n.asked(Check("stands beside a free force", instead))
 
 
 def _as_fitted(left: Left, last: State) -> Left:
     """The clearest structure with the free force as it was fitted, everything else free beside it."""
-    at = free_index(last.fit.layout)
-    if at is None:
+    term = free_force_of(last.fit.layout)
+    if term is None:
         return left
-    begin, count = last.fit.layout.first_of[at], len(last.fit.layout.parts[at])
-    force = last.fit.theta[begin : begin + count]
-    std = np.sqrt(np.diag(last.fit.cov)[begin : begin + count])
-    term = last.terms[at]
-    if isinstance(term, FreeForce) and term.reference is not None:
+    at = last.fit.layout.of(term)
+    force, std = last.fit.theta[at], last.fit.std[at]
+    if term.reference is not None:
         force, std = np.insert(force, term.reference, 0.0), np.insert(std, term.reference, np.inf)
     if not np.all(std > 0):  # a steady force of another term and this one's mean are one
         return left
@@ -160,12 +161,13 @@ def _channel(data: Prepared) -> str:
     return {"heave": "depth", "yaw": "heading"}.get(data.scale.axis, "position")
 
 
-def _places(found: Found, data: Prepared, channel: str, left: Left, rng: np.random.Generator) -> tuple[Mismatch, ...]:
+def _places(before: State, after: State, data: Prepared, left: Left, rng: np.random.Generator) -> tuple[Mismatch, ...]:
     """Where the baseline fails; nothing when nothing was found and nothing is left."""
-    if not found.after.terms:
+    channel = _channel(data)
+    if not after.terms:
         return places_of(left, data, channel)
-    seen = judge_left(found.before.fit, found.before.white, data, rng)
-    return places_of(seen, data, channel) or place_of_findings(seen, found, data, channel)
+    seen = judge_left(before.fit, before.white, data, rng)
+    return places_of(seen, data, channel) or place_of_findings(seen, before, after, data, channel)
 
 
 def _noise_note(after: State, data: Prepared) -> tuple[str, ...]:

@@ -6,16 +6,23 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.stats import norm
 
 from identification.mismatch import policy
 from identification.mismatch.diagnosis import NextExperiment, PlanStep
+from identification.mismatch.next_experiment.discrimination import needed, power
+from identification.mismatch.next_experiment.predicted_response import (
+    PredictedResponse,
+    inverse_information,
+    known_from_bounds,
+)
 from identification.mismatch.noise.covariance import Noise, Rows, Whitener
+from identification.mismatch.select.stepwise import RivalTerm
 from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.model import on_other_runs, predict
 from identification.mismatch.vehicle.naming import Named
 from identification.mismatch.vehicle.runs import Prepared, Run
 from identification.mismatch.vehicle.search import State
+from identification.physics.vehicle.term import VehicleTerm
 
 BUDGET = 300.0
 """s of a proposed run, as of a thruster's sweep."""
@@ -32,7 +39,7 @@ def propose(state: State, named: Sequence[Named], data: Prepared) -> NextExperim
         return None
     finding, rival = min(pairs, key=lambda pair: pair[1].bic_loss)
     top = data.scale.volts
-    found = [(power(steps, state.fit, rival.fit, data, state.noise), steps) for steps in plans(top)]
+    found = [(decides(steps, state, rival, data), steps) for steps in plans(top)]
     best, steps = max(found, key=lambda one: one[0])
     why = f"separates {finding.term.id} from {rival.term.id}"
     if best < policy.vehicle.VEHICLE_SWEEP_POWER:
@@ -56,24 +63,30 @@ def plans(top: float) -> tuple[tuple[PlanStep, ...], ...]:
     )
 
 
-def power(steps: Sequence[PlanStep], one: Fit, other: Fit, data: Prepared, noise: Noise) -> float:
-    """Probability that a run of these steps decides between two fitted models, at VEHICLE_SWEEP_FALSE_ALARM."""
-    run = _planned(steps, data)
+def decides(steps: Sequence[PlanStep], state: State, rival: RivalTerm[VehicleTerm, Fit], data: Prepared) -> float:
+    """Probability that a run of these steps decides rightly between a model and its rival, the worse of both ways."""
+    one, other = (foreseen(steps, fitted, state.noise, data) for fitted in (state.fit, rival.fit))
+    more, rows, new = rival.fit.theta.size - state.fit.theta.size, state.fit.residual.size, one.value.size
+    return min(
+        power(one, other, needed(rival.bic_loss, more, rows, new)),
+        power(other, one, needed(-rival.bic_loss, -more, rows, new)),
+    )
+
+
+def foreseen(steps: Sequence[PlanStep], fitted: Fit, noise: Noise, data: Prepared) -> PredictedResponse:
+    """What a model says of a run of these steps, from rest, and what the data in hand and its own start leave open."""
+    run, old = _planned(steps, data), fitted.layout
     there = replace(data, runs=(run,))
-    predicted = []
-    for fitted in (one, other):
-        layout, theta = on_other_runs(fitted.layout, there, fitted.theta)
-        theta[layout.starts :] = 0.0
-        predicted.append(predict(layout, theta, there, 0, None, slopes=False).response)
-    apart = predicted[0] - predicted[1]
-    ones = np.ones((run.time.size, 1)) if run.quantity == "position" else np.zeros((run.time.size, 0))
+    layout, theta = on_other_runs(old, there, fitted.theta)
+    theta[layout.starts :] = 0.0
+    found = predict(layout, theta, there, 0, None, slopes=True)
     white = Whitener(noise, run.rows, np.zeros(run.time.size))
-    left = white.whiten(apart)
-    if ones.shape[1]:
-        base = white.whiten(ones)
-        left = left - base @ np.linalg.lstsq(base, left, rcond=None)[0]
-    d = float(np.linalg.norm(left))
-    return float(norm.sf(norm.isf(policy.vehicle.VEHICLE_SWEEP_FALSE_ALARM) - d))
+    known, free = known_from_bounds(*old.bounds()), fitted.free
+    inside = np.zeros((old.size, old.size))
+    inside[np.ix_(free, free)] = inverse_information(fitted.jacobian[:, free], known[free])
+    cov = np.diag([0.0] * layout.starts + [data.scale.speed**2, data.scale.length**2])
+    cov[: old.starts, : old.starts] = inside[: old.starts, : old.starts]
+    return PredictedResponse(white.whiten(found.response), white.whiten(found.slopes), cov)
 
 
 def _planned(steps: Sequence[PlanStep], data: Prepared) -> Run:

@@ -18,6 +18,7 @@ from identification.mismatch.noise.variances import fit_noise
 from identification.mismatch.vehicle.model import Layout, Prediction, known, predict
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared
+from identification.physics.vehicle.term import VehicleTerm
 from identification.recording import Floats
 
 Mask = NDArray[np.bool_]
@@ -44,6 +45,16 @@ class Fit:
     def chi2(self) -> float:
         """Of whitened measurements and of what was known beforehand."""
         return float(self.residual @ self.residual)
+
+    @property
+    def values(self) -> dict[VehicleTerm, tuple[float, ...]]:
+        """The values of each term."""
+        return self.layout.values(self.theta)
+
+    @property
+    def std(self) -> Floats:
+        """(p,) standard errors, NaN where they are not determined."""
+        return np.sqrt(np.diag(self.cov))
 
 
 def weights(noise: Noise, data: Prepared, keep: Sequence[Mask] | None = None) -> Weights:
@@ -148,9 +159,9 @@ def _cov(H: Floats, free: Mask) -> Floats:
     return out
 
 
-def at_bound(fitted: Fit, i: int) -> bool:
-    """Whether the parameters of term i end at what is physically possible."""
-    return impossible(fitted.layout.parts[i], fitted.layout.of(i, fitted.theta))
+def at_bound(fitted: Fit, term: VehicleTerm) -> bool:
+    """Whether the parameters of a term end at what is physically possible."""
+    return impossible(fitted.layout.parts[term], fitted.values[term])
 
 
 def noise_of(fitted: Fit, data: Prepared, extra: Sequence[Floats] | None = None) -> Noise:

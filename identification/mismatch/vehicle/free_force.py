@@ -251,22 +251,18 @@ def with_free_force(state: State, data: Prepared, structure: Structure) -> State
     return refreshed(fit(layout, theta, data, state.white, state.fit.motions), data, ())
 
 
-def free_index(layout: Layout) -> int | None:
-    """Which term is a free force."""
-    return next((i for i, term in enumerate(layout.model.terms) if isinstance(term, FreeForce)), None)
+def free_force_of(layout: Layout) -> FreeForce | None:
+    """The term that is a free force."""
+    return next((term for term in layout.parts if isinstance(term, FreeForce)), None)
 
 
-def carried(layout: Layout, index: int, bare: Fit, unseen: Prepared) -> Layout:
+def carried(layout: Layout, term: FreeForce, bare: Fit, unseen: Prepared) -> Layout:
     """The same model for other runs, whose covariate is taken from `bare`: their motion without the free force."""
-    terms = list(layout.model.terms)
-    term = terms[index]
-    if not isinstance(term, FreeForce):
-        raise TypeError(f"term {index} is {term.id}, not a free force")
     there = next((c for c in covariates(bare, unseen) if c.quantity == term.covariate.quantity), None)
     known = there is not None and there.quantity not in LOCAL
-    terms[index] = (
+    moved = (
         over(replace(there, knots=term.covariate.knots), unseen, term.reference)
         if known and there
         else replace(term, bumps={})
     )
-    return layout_of(VehicleModel(tuple(terms)), unseen)
+    return layout_of(VehicleModel(tuple(moved if t is term else t for t in layout.parts)), unseen)

@@ -13,7 +13,7 @@ from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.validate.cross_validation import folds
 from identification.mismatch.validate.held_out import fitted_blocks
 from identification.mismatch.vehicle.fitting import Fit, fit, weights
-from identification.mismatch.vehicle.free_force import carried, free_index
+from identification.mismatch.vehicle.free_force import carried, free_force_of
 from identification.mismatch.vehicle.model import Layout, on_other_runs, without_term
 from identification.mismatch.vehicle.runs import Prepared, Run
 from identification.mismatch.vehicle.search import State
@@ -95,12 +95,12 @@ def _refitted(state: State, data: Prepared, kept: Prepared) -> Fit:
 
 def _elsewhere(fitted: Fit, data: Prepared, unseen: Prepared, noise: float) -> list[Floats]:
     """Residual in runs that were not fitted, of `noise` at each sample; a free force is laid over their own motion."""
-    at = free_index(fitted.layout)
-    if at is None:
+    free = free_force_of(fitted.layout)
+    if free is None:
         return residuals(_begun(fitted.layout, fitted.theta, data, unseen, noise), unseen)
-    layout, theta = without_term(fitted.layout, data, fitted.theta, at)
+    layout, theta = without_term(fitted.layout, data, fitted.theta, free)
     bare = _begun(layout, theta, data, unseen, noise)
-    return residuals(_begun(carried(fitted.layout, at, bare, unseen), fitted.theta, data, unseen, noise), unseen)
+    return residuals(_begun(carried(fitted.layout, free, bare, unseen), fitted.theta, data, unseen, noise), unseen)
 
 
 def _begun(layout: Layout, theta: Floats, data: Prepared, unseen: Prepared, noise: float) -> Fit:
@@ -113,10 +113,9 @@ def _begun(layout: Layout, theta: Floats, data: Prepared, unseen: Prepared, nois
     fixed = np.ones(new.size)
     fixed[new.starts :] = 0.0
     known = {run.moment.ballast for run in data.runs}
-    for i, term in enumerate(new.model.terms):
+    for term in new.parts:
         if term.form == "by_ballast":
-            for k, one in enumerate(unseen.scale.ballasts):
-                fixed[new.first_of[i] + k] = float(one in known)
+            fixed[new.of(term)] = [one in known for one in unseen.scale.ballasts]
     return fit(new, start, unseen, weights(Noise(noise**2, 0.0), unseen), fixed=fixed)
 
 

@@ -7,7 +7,7 @@ the position at its start, which are nuisance. Where neither mass nor thrust is 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -48,34 +48,33 @@ class Layout:
 
     model: VehicleModel
     base: tuple[Parameter, ...]
-    parts: tuple[tuple[Parameter, ...], ...]
+    parts: Mapping[VehicleTerm, tuple[Parameter, ...]]
     """Parameters of each term."""
     runs: int
     fastest: float
     """Speed beyond which no run can have begun: a wild start would pass for a shift of the place."""
 
-    @property
-    def first_of(self) -> tuple[int, ...]:
-        """Index of the first parameter of each term."""
-        ends = np.cumsum([len(self.base), *map(len, self.parts)])
-        return tuple(int(e) for e in ends[:-1])
+    def of(self, term: VehicleTerm) -> slice:
+        """Where the parameters of a term stand."""
+        before = list(self.parts).index(term)
+        begin = len(self.base) + sum(map(len, list(self.parts.values())[:before]))
+        return slice(begin, begin + len(self.parts[term]))
+
+    def values(self, theta: Floats) -> dict[VehicleTerm, tuple[float, ...]]:
+        """The values of each term."""
+        return {term: tuple(theta[self.of(term)].tolist()) for term in self.parts}
 
     @property
     def starts(self) -> int:
         """Index of the first run's velocity."""
-        return len(self.base) + sum(map(len, self.parts))
+        return len(self.base) + sum(map(len, self.parts.values()))
 
     @property
     def size(self) -> int:
         return self.starts + 2 * self.runs
 
-    def of(self, i: int, theta: Floats) -> tuple[float, ...]:
-        """Values of term i."""
-        begin = self.first_of[i]
-        return tuple(float(v) for v in theta[begin : begin + len(self.parts[i])])
-
     def bounds(self) -> tuple[Floats, Floats]:
-        inside = [*self.base, *(p for part in self.parts for p in part)]
+        inside = [*self.base, *(p for part in self.parts.values() for p in part)]
         low = [p.low for p in inside] + [-self.fastest, -np.inf] * self.runs
         high = [p.high for p in inside] + [self.fastest, np.inf] * self.runs
         return np.array(low), np.array(high)
@@ -91,7 +90,7 @@ def layout_of(model: VehicleModel, data: Prepared) -> Layout:
     for thruster, at in zip(data.installation.thrusters, _coefficients(data), strict=True):
         if any(data.installation.cov[i, i] > 0 for i in at):
             base.append(Parameter(f"C[{thruster.name}]", "1", 0.0, 1e3 if np.any(values[list(at)] != 0) else 1.0))
-    parts = tuple(term.parameters(scale) for term in model.terms)
+    parts = {term: term.parameters(scale) for term in model.terms}
     return Layout(model, tuple(base), parts, len(data.runs), FASTEST * scale.speed)
 
 
@@ -146,8 +145,8 @@ def begin(layout: Layout, data: Prepared) -> Floats:
     guess = {"k2": 0.5 * scale.force / scale.speed**2, "m": _typical_mass(data)}
     for i, p in enumerate(layout.base):
         theta[i] = guess.get(p.name, 1.0)
-    for i, part in enumerate(layout.parts):
-        theta[layout.first_of[i] : layout.first_of[i] + len(part)] = [p.neutral or 0.0 for p in part]
+    for term, part in layout.parts.items():
+        theta[layout.of(term)] = [p.neutral or 0.0 for p in part]
     for j, run in enumerate(data.runs):
         n = min(5, run.time.size)
         slope, level = np.polyfit(run.time[:n] - run.start, run.response[:n], 1)
@@ -159,14 +158,14 @@ def push_of(layout: Layout, theta: Floats, run: Run) -> Floats:
     """(g,) N on the axis, the mean over each step."""
     volts = run.moment.volts
     ordered = layout.model.ordered()
-    values = {id(term): layout.of(i, theta) for i, term in enumerate(layout.model.terms)}
+    values = layout.values(theta)
     for term in ordered:
         if term.stage == "command":
-            volts = term.on_volts(volts, run.moment, values[id(term)])
+            volts = term.on_volts(volts, run.moment, values[term])
     thrust = _thrust(layout, theta, run, volts)
     for term in ordered:
         if term.stage == "thrust":
-            thrust = term.on_thrust(thrust, run.moment, values[id(term)])
+            thrust = term.on_thrust(thrust, run.moment, values[term])
     whole = np.tensordot(run.arms, thrust, axes=1)
     return np.asarray(whole @ np.full(whole.shape[1], 1 / whole.shape[1]))
 
@@ -186,9 +185,9 @@ def body_of(layout: Layout, theta: Floats, run: Run, data: Prepared) -> Body:
     names = {p.name: i for i, p in enumerate(layout.base)}
     mass = 1.0 if data.scale.per_kg else theta[names["m"]] if "m" in names else data.mass.value if data.mass else 1.0
     body = Body(mass=float(mass), quadratic=float(theta[names["k2"]]))
-    for i, term in enumerate(layout.model.terms):
+    for term, values in layout.values(theta).items():
         if term.stage == "body":
-            body = term.on_body(body, run.moment, layout.of(i, theta))
+            body = term.on_body(body, run.moment, values)
     return body
 
 
@@ -256,8 +255,7 @@ def _pushes(layout: Layout, i: int) -> bool:
     """Whether parameter i enters through the thrusters."""
     if i < len(layout.base):
         return layout.base[i].name.startswith("C[")
-    at = max(k for k, first in enumerate(layout.first_of) if first <= i and layout.parts[k])
-    return layout.model.terms[at].stage != "body"
+    return next(term for term in layout.parts if layout.of(term).stop > i).stage != "body"
 
 
 def with_term(
@@ -268,11 +266,9 @@ def with_term(
     return new, np.concatenate([theta[: layout.starts], values, theta[layout.starts :]])
 
 
-def without_term(layout: Layout, data: Prepared, theta: Floats, index: int) -> tuple[Layout, Floats]:
-    terms = layout.model.terms
-    new = layout_of(VehicleModel((*terms[:index], *terms[index + 1 :])), data)
-    begin_at, count = layout.first_of[index], len(layout.parts[index])
-    return new, np.delete(theta, range(begin_at, begin_at + count))
+def without_term(layout: Layout, data: Prepared, theta: Floats, term: VehicleTerm) -> tuple[Layout, Floats]:
+    new = layout_of(VehicleModel(tuple(t for t in layout.model.terms if t != term)), data)
+    return new, np.delete(theta, layout.of(term))
 
 
 def on_other_runs(layout: Layout, data: Prepared, theta: Floats) -> tuple[Layout, Floats]:

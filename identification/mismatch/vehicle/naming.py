@@ -2,138 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
-from identification.mismatch.model.whitening import Weights
-from identification.mismatch.name.naming import difference, probability_beside
+from identification.mismatch.name.named_term import Check, NamedTerm, named_term, part_check
 from identification.mismatch.select.family_wise import orthogonal_basis
+from identification.mismatch.select.stepwise import exchanged, stands
 from identification.mismatch.vehicle.fitting import Fit, at_bound
 from identification.mismatch.vehicle.model import added_forces, respond
 from identification.mismatch.vehicle.motion import Motion
 from identification.mismatch.vehicle.runs import Prepared
-from identification.mismatch.vehicle.screening import screen, trials, whitened
-from identification.mismatch.vehicle.search import FITTED, State, bic, dropped, fitted_with
+from identification.mismatch.vehicle.screening import effect_of, whitened
+from identification.mismatch.vehicle.search import State, Vehicle
 from identification.physics.vehicle.term import VehicleTerm
 from identification.recording import Floats
 
-SWAPS = 2
-"""Rounds in which a term gives way to a better rival: more would go in circles."""
+Named = NamedTerm[VehicleTerm, Fit]
 
 
-@dataclass(frozen=True, eq=False)
-class Rival:
-    """Another term in the place of one, everything fitted anew."""
-
-    term: VehicleTerm
-    fit: Fit
-    bic_loss: float
-
-
-@dataclass(frozen=True, eq=False)
-class Named:
-    term: VehicleTerm
-    chi2_gain: float
-    """Chi-square that is lost without it."""
-    p_value: float
-    bic_gain: float
-    rivals: tuple[Rival, ...]
-    probability: float
-    failed_checks: tuple[str, ...]
-    """Why the name is not earned; empty when it is."""
-
-
-def name(
-    state: State, data: Prepared, candidates: Sequence[VehicleTerm], rng: np.random.Generator
-) -> tuple[State, tuple[Named, ...]]:
+def name(state: State, vehicle: Vehicle) -> tuple[State, tuple[Named, ...]]:
     """Each term against its rivals; another that does better takes the place first."""
-    named = _all_named(state, data, candidates, rng)
-    for _ in range(SWAPS):
-        better = [r for n in named for r in n.rivals if r.bic_loss < -policy.select.RIVAL_BETTER_BIC]
-        if not better:
-            break
-        state = State(min(better, key=lambda r: r.bic_loss).fit, state.noise, state.white)
-        named = _all_named(state, data, candidates, rng)
-    return state, named
+    state, known = exchanged(vehicle, state)
+    standing = known or {term: stands(vehicle, state, term) for term in state.terms}
+    return state, tuple(
+        named_term(term, state.fit, stand, tuple(checks(state, vehicle.data, term)), effect_of)
+        for term, stand in standing.items()
+    )
 
 
-def _all_named(
-    state: State, data: Prepared, candidates: Sequence[VehicleTerm], rng: np.random.Generator
-) -> tuple[Named, ...]:
-    return tuple(_named(state, data, candidates, i, rng) for i in range(len(state.terms)))
-
-
-def _named(state: State, data: Prepared, candidates: Sequence[VehicleTerm], i: int, rng: np.random.Generator) -> Named:
-    term = state.terms[i]
-    less = dropped(state, data, i)
-    gain = less.chi2 - state.fit.chi2
-    count = len(state.fit.layout.parts[i])
-    rivals = _rivals(state, less, data, candidates, term, rng)
-    near = tuple(r for r in rivals if r.bic_loss < policy.select.RIVAL_STATED_BIC)
-    failed = ["its parameters end at what is physically possible"] if at_bound(state.fit, i) else []
-    failed += inconstancies(state.fit, state.white, data, i)
-    kept = tuple(r for r in near if _key(r.term) != _key(term) or r.bic_loss < -policy.select.RIVAL_BETTER_BIC)
-    p = max(float(chi2_sf(gain, count)), 1e-300)
-    probability = probability_beside([r.bic_loss for r in near])
-    return Named(term, gain, p, bic(less) - state.bic(), kept, probability, tuple(failed))
-
-
-def _rivals(
-    state: State,
-    less: Fit,
-    data: Prepared,
-    candidates: Sequence[VehicleTerm],
-    term: VehicleTerm,
-    rng: np.random.Generator,
-) -> list[Rival]:
-    """Every other term that could take most of what this one explains."""
-    there = [t for t in state.terms if t is not term]
-    others = [t for t in candidates if t is not term and all(_key(t) != _key(u) for u in there)]
-    ranked, _ = screen(less, state.white, trials(less, data, others), rng)
-    out = []
-    for screened in ranked[: FITTED + 1]:
-        if (
-            less.chi2 - screened.gain
-            > state.fit.chi2 + 0.5 * (less.chi2 - state.fit.chi2) + policy.select.RIVAL_STATED_BIC
-        ):
-            continue
-        other = fitted_with(less, state.white, data, screened)
-        if at_bound(other, len(other.layout.parts) - 1):
-            continue
-        out.append(Rival(screened.trial.term, other, bic(other) - state.bic()))
-    return sorted(out, key=lambda r: r.bic_loss)
-
-
-def _key(term: VehicleTerm) -> tuple[str, str]:
-    return term.id, getattr(term, "name", "")
-
-
-def inconstancies(fitted: Fit, white: Weights, data: Prepared, term: int) -> list[str]:
-    """Parts of the recordings in which a term's amount differs by more than chance and VEHICLE_PART_DIFFERENCE."""
-    layout, i = fitted.layout, fitted.layout.first_of[term]
+def checks(state: State, data: Prepared, term: VehicleTerm) -> Iterator[Check]:
+    """Whether its values are possible, and a parameter the same in parts of the recordings."""
+    fitted, ended = state.fit, at_bound(state.fit, term)
+    yield Check("its values are possible", "its parameters end at what is physically possible" if ended else "")
+    layout, i = fitted.layout, fitted.layout.of(term).start
     amount = fitted.theta[i] - (layout.parts[term][0].neutral or 0.0)
     if len(layout.parts[term]) > 1 or amount == 0 or not fitted.free[i]:
-        return []
+        return
     base = orthogonal_basis(fitted.jacobian)
     effects = [
         amount * added_forces(layout, fitted.theta, data, j, fitted.motions[j])[:, i] for j in range(len(data.runs))
     ]
-    out = []
     splits = _splits(fitted.motions, data)
-    for name, masks in splits.items():
+    for what, masks in splits.items():
         columns = [
             respond(layout, fitted.theta, data, j, fitted.motions[j], (effects[j] * masks[j])[:, None])[:, :-2]
             for j in range(len(data.runs))
         ]
-        column = whitened(white, columns, fitted.residual.size)[:, 0]
-        apart = difference(column, base, fitted.residual, policy.vehicle.VEHICLE_PART_DIFFERENCE, len(splits))
-        if apart is not None:
-            out.append(f"its parameter is not the same {name} ({100 * apart:.0f} % apart)")
-    return out
+        column = whitened(state.white, columns, fitted.residual.size)[:, 0]
+        yield part_check(what, column, base, fitted.residual, policy.vehicle.VEHICLE_PART_DIFFERENCE, len(splits))
 
 
 def _splits(motions: Sequence[Motion], data: Prepared) -> dict[str, list[Floats]]:

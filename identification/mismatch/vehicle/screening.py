@@ -86,30 +86,44 @@ class Screened:
     """A trial against the residual."""
 
     trial: Trial
+    span: Floats
+    """(N + q, k) orthonormal: what it changes that the model's own parameters cannot."""
     gain: float
     """Chi-square that it would explain, to first order."""
     p_value: float
 
 
-def screen(
-    fitted: Fit, white: Weights, found: Sequence[Trial], rng: np.random.Generator
-) -> tuple[list[Screened], float]:
-    """Best trial of each term, best first; and the p-value that the best must pass (SCREENING_FALSE_ALARM)."""
+def explained(fitted: Fit, white: Weights, found: Sequence[Trial]) -> list[Screened]:
+    """What each trial would explain of the residual."""
     base, residual = orthogonal_basis(fitted.jacobian), fitted.residual
-    spans, judged = [], []
+    out = []
     for trial in found:
         Q = beyond(whitened(white, trial.columns, residual.size), base)
         if Q.shape[1]:
             gain = float(np.sum((Q.T @ residual) ** 2))
-            spans.append(Q)
-            judged.append(Screened(trial, gain, float(chi2_sf(gain, Q.shape[1]))))
+            out.append(Screened(trial, Q, gain, float(chi2_sf(gain, Q.shape[1]))))
+    return out
+
+
+def needed(judged: Sequence[Screened], residual: Floats, rng: np.random.Generator) -> float:
+    """The p-value that the best must pass (SCREENING_FALSE_ALARM)."""
     if not judged:
-        return [], 0.0
-    needed = family_threshold([s.p_value for s in judged], spans, residual, rng, policy.select.SCREENING_FALSE_ALARM)
-    best: dict[tuple[str, str, str], Screened] = {}
+        return 0.0
+    p_values, spans = [s.p_value for s in judged], [s.span for s in judged]
+    return family_threshold(p_values, spans, residual, rng, policy.select.SCREENING_FALSE_ALARM)
+
+
+def best_of_each(judged: Sequence[Screened]) -> list[Screened]:
+    """Best trial of each term, best first."""
+    best: dict[VehicleTerm, Screened] = {}
     for one in sorted(judged, key=lambda s: -s.gain):
-        best.setdefault((one.trial.term.id, one.trial.term.form, getattr(one.trial.term, "name", "")), one)
-    return sorted(best.values(), key=lambda s: (s.p_value, -s.gain)), needed
+        best.setdefault(one.trial.term, one)
+    return sorted(best.values(), key=lambda s: (s.p_value, -s.gain))
+
+
+def effect_of(term: VehicleTerm) -> str:
+    """Of which all forms are one effect: its id, and an efficiency's own name."""
+    return f"{term.id} {getattr(term, 'name', '')}"
 
 
 def whitened(white: Weights, columns: Sequence[Floats], rows: int) -> Floats:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,11 +11,12 @@ from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
-from identification.mismatch.select.forward_selection import least_earned, preferred
+from identification.mismatch.select.rounds import Candidate
+from identification.mismatch.select.stepwise import RivalTerm, forward
 from identification.mismatch.vehicle.fitting import Fit, at_bound, fit, noise_of, weights
 from identification.mismatch.vehicle.model import Layout, VehicleModel, begin, layout_of, with_term, without_term
 from identification.mismatch.vehicle.runs import Prepared
-from identification.mismatch.vehicle.screening import Screened, screen, trials
+from identification.mismatch.vehicle.screening import Screened, best_of_each, effect_of, explained, needed, trials
 from identification.physics.vehicle.term import VehicleTerm
 from identification.recording import Floats
 
@@ -25,6 +26,9 @@ LIGHT = 0.1
 """Of the mass that a first guess takes."""
 QUICK = 10
 """Steps of a candidate's fit."""
+
+Judged = tuple[list[Screened], float]
+"""Best trial of each term, best first, and the p-value that the best must pass."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,45 +43,91 @@ class State:
     def terms(self) -> tuple[VehicleTerm, ...]:
         return self.fit.layout.model.terms
 
-    def bic(self) -> float:
-        """Chi-square and what its parameters cost; to be compared under one noise."""
-        return bic(self.fit)
-
-
-def bic(fitted: Fit) -> float:
-    """Chi-square plus ln N for each parameter of a term."""
-    number = sum(map(len, fitted.layout.parts))
-    return fitted.chi2 + number * float(np.log(fitted.residual.size))
-
 
 @dataclass(frozen=True, eq=False)
-class Found:
-    before: State
-    after: State
-    candidates: tuple[VehicleTerm, ...]
+class Vehicle:
+    """Runs of a vehicle, and terms that may explain them: a `System` of stepwise selection."""
+
+    data: Prepared
+    terms: tuple[VehicleTerm, ...]
+
+    def beside(self, terms: Iterable[VehicleTerm]) -> list[VehicleTerm]:
+        """Candidates that are not among these, nor another form of one."""
+        there = set(map(effect_of, terms))
+        return [term for term in self.terms if effect_of(term) not in there]
+
+    def judged(self, state: State, rng: np.random.Generator) -> Judged:
+        """Trials against what is left, and the p-value that the best must pass."""
+        found = explained(state.fit, state.white, trials(state.fit, self.data, self.beside(state.terms)))
+        return best_of_each(found), needed(found, state.fit.residual, rng)
+
+    def additions(self, state: State, judged: Judged) -> list[tuple[Candidate[VehicleTerm], Fit]]:
+        """The most promising, fitted: those that pass the family-wise threshold and make the BIC better."""
+        ranked, threshold = judged
+        promise = policy.vehicle.VEHICLE_CANDIDATE_GAIN * max((s.gain for s in ranked), default=0.0)
+        out = []
+        for screened in [s for s in ranked if s.gain >= promise][:FITTED]:
+            term, new = screened.trial.term, self._with(state.fit, state.white, screened)
+            gain, size = state.fit.chi2 - new.chi2, len(new.values[term])
+            cost = size * float(np.log(new.residual.size))
+            if gain > cost and chi2_sf(gain, size) < threshold:
+                out.append((Candidate(term, gain, cost, at_bound(new, term)), new))
+        return out
+
+    def _with(self, now: Fit, white: Weights, screened: Screened) -> Fit:
+        """The model with a screened term, everything fitted anew from the amount that screened best."""
+        layout, theta = with_term(now.layout, self.data, now.theta, screened.trial.term, screened.trial.values)
+        return fit(layout, theta, self.data, white, now.motions, steps=QUICK)
+
+    def enlarged(self, _: State, better: Fit) -> State:
+        """The model under the noise of its own residual."""
+        return refreshed(better, self.data, self.beside(better.values))
+
+    def unhidden(self, _state: State, _judged: Judged) -> None:
+        """Nothing hides: noise is estimated beside all that the catalogue could change."""
+
+    def without(self, state: State, term: VehicleTerm) -> Fit:
+        layout, theta = without_term(state.fit.layout, self.data, state.fit.theta, term)
+        return fit(layout, theta, self.data, state.white, state.fit.motions, steps=QUICK)
+
+    def less(self, state: State, terms: Sequence[VehicleTerm]) -> State:
+        """The model without these."""
+        for term in terms:
+            state = self.replaced(state, self.without(state, term))
+        return state
+
+    def replaced(self, state: State, other: Fit) -> State:
+        """Under the same noise: chi-squares can be compared."""
+        return State(other, state.noise, state.white)
+
+    def rivals(self, state: State, term: VehicleTerm, less: Fit) -> list[RivalTerm[VehicleTerm, Fit]]:
+        """Every other term that could take most of what this one explains."""
+        others = [t for t in self.beside(less.values) if t != term]
+        gain = less.chi2 - state.fit.chi2
+        out = []
+        for screened in best_of_each(explained(less, state.white, trials(less, self.data, others)))[: FITTED + 1]:
+            if screened.gain < 0.5 * gain - policy.select.RIVAL_STATED_BIC:
+                continue
+            other, new = screened.trial.term, self._with(less, state.white, screened)
+            if not at_bound(new, other):
+                more, loss = len(new.values[other]) - len(state.fit.values[term]), new.chi2 - state.fit.chi2
+                bic_loss = loss + more * float(np.log(new.residual.size))
+                out.append(RivalTerm(other, new, bic_loss, loss + 2 * more))
+        return sorted(out, key=lambda rival: rival.bic_loss)
+
+    def impossible(self, state: State, term: VehicleTerm) -> bool:
+        return at_bound(state.fit, term)
+
+    def merged(self, _: State, best: tuple[float, Fit] | None) -> tuple[float, Fit] | None:
+        """One term in the place of two is not tried: each trial is a simulation for every slope."""
+        return best
 
 
-def search(data: Prepared, candidates: Sequence[VehicleTerm], rng: np.random.Generator) -> Found:
+def search(vehicle: Vehicle, rng: np.random.Generator) -> tuple[State, State]:
     """The baseline, and the model that nothing in the catalogue improves any more."""
-    state = _baseline(data, candidates)
-    first, seen = state, {frozenset(state.terms)}
-    while len(state.terms) < policy.vehicle.VEHICLE_MODEL_TERMS:
-        left = [term for term in candidates if _new(term, state.terms)]
-        best = _best(state, data, left, rng)
-        if best is None:
-            break
-        larger = pruned(refreshed(best, data, left), data)
-        if frozenset(larger.terms) in seen:
-            break
-        state = larger
-        seen.add(frozenset(state.terms))
-    return Found(_under(first, state, data), state, tuple(candidates))
-
-
-def _new(term: VehicleTerm, there: Sequence[VehicleTerm]) -> bool:
-    """Not in the model, nor another form of what is; efficiencies of other groups of thrusters are new."""
-    name = getattr(term, "name", "")
-    return all(t.id != term.id or getattr(t, "name", "") != name for t in there)
+    first = _baseline(vehicle.data, vehicle.terms)
+    last, _ = forward(vehicle, first, policy.vehicle.VEHICLE_MODEL_TERMS, rng)
+    return _under(first, last, vehicle.data), last
 
 
 def _baseline(data: Prepared, candidates: Sequence[VehicleTerm]) -> State:
@@ -85,14 +135,12 @@ def _baseline(data: Prepared, candidates: Sequence[VehicleTerm]) -> State:
     spread = np.concatenate([np.diff(run.response, 2) for run in data.runs])
     white = float(np.median(np.abs(spread)) / 0.6745) ** 2 / 6 or 1e-6 * float(np.var(data.runs[0].response))
     noise = Noise(white, 0.0)
-    rough = min((fit(layout, start, data, weights(noise, data)) for start in _starts(layout, data)), key=_chi2)
+    rough = min(
+        (fit(layout, start, data, weights(noise, data)) for start in _starts(layout, data)), key=lambda each: each.chi2
+    )
     noise = noise_of(rough, data, _columns(rough, data, candidates))
     white_of = weights(noise, data)
     return State(fit(layout, rough.theta, data, white_of, rough.motions), noise, white_of)
-
-
-def _chi2(fitted: Fit) -> float:
-    return fitted.chi2
 
 
 def _starts(layout: Layout, data: Prepared) -> list[Floats]:
@@ -115,66 +163,11 @@ def _columns(fitted: Fit, data: Prepared, terms: Sequence[VehicleTerm]) -> list[
     ]
 
 
-def _best(state: State, data: Prepared, terms: Sequence[VehicleTerm], rng: np.random.Generator) -> Fit | None:
-    """The best model with one term more, when it passes the family-wise threshold and its BIC is better."""
-    ranked, needed = screen(state.fit, state.white, trials(state.fit, data, terms), rng)
-    found = [fitted_with(state.fit, state.white, data, s) for s in promising(ranked)]
-    good = [one for one in found if chi2_sf(state.fit.chi2 - one.chi2, _more(state, one)) < needed]
-    good = [one for one in good if bic(one) < state.bic()]
-    if not good:
-        return None
-    at = len(state.terms)
-    gains, pressed = [state.bic() - bic(one) for one in good], [at_bound(one, at) for one in good]
-    return good[preferred(gains, [_more(state, one) for one in good], pressed)]
-
-
-def promising(ranked: Sequence[Screened]) -> list[Screened]:
-    """Those that promise most."""
-    most = max((s.gain for s in ranked), default=0.0)
-    return [s for s in ranked if s.gain >= policy.vehicle.VEHICLE_CANDIDATE_GAIN * most][:FITTED]
-
-
-def _more(state: State, other: Fit) -> int:
-    return max(other.layout.starts - state.fit.layout.starts, 1)
-
-
-def fitted_with(now: Fit, white: Weights, data: Prepared, screened: Screened, steps: int = QUICK) -> Fit:
-    """The model with a screened term, everything fitted anew from the amount that screened best."""
-    term, values = screened.trial.term, screened.trial.values
-    layout, theta = with_term(now.layout, data, now.theta, term, values)
-    return fit(layout, theta, data, white, now.motions, steps=steps)
-
-
 def refreshed(better: Fit, data: Prepared, left: Sequence[VehicleTerm]) -> State:
-    """The same model under the noise of its own residual."""
-    terms = [term for term in left if _new(term, better.layout.model.terms)]
-    noise = noise_of(better, data, _columns(better, data, terms))
+    """The same model under the noise of its own residual, which must not hold what may still be added, `left`."""
+    noise = noise_of(better, data, _columns(better, data, left))
     white = weights(noise, data)
     return State(fit(better.layout, better.theta, data, white, better.motions), noise, white)
-
-
-def pruned(state: State, data: Prepared) -> State:
-    """Without terms that no longer earn their place, worst first."""
-    while state.terms:
-        less = [dropped(state, data, i) for i in range(len(state.terms))]
-        worst = least_earned([one.chi2 - state.fit.chi2 for one in less], [*map(len, state.fit.layout.parts)])
-        if worst is None:
-            return state
-        state = State(less[worst], state.noise, state.white)
-    return state
-
-
-def less(state: State, data: Prepared, terms: Sequence[VehicleTerm]) -> State:
-    """The model without these, everything else fitted anew."""
-    for term in terms:
-        state = State(dropped(state, data, state.terms.index(term)), state.noise, state.white)
-    return state
-
-
-def dropped(state: State, data: Prepared, i: int, steps: int = QUICK) -> Fit:
-    """Everything but term i, fitted anew."""
-    layout, theta = without_term(state.fit.layout, data, state.fit.theta, i)
-    return fit(layout, theta, data, state.white, state.fit.motions, steps=steps)
 
 
 def _under(first: State, last: State, data: Prepared) -> State:

@@ -49,8 +49,7 @@ def demo(axis: str = "surge", turned: float = 1.0) -> Prepared:
 def responses(term: VehicleTerm, values: tuple[float, ...], data: Prepared) -> np.ndarray:
     layout = layout_of(VehicleModel((term,)), data)
     theta = begin(layout, data)
-    first = layout.first_of[0]
-    theta[0], theta[first : first + len(values)], theta[layout.starts :] = 40.0, values, 0.0
+    theta[0], theta[layout.of(term)], theta[layout.starts :] = 40.0, values, 0.0
     return np.concatenate([predict(layout, theta, data, j, None, slopes=False).response for j in range(len(data.runs))])
 
 
@@ -88,7 +87,7 @@ def test_slopes_are_those_of_differences(term: VehicleTerm) -> None:
     theta = begin(layout, data)
     values = term.trials(data.scale)[-1]
     theta[0] = 40.0
-    theta[layout.first_of[0] : layout.first_of[0] + len(values)] = values
+    theta[layout.of(term)] = values
     found = predict(layout, theta, data, 1, None, slopes=True)
     for i in range(layout.size):
         d = np.zeros(layout.size)

@@ -113,7 +113,7 @@ def test_a_true_model_is_explained_with_its_error():
     assert found.verdict == "explained"
     (one,) = found.findings
     assert one.parameters["half_width"].value == pytest.approx(1.2, abs=4 * one.parameters["half_width"].std)
-    again = finding_of(completed.earned[0], chosen.data, completed.intervals)
+    again = finding_of(completed.earned[0], chosen.data.scale, completed.intervals)
     assert (one.statement, one.bic_gain, one.parameters) == (again.statement, again.bic_gain, again.parameters)
     assert found.train.before > 3 * found.train.after
     assert found.train.after == pytest.approx(NOISE, rel=0.1)

@@ -14,7 +14,7 @@ import pytest
 
 from identification.mismatch import policy
 from identification.mismatch.policy.record.page import page, percent
-from identification.mismatch.select.forward_selection import accept_threshold
+from identification.mismatch.select.stepwise import accept_threshold
 
 ROOT = Path(__file__).parents[4]
 ENGINE = ROOT / "identification" / "mismatch"

@@ -9,9 +9,10 @@ import pytest
 
 from identification.mismatch.estimate.estimate import fit_without
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.select.forward_selection import accept_threshold, prune, resumed
-from identification.mismatch.select.rivals import mirrored, swap_tests, swaps
+from identification.mismatch.select.forward_selection import Thruster, prune, resumed
+from identification.mismatch.select.rivals import mirrored, swaps
 from identification.mismatch.select.stage import exchange_rivals
+from identification.mismatch.select.stepwise import accept_threshold, exchanged
 from identification.physics.asymmetry import Asymmetry
 from identification.physics.command_saturation import CommandSaturation
 from identification.physics.dead_band import DeadBand
@@ -158,7 +159,7 @@ def test_two_that_are_the_same_curve_stay_as_they_were():
     """An asymmetry and what a torque does to the cell: neither is better."""
     recording = short(change=lambda _t, V, F: np.where(V < 0, 0.9, 1.0) * F)
     data, estimate = known_noise({UNEVEN: (1.0,)}, [recording])
-    after, standing = swap_tests(estimate, data, (UNEVEN, TorqueCrosstalk()))
+    after, standing = exchanged(Thruster(data, (UNEVEN, TorqueCrosstalk())), estimate)
     assert after is estimate
     (rival,) = standing[UNEVEN][1]
     assert abs(rival.bic_loss) < 1.0

@@ -1,0 +1,137 @@
+"""What speaks for a name, whatever is modelled: how the term stands beside its rivals, and what it was asked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic
+
+import numpy as np
+
+from identification.estimation.tails import chi2_sf, noncentral_chi2_sf
+from identification.mismatch import policy
+from identification.mismatch.select.rounds import T
+from identification.mismatch.select.stepwise import F, RivalTerm, Standing
+from identification.recording import Floats
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing that a name is asked."""
+
+    asked: str
+    failed: str = ""
+    """Why the name is not earned; empty where it passes."""
+    told: str = ""
+    """Its figures, or why it says nothing here."""
+    silent: bool = False
+    """Whether it says nothing here."""
+
+
+@dataclass(frozen=True, eq=False)
+class NamedTerm(Generic[T, F]):
+    """One term of the final model and what speaks for its name."""
+
+    term: T
+    theta: tuple[float, ...]
+    std: tuple[float, ...]
+    chi2_gain: float
+    bic_gain: float
+    p_value: float
+    probability: float
+    rivals: tuple[RivalTerm[T, F], ...]
+    """Other effects within RIVAL_STATED_BIC, best first."""
+    checks: tuple[Check, ...]
+    """All that it was asked."""
+
+    @property
+    def failed_checks(self) -> tuple[str, ...]:
+        """Why the name is not earned; empty when it is."""
+        return tuple(check.failed for check in self.checks if check.failed)
+
+    def asked(self, *more: Check) -> NamedTerm[T, F]:
+        """The same with further checks."""
+        return replace(self, checks=(*self.checks, *more))
+
+
+def effect_id(term: T) -> str:
+    return term.id
+
+
+def named_term(
+    term: T,
+    fitted: F,
+    stands: Standing[F, T],
+    asked: tuple[Check, ...],
+    effect_of: Callable[[T], str] = effect_id,
+) -> NamedTerm[T, F]:
+    """A term of a model beside its rivals: of each other effect the best form; `effect_of`: what counts as one."""
+    less, others = stands
+    gain, values = less.chi2 - fitted.chi2, fitted.values[term]
+    unique: dict[str, RivalTerm[T, F]] = {}
+    for r in others:
+        if min(r.bic_loss, r.aic_loss) < policy.select.RIVAL_STATED_BIC and effect_of(r.term) != effect_of(term):
+            unique.setdefault(effect_of(r.term), r)
+    return NamedTerm(
+        term,
+        values,
+        tuple(map(float, fitted.std[fitted.layout.of(term)])),
+        gain,
+        gain - len(values) * float(np.log(max(fitted.residual.size, 2))),
+        max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
+        probability_beside([r.bic_loss for r in unique.values()]),
+        tuple(unique.values()),
+        asked,
+    )
+
+
+def restated(named: Sequence[NamedTerm[T, F]], final: F) -> list[NamedTerm[T, F]]:
+    """The same with their values in the final model, where they are in it."""
+    values, at, std = final.values, final.layout, final.std
+    return [
+        replace(n, theta=values[n.term], std=tuple(map(float, std[at.of(n.term)]))) if n.term in values else n
+        for n in named
+    ]
+
+
+def probability_beside(losses: Sequence[float]) -> float:
+    """Of a name beside rivals whose BIC is worse by these."""
+    return float(1.0 / (1.0 + sum(np.exp(-0.5 * max(loss, 0.0)) for loss in losses)))
+
+
+@dataclass(frozen=True, slots=True)
+class PartDifference:
+    """Of an effect in one part of the recordings, as a share of itself."""
+
+    share: float
+    error: float
+    """Standard error."""
+    p_value: float
+    """That it is no more than what is spared."""
+
+
+def part_difference(column: Floats, basis: Floats, residual: Floats, spared: float) -> PartDifference | None:
+    """By how much an effect differs there; None where that part tells too little.
+
+    `column` (n,): all that it does there, whitened; `basis` (n, p): orthonormal, what the model can follow. A share of
+    `spared` counts as the same.
+    """
+    rest = column - basis @ (basis.T @ column)
+    size = float(np.linalg.norm(rest))
+    if size < 1e-3 * float(np.linalg.norm(column)) or size < policy.name.PART_SIGMA:
+        return None
+    score = float(rest @ residual) / size
+    p = float(noncentral_chi2_sf(score**2, 1, (spared * size) ** 2))
+    return PartDifference(abs(score) / size, 1 / size, p)
+
+
+def part_check(what: str, column: Floats, basis: Floats, residual: Floats, spared: float, tests: int) -> Check:
+    """Whether a parameter is the same in `what`, of `tests` such questions; arrays as of `part_difference`."""
+    asked = f"the same {what}"
+    apart = part_difference(column, basis, residual, spared)
+    if apart is None:
+        return Check(asked, told="the parts tell too little", silent=True)
+    p = apart.p_value * tests
+    says = f"{100 * apart.share:.0f} % apart"
+    failed = f"its parameter is not the same {what} ({says})" if p < policy.name.INCONSTANT_P else ""
+    return Check(asked, failed, f"{says}, +- {100 * apart.error:.0f} %; p {min(p, 1.0):.2g}")

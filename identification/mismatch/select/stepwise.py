@@ -1,0 +1,200 @@
+"""Stepwise selection, written once for whatever is modelled: terms added, dropped, and exchanged for their rivals."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Generic, Protocol, TypeVar
+
+import numpy as np
+
+from identification.estimation.tails import chi2_isf
+from identification.mismatch import policy
+from identification.mismatch.select.rounds import Candidate, Judged, Round, T, Unhidden
+from identification.recording import Floats
+
+ROUNDS = 3
+"""Exchanges of a term for a rival, at most: more would go in circles."""
+
+
+class Fitted(Protocol):
+    """A model at its best values."""
+
+    @property
+    def chi2(self) -> float: ...
+
+    @property
+    def residual(self) -> Floats:
+        """(n,) whitened."""
+
+    @property
+    def values(self) -> Mapping[Any, tuple[float, ...]]:
+        """Of each term of the model."""
+
+    @property
+    def std(self) -> Floats:
+        """Standard errors of all parameters, in the order of `layout`."""
+
+    @property
+    def layout(self) -> Any:
+        """Where the parameters of each term stand among all: `layout.of(term)`."""
+
+
+class Weighed(Protocol):
+    """A model as fitted, with the noise that weighs it."""
+
+    @property
+    def fit(self) -> Any: ...
+
+
+F = TypeVar("F", bound=Fitted)
+S = TypeVar("S", bound=Weighed)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class RivalTerm(Generic[T, F]):
+    """Another term in the place of one, refitted."""
+
+    term: T
+    fit: F
+    bic_loss: float
+    """By how much its BIC is worse."""
+    aic_loss: float
+    """By how much its AIC is worse: BIC alone would hide a rival with more parameters than the data can tell apart."""
+
+
+Standing = tuple[F, list[RivalTerm[T, F]]]
+"""The fit without a term, and the rivals in its place."""
+
+
+class System(Protocol[T, F, S, Judged]):
+    """What is modelled, as a search asks it; `state` is a model of it, fitted, with the noise that weighs it."""
+
+    def judged(self, state: S, rng: np.random.Generator, /) -> Judged:
+        """What may still be added to the model, against what it leaves."""
+
+    def additions(self, state: S, judged: Judged, /) -> list[tuple[Candidate[T], F]]:
+        """Of what passes the likeliest, fitted: those that gain more than their parameters cost."""
+
+    def enlarged(self, state: S, larger: F, /) -> S:
+        """A larger model, its noise estimated anew beside all that may still be added."""
+
+    def unhidden(self, state: S, judged: Judged, /) -> tuple[Unhidden, S] | None:
+        """The model with a term that the noise had taken for its own."""
+
+    def without(self, state: S, term: T, /) -> F:
+        """The rest of the model, refitted."""
+
+    def replaced(self, state: S, other: F, /) -> S:
+        """A smaller model, or one with a rival, in the place of the model."""
+
+    def rivals(self, state: S, term: T, less: F, /) -> list[RivalTerm[T, F]]:
+        """Terms that could do what this one does, each refitted in its place, best first; `less`: without it."""
+
+    def impossible(self, state: S, term: T, /) -> bool:
+        """Whether the values of a term are none that it can have."""
+
+    def merged(self, state: S, best: tuple[float, F] | None, /) -> tuple[float, F] | None:
+        """The better of `best`, a BIC loss and a fit, and one term in the place of two."""
+
+
+def forward(
+    system: System[T, F, S, Judged],
+    state: S,
+    most: int,
+    rng: np.random.Generator,
+    known: Collection[frozenset[T]] = (),
+) -> tuple[S, tuple[Round[T, Judged], ...]]:
+    """Larger models, of `most` terms, while something passes, none of those that are `known`; and how it went."""
+    rounds: list[Round[T, Judged]] = []
+    seen = {frozenset(state.fit.values), *known}
+    while True:
+        inside = tuple(state.fit.values)
+        judged = system.judged(state, rng)
+        full = len(inside) >= most
+        found = [] if full else system.additions(state, judged)
+        told, larger = None, _lasting(system, state, found, seen)
+        if larger is None and not full and (hidden := system.unhidden(state, judged)) is not None:
+            beside = pruned(system, hidden[1])
+            if frozenset(beside.fit.values) not in seen:
+                told, larger = hidden[0], beside
+        fitted = tuple(candidate for candidate, _ in found)
+        rounds.append(Round(inside, judged, fitted, told, None if larger is None else tuple(larger.fit.values)))
+        if larger is None:
+            return state, tuple(rounds)
+        state = larger
+        seen.add(frozenset(state.fit.values))
+
+
+def _lasting(
+    system: System[T, F, S, Judged],
+    state: S,
+    found: Sequence[tuple[Candidate[T], F]],
+    seen: Collection[frozenset[T]],
+) -> S | None:
+    """The larger model, pruned; of additions that are dropped again the next best. None where none lasts."""
+    while found:
+        larger = system.enlarged(state, _best(found))
+        smaller = pruned(system, larger)
+        if frozenset(smaller.fit.values) not in seen:
+            return smaller
+        refused = set(larger.fit.values) - set(state.fit.values)
+        found = [each for each in found if each[0].term not in refused]
+    return None
+
+
+def _best(found: Sequence[tuple[Candidate[T], F]]) -> F:
+    """The best gain beyond its price, or a simpler term that gains nearly as much; first what is possible."""
+    possible = [each for each in found if not each[0].at_bound] or found
+    most = max(candidate.chi2_gain - candidate.price for candidate, _ in possible)
+
+    def simplest(each: tuple[Candidate[T], F]) -> tuple[int, float]:
+        candidate, fitted = each
+        return len(fitted.values[candidate.term]), candidate.price - candidate.chi2_gain
+
+    near = [c for c in possible if c[0].chi2_gain - c[0].price >= policy.select.SIMPLER_TERM_GAIN * most]
+    return min(near, key=simplest)[1]
+
+
+def pruned(system: System[T, F, S, Judged], state: S) -> S:
+    """Without terms that give less than their price, worst first."""
+    while state.fit.values:
+        less = [system.without(state, term) for term in state.fit.values]
+        sizes = map(len, state.fit.values.values())
+        short = [each.chi2 - state.fit.chi2 - accept_threshold(size) for each, size in zip(less, sizes, strict=True)]
+        if min(short) > 0:
+            break
+        state = system.replaced(state, less[short.index(min(short))])
+    return state
+
+
+def accept_threshold(extra: int) -> float:
+    return chi2_isf(policy.select.KEPT_TERM_FALSE_ALARM, extra)
+
+
+def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Standing[F, T]] | None]:
+    """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end."""
+    for _ in range(ROUNDS):
+        best: tuple[float, F] | None = None
+        standing = {term: stands(system, state, term) for term in state.fit.values}
+        for term, (less, rivals) in standing.items():
+            # a value that is not possible explains nothing: whatever does nearly as well goes before it
+            price = 0.0
+            if system.impossible(state, term):
+                price = policy.select.PRESSED_TERM_HANDICAP * (less.chi2 - state.fit.chi2)
+            for rival in rivals:
+                loss = rival.bic_loss - price
+                lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.fit.values[rival.term]))
+                if lasts and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):
+                    best = (loss, rival.fit)
+        best = system.merged(state, best)
+        if best is None:
+            return state, standing
+        state = system.replaced(state, best[1])
+    return state, None
+
+
+def stands(system: System[T, F, S, Judged], state: S, term: T) -> Standing[F, T]:
+    """How a term stands: the model without it, and its rivals."""
+    less = system.without(state, term)
+    return less, system.rivals(state, term, less)

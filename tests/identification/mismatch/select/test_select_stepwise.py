@@ -1,0 +1,196 @@
+"""Stepwise selection of columns of a linear model: a `System` of a few lines, whose answers are worked out by hand."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from identification.mismatch.name.named_term import Check, named_term, restated
+from identification.mismatch.select.rounds import Candidate, Unhidden
+from identification.mismatch.select.stepwise import ROUNDS, RivalTerm, accept_threshold, exchanged, forward, pruned
+
+ROWS = 64
+LOGN = float(np.log(ROWS))
+
+
+@dataclass(frozen=True)
+class Column:
+    id: str
+    form: str = ""
+
+    def parameters(self, scale):
+        return ()
+
+    def statement(self, theta, scale):
+        return f"{self.id} {theta[0]:.2g}"
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    terms: tuple[Column, ...]
+
+    def of(self, term):
+        at = self.terms.index(term)
+        return slice(at, at + 1)
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    layout: Layout
+    values: dict[Column, tuple[float, ...]]
+    residual: np.ndarray
+    std: np.ndarray
+
+    @property
+    def chi2(self):
+        return float(self.residual @ self.residual)
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    fit: Fit
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """`y` by columns of unit noise; orthogonal ones unless they are made alike."""
+
+    y: np.ndarray
+    columns: dict[Column, np.ndarray]
+    pressed: frozenset[Column] = frozenset()
+    hidden: Column | None = None
+
+    def fit(self, *terms):
+        J = np.column_stack([self.columns[t] for t in terms]) if terms else np.empty((ROWS, 0))
+        at = np.linalg.lstsq(J, self.y, rcond=None)[0]
+        std = np.sqrt(np.diag(np.linalg.pinv(J.T @ J)))
+        return Fit(Layout(terms), {t: (float(v),) for t, v in zip(terms, at, strict=True)}, self.y - J @ at, std)
+
+    def state(self, *terms):
+        return State(self.fit(*terms))
+
+    def judged(self, state, rng):
+        return [t for t in self.columns if t not in state.fit.values and t != self.hidden]
+
+    def additions(self, state, judged):
+        found = [(t, self.fit(*state.fit.values, t)) for t in judged]
+        gains = [(Candidate(t, state.fit.chi2 - f.chi2, LOGN, t in self.pressed), f) for t, f in found]
+        return [each for each in gains if each[0].chi2_gain > LOGN]
+
+    def enlarged(self, state, larger):
+        return State(larger)
+
+    def unhidden(self, state, judged):
+        if self.hidden is None or self.hidden in state.fit.values:
+            return None
+        return Unhidden(9.0, 5.0), self.state(*state.fit.values, self.hidden)
+
+    def without(self, state, term):
+        return self.fit(*(t for t in state.fit.values if t != term))
+
+    def replaced(self, state, other):
+        return State(other)
+
+    def rivals(self, state, term, less):
+        others = [t for t in self.columns if t not in state.fit.values]
+        fits = [(t, self.fit(*less.values, t)) for t in others]
+        found = [RivalTerm(t, f, f.chi2 - state.fit.chi2, f.chi2 - state.fit.chi2) for t, f in fits]
+        return sorted(found, key=lambda r: r.bic_loss)
+
+    def impossible(self, state, term):
+        return term in self.pressed
+
+    def merged(self, state, best):
+        return best
+
+
+A, B, C, D = map(Column, "abcd")
+E = np.eye(ROWS)
+RNG = np.random.default_rng(0)
+
+
+def wave(k):
+    return E[k]
+
+
+def test_columns_are_added_by_what_they_gain_until_none_pays():
+    system = Columns(9 * wave(0) + 5 * wave(1) + 1 * wave(2), {A: wave(1), B: wave(0), C: wave(2)})
+    last, rounds = forward(system, system.state(), 9, RNG)
+    assert list(last.fit.values) == [B, A]
+    assert [one.model for one in rounds] == [(), (B,), (B, A)]
+    assert [one.after for one in rounds] == [(B,), (B, A), None]
+    assert {c.term for c in rounds[0].fitted} == {A, B}
+    full, told = forward(system, system.state(), 1, RNG)
+    assert list(full.fit.values) == [B]
+    assert told[-1].fitted == ()
+
+
+def test_what_is_pressed_goes_last_and_what_is_known_is_not_tried_again():
+    system = Columns(9 * wave(0) + 5 * wave(1), {A: wave(1), B: wave(0)}, frozenset({B}))
+    assert list(forward(system, system.state(), 9, RNG)[0].fit.values) == [A, B]
+    last, _ = forward(system, system.state(), 1, RNG, [frozenset({A})])
+    assert list(last.fit.values) == [B], "of additions that are known the next best"
+
+
+def test_what_hides_is_asked_for_where_nothing_else_lasts():
+    system = Columns(4 * wave(0) + 5 * wave(1), {A: wave(1), D: wave(0)}, hidden=D)
+    last, rounds = forward(system, system.state(), 9, RNG)
+    assert list(last.fit.values) == [A, D]
+    assert [one.hidden is not None for one in rounds] == [False, True, False]
+    weak = Columns(1 * wave(0) + 5 * wave(1), {A: wave(1), D: wave(0)}, hidden=D)
+    assert list(forward(weak, weak.state(), 9, RNG)[0].fit.values) == [A], "pruned again: the model was there before"
+
+
+def test_a_column_is_dropped_below_its_threshold_the_worst_first():
+    least = float(np.sqrt(accept_threshold(1)))
+    system = Columns((least + 0.1) * wave(0) + (least - 0.1) * wave(1), {A: wave(0), B: wave(1)})
+    assert list(pruned(system, system.state(A, B)).fit.values) == [A]
+
+
+def alike(share):
+    """A column that is `share` of the first, the rest of it along one that nothing has."""
+    return share * wave(0) + np.sqrt(1 - share**2) * wave(40)
+
+
+def test_a_better_rival_takes_the_place_and_how_each_stands_is_told():
+    system = Columns(9 * wave(0) + 5 * wave(1), {A: alike(0.9), B: wave(0), C: wave(1)})
+    last, standing = exchanged(system, system.state(A, C))
+    assert set(last.fit.values) == {B, C}
+    assert standing is not None
+    less, (rival,) = standing[B]
+    assert list(less.values) == [C]
+    assert rival.term == A
+    assert np.isclose(rival.bic_loss, 81 * (1 - 0.9**2))
+
+
+def test_what_has_impossible_values_gives_way_to_what_does_nearly_as_well():
+    columns = {A: wave(0), B: alike(0.95)}
+    whole = Columns(9 * wave(0), columns)
+    assert list(exchanged(whole, whole.state(A))[0].fit.values) == [A]
+    pressed = Columns(9 * wave(0), columns, frozenset({A}))
+    assert list(exchanged(pressed, pressed.state(A))[0].fit.values) == [B]
+
+
+def test_exchanges_that_go_in_circles_end():
+    circle = Columns(9 * wave(0), {A: wave(0), B: alike(0.999)}, frozenset({A, B}))
+    last, standing = exchanged(circle, circle.state(A))
+    assert standing is None
+    assert list(last.fit.values) == [B if ROUNDS % 2 else A]
+
+
+def test_a_name_has_one_rival_of_each_effect_and_its_values_in_the_last_model():
+    other, form = Column("b", "steep"), Column("a", "steep")
+    system = Columns(9 * wave(0), {A: wave(0), B: alike(0.999), other: alike(0.998), form: alike(0.999), C: wave(3)})
+    state = system.state(A)
+    found = named_term(A, state.fit, (system.fit(), system.rivals(state, A, system.fit())), (Check("asked", "failed"),))
+    assert [r.term for r in found.rivals] == [B], "neither another form of its own, nor one twice, nor what is far off"
+    assert found.chi2_gain == 81.0
+    assert np.isclose(found.bic_gain, 81 - LOGN)
+    assert found.failed_checks == ("failed",)
+    loss = found.rivals[0].bic_loss
+    assert np.isclose(found.probability, 1 / (1 + np.exp(-loss / 2)))
+    twice = Columns(18 * wave(0), system.columns)
+    (again,) = restated([found], twice.fit(A))
+    assert again.theta == (18.0,)
+    assert restated([found], twice.fit(B)) == [found]
