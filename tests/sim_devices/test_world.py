@@ -39,6 +39,7 @@ SHOWN = {
     "time_skew": {"delay": 0.05},
     "load_cell_creep": {"share": 0.02, "time_constant": 10.0},
     "load_cell_nonlinearity": {"quadratic": 1e-4},
+    "load_cell_even_bend": {"coefficient": 1e-4},
     "periodic_disturbance": {"amplitude": 0.5, "frequency": 17.0},
     "zero_drift": {"rate": 0.05},
     "load_cell_saturation": {"limit": 50.0},
