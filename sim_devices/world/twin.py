@@ -210,6 +210,7 @@ TERMS: Mapping[str, Callable[[Values, str, float, float], Table]] = {
     "time_skew": _same,
     "load_cell_creep": _same,
     "load_cell_nonlinearity": _cell,
+    "load_cell_even_bend": _same,
     "zero_drift": _same,
     "zero_offset": _offset,
     "load_cell_saturation": _limit,

@@ -29,6 +29,7 @@ PLACES: Final = {
     "command_saturation": LEVEL | SLIP,
     "load_cell_saturation": SIDE,
     "load_cell_nonlinearity": LEVEL,
+    "load_cell_even_bend": SIDE,
     "cavitation": LEVEL,
     "asymmetry": SIDE,
     "torque_crosstalk": SIDE,

@@ -109,6 +109,7 @@ SAME: Final[Mapping[str, Callable[[Table, str, float, Table], Table]]] = {
         {name: p[name] for name in ("share", "time_constant")} if form == "one_constant" and "share_2" not in p else {}
     ),
     "load_cell_nonlinearity": _bend,
+    "load_cell_even_bend": _direct(coefficient="coefficient"),
     "zero_drift": _drift,
     "zero_offset": _direct(offset="offset", at="start"),
     "load_cell_saturation": _direct(limit="limit"),

@@ -219,6 +219,7 @@ SHAPES: dict[str, Callable[[Scale, Rng, str], Shape]] = {
     "time_skew": lambda s, _r, _f: Shape("time_skew", "delay", 1.0, lowest=s.grid, quantum=s.grid),
     "load_cell_creep": _creep,
     "load_cell_nonlinearity": _cell_curve,
+    "load_cell_even_bend": lambda s, r, _f: Shape("load_cell_even_bend", "coefficient", 0.04, _sign(r) / s.thrust),
     "periodic_disturbance": _line,
     "zero_drift": _drift,
     "zero_offset": lambda s, r, _f: Shape(

@@ -107,6 +107,7 @@ BOTH_SIGNS = frozenset(
     {
         "load_cell_creep",
         "load_cell_nonlinearity",
+        "load_cell_even_bend",
         "zero_drift",
         "zero_offset",
         "linear_term",

@@ -8,6 +8,7 @@ An effect that is not named in the world file is not there at all: its stage hol
 from sim_devices.world.effects.blade import Asymmetry, Cavitation, Exponent, Heating, LinearTerm, ReversalLoss
 from sim_devices.world.effects.cell import (
     LoadCellCreep,
+    LoadCellEvenBend,
     LoadCellNonlinearity,
     PeriodicDisturbance,
     ZeroDrift,
@@ -46,6 +47,7 @@ EFFECTS: dict[str, type[Effect]] = {
     "time_skew": TimeSkew,
     "load_cell_creep": LoadCellCreep,
     "load_cell_nonlinearity": LoadCellNonlinearity,
+    "load_cell_even_bend": LoadCellEvenBend,
     "periodic_disturbance": PeriodicDisturbance,
     "zero_drift": ZeroDrift,
     "zero_offset": ZeroOffset,

@@ -63,6 +63,21 @@ class LoadCellNonlinearity:
 
 
 @dataclass(slots=True)
+class LoadCellEvenBend:
+    """Cell whose pull and push do not mirror each other: F + coefficient F^2, of one sign in both directions."""
+
+    stage: ClassVar[Stage] = "cell"
+    coefficient: float
+    """1/N."""
+
+    def apply(self, value: float, _s: State, _dt: float) -> float:
+        return value + self.coefficient * value**2
+
+    def over(self, value: Floats, _h: History) -> Floats:
+        return np.asarray(value + self.coefficient * value**2)
+
+
+@dataclass(slots=True)
 class PeriodicDisturbance:
     """Pick-up, mains or blade pass: + amplitude sin(2 pi p + phase).
 

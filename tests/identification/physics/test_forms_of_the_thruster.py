@@ -56,6 +56,7 @@ def test_static_forms_of_the_propeller():
     assert term("command_saturation").apply(x, m, (8.0,)).tolist() == [-8, -6, 6, 8]
     assert term("load_cell_nonlinearity", "quadratic").apply(T, m, (1e-3,))[[0, 3]] == pytest.approx([-77.184, 77.184])
     assert term("load_cell_nonlinearity", "cubic").apply(T, m, (1e-5,))[[0, 3]] == pytest.approx([-75.73248, 75.73248])
+    assert term("load_cell_even_bend").apply(T, m, (1e-3,)) == pytest.approx([-66.816, -17.676, 18.324, 77.184])
 
 
 def test_forms_that_read_another_channel():

@@ -9,8 +9,10 @@ import pytest
 from sim_devices import concealed
 from sim_devices.concealed.cases.definition import history
 from sim_devices.concealed.cases.plans import held, profile
+from sim_devices.concealed.cases.shapes import shape
 from sim_devices.concealed.visibility.oracle import with_amount
 from sim_devices.concealed.visibility.projection import history_volts
+from sim_devices.concealed.visibility.rivals import BOTH_SIGNS
 from sim_devices.concealed.visibility.whitening import Whitening
 from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, drawn, peak_coefficients
 from tests.concealed.recordings import recording, recordings
@@ -24,6 +26,7 @@ CELL = {  # act behind the propeller: no other channel may know of them
     "time_skew",
     "load_cell_creep",
     "load_cell_nonlinearity",
+    "load_cell_even_bend",
     "load_cell_saturation",
     "periodic_disturbance",
     "zero_drift",
@@ -191,6 +194,14 @@ def test_twins_are_near_and_strangers_are_far():
     left = {twin.rival: twin.left for twin in concealed.twins(case, "winding_resistance", rivals, rng(17))}
     assert left.keys() == {"exponent", "periodic_disturbance"}  # no flow, no drift, not itself
     assert left["exponent"] < 0.5 * 40.0 < 0.95 * 40.0 < left["periodic_disturbance"] <= 40.0 * 1.05
+
+
+@pytest.mark.parametrize("effect", concealed.SHAPES)
+def test_an_amount_that_is_drawn_with_either_sign_may_have_either_sign_as_a_rival(effect):
+    scale = concealed.case(rng(18), **SHORT).scale
+    for form in concealed.FORMS.get(effect, ("",)):
+        signs = {np.sign(shape(effect, scale, rng(seed), form).gain) for seed in range(20)}
+        assert len(signs) == 1 or effect in BOTH_SIGNS
 
 
 def test_names_that_are_not_known_and_strengths_that_cannot_be():

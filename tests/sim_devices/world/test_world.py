@@ -39,6 +39,7 @@ SHOWN = {
     "time_skew": {"delay": 0.05},
     "load_cell_creep": {"share": 0.02, "time_constant": 10.0},
     "load_cell_nonlinearity": {"quadratic": 1e-4},
+    "load_cell_even_bend": {"coefficient": 1e-4},
     "periodic_disturbance": {"amplitude": 0.5, "frequency": 17.0},
     "zero_drift": {"rate": 0.05},
     "load_cell_saturation": {"limit": 50.0},
@@ -131,6 +132,7 @@ def test_steady_effects_have_their_textbook_shape():
     assert at({"exponent": {"exponent": 1.5, "reference_voltage": 4.0}}, 16.0) == pytest.approx(256 * C / 2, rel=1e-6)
     assert at({"cavitation": {"onset": 15.0, "slope": 0.02}}, 20.0) == pytest.approx(400 * C * 0.9, rel=1e-6)
     assert at({"torque_crosstalk": {"coefficient": 0.01}}, -10.0) == pytest.approx(-100 * C + 1.0, rel=1e-6)
+    assert at({"load_cell_even_bend": {"coefficient": 1e-3}}, -10.0) == pytest.approx(-40.0 + 1.6, rel=1e-6)
     assert at({"stand_resonance": {"frequency": 8.0, "damping": 0.2}}, 10.0) == pytest.approx(100 * C, rel=1e-6)
 
 
