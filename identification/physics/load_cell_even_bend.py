@@ -10,7 +10,7 @@ from identification.physics.traits import Traits
 from identification.recording import Floats
 
 MOST = 0.05
-"""Of full thrust: ten times a poor cell's; a larger difference of the directions is the propeller's."""
+"""Of full thrust: 25 times a poor cell's 0.2 % of range; a larger difference of the directions is the propeller's."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class LoadCellEvenBend:
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
-            f"Load-cell even bend: at {scale.thrust:.3g} N of either sign the cell shows "
+            f"Load-cell even bend: at {scale.thrust:.3g} N of either sign the cell is off by "
             f"{theta[0] * scale.thrust**2:+.2g} N; check it with dead weights in pull and in push."
         )
 

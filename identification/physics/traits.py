@@ -85,7 +85,7 @@ class Traits:
     frequency: str = ""
     """The parameter that is a frequency in Hz: beyond half the sampling rate it has an alias below."""
     even: bool = False
-    """Even in the drive: one curve in other words, with every other such term, unless a torque was recorded."""
+    """Goes as x^2 whatever the sign: one curve with every other such term, unless a torque was recorded."""
     flow: bool = False
     """Water that never moves shows nothing of it."""
     neighbour: bool = False
