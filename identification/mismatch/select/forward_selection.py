@@ -167,11 +167,9 @@ class Thruster:
 
     def additions(self, estimate: Estimate, judged: Screening) -> list[tuple[Candidate[Term], Fit]]:
         """Candidates, fitted, that gain more than their parameters cost."""
-        found: list[tuple[Candidate[Term], Fit]] = []
-        if judged.largest <= judged.threshold:
-            return found
         data, weights = self.data, estimate.weights
-        for term, values in _candidates(judged, data):
+        found = []
+        for term, values in _candidates(judged, data) if judged.largest > judged.threshold else []:
             bigger, theta = estimate.fit.more(term, refined(estimate.fit, data, weights, term, values))
             new = fit(bigger, theta, data, weights)
             gain = estimate.fit.chi2 - new.chi2
