@@ -30,8 +30,8 @@ def as_sampled(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
         late = _late(channel)
         if late > 0:
             told[channel.stream] += f"; {channel.name} {1e3 * late:.3g} ms before its stamp, as stated"
-    sentences = (f"{stream}: {says.removeprefix('; ')}" for stream, says in told.items() if says)
-    return replace(recording, channels=tuple(channels)), tuple(sentences)
+    sentences = tuple(f"{stream}: {says.removeprefix('; ')}" for stream, says in told.items() if says)
+    return (replace(recording, channels=tuple(channels)) if sentences else recording), sentences
 
 
 def _clock(channel: Channel) -> tuple[Floats, str]:
