@@ -16,9 +16,16 @@ from typing import NamedTuple
 
 from drivers.errors import DeviceError, LinkError
 from drivers.ports.inbox import BadRecords
-from drivers.ports.lines import LineCutter, check_line_rate, printable
+from drivers.ports.lines import (
+    HOST_DELAY_STD,
+    LineCutter,
+    check_acquisition,
+    check_line_rate,
+    line_time,
+    printable,
+)
 from drivers.ports.serial_port import SerialPort, SerialSettings
-from drivers.protocols import Channel, LinkHealth, Sample, Stream
+from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream
 
 GROUPS = frozenset(("value", "raw", "unit", "t"))
 
@@ -90,6 +97,14 @@ class Options:
     """Text sent before closing."""
     tare: str = ""
     """Text that zeroes the instrument; empty: it cannot."""
+    delay: float = 0.0
+    """s by which a value is behind the quantity: conversion and group delay of a filter, without the line."""
+    delay_std: float = HOST_DELAY_STD
+    """s, 1 sigma, of this delay and the computer's."""
+    window: float | None = None
+    """s that a value is the mean of."""
+    filter: str = ""
+    """What the instrument does to a value, in words."""
     gain_std: float | None = None
     """Relative standard uncertainty (1 sigma) of scale."""
     noise_std: float | None = None
@@ -111,6 +126,7 @@ class Options:
             raise ValueError(
                 f"line_stream pattern needs a group (?P<value>...) or (?P<raw>...) and knows only {sorted(GROUPS)}"
             )
+        check_acquisition("line_stream", delay=self.delay, delay_std=self.delay_std, window=self.window)
         if not math.isfinite(self.scale) or self.scale == 0.0 or not math.isfinite(self.offset):
             raise ValueError(f"line_stream scale must be finite and not 0, offset finite: {self.scale}, {self.offset}")
 
@@ -135,18 +151,20 @@ class LineStream:
             "formula": "value = scale * reading + offset", "scale": options.scale, "offset": options.offset,
             "gain_std": options.gain_std,
         }  # fmt: skip
-        resolution = abs(options.scale) if "raw" in self._groups and "value" not in self._groups else None
+        on_the_line = line_time(options.baud, options.framing, options.line_characters)
+        quantum = abs(options.scale) if "raw" in self._groups and "value" not in self._groups else None
         channels = [
             Channel(
                 options.quantity or "value", options.quantity, options.unit, noise_std=options.noise_std,
-                resolution=resolution, calibration=json.dumps(calibration),
+                quantum=quantum, delay=options.delay + on_the_line, delay_std=options.delay_std,
+                window=options.window, filter=options.filter, calibration=json.dumps(calibration),
             )
         ]  # fmt: skip
         if "raw" in self._groups:
             channels.append(Channel("raw", None, "1", integer=True, description="counts as sent"))
         if "t" in self._groups:
             channels.append(Channel("device_time", None, "1", description="the instrument's own time, as sent"))
-        return (Stream(self.name, "line_stream", tuple(channels), 1.0 / options.rate),)
+        return (Stream(self.name, "line_stream", tuple(channels), 1.0 / options.rate, QUARTZ),)
 
     def open(self) -> str:
         self._bad, self._fault, self._unit = BadRecords(), None, None

@@ -28,9 +28,9 @@ from drivers.mt_sics_lines import (
     number,
 )
 from drivers.ports.inbox import BadRecords
-from drivers.ports.lines import check_line_rate, printable
+from drivers.ports.lines import HOST_DELAY_STD, check_acquisition, check_line_rate, line_time, printable
 from drivers.ports.serial_port import SerialPort, SerialSettings
-from drivers.protocols import Channel, LinkHealth, Sample, Stream
+from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream
 
 RATE_TOLERANCE = 0.25
 """A module rounds UPD to the nearest rate it can do; a rate read back further off than this is refused."""
@@ -59,6 +59,14 @@ class Options:
     """N, known noise of one reading (1 sigma)."""
     resolution: float | None = None
     """N, one digit of the display."""
+    delay: float = 0.0
+    """s by which a value is behind the force, without the line: conversion, group delay of the filter that is set."""
+    delay_std: float = HOST_DELAY_STD
+    """s, 1 sigma, of this delay and the computer's."""
+    window: float | None = None
+    """s that a reading is the mean of."""
+    filter: str = ""
+    """What the module does to a reading, in words."""
     range_min: float | None = None
     """N"""
     range_max: float | None = None
@@ -77,6 +85,7 @@ class Options:
             raise ValueError(f"mt_sics unit must be one of {', '.join(NEWTONS_PER_UNIT)}, not {self.unit!r}")
         if self.gain_std is not None and not 0.0 <= self.gain_std < 1.0:
             raise ValueError(f"mt_sics gain_std is relative (0.0005 = 0.05 %), it cannot be {self.gain_std}")
+        check_acquisition("mt_sics", delay=self.delay, delay_std=self.delay_std, window=self.window)
         if not 0.0 < self.timeout <= 60.0:
             raise ValueError(f"mt_sics timeout must be between 0 and 60 s, not {self.timeout}")
 
@@ -100,12 +109,15 @@ class MtSics:
         options = self._options
         formula = "thrust = sign * reading * newtons per unit shown (standard gravity 9.80665 m/s^2)"
         calibration = {"formula": formula, "sign": options.sign, "gain_std": options.gain_std}
+        on_the_line = line_time(options.baud, options.framing, LINE_CHARACTERS)
         thrust = Channel(
-            "thrust", "thrust", "N", noise_std=options.noise_std, resolution=options.resolution,
-            range_min=options.range_min, range_max=options.range_max, calibration=json.dumps(calibration),
+            "thrust", "thrust", "N", noise_std=options.noise_std, quantum=options.resolution,
+            delay=options.delay + on_the_line, delay_std=options.delay_std, window=options.window,
+            filter=options.filter, range_min=options.range_min, range_max=options.range_max,
+            calibration=json.dumps(calibration),
         )  # fmt: skip
         stable = Channel("stable", None, "1", description="1: the balance calls the reading stable")
-        return (Stream(self.name, "mt_sics", (thrust, stable), 1.0 / options.rate),)
+        return (Stream(self.name, "mt_sics", (thrust, stable), 1.0 / options.rate, QUARTZ),)
 
     def open(self) -> str:
         self._bad, self._fault, self._unit = BadRecords(), None, ""

@@ -5,6 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
+QUARTZ = 1e-4
+"""Relative, 1 sigma: the clock of a device that sends by itself, quartz or ceramic resonator, over temperature."""
+
 
 @dataclass(frozen=True, slots=True)
 class Channel:
@@ -16,8 +19,16 @@ class Channel:
     integer: bool = False
     """True for raw counts (recorded as int64)."""
     noise_std: float | None = None
-    resolution: float | None = None
+    quantum: float | None = None
     """Step of the device's quantisation, in `unit`."""
+    delay: float | None = None
+    """s from the quantity to the arrival of an undisturbed row: conversion, group delay of a filter, transport."""
+    delay_std: float | None = None
+    """s, 1 sigma: what is not known of `delay`, the same for all rows."""
+    window: float | None = None
+    """s that the device averages a value over, ending `delay` before its arrival."""
+    filter: str = ""
+    """Kind, order and corner of what else the device does to a value, in words."""
     range_min: float | None = None
     range_max: float | None = None
     calibration: str | None = None
@@ -34,6 +45,9 @@ class Stream:
     channels: tuple[Channel, ...]
     period_s: float
     """Nominal time between rows."""
+    clock_drift_std: float | None = None
+    """Relative, 1 sigma: the device sends rows by a clock of its own, and its rate is known so well; None: it is asked,
+    or sends when it likes."""
 
 
 class Sample(NamedTuple):

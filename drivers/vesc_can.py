@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from drivers.errors import DeviceError, LinkError
 from drivers.ports.can_bus import CanBus, Frame
 from drivers.ports.inbox import BadRecords, Inbox
-from drivers.protocols import Channel, LinkHealth, Sample, Stream, Watchdog
+from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream, Watchdog
 from drivers.vesc_frames import (
     FAULTS,
     PONG,
@@ -250,19 +250,19 @@ def _streams(name: str, options: Options) -> tuple[Stream, ...]:
     per_erpm = 1.0 / (60.0 * options.pole_pairs)
     description = "duty x measured bus voltage; its error is about 0.1 V x duty + 0.001 x bus voltage"
     motor = (
-        Channel("rotation_rate", "rotation_rate", "rev/s", resolution=per_erpm, description="ERPM / pole pairs / 60"),
-        Channel("current", "current", "A", resolution=0.1),
-        Channel("duty", None, "1", resolution=0.001),
+        Channel("rotation_rate", "rotation_rate", "rev/s", quantum=per_erpm, description="ERPM / pole pairs / 60"),
+        Channel("current", "current", "A", quantum=0.1),
+        Channel("duty", None, "1", quantum=0.001),
         Channel("motor_voltage", "motor_voltage", "V", description=description),
     )
     supply = (
-        Channel("bus_voltage", "bus_voltage", "V", resolution=0.1),
+        Channel("bus_voltage", "bus_voltage", "V", quantum=0.1),
         Channel("tachometer", None, "1", integer=True, description="counts, 6 per electrical revolution"),
     )
     thermal = (
-        Channel("motor_temperature", "motor_temperature", "degC", resolution=0.1),
-        Channel("fet_temperature", None, "degC", resolution=0.1),
-        Channel("input_current", None, "A", resolution=0.1),
+        Channel("motor_temperature", "motor_temperature", "degC", quantum=0.1),
+        Channel("fet_temperature", None, "degC", quantum=0.1),
+        Channel("input_current", None, "A", quantum=0.1),
     )
     parts = [
         ("", options.rate, motor),
@@ -273,4 +273,6 @@ def _streams(name: str, options: Options) -> tuple[Stream, ...]:
         # commands come at the loop's rate, which a driver does not know; 50 Hz is the loop's default
         fault = (Channel("fault_code", None, "1", integer=True, description="mc_fault_code, 0 is none"),)
         parts.append(("_fault", 50.0 / options.fault_every, fault))
-    return tuple(Stream(name + part, "vesc_can", channels, 1.0 / rate) for part, rate, channels in parts if rate)
+    return tuple(
+        Stream(name + part, "vesc_can", channels, 1.0 / rate, QUARTZ) for part, rate, channels in parts if rate
+    )

@@ -34,18 +34,34 @@ def bits_per_character(framing: str) -> int:
     return 1 + int(data) + (parity != "N") + int(stop)
 
 
+HOST_DELAY_STD = 0.0005
+"""s, 1 sigma: what the least delay of a serial adapter and the computer is not known by (its timer set to 1 ms)."""
+
+
+def line_time(baud: int, framing: str, characters: int) -> float:
+    """S that a message of `characters` bytes is on the wire."""
+    return bits_per_character(framing) * characters / baud
+
+
 def check_line_rate(who: str, rate: float, baud: int, framing: str, characters: int) -> None:
     """Raise ValueError when `rate` messages/s of `characters` bytes each do not fit through `baud` bit/s."""
     if not 0.0 < rate < float("inf"):
         raise ValueError(f"{who} rate must be a positive number of samples/s, not {rate}")
     if baud <= 0:
         raise ValueError(f"{who} baud must be positive, not {baud}")
-    limit = baud / (bits_per_character(framing) * characters)
+    limit = 1.0 / line_time(baud, framing, characters)
     if rate > limit:
         raise ValueError(
             f"{who} asks {rate:g} samples/s but {baud} baud carries at most {limit:.0f}/s"
             f" ({characters} characters a sample): lower rate or raise baud"
         )
+
+
+def check_acquisition(who: str, **seconds: float | None) -> None:
+    """Raise ValueError for a delay, its error or a window that is negative, not finite or longer than a minute."""
+    for name, value in seconds.items():
+        if value is not None and not 0.0 <= value <= 60.0:
+            raise ValueError(f"{who} {name} must be between 0 and 60 s, not {value}")
 
 
 def printable(line: bytes) -> str:

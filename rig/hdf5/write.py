@@ -68,7 +68,8 @@ class StreamWriter:
         self._t0_ns = t0_ns
         self._latest = np.iinfo(np.int64).min
         self._waiting: list[Rows] = []
-        _attributes(group, {"source": spec.source, "device_id": spec.device_id, "note": spec.note})
+        facts = ("source", "device_id", "note", "period", "clock_drift_std")
+        _attributes(group, {name: getattr(spec, name) for name in facts})
         self._channels = [Column(_channel(group, channel)) for channel in spec.channels]
         self._time = Column(_table(group, "time", np.dtype("<f8"), CHUNK_ROWS))
         group["time"].attrs.create("unit", "s")
@@ -215,8 +216,9 @@ def _table(group: h5py.Group, name: str, dtype: np.dtype[Any], chunk: int) -> h5
 def _channel(group: h5py.Group, spec: ChannelSpec) -> h5py.Dataset:
     dataset = _table(group, spec.name, np.dtype("<i8" if spec.integer else "<f8"), CHUNK_ROWS)
     facts: dict[str, Attribute | None] = {
-        name: getattr(spec, name) for name in ("quantity", "unit", "noise_std", "resolution", "range_min", "range_max")
+        name: getattr(spec, name) for name in ("quantity", "unit", "noise_std", "range_min", "range_max")
     }
+    facts |= {name: getattr(spec, name) for name in ("quantum", "delay", "delay_std", "window", "filter")}
     facts |= {name: getattr(spec, name) for name in ("calibration", "thruster", "axis", "description")}
     if spec.integer:
         facts["missing_value"] = MISSING

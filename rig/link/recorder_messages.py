@@ -28,7 +28,12 @@ class ChannelSpec:
     integer: bool = False
     """True: int64 raw counts. A row without a count is written as `missing_value`, an attribute of the dataset."""
     noise_std: float | None = None
-    resolution: float | None = None
+    quantum: float | None = None
+    delay: float | None = None
+    """s, as `delay_std` and `window`."""
+    delay_std: float | None = None
+    window: float | None = None
+    filter: str = ""
     range_min: float | None = None
     range_max: float | None = None
     calibration: str | None = None
@@ -47,6 +52,9 @@ class StreamSpec:
     channels: tuple[ChannelSpec, ...]
     device_id: str = ""
     note: str = ""
+    period: float | None = None
+    """s between rows by the device's own clock; written only with `clock_drift_std`."""
+    clock_drift_std: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

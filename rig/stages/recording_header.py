@@ -38,7 +38,10 @@ def opening(campaign: CampaignConfig, bench: Bench, thruster: str, path: Path, t
 def stream_spec(stream: Stream, device_id: str, primary: bool) -> StreamSpec:
     """One group of the recording; the thrust of the bench's force device gets the role `primary`."""
     channels = tuple(_channel_spec(channel, primary) for channel in stream.channels)
-    return StreamSpec(stream.name, stream.source, channels, device_id)
+    period = None if stream.clock_drift_std is None else stream.period_s
+    return StreamSpec(
+        stream.name, stream.source, channels, device_id, period=period, clock_drift_std=stream.clock_drift_std
+    )
 
 
 def expected_bytes(streams: Iterable[Stream], campaign: CampaignConfig) -> int:
@@ -59,7 +62,11 @@ def _channel_spec(channel: Channel, primary: bool) -> ChannelSpec:
         channel.unit,
         integer=channel.integer,
         noise_std=channel.noise_std,
-        resolution=channel.resolution,
+        quantum=channel.quantum,
+        delay=channel.delay,
+        delay_std=channel.delay_std,
+        window=channel.window,
+        filter=channel.filter,
         range_min=channel.range_min,
         range_max=channel.range_max,
         calibration=calibration,

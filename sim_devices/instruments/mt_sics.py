@@ -53,6 +53,7 @@ class MtSics:
         self._buffer = b""
         self._zero = self._tare = 0.0
         self._value = read()
+        self._conversions: list[float] = []
         self._rate = options.rate
         self._next = 0.0
         self._streaming = False
@@ -85,9 +86,12 @@ class MtSics:
             return self._identity()
         out = b""
         while self._next <= t:
-            self._next += 1.0 / (self._rate * RATE_FAULTS.get(self._fault, 1.0))
-            self._sample()
-            out += self._on_reading(t)
+            each = self._options.average
+            self._next += 1.0 / (self._rate * RATE_FAULTS.get(self._fault, 1.0) * each)
+            self._conversions.append(self._read())
+            if len(self._conversions) >= each:
+                self._sample()
+                out += self._on_reading(t)
         return b"" if self._fault == "silent" else out
 
     def fault(self, name: str, t: float) -> None:
@@ -111,8 +115,10 @@ class MtSics:
     # -- readings ---------------------------------------------------------------------------------------------------
 
     def _sample(self) -> None:
+        """The mean of the conversions since the last reading."""
+        conversions, self._conversions = self._conversions or [self._read()], []
         if self._fault != "frozen":
-            self._value = self._read()
+            self._value = sum(conversions) / len(conversions)
             self._recent.append(self._value)
 
     @property

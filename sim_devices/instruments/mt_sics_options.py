@@ -30,10 +30,14 @@ class MtSicsOptions:
     """readings/s, the most UPD accepts."""
     stable_band: float = 0.3
     """N."""
+    average: int = 1
+    """Conversions, evenly spread over the time between two readings, of which a reading is the mean."""
 
     def __post_init__(self) -> None:
         if self.unit not in UNITS:
             raise ValueError(f"unit must be one of {', '.join(UNITS)}, got {self.unit!r}")
+        if self.average < 1:
+            raise ValueError(f"average must be at least 1, got {self.average}")
         if not 0 < self.rate <= self.max_rate or self.digit <= 0:
             raise ValueError("0 < rate <= max_rate and digit > 0 are needed")
 

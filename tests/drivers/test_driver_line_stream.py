@@ -27,7 +27,7 @@ def test_hx711_counts_are_kept_beside_the_force():
         peer.streaming = None
         samples = collect(device, 1)
         (stream,) = device.streams
-        assert [(c.name, c.integer, c.resolution) for c in stream.channels] == [
+        assert [(c.name, c.integer, c.quantum) for c in stream.channels] == [
             ("thrust", False, 0.001),
             ("raw", True, None),
         ]

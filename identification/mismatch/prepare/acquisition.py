@@ -10,6 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.prepare.sample_clock import sample_times
 from identification.recording import Channel, Floats, Recording
 
@@ -37,7 +38,7 @@ def as_sampled(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
 def _clock(channel: Channel) -> tuple[Floats, str]:
     """Times of the stream's rows before any delay, and what was done to them."""
     how = channel.acquisition
-    if how.period is None or how.clock_drift_std is None or not channel.time.size:
+    if how.period is None or how.clock_drift_std is None or channel.time.size < policy.prepare.CLOCK_ROWS:
         return channel.time, ""
     clock = sample_times(channel.time, how.period)
     if clock is None:
