@@ -67,7 +67,8 @@ def run(
 
 
 def calibrate(world: Path, links: Path | None, seed: int | None, campaign: Path, output: Path) -> int:
-    """The bench in a process of its own, `rig run` on it, then each fit beside the truth. 0 when all agree.
+    """The bench in a process of its own, `rig run` on it, then each fit beside the truth, and what `rig diagnose` says
+    that the model leaves out of each recording. 0 when all fits agree.
 
     The console opens where there is a terminal, the progress bar elsewhere.
     """
@@ -82,8 +83,12 @@ def calibrate(world: Path, links: Path | None, seed: int | None, campaign: Path,
             constants = bench.truth("header")[0]["C"]
     except (WorldError, RuntimeError) as error:
         fail(str(error))
-    rows = [row for fits in sorted(set(output.glob(f"*/{FITS}")) - before) for row in compare(fits, constants)]
+    made = sorted(set(output.glob(f"*/{FITS}")) - before)
+    rows = [row for fits in made for row in compare(fits, constants)]
     click.echo(table(rows))
+    for recording in (each for fits in made for each in sorted(fits.parent.glob("*.h5"))):
+        click.echo()
+        status = rig(["diagnose", str(recording)]) or status
     return status or int(not rows or any(abs(row.z) > SUSPICIOUS for row in rows))
 
 

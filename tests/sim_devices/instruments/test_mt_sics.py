@@ -203,3 +203,12 @@ def test_a_module_that_runs_away_or_falls_asleep():
     assert cell.wait(2.0).count(b"N\r\n") == pytest.approx(200, abs=12)
     cell.module.fault("slow", cell.t)
     assert cell.wait(5.0).count(b"N\r\n") == pytest.approx(5, abs=2)
+
+
+def test_a_reading_is_the_mean_of_its_conversions():
+    forces = iter([0.0, *range(1, 100)])
+    module = MtSics(MtSicsOptions("mt_sics", "cell", rate=10.0, average=4), lambda: float(next(forces)))
+    module.feed(b"SIR\r\n", 0.0)
+    said = b"".join(module.tick(0.025 * k) for k in range(9))
+    values = [float(line.split()[2]) for line in said.splitlines()]
+    assert values[:2] == [pytest.approx(3.5), pytest.approx(7.5)]
