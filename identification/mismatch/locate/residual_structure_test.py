@@ -20,7 +20,7 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.covariates import Covariate, covariates
 from identification.mismatch.select.family_wise import beside, family_p_value, orthogonal_basis
-from identification.mismatch.select.jumps import TRIED, jumps
+from identification.mismatch.select.likeliest_trials import TRIED, jumps
 from identification.mismatch.select.shape_error import allowed_in, corrections
 from identification.recording import Floats
 

@@ -18,7 +18,7 @@ from identification.mismatch.model.whitening import Weights
 from identification.mismatch.prepare.scales import scale_of
 from identification.mismatch.select.covariates import covariates
 from identification.mismatch.select.family_wise import MOST_PLAIN, lengths, matching_pursuit, orthogonal_basis
-from identification.mismatch.select.jumps import jumps
+from identification.mismatch.select.likeliest_trials import jumps
 from identification.physics.term import Term
 from identification.recording import Floats
 from identification.run_history.history import History

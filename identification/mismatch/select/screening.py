@@ -25,8 +25,7 @@ from identification.mismatch.select.family_wise import (
     quiet,
     surrogate_scores,
 )
-from identification.mismatch.select.jumps import likeliest_jumps
-from identification.mismatch.select.ringing import likeliest_rings
+from identification.mismatch.select.likeliest_trials import likeliest_jumps, likeliest_rings
 from identification.physics.term import Term
 from identification.recording import Floats
 

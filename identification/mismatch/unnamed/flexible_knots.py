@@ -15,7 +15,7 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.family_wise import orthogonal_basis
-from identification.mismatch.select.jumps import likeliest_jumps
+from identification.mismatch.select.likeliest_trials import likeliest_jumps
 from identification.mismatch.unnamed.flexible_kinds import shapes_over
 from identification.mismatch.unnamed.spline_knot_selection import Moments, choose, heights, nodes_of
 from identification.recording import Floats

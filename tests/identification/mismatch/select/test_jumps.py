@@ -9,7 +9,7 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.select.baseline import baseline, start
 from identification.mismatch.select.family_wise import orthogonal_basis
-from identification.mismatch.select.jumps import TRIED, likeliest_jumps
+from identification.mismatch.select.likeliest_trials import TRIED, likeliest_jumps
 from tests.identification.diagnosed_runs import run
 
 

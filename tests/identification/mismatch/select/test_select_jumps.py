@@ -13,8 +13,7 @@ from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.select.aliases import within_samples
 from identification.mismatch.select.family_wise import orthogonal_basis
-from identification.mismatch.select.jumps import jumps, likeliest_jumps
-from identification.mismatch.select.ringing import likeliest_rings
+from identification.mismatch.select.likeliest_trials import jumps, likeliest_jumps, likeliest_rings
 from identification.physics.stand_resonance import StandResonance
 from identification.recording import Channel, Recording
 from tests.identification.diagnosed_runs import NOISE, C

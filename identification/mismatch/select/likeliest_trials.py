@@ -1,6 +1,7 @@
-"""When zero or gain may have jumped: every instant is looked at, as no grid of trials can.
+"""Trials that the residual itself points to, where no grid would be fine enough: instants of a jump, lines of a stand.
 
-Under slow noise a step is seen by what changes within seconds of it: a trial half a minute off sees nothing.
+Under slow noise a step is seen by what changes within seconds of it: a trial half a minute off sees nothing. Resonances
+are looked for in what the ticks of the command tell: many more can be tried on their few rows than on all.
 """
 
 from __future__ import annotations
@@ -12,13 +13,22 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import acting
+from identification.mismatch.model.step_response import told
 from identification.mismatch.model.whitening import Weights
+from identification.physics.term import Term
 from identification.recording import Floats
 
 TRIED = 600
 """Instants, evenly over the rows: the p-value of the likeliest is multiplied by it."""
 SIZED = 60
 """Of these the sigmas are worked out, and of as many that look likeliest; between them the size is interpolated."""
+APART = 4.0
+"""Hz: what is followed for a tenth of a second tells no finer."""
+SHARP, DULL = 0.05, 0.3
+"""Damping."""
+LOWEST = 5.0
+"""Hz: what rings more slowly is among the term's own trials."""
 
 
 def likeliest_jumps(
@@ -82,3 +92,29 @@ def _peaks(score: Floats) -> Floats:
     """The score where no neighbour's is larger, elsewhere next to nothing."""
     beside = np.maximum(np.append(score[1:], 0.0), np.append(0.0, score[:-1]))
     return np.where(score >= beside, score, 1e-3 * score)
+
+
+def likeliest_rings(fitted: Fit, data: Data, term: Term, most: int) -> tuple[tuple[float, ...], ...]:
+    """Up to `most` trials of a stand_resonance, the best of each damping first."""
+    highest = term.parameters(data.scale)[1].high
+    rows = sum(each.target.size for each in data.ticks)
+    residual = fitted.residual[fitted.residual.size - rows :]
+    base = _told(fitted, data, None)
+    out: list[tuple[float, ...]] = []
+    for damping, tried in (
+        (SHARP, np.arange(LOWEST, highest, APART)),
+        (DULL, np.geomspace(LOWEST, max(highest, 2 * LOWEST), 18)),
+    ):
+        trials = [(1.0, float(f), damping) for f in tried]
+        change = np.column_stack([_told(fitted, data, (term, values)) - base for values in trials])
+        size = np.linalg.norm(change, axis=0)
+        score = np.abs(change.T @ residual) / np.where(size > 0, size, np.inf)
+        out += [trials[j] for j in np.argsort(-score)[: most // 2]]
+    return tuple(out)
+
+
+def _told(fitted: Fit, data: Data, more: tuple[Term, tuple[float, ...]] | None) -> Floats:
+    terms = acting(fitted.model, fitted.theta, data.scale)
+    if more is not None:
+        terms = [*terms, (*more, data.scale)]
+    return np.concatenate([told(rows, terms, fitted.theta.C, fitted.theta.shift) for rows in data.ticks])
