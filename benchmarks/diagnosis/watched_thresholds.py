@@ -10,7 +10,7 @@ told apart; a function of numpy or scipy raises TypeError for it, rather than ta
 from __future__ import annotations
 
 import operator
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -139,8 +139,3 @@ def _reader(
         return known[name]
 
     return read
-
-
-def same(turned: set[str], settings: Sequence[str]) -> list[str]:
-    """Settings in which the answer is the one at the values themselves."""
-    return [setting for setting in settings if setting not in turned]

@@ -39,5 +39,9 @@ def test_what_cannot_be_true_says_nothing(acquisition):
     assert acquisition({"delay": -1.0, "window": float("nan")}, {}) == Acquisition()
 
 
+def test_a_clock_of_no_period_is_none(acquisition):
+    assert acquisition({}, {"period": 0.0, "clock_drift_std": 1e-4}).period is None
+
+
 def test_one_digit_was_called_resolution_at_first(acquisition):
     assert acquisition({}, {}, {"resolution": 0.02}) == Acquisition(quantum=0.02)
