@@ -66,7 +66,7 @@ LANES = {
 QUICK = 6.0
 """s that a case of the set took at most in the proof; where an effect has none so quick, its quickest."""
 LIMIT = 120.0
-"""s for one diagnosis; a longer one has failed."""
+"""s of CPU for one diagnosis; a longer one has failed."""
 ASKED = {
     "select.SCREENING_FALSE_ALARM": "what may be found at all",
     "select.KEPT_TERM_FALSE_ALARM": "what stays in the model",
@@ -117,7 +117,7 @@ def settings(only: Sequence[str] = ()) -> list[Setting]:
 
 
 def overdue(*_: object) -> None:
-    raise TimeoutError(f"took more than {LIMIT:g} s")
+    raise TimeoutError(f"took more than {LIMIT:g} s of CPU")
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,12 +133,12 @@ class Answered:
 
 
 def _answered(folder: Path, without: Sequence[str], setting: Setting) -> Answered:
-    signal.setitimer(signal.ITIMER_REAL, LIMIT)
+    signal.setitimer(signal.ITIMER_PROF, LIMIT)
     try:
         with policy.overridden(setting.values):
             answer, _ = answered(folder, tuple(without))
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
     return Answered(answer)
 
 
@@ -173,7 +173,7 @@ def judged(
     world = [sys.executable, "-m", "sim_devices", "conceal", "-", str(store.root)]
     store.opened.mkdir(parents=True, exist_ok=True)
     subprocess.run(world, input=json.dumps(job.asked()) + "\n", text=True, check=True, capture_output=True, cwd=ROOT)
-    signal.signal(signal.SIGALRM, overdue)
+    signal.signal(signal.SIGPROF, overdue)
     out: list[Row] = []
     truth = store.truth(job)
     if truth is not None and not truth["error"]:
