@@ -27,6 +27,7 @@ class TorqueCrosstalk:
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage", "direction")
     traits: ClassVar[Traits] = Traits(
         even=True,
+        rare=True,
         seen_by=TORQUE,
         proxy=Proxy(TORQUE, "no torque was recorded", "the square of the rotor's rate as the model has it"),
         told_by=((TORQUE, "the torque channel"), ("", "dead weights on the cell")),

@@ -86,6 +86,8 @@ class Traits:
     """The parameter that is a frequency in Hz: beyond half the sampling rate it has an alias below."""
     even: bool = False
     """Goes as x^2 whatever the sign: one curve with every other such term, unless a torque was recorded."""
+    rare: bool = False
+    """Where an ordinary effect does as well, that is named, and this one stated as its rival."""
     flow: bool = False
     """Water that never moves shows nothing of it."""
     neighbour: bool = False

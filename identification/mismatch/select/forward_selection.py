@@ -17,6 +17,7 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
 from identification.mismatch.select.flatness import noise_goes_on
+from identification.mismatch.select.nearby_start import best_forms
 from identification.mismatch.select.rivals import one_for_two, swaps
 from identification.mismatch.select.rounds import Candidate, Round, Unhidden
 from identification.mismatch.select.screening import (
@@ -185,6 +186,10 @@ class Thruster:
         plain = plain_shapes(best, self.data, estimate.weights, every_shape(best, self.data, remaining))
         return refresh(best.model, best.theta, self.data, plain, estimate)
 
+    def reformed(self, estimate: Estimate) -> Estimate:
+        better = best_forms(estimate.fit, self.terms, self.data, estimate.weights)
+        return estimate if better is estimate.fit else self.enlarged(estimate, better)
+
     def unhidden(self, estimate: Estimate, judged: Screening) -> tuple[Unhidden, Estimate] | None:
         return _hidden(estimate, judged, self.data)
 
@@ -202,6 +207,9 @@ class Thruster:
         return at_bound(term, estimate.fit, self.data, estimate.weights) or noise_goes_on(
             estimate.fit, term, estimate.noise, self.data
         )
+
+    def rarer(self, term: Term, other: Term) -> bool:
+        return term.traits.rare and not other.traits.rare
 
     def merged(self, estimate: Estimate, best: tuple[float, Fit] | None) -> tuple[float, Fit] | None:
         return one_for_two(estimate, self.data, self.terms, best)

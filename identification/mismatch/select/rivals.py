@@ -14,6 +14,7 @@ from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, f
 from identification.mismatch.model.data import Data, price
 from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.flatness import noise_goes_on
+from identification.mismatch.select.nearby_start import best_forms, nearer
 from identification.mismatch.select.screening import directions, refined
 from identification.mismatch.select.stepwise import RivalTerm
 from identification.physics.term import Term
@@ -23,6 +24,8 @@ MOST_MERGERS = 3
 """Terms tried in the place of each pair."""
 RIVAL_STEPS = 15
 """Steps of the fit of a rival: what is not near by then is no rival."""
+FORMS_BEYOND = 5.0
+"""Times what is stated: a rival that loses so much may do as well with the other terms in other forms."""
 MOST_REFITS = 7
 """Rivals of one term that are refitted, the most alike first: each costs a fit."""
 
@@ -98,7 +101,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
         begin = refined(less, data, estimate.weights, other, values)
         more = price(other, data) - extra_now
         extra = more * logn
-        bigger, begun = less.more(other, begin)
+        bigger, begun = nearer(less.more(other, begin), now, term, other, begin, data, estimate.weights)
         if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
             new = fit(bigger, begun, data, estimate.weights)
         else:
@@ -110,6 +113,8 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
                 RIVAL_STEPS,
                 now.chi2 + policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more),
             )
+        if new.chi2 - now.chi2 + extra < FORMS_BEYOND * policy.select.RIVAL_STATED_BIC:
+            new = best_forms(new, [t for t in terms if t.id != other.id], data, estimate.weights)
         if at_bound(other, new, data, estimate.weights) or noise_goes_on(new, other, estimate.noise, data):
             continue
         loss = new.chi2 - now.chi2 + extra

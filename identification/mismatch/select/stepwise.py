@@ -79,6 +79,9 @@ class System(Protocol[T, F, S, Judged]):
     def enlarged(self, state: S, larger: F, /) -> S:
         """A larger model, its noise estimated anew beside all that may still be added."""
 
+    def reformed(self, state: S, /) -> S:
+        """The same effects in the forms that fit best; `state` itself where they are those."""
+
     def unhidden(self, state: S, judged: Judged, /) -> tuple[Unhidden, S] | None:
         """The model with a term that the noise had taken for its own."""
 
@@ -93,6 +96,9 @@ class System(Protocol[T, F, S, Judged]):
 
     def impossible(self, state: S, term: T, /) -> bool:
         """Whether the values of a term are none that it can have."""
+
+    def rarer(self, term: T, other: T, /) -> bool:
+        """Whether `other` is the ordinary one of two, and is named where both do as well."""
 
     def merged(self, state: S, best: tuple[float, F] | None, /) -> tuple[float, F] | None:
         """The better of `best`, a BIC loss and a fit, and one term in the place of two."""
@@ -113,7 +119,7 @@ def forward(
         judged = system.judged(state, rng)
         full = len(inside) >= most
         found = [] if full else system.additions(state, judged)
-        told, larger = None, _lasting(system, state, found, seen)
+        told, larger = None, _reformed(system, _lasting(system, state, found, seen), seen)
         if larger is None and not full and (hidden := system.unhidden(state, judged)) is not None:
             beside = pruned(system, hidden[1])
             if frozenset(beside.fit.values) not in seen:
@@ -124,6 +130,14 @@ def forward(
             return state, tuple(rounds)
         state = larger
         seen.add(frozenset(state.fit.values))
+
+
+def _reformed(system: System[T, F, S, Judged], larger: S | None, seen: Collection[frozenset[T]]) -> S | None:
+    """The larger model in its best forms, pruned; as it is where that has been there before."""
+    if larger is None or (other := system.reformed(larger)) is larger:
+        return larger
+    other = pruned(system, other)
+    return larger if frozenset(other.fit.values) in seen else other
 
 
 def _lasting(
@@ -183,7 +197,8 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
             if system.impossible(state, term):
                 price = policy.select.PRESSED_TERM_HANDICAP * (less.chi2 - state.fit.chi2)
             for rival in rivals:
-                loss = rival.bic_loss - price
+                ordinary = policy.select.RIVALS_EQUAL_BIC if system.rarer(term, rival.term) else 0.0
+                loss = rival.bic_loss - max(price, ordinary)
                 lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.fit.values[rival.term]))
                 if lasts and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):
                     best = (loss, rival.fit)

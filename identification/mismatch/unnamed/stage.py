@@ -55,8 +55,15 @@ def run(
     earned, unearned, split = validated.earned, validated.unearned, validated.split
     open_ended = (located.structured or bool(unearned)) and bool(located.left.groups)
     bare, left, flexible = now, located.left, None
+    if open_ended and unearned:
+        bare, left = _without(now, data, unearned, rng)
+        nothing = left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM
+        if nothing and not located.structured:  # it was noise that they followed
+            after = refresh(bare.fit.model, bare.fit.theta, data, None, now)
+            return Completed(after, *_with_values(earned, now, after, data, None), (), None, False, after, left)
+        if nothing:
+            bare, left = now, located.left
     if open_ended:
-        bare, left = _located(now, data, located.left, unearned, rng)
         over = foremost_covariate(left, unearned, data)
         flexible = extend(now, before, data, over, unearned, split, rng)
     if flexible is not None:
@@ -66,20 +73,19 @@ def run(
     if earned and unearned and not predicts(after, before, data, unseen):
         refuted = Check("predicts better than the baseline", ALONE)
         after, unearned, earned = before, (*unearned, *(n.asked(refuted) for n in earned)), ()
-        bare, left = _located(now, data, located.left, unearned, rng)
+        bare, left = _without(now, data, unearned, rng)
+        if left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM:
+            bare, left = now, located.left
     valued, known = _with_values(earned, now, after, data, None)
     return Completed(after, valued, known, unearned, None, open_ended, bare, left)
 
 
-def _located(
-    after: Estimate, data: Data, left: ResidualStructure, unearned: Sequence[Named], rng: np.random.Generator
+def _without(
+    after: Estimate, data: Data, unearned: Sequence[Named], rng: np.random.Generator
 ) -> tuple[Estimate, ResidualStructure]:
-    """What is left without the terms whose names were not earned: they are no physics, and would hide its place."""
-    if not unearned:
-        return after, left
+    """The model without the terms whose names were not earned, and what it leaves: they would hide its place."""
     bare = replace(after, fit=fit(*after.fit.less(*(n.term for n in unearned)), data, after.weights))
-    seen = residual_structure(bare.fit, data, after.weights, rng)
-    return (bare, seen) if seen.p_value < policy.locate.RESIDUAL_FALSE_ALARM else (after, left)
+    return bare, residual_structure(bare.fit, data, after.weights, rng)
 
 
 def foremost_covariate(left: ResidualStructure, unearned: Sequence[Named], data: Data) -> str:

@@ -83,6 +83,10 @@ class Vehicle:
         """The model under the noise of its own residual."""
         return refreshed(better, self.data, self.beside(better.values))
 
+    def reformed(self, state: State) -> State:
+        """Forms of a vehicle's effects are exchanged at the end, as rivals are."""
+        return state
+
     def unhidden(self, _state: State, _judged: Judged) -> None:
         """Nothing hides: noise is estimated beside all that the catalogue could change."""
 
@@ -117,6 +121,10 @@ class Vehicle:
 
     def impossible(self, state: State, term: VehicleTerm) -> bool:
         return at_bound(state.fit, term)
+
+    def rarer(self, _term: VehicleTerm, _other: VehicleTerm) -> bool:
+        """No effect of a vehicle is rarer than its rivals."""
+        return False
 
     def merged(self, _: State, best: tuple[float, Fit] | None) -> tuple[float, Fit] | None:
         """One term in the place of two is not tried: each trial is a simulation for every slope."""

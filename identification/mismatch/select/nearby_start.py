@@ -1,0 +1,103 @@
+"""One term in the place of another: where its fit begins, and the same effects in the forms that fit best."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from identification.mismatch import policy
+from identification.mismatch.estimate.fitting import Fit, at_bound, bounds_of, change_of, fit, residual_of
+from identification.mismatch.model.data import Data, price
+from identification.mismatch.model.model import Model, extended
+from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.whitening import Weights
+from identification.physics.term import Term
+from identification.recording import Floats
+
+Start = tuple[Model, Theta]
+FORM_STEPS = 15
+"""Steps of the fit of another form, begun close by."""
+
+
+def nearer(
+    one: Start, now: Fit, term: Term, other: Term, values: tuple[float, ...], data: Data, weights: Weights
+) -> Start:
+    """Of `one` and the model `now` with `other` in the place of `term` the start that leaves less.
+
+    From the model without the term the way is long where its effect is large, and valleys lie on it; the whole model,
+    with what the term does followed by all that is left and by `other` from `values` on, is near where one curve can
+    be written as the other.
+    """
+    near = _in_place(now, term, other, values, data, weights)
+    if near is None:
+        return one
+    return min(one, near, key=lambda start: _left(start, data, weights))
+
+
+def best_forms(fitted: Fit, terms: Sequence[Term], data: Data, weights: Weights) -> Fit:
+    """The same effects, each in the textbook form that fits best beside the others; `fitted` where that is as it is.
+
+    A form is chosen while other effects are still missing, and what is added later makes up for a wrong one: so it is
+    asked again whenever the model changes.
+    """
+    for term in fitted.model.terms:
+        for other in terms:
+            if other.id == term.id and other != term and other not in fitted.model.terms:
+                fitted = _better_form(fitted, term, other, data, weights)
+    return fitted
+
+
+def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights) -> Fit:
+    """The other of two forms where its BIC is less."""
+    if term not in now.model.terms:
+        return now
+    logn = float(np.log(max(now.residual.size, 2)))
+    wanted = now.chi2 - policy.select.RIVAL_BETTER_BIC - (price(other, data) - price(term, data)) * logn
+    starts = [_in_place(now, term, other, values, data, weights) for values in other.trials(data.scale)]
+    possible = [start for start in starts if start is not None]
+    if not possible:
+        return now
+    begin = min(possible, key=lambda start: _left(start, data, weights))
+    new = fit(*begin, data, weights, FORM_STEPS, wanted)
+    return new if new.chi2 < wanted and not at_bound(other, new, data, weights) else now
+
+
+def _left(start: Start, data: Data, weights: Weights) -> float:
+    residual = residual_of(*start, data, weights)
+    chi2 = float(residual @ residual)
+    return chi2 if np.isfinite(chi2) else np.inf
+
+
+def _in_place(
+    now: Fit, term: Term, other: Term, values: tuple[float, ...], data: Data, weights: Weights
+) -> Start | None:
+    """None where `other` cannot be had in any amount."""
+    rest, theta = now.less(term)
+    bigger, begun = extended(rest, theta, other, values)
+    effect = weights.whiten(*change_of((rest, theta), (now.model, now.theta), data, weights))
+    change = weights.whiten(*change_of((rest, theta), (bigger, begun), data, weights))
+    size = float(np.linalg.norm(change))
+    if size == 0 or not np.isfinite(size):
+        return None
+    own = now.layout.of(term)
+    kept = np.array([j < own.start or j >= own.stop for j in range(now.free.size)])
+    slopes = now.jacobian[:, kept[now.free]]
+    steps = _followed(np.column_stack([slopes, change / size]), effect)
+    moved = theta.vector
+    moved[now.free[kept]] += steps[:-1]
+    first = other.parameters(data.scale)[0]
+    assert first.neutral is not None
+    amount = first.neutral + steps[-1] / size * (values[0] - first.neutral)
+    begin = (float(np.clip(amount, first.low, first.high)), *values[1:])
+    bigger, start = extended(rest, theta.with_vector(moved), other, begin)
+    low, high, _ = bounds_of(bigger, data, start)
+    return bigger, start.with_vector(np.clip(start.vector, low, high))
+
+
+def _followed(columns: Floats, target: Floats) -> Floats:
+    """(p,) least squares by columns of any size; what they cannot tell apart is left small."""
+    size = np.linalg.norm(columns, axis=0)
+    size = np.where(size > 0, size, 1.0)
+    found: Floats = np.linalg.lstsq(columns / size, target, rcond=1e-6)[0] / size
+    return found
