@@ -25,7 +25,7 @@ MOST_PREDICTIONS = 400
 """Values behind the first terms of models: a fit moves one parameter at a time."""
 MOST_LEADS = 160
 """What dynamics make of the ticks: those of all trials of a screening, twice."""
-MOST_LATELY = 12
+MOST_LATELY = 24
 """What the rates of the last few models make at the samples: most terms change none."""
 MOST_REFERENCES = 24
 """Rotors from whose rates those of similar ones are sought."""

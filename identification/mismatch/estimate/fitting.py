@@ -126,12 +126,12 @@ def _raw(model: Model, theta: Theta, data: Data, there: Theta, *, with_rate: boo
         history = run.history
         F, x = predict(model, theta, run, data.scale, tare)
         more = theta.C * shown(model, theta, history, F, x, tare)
-        more = more * ahead(model, theta, run, x, data.scale.driver, late)
+        more = more * ahead(model, theta, run, x, data.scale, late, tare)
         if theta.shift:
             F = run.delayed(F, theta.shift)
         thrust.append((reconstructed(F, history.middle, history.sampled) + more)[rows] + tare)
         if with_rate:
-            seen = turning(model, theta, run, x, data.scale.driver, there.rate_shift)
+            seen = turning(model, theta, run, x, data.scale, there.rate_shift)
             rate.append(theta.k * seen[history.rate_rows])
     return thrust, rate
 

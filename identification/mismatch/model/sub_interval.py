@@ -13,6 +13,8 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.static_gain import rotor_gain, thrust_gain
+from identification.physics.term import Scale
 from identification.physics.traits import Dynamics, LimitsCommand, LimitsReading
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed
@@ -27,9 +29,17 @@ def delay_of(model: Model, theta: Theta) -> float:
     return sum(each.delay for each in _dynamics(model, theta, 1.0))
 
 
-def ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: float, late: float) -> Floats:
+def ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, late: float, tare: float) -> Floats:
     """(M,) driver |driver|, at the thrust samples less the line through means: of a force at the rates x (M,) that a
     stand may pass on, and that comes `late` s after."""
+    history, largest = run.history, scale.driver
+    if history.ticks is None:
+        return _ahead(model, theta, run, x, largest, late)
+    gain = rotor_gain(model, theta, run, scale) * thrust_gain(model, theta, run, x, scale, tare)
+    return gain * _ahead(model, theta, run, x, largest, late)
+
+
+def _ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: float, late: float) -> Floats:
     history = run.history
     passed = Passed(_rotor(model, theta, largest), _ring(model, theta), late if _is_late(late, history) else 0.0)
     share = passed_on(model, theta, history)
@@ -41,13 +51,15 @@ def ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: fl
     return run.lately("ahead", lambda: share * (2 * np.abs(x) * known[0] + known[1]), x, known, share)
 
 
-def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: float, late: float) -> Floats:
+def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, late: float) -> Floats:
     """(M,) rate at its samples, in units of the driver, of a rotor whose mean rates are `x` (M,), read `late` s after;
     the rotor alone passes ticks on."""
     history = run.history
-    passed = Passed(_rotor(model, theta, largest), delay=late if _is_late(late, history) else 0.0)
+    passed = Passed(_rotor(model, theta, scale.driver), delay=late if _is_late(late, history) else 0.0)
     known = _remembered(run, "rate", passed) if _changes(passed, history) else history.rate_lead
     share, shift = passed_on(model, theta, history), theta.rate_shift
+    if history.ticks is not None:
+        share = share * rotor_gain(model, theta, run, scale)
 
     def made() -> Floats:
         assert history.rate_sampled is not None

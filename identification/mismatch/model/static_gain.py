@@ -1,0 +1,84 @@
+"""How much of a fast change a model's static terms pass on: what ticks do within an interval goes through them too.
+
+Asked by a small change that alternates from interval to interval: what has a memory answers it as it answers a tick.
+Dynamics of a few ticks (a lag, a ring, a delay) and limits have answers of their own (sub_interval.py).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.mismatch.model.model import Model, acting
+from identification.mismatch.model.parameters import Theta
+from identification.physics.term import Scale, Term, TermContext
+from identification.recording import Floats
+from identification.run_history.remembered import RememberedRun
+
+SMALL = 1e-4
+"""Relative change that is tried."""
+MOST_GAIN = 5.0
+"""Where a curve is steeper, an interval is no place to speak of its slope."""
+ROTOR = ("command", "rotor")
+
+Acting = list[tuple[Term, tuple[float, ...], Scale]]
+
+
+def rotor_gain(model: Model, theta: Theta, run: RememberedRun, scale: Scale) -> Floats | float:
+    """(M,) or 1: change of the rate per change of the driver, both in units of the driver."""
+    terms = [each for each in _static(model, theta, scale) if each[0].stage in ROTOR]
+    if not terms:
+        return 1.0
+    key = ("rotor gain", tuple((term, values) for term, values, _ in terms))
+    return run.lately(key, lambda: _rotor_gain(terms, theta, run))
+
+
+def thrust_gain(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, tare: float) -> Floats | float:
+    """(M,) or 1: change of the reading per change of C x|x|, where the rates are `x` (M,)."""
+    terms = [each for each in _static(model, theta, scale) if each[0].stage not in ROTOR]
+    if not terms:
+        return 1.0
+    key = ("thrust gain", theta.C, tare, tuple((term, values) for term, values, _ in terms))
+    return run.lately(key, lambda: _thrust_gain(terms, theta, run, x, tare), x)
+
+
+def _static(model: Model, theta: Theta, scale: Scale) -> Acting:
+    """Terms that answer a fast change at once, whatever they do later."""
+    out = []
+    for term, values, sizes in acting(model, theta, scale):
+        traits = term.traits
+        if traits.dynamics is None and not traits.limits and (traits.delays or not traits.moving) and not term.needs:
+            out.append((term, values, sizes))
+    return out
+
+
+def _rotor_gain(terms: Acting, theta: Theta, run: RememberedRun) -> Floats:
+    driver = run.history.driver
+    moved = driver * (1 + SMALL * _alternating(driver.size))
+    old, new = driver, moved
+    for term, values, sizes in terms:
+        old, new = (term.apply(value, TermContext(run, sizes, theta.C, 0.0, value), values) for value in (old, new))
+    return _ratio(new - old, moved - driver)
+
+
+def _thrust_gain(terms: Acting, theta: Theta, run: RememberedRun, x: Floats, tare: float) -> Floats:
+    moved = x * (1 + SMALL * _alternating(x.size))
+    old, new = (theta.C * rate * np.abs(rate) for rate in (x, moved))
+    change = new - old
+    for term, values, sizes in terms:
+        old, new = (
+            term.apply(force, TermContext(run, sizes, theta.C, tare, rate), values)
+            for force, rate in ((old, x), (new, moved))
+        )
+    return _ratio(new - old, change)
+
+
+def _alternating(size: int) -> NDArray[np.int64]:
+    return 1 - 2 * (np.arange(size) % 2)
+
+
+def _ratio(new: Floats, old: Floats) -> Floats:
+    """1 where nothing was moved."""
+    moved = old != 0
+    out: Floats = np.where(moved, new / np.where(moved, old, 1.0), 1.0)
+    return np.clip(out, 0.0, MOST_GAIN)
