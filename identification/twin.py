@@ -82,6 +82,18 @@ class TwinNoise:
 
 
 @dataclass(frozen=True, slots=True)
+class Alternative:
+    """The same effects with one of them in another textbook form, refitted to the same recordings."""
+
+    C: float
+    terms: tuple[TwinTerm, ...]
+    loss: float
+    """By how much chi-square is more than the twin's own."""
+    gain: float
+    """By how much it would be more without that effect."""
+
+
+@dataclass(frozen=True, slots=True)
 class Source:
     """A recording that the numbers come from."""
 
@@ -115,6 +127,8 @@ class Twin:
     """rev/s per unit of the driver; None where no rotation rate was recorded."""
     lines: tuple[TwinLine, ...] = ()
     """Periodic disturbances, the clearest first."""
+    alternatives: tuple[Alternative, ...] = ()
+    """What other textbook forms would have said: how far the forms may be off in another run."""
     created: str = ""
     """ISO 8601 UTC."""
     software: str = ""

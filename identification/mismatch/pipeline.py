@@ -10,7 +10,7 @@ import numpy as np
 from identification.mismatch.answer import stage as answer
 from identification.mismatch.answer.periodic_findings import told_lines
 from identification.mismatch.answer.trace import Trace
-from identification.mismatch.compare.saved_model_baseline import starting
+from identification.mismatch.compare.saved_model_baseline import lasting, starting
 from identification.mismatch.faults import stage as faults
 from identification.mismatch.locate import stage as locate
 from identification.mismatch.name import stage as name
@@ -77,6 +77,7 @@ def traced(
     without: Collection[str] = (),
 ) -> Trace | Refusal:
     """The same of a thruster, with what each stage handed on."""
+    baseline = None if baseline is None else lasting(baseline, recordings)
     draws, given = Draws.of(seed), None if baseline is None else starting(baseline)
     prepared = prepare.run(recordings, holdout, baseline)
     if isinstance(prepared, Refusal):

@@ -14,7 +14,7 @@ import numpy as np
 
 from identification.flexible_terms.flexible import MULTIPLIERS, Flexible
 from identification.physics.term import Scale, Term
-from identification.twin import TERMS, Source, Twin, TwinLine, TwinNoise, TwinTerm, names_of
+from identification.twin import TERMS, Alternative, Source, Twin, TwinLine, TwinNoise, TwinTerm, names_of
 from rig.errors import TwinError
 from rig.twin.writing import FORMAT, VERSION
 
@@ -112,6 +112,7 @@ def _twin(top: Table) -> Twin:
         covariance=_covariance(top.table("covariance"), names),
         noise=_noise(top.table("noise")),
         lines=tuple(map(_line, top.tables("lines"))) if "lines" in top.content else (),
+        alternatives=tuple(map(_alternative, top.tables("alternatives"))) if "alternatives" in top.content else (),
         sources=tuple(_source(each) for each in top.tables("recordings")),
         interval=top.number("interval", 1e-6),
         highest_driver=top.number("highest_driver", 0.0),
@@ -256,6 +257,11 @@ def _line(table: Table) -> TwinLine:
         phase,
         phase_std,
     )
+
+
+def _alternative(table: Table) -> Alternative:
+    terms = tuple(_term(each) for each in table.tables("terms"))
+    return Alternative(table.number("C"), terms, table.number("loss"), table.number("gain"))
 
 
 def _source(table: Table) -> Source:

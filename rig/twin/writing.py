@@ -10,7 +10,7 @@ from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from identification.twin import Twin, TwinLine, TwinTerm
+from identification.twin import Alternative, Twin, TwinLine, TwinTerm
 
 FORMAT = "thruster-rig-twin"
 VERSION = 2
@@ -25,19 +25,11 @@ def twin_json(twin: Twin) -> dict[str, object]:
         "thruster": twin.thruster,
         "driver": twin.driver_quantity,
         "C": twin.C,
-        "terms": [
-            {
-                "effect": t.effect,
-                "form": t.form,
-                **({} if t.flexible is None else {"flexible": asdict(t.flexible)}),
-                "parameters": _with_units(t),
-                "scale": asdict(t.scale),
-            }
-            for t in twin.terms
-        ],
+        "terms": [_term_json(t) for t in twin.terms],
         "covariance": {"names": list(twin.names), "matrix": [list(row) for row in twin.covariance]},
         "noise": asdict(twin.noise),
         **({"lines": [_line_json(line) for line in twin.lines]} if twin.lines else {}),
+        **({"alternatives": [_alternative(each) for each in twin.alternatives]} if twin.alternatives else {}),
         "recordings": [asdict(source) for source in twin.sources],
         "interval": twin.interval,
         "highest_driver": twin.highest_driver,
@@ -45,6 +37,20 @@ def twin_json(twin: Twin) -> dict[str, object]:
         "created": twin.created,
         "software": twin.software,
     }
+
+
+def _term_json(t: TwinTerm) -> dict[str, object]:
+    return {
+        "effect": t.effect,
+        "form": t.form,
+        **({} if t.flexible is None else {"flexible": asdict(t.flexible)}),
+        "parameters": _with_units(t),
+        "scale": asdict(t.scale),
+    }
+
+
+def _alternative(other: Alternative) -> dict[str, object]:
+    return {"C": other.C, "loss": other.loss, "gain": other.gain, "terms": [_term_json(t) for t in other.terms]}
 
 
 def _line_json(line: TwinLine) -> dict[str, object]:

@@ -14,18 +14,29 @@ from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.diagnosis import Finding
 from identification.mismatch.estimate.estimate import Estimate
+from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
+from identification.mismatch.name.naming import Named
 from identification.mismatch.value import Value
 from identification.recording import Recording
-from identification.twin import Source, Twin, TwinNoise, TwinTerm, names_of
+from identification.twin import Alternative, Source, Twin, TwinNoise, TwinTerm, names_of
 
 
 def with_twin(
-    draft: Draft, estimate: Estimate, data: Data, recordings: Sequence[Recording], before: Twin | None
+    draft: Draft,
+    estimate: Estimate,
+    data: Data,
+    recordings: Sequence[Recording],
+    before: Twin | None,
+    named: Sequence[Named] = (),
 ) -> Draft:
-    """The draft with its twin; against an earlier twin the terms given are in the model, and a change is told."""
-    draft = replace(draft, twin=twin_of(estimate, data, recordings, before))
+    """The draft with its twin; against an earlier twin the terms given are in the model, and a change is told.
+
+    `named`: the terms of the model with their other forms.
+    """
+    twin = twin_of(estimate, data, recordings, before)
+    draft = replace(draft, twin=replace(twin, alternatives=_alternatives(estimate, data, named)))
     if before is None:
         return draft
     known = before.origin
@@ -37,11 +48,11 @@ def with_twin(
     elif changed is not None:
         findings = (*findings, changed)
     was = given_values(before)
-    named = ", ".join(dict.fromkeys(t.effect for t in before.terms))
+    of_twin = ", ".join(dict.fromkeys(t.effect for t in before.terms))
     return replace(
         draft,
         findings=findings,
-        baseline_model=f"{known} ({draft.baseline_model}{' with ' + named if named else ''})",
+        baseline_model=f"{known} ({draft.baseline_model}{' with ' + of_twin if of_twin else ''})",
         baseline={**draft.baseline, **was},
         model_terms=(*(t.effect for t in before.terms), *draft.model_terms),
         model={**was, **_renamed(draft.model, was)},
@@ -95,16 +106,7 @@ def changed_constant(twin: Twin, estimate: Estimate, known: str, unit: str) -> F
 def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], before: Twin | None) -> Twin:
     """The fitted model as a twin; files' hashes and the time are added by who knows them."""
     fitted = estimate.fit
-    terms = tuple(
-        TwinTerm(
-            term.id,
-            term.form,
-            {p.name: value for p, value in zip(term.parameters(sizes), values, strict=True)},
-            sizes,
-            term if isinstance(term, Flexible) else None,
-        )
-        for term, values, sizes in acting(fitted.model, fitted.theta, data.scale)
-    )
+    terms = _terms(fitted, data)
     return Twin(
         thruster=recordings[0].thruster,
         driver_quantity=data.histories[0].driver_quantity,
@@ -131,6 +133,30 @@ def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], bef
         interval=_interval(recordings),
         highest_driver=max(data.scale.driver, 0.0 if before is None else before.highest_driver),
         rate_per_driver=fitted.theta.k if data.with_rate else None,
+    )
+
+
+def _terms(fitted: Fit, data: Data) -> tuple[TwinTerm, ...]:
+    return tuple(
+        TwinTerm(
+            term.id,
+            term.form,
+            {p.name: value for p, value in zip(term.parameters(sizes), values, strict=True)},
+            sizes,
+            term if isinstance(term, Flexible) else None,
+        )
+        for term, values, sizes in acting(fitted.model, fitted.theta, data.scale)
+    )
+
+
+def _alternatives(estimate: Estimate, data: Data, named: Sequence[Named]) -> tuple[Alternative, ...]:
+    """Of the final model with one effect in another form; none where it is not the model that was named."""
+    model = estimate.fit.model
+    return tuple(
+        Alternative(r.fit.theta.C, _terms(r.fit, data), max(r.fit.chi2 - n.chi2_of_all, 0.0), n.chi2_gain)
+        for n in named
+        for r in n.forms
+        if set(r.fit.model.terms) - {r.term} == set(model.terms) - {n.term}
     )
 
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from math import sqrt
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import raw
 from identification.mismatch.model.data import Data, PriorPredictionFactor
 from identification.mismatch.model.model import Given, Model
 from identification.mismatch.model.parameters import Theta
-from identification.recording import Floats
-from identification.twin import Twin
+from identification.recording import Floats, Recording
+from identification.twin import Twin, names_of
 
 PROBE = 0.1
 """Standard deviations by which a parameter is moved for the slope of the prediction."""
@@ -41,34 +43,75 @@ def _both(one: PriorPredictionFactor | None, other: PriorPredictionFactor | None
     return PriorPredictionFactor(thrust, rate)
 
 
-def prior_factor(twin: Twin, data: Data, theta: Theta) -> PriorPredictionFactor | None:
-    """Change of the prediction by one standard deviation along each principal axis of the terms' covariance.
+def lasting(twin: Twin, recordings: Sequence[Recording]) -> Twin:
+    """The twin for other recordings than its own: without terms that are of one run's own time (a jump of the zero)."""
+    ids = {source.recording_id for source in twin.sources}
+    of_the_run = [t.known and t.term.traits.own_clock and not t.term.traits.delay for t in twin.terms]
+    if not any(of_the_run) or any(r.recording_id in ids for r in recordings):
+        return twin
+    stays = [True]
+    for term, left_out in zip(twin.terms, of_the_run, strict=True):
+        stays += [not left_out] * len(term.values)
+    kept = np.flatnonzero(stays)
+    terms = tuple(t for t, left_out in zip(twin.terms, of_the_run, strict=True) if not left_out)
+    covariance = np.array(twin.covariance)[np.ix_(kept, kept)]
+    return replace(twin, terms=terms, names=names_of(terms), covariance=tuple(map(tuple, covariance.tolist())))
 
-    C is fitted anew in each diagnosis, so its own uncertainty is not in it.
+
+def prior_factor(twin: Twin, data: Data, theta: Theta) -> PriorPredictionFactor | None:
+    """How the prediction may be off, each direction one standard deviation long.
+
+    Along each principal axis of the terms' covariance; towards what each other textbook form would have said; and in
+    proportion to what each term does. C is fitted anew in each diagnosis, so its own uncertainty is not in it.
     """
+    base = raw(Model((), given(twin)), theta, data, with_rate=data.with_rate)
+    moves = [*_along_axes(twin, theta, data, base), *_towards_forms(twin, theta, data, base)]
+    moves += _in_proportion(twin, theta, data, base)
+    if not moves:
+        return None
+    thrust = tuple(np.column_stack(columns) for columns in zip(*(move[0] for move in moves), strict=True))
+    rate = tuple(np.column_stack(columns) for columns in zip(*(move[1] for move in moves), strict=True))
+    return PriorPredictionFactor(thrust, rate)
+
+
+Predicted = tuple[list[Floats], list[Floats]]
+"""Of thrust and rate, run by run."""
+
+
+def _along_axes(twin: Twin, theta: Theta, data: Data, base: Predicted) -> list[Predicted]:
     covariance = np.array(twin.covariance)[1:, 1:]
     if not covariance.size:
-        return None
+        return []
     std = np.sqrt(np.diag(covariance))
     moving = std > 0
     values, axes = np.linalg.eigh(covariance[np.ix_(moving, moving)] / np.outer(std[moving], std[moving]))
     root = np.zeros((std.size, values.size))
     root[moving] = std[moving, None] * axes * np.sqrt(np.maximum(values, 0.0))
-    base, base_rate = raw(Model((), given(twin)), theta, data, with_rate=data.with_rate)
-    thrust: list[list[Floats]] = [[] for _ in data.histories]
-    rate: list[list[Floats]] = [[] for _ in data.histories]
-    for axis in root.T:
-        moved = Model((), given(_moved(twin, PROBE * axis)))
-        new, new_rate = raw(moved, theta, data, with_rate=data.with_rate)
-        for out, a, b in zip(thrust, new, base, strict=True):
-            out.append((a - b) / PROBE)
-        for out, a, b in zip(rate, new_rate, base_rate, strict=False):
-            out.append((a - b) / PROBE)
-    if not root.shape[1]:
-        return None
-    return PriorPredictionFactor(
-        tuple(np.column_stack(c) for c in thrust), tuple(np.column_stack(c) for c in rate if c)
-    )
+    models = [Model((), given(_moved(twin, PROBE * axis))) for axis in root.T]
+    return [_change(model, theta, data, base, 1 / PROBE) for model in models]
+
+
+def _towards_forms(twin: Twin, theta: Theta, data: Data, base: Predicted) -> list[Predicted]:
+    """No further than a form may have been off in the twin's own run."""
+    out = []
+    for other in twin.alternatives:
+        most = policy.compare.FORM_ERROR_SIGMA + policy.compare.FORM_ERROR * sqrt(max(other.gain, 0.0))
+        far = min(1.0, most / sqrt(max(other.loss, 1e-12)))
+        model = Model((), tuple(Given(t.term, t.values, t.scale) for t in other.terms))
+        out.append(_change(model, replace(theta, C=theta.C * other.C / twin.C), data, base, far))
+    return out
+
+
+def _in_proportion(twin: Twin, theta: Theta, data: Data, base: Predicted) -> list[Predicted]:
+    every = given(twin)
+    less = [Model((), every[:i] + every[i + 1 :]) for i in range(len(every))]
+    return [_change(model, theta, data, base, policy.compare.FORM_ERROR) for model in less]
+
+
+def _change(model: Model, theta: Theta, data: Data, base: Predicted, times: float) -> Predicted:
+    new = raw(model, theta, data, with_rate=data.with_rate)
+    thrust, rate = ([times * (a - b) for a, b in zip(x, y, strict=True)] for x, y in zip(new, base, strict=True))
+    return thrust, rate
 
 
 def _moved(twin: Twin, by: Floats) -> Twin:

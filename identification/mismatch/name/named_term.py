@@ -43,6 +43,10 @@ class NamedTerm(Generic[T, F]):
     """Other effects within RIVAL_STATED_BIC, best first."""
     checks: tuple[Check, ...]
     """All that it was asked."""
+    forms: tuple[RivalTerm[T, F], ...] = ()
+    """The same effect in its other textbook forms, best first, however much worse."""
+    chi2_of_all: float = 0.0
+    """Of the whole model, beside which the fits of rivals and forms stand."""
 
     @property
     def failed_checks(self) -> tuple[str, ...]:
@@ -82,6 +86,8 @@ def named_term(
         probability_beside([r.bic_loss for r in unique.values()]),
         tuple(unique.values()),
         asked,
+        tuple(r for r in others if effect_of(r.term) == effect_of(term)),
+        fitted.chi2,
     )
 
 

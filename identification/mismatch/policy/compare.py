@@ -32,6 +32,23 @@ SIMULATION_COVERS = Threshold(
     unit="share of the real thrust samples",
     reason="A simulation that covers less is refused: the rest would be judged against nothing.",
 )
+FORM_ERROR = Threshold(
+    0.01,
+    unit="share of what a term changes",
+    reason=(
+        "A twin's textbook forms are taken to be off by so much in another run, in size and towards each other form "
+        "of the same effect: what its own run could not tell shows where the plan is another."
+    ),
+    evidence=(
+        "A lag fitted as mixed where it was quadratic left a dead band of 9.6 sigma in a staircase after random levels "
+        "(field case 3 of the lane `difference` before this)."
+    ),
+)
+FORM_ERROR_SIGMA = Threshold(
+    3.0,
+    unit="sigma in the twin's own run",
+    reason="Another form that lost no more there was not told from the one that was chosen.",
+)
 SIGNATURE_THRUST = Threshold(
     0.02,
     unit="share of the largest change or thrust",

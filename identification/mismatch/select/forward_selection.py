@@ -18,7 +18,7 @@ from identification.mismatch.model.parameters import Theta
 from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
 from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.nearby_start import best_forms
-from identification.mismatch.select.rivals import one_for_two, swaps
+from identification.mismatch.select.rivals import one_for_two, one_less, swaps
 from identification.mismatch.select.rounds import Candidate, Round, Unhidden
 from identification.mismatch.select.screening import (
     Screening,
@@ -212,6 +212,7 @@ class Thruster:
         return term.traits.rare and not other.traits.rare
 
     def merged(self, estimate: Estimate, best: tuple[float, Fit] | None) -> tuple[float, Fit] | None:
+        best = one_less(estimate, self.data, self.terms, best)
         return one_for_two(estimate, self.data, self.terms, best)
 
 

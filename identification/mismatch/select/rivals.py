@@ -26,6 +26,8 @@ RIVAL_STEPS = 15
 """Steps of the fit of a rival: what is not near by then is no rival."""
 FORMS_BEYOND = 5.0
 """Times what is stated: a rival that loses so much may do as well with the other terms in other forms."""
+SMALL_TERM = 0.05
+"""Of what the largest term gains: one that gains less may be a repair."""
 MOST_REFITS = 7
 """Rivals of one term that are refitted, the most alike first: each costs a fit."""
 
@@ -66,6 +68,25 @@ def one_for_two(
                 and not at_bound(other, new, data, estimate.weights)
             ):
                 best = (float(loss), new)
+    return best
+
+
+def one_less(
+    estimate: Estimate, data: Data, terms: Sequence[Term], best: tuple[float, Fit] | None
+) -> tuple[float, Fit] | None:
+    """The better of `best` and the model without one of its small terms, the others in their best forms: a term that
+    came early may do no more than repair a form that is the wrong one because of it."""
+    now = estimate.fit
+    less = {term: fit_without(estimate, term, data) for term in now.model.terms}
+    most = max(each.chi2 for each in less.values()) - now.chi2
+    logn = float(np.log(max(now.residual.size, 2)))
+    for term, without in less.items():
+        if without.chi2 - now.chi2 > SMALL_TERM * most:
+            continue
+        new = best_forms(without, terms, data, estimate.weights)
+        loss = new.chi2 - now.chi2 - price(term, data) * logn
+        if new is not without and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):
+            best = (float(loss), new)
     return best
 
 
