@@ -20,7 +20,8 @@ import numpy as np
 
 from identification.recording import QUANTITY_UNITS, Floats
 from rig.errors import RecordingError
-from rig.importing.convert import Imported, StreamData
+from rig.importing.convert import Imported
+from rig.importing.streams import StreamData
 from rig.link.recorder_messages import Attribute, ChannelSpec, StepRow, StreamSpec
 
 FORMAT = "thruster-rig-recording"
