@@ -9,9 +9,9 @@ import numpy as np
 
 from identification.recording import Floats
 from rig.errors import ConfigError, RecordingError
-from rig.importing.cells import Cells, names_of
 from rig.importing.expression import evaluate
 from rig.importing.mapping import ChannelMap, ImportMap
+from rig.importing.reading.cells import Cells, names_of
 from rig.importing.units import FROM_HEADER, Conversion, conversion, unit_in
 
 

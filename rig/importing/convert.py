@@ -10,11 +10,11 @@ import numpy as np
 
 from identification.recording import Floats
 from rig.errors import ConfigError, RecordingError
-from rig.importing.cells import Cells, columns_used, read_cells
 from rig.importing.channels import channels_of
 from rig.importing.mapping import Column, ImportMap
+from rig.importing.reading.cells import Cells, columns_used, read_cells
+from rig.importing.reading.table import Refused, header_value, read_table
 from rig.importing.streams import StreamData, laid_out
-from rig.importing.table import Refused, header_value, read_table
 from rig.importing.understood import doubts, first_time, understood
 from rig.importing.units import KNOWN_PARAMETERS
 from rig.link.recorder_messages import StepRow
@@ -37,6 +37,8 @@ class Imported:
     """ISO 8601 UTC of the first row, where the file says it with a time zone."""
     rows: int
     bad: int
+    clock_start: float | None = None
+    """s on the file's own clock where the recording's time is 0; None where the file has no time."""
 
 
 def convert(data: bytes, plan: ImportMap, overrides: Mapping[str, float]) -> Imported:
@@ -64,6 +66,7 @@ def convert(data: bytes, plan: ImportMap, overrides: Mapping[str, float]) -> Imp
         created=created,
         rows=cells.rows,
         bad=refused.counts.total(),
+        clock_start=found.start,
     )
 
 
@@ -106,7 +109,7 @@ def _leading_nan(values: Floats) -> int:
 
 
 def _parameters(plan: ImportMap, overrides: Mapping[str, float]) -> dict[str, float]:
-    known = [*plan.parameters, *_asked_for(plan)]
+    known = parameters_known(plan)
     for name in overrides:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)
@@ -115,8 +118,8 @@ def _parameters(plan: ImportMap, overrides: Mapping[str, float]) -> dict[str, fl
     return {**plan.parameters, **overrides}
 
 
-def _asked_for(plan: ImportMap) -> list[str]:
-    """Parameters that units may ask for: of a command that is no voltage, of electrical speed."""
+def parameters_known(plan: ImportMap) -> list[str]:
+    """Those of the map, and those that units may ask for: of a command that is no voltage, of electrical speed."""
     driven = {"command_voltage", "rotation_rate"}
     found = [c for stream in plan.streams.values() for c in stream.channels.values() if c.quantity in driven]
-    return [name for name in KNOWN_PARAMETERS if found and name not in plan.parameters]
+    return [*plan.parameters, *(name for name in KNOWN_PARAMETERS if found and name not in plan.parameters)]

@@ -17,7 +17,7 @@ from pydantic import TypeAdapter, ValidationError
 from identification.recording import QUANTITY_UNITS
 from rig.errors import ConfigError
 from rig.importing.expression import names_in
-from rig.importing.row_filter import parse
+from rig.importing.reading.row_filter import parse
 from rig.importing.units import FROM_HEADER, conversion, factor_to_si, seconds
 
 ColumnRef = str | int
@@ -116,7 +116,7 @@ class FileMap:
     """Columns of a row; by default those of the header, without one the most frequent number."""
     decimal: Literal[".", ","] = "."
     where: str = ""
-    """Rows that are wanted, as rig.importing.row_filter reads it; empty: all."""
+    """Rows that are wanted, as rig.importing.reading.row_filter reads it; empty: all."""
 
 
 @dataclass(frozen=True)

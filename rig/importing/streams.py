@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
-from rig.importing.cells import Cells
 from rig.importing.channels import ChannelData
 from rig.importing.mapping import ImportMap, StreamMap
+from rig.importing.reading.cells import Cells
 from rig.importing.timing.clock import regular
 from rig.importing.timing.levels import LevelTimes, Rows, level_times, rows_are
 from rig.link.recorder_messages import ChannelSpec, StepRow, StreamSpec
@@ -36,6 +36,8 @@ class LaidOut:
     streams: tuple[StreamData, ...]
     steps: tuple[StepRow, ...]
     rows: Rows
+    start: float | None
+    """s on the file's own clock of the recording's time 0; None where the file has no time."""
 
 
 def laid_out(plan: ImportMap, cells: Cells, channels: Sequence[ChannelData]) -> LaidOut:
@@ -52,7 +54,8 @@ def laid_out(plan: ImportMap, cells: Cells, channels: Sequence[ChannelData]) -> 
         for called, part in _apart(name, own) if levels is not None else [(name, own)]:
             if part:
                 streams.append(_stream(called, stream, part, _time(plan, stream, cells, levels, part) - start, levels))
-    return LaidOut(tuple(streams), () if levels is None else _steps(levels, first, start), rows)
+    steps = () if levels is None else _steps(levels, first, start)
+    return LaidOut(tuple(streams), steps, rows, start if plan.time in cells.time else None)
 
 
 def _apart(name: str, own: Sequence[ChannelData]) -> list[tuple[str, list[ChannelData]]]:

@@ -8,11 +8,11 @@ from typing import Final
 import numpy as np
 
 from rig.errors import ConfigError
-from rig.importing.cells import Cells, time_index
 from rig.importing.channels import ChannelData
 from rig.importing.mapping import ImportMap, Time
+from rig.importing.reading.cells import Cells, time_index
+from rig.importing.reading.table import Table
 from rig.importing.streams import COMMAND
-from rig.importing.table import Table
 from rig.importing.timing.clock import wall_clock
 from rig.importing.timing.levels import Rows
 from rig.importing.units import FROM_HEADER, conversion, unit_in
@@ -97,7 +97,7 @@ def _other_unit(channel: ChannelData) -> Iterator[str]:
     said = conversion(quantity, unit) if _is_known(quantity, unit) else None
     if said is not None and (said.si, said.said) != (channel.conversion.si, channel.conversion.said):
         yield (
-            f"{channel.stream}/{channel.name}: the file's header says {unit}, the map {facts.unit}, and so it was read; "
+            f"{channel.stream}/{channel.name}: the file's header says {unit}, the map {facts.unit}: so it was read; "
             f'if the header is right, write unit = "{unit}" (or "header") in the map'
         )
 

@@ -11,8 +11,8 @@ import numpy as np
 from identification.recording import Floats
 from rig.importing.expression import names_in
 from rig.importing.mapping import ChannelMap, Column, ImportMap, Time
-from rig.importing.row_filter import columns_of, parse, refuse_empty, row_passes
-from rig.importing.table import Refused, Table, index_of, no_such_column
+from rig.importing.reading.row_filter import columns_of, parse, refuse_empty, row_passes
+from rig.importing.reading.table import Refused, Table, index_of, no_such_column
 from rig.importing.timing.clock import reader
 from rig.importing.units import factor_to_si
 
