@@ -26,6 +26,8 @@ class ChannelData:
     """From the unit of the map to that of the format; None for a channel without a quantity."""
     values: Floats
     """(rows,) in `unit`, NaN where nothing was measured."""
+    sign: float = 1.0
+    """What the map's `sign` stands for."""
 
     @property
     def unit(self) -> str:
@@ -64,11 +66,12 @@ def _channel(
     given = np.broadcast_to(facts.factor * raw + facts.offset, (rows,)).astype(np.float64)
     change = None if facts.quantity is None else _conversion(f"{stream}/{name}", facts.quantity, facts, parameters)
     out = given if change is None else change.apply(given, parameters)
-    out = _sign(facts, parameters) * out
+    sign = _sign(facts, parameters)
+    out = sign * out
     if facts.unwrap:
         finite = np.isfinite(out)
         out[finite] = np.unwrap(out[finite])
-    return ChannelData(stream, name, facts, change, out)
+    return ChannelData(stream, name, facts, change, out, sign)
 
 
 def _conversion(who: str, quantity: str, facts: ChannelMap, parameters: Mapping[str, float]) -> Conversion:

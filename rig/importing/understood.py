@@ -66,12 +66,7 @@ def _units(channels: Sequence[ChannelData]) -> str:
 
 
 def _unit(channel: ChannelData) -> str:
-    turned = ", sign turned" if _turned(channel) else ""
-    return f"{channel.unit}{_arithmetic(channel)}{turned}"
-
-
-def _turned(channel: ChannelData) -> bool:
-    return channel.facts.sign == -1
+    return f"{channel.unit}{_arithmetic(channel)}{' with its sign turned' if channel.sign < 0 else ''}"
 
 
 def _arithmetic(channel: ChannelData) -> str:
@@ -121,8 +116,8 @@ def _wrong_way(channels: Sequence[ChannelData]) -> Iterator[str]:
         return
     together = float(np.corrcoef(x, y)[0, 1])
     if together < AGAINST:
-        sign = thrust.facts.sign
-        do = f"--set {sign}=1 or -1, the other" if isinstance(sign, str) else f"sign = {-int(sign)} in the map"
+        named, other = thrust.facts.sign, -int(thrust.sign)
+        do = f"--set {named}={other}" if isinstance(named, str) else f"sign = {other} in the map"
         yield (
             f"thrust goes against the command (correlation {together:.2f}): the cell's sign is the other way round, or "
             f"the motor's leads; where it is the cell: {do}"
