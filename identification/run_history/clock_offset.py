@@ -155,11 +155,18 @@ def _refined(driver: Signal, response: Signal, relation: Relation, at: float, st
         for k in range(BLOCKS)
     ]
     spread = float(np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((np.array(without) - np.mean(without)) ** 2)))
-    grain = min(float(np.median(np.diff(s.time))) for s in (driver, response)) / np.sqrt(12.0)
+    grain = _grain(driver, response)
     shifted = driver.time[[0, -1]] + found
     overlap = min(shifted[1], response.time[-1]) - max(shifted[0], response.time[0])
     share = 1 - _left(driver, response, found, relation)
     return ClockOffset(found, float(np.hypot(spread, grain)), share, float(overlap))
+
+
+def _grain(driver: Signal, response: Signal) -> float:
+    """s, standard deviation of what sampling leaves open: the finer spacing; of a logged command its own too."""
+    ours, theirs = (float(np.median(np.diff(s.time))) for s in (driver, response))
+    logged = driver.held and float(np.mean(np.diff(driver.value) != 0)) < 0.5
+    return float(np.hypot(min(ours, theirs), ours if logged else 0.0) / np.sqrt(12.0))
 
 
 def _sums(H: Floats, y: Floats) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

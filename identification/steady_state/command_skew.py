@@ -25,8 +25,13 @@ LEAST_LEVEL: Final = 0.5
 """s: commands that change faster are no levels."""
 LEAST_SAMPLES: Final = 8
 """Of a level of a log."""
+SLOW: Final = 0.5
+"""s: by less than this rotor and water of a sound thruster lag their command (motors 0.05 to 0.3 s, inflow 0.1 to 0.5 s,
+docs/physics); only what lags more may be a clock."""
 STEADIER: Final = 2.0
 """Times by which the variance within levels must fall with the shift."""
+AS_STEADY: Final = 1.5
+"""Times the least variance: shifts within it are told apart by whether the levels then follow their command."""
 SHIFTS: Final = 41
 """Tried on either side, up to one level."""
 
@@ -98,18 +103,28 @@ def _of_log(windows: tuple[Window, ...], time: Floats, value: Floats) -> Command
     if level < LEAST_LEVEL or time.size < LEAST_SAMPLES * len(windows):
         return None
     shifts = level * np.linspace(-1.0, 1.0, 2 * SHIFTS + 1)
-    scatter = np.array([_within(windows, time, value, shift) for shift in shifts.tolist()])
-    best, now = int(np.argmin(scatter)), scatter[SHIFTS]
-    found = CommandSkew(float(shifts[best]), level, table=False)
-    return found if found.share >= LEAST_SHARE and now > STEADIER * scatter[best] else None
+    tried = [_within(windows, time, value, shift) for shift in shifts.tolist()]
+    scatter = np.array([variance for variance, _ in tried])
+    steady = scatter <= AS_STEADY * float(scatter.min())
+    best = int(np.argmax(np.where(steady, [follows for _, follows in tried], -np.inf)))
+    found, now = CommandSkew(float(shifts[best]), level, table=False), scatter[SHIFTS]
+    if found.share < LEAST_SHARE or 0 < found.seconds < SLOW:
+        return None
+    return found if now > STEADIER * scatter[best] else None
 
 
-def _within(windows: tuple[Window, ...], time: Floats, value: Floats, shift: float) -> float:
-    """N^2, variance of the samples about the mean of their level, levels shifted by `shift` s; of whole levels only."""
+def _within(windows: tuple[Window, ...], time: Floats, value: Floats, shift: float) -> tuple[float, float]:
+    """N^2, variance of the samples about the mean of their level, levels shifted by `shift` s; and the correlation of
+    those means with V|V|: thrust of the level before is as steady, but it does not follow this command."""
     total, count = 0.0, 0
+    means, squares = [], []
     for w in windows:
         low, high = np.searchsorted(time, (w.t_start + shift, w.t_end + shift))
         part = value[low:high]
         if part.size >= LEAST_SAMPLES:
             total, count = total + float(np.sum((part - part.mean()) ** 2)), count + part.size - 1
-    return total / count if count else float("inf")
+            means.append(float(part.mean()))
+            squares.append(w.voltage * abs(w.voltage))
+    if len(means) < 3 or not np.ptp(means) or not np.ptp(squares):
+        return float("inf"), 0.0
+    return total / count, abs(float(np.corrcoef(means, squares)[0, 1]))

@@ -57,7 +57,8 @@ def compare_command(sim: Path, real: Path, holdout: tuple[Path, ...], seed: int,
     try:
         wanted = wanted_of(**outputs)
         found = compare_files(sim, real, holdout, seed, wanted)
-        tell(found.real, wanted, [found.recording])
+        held = recordings_in(holdout, "rig compare") if holdout else []
+        tell(found.real, wanted, [found.recording], [sim, real, *held])
     except (RigError, OSError) as error:
         click.echo(f"rig compare: {error}", err=True)
         raise SystemExit(2) from error

@@ -91,7 +91,7 @@ def _answer(recordings: Sequence[Recording], runs: Sequence[Run], wanted: Wanted
         for recording in recordings
         if recording.outcome in {"aborted", "tripped"}
     )
-    notes = (*_out_of_order(recordings), *_skewed(recordings), *notes)
+    notes = (*_out_of_order(recordings), *_skewed(recordings), *notes, *_whose_tares(recordings))
     others = tuple(_beside(recordings, runs, wanted))
     dynamics = fit_dynamics(recordings) if wanted.dynamics else None
     remainders = tuple(without(fit, name) for name in fit.parameters)
@@ -102,6 +102,12 @@ def _out_of_order(recordings: Sequence[Recording]) -> list[str]:
     """What the reader had to leave out since its time runs backwards."""
     texts = [event.text for recording in recordings for event in recording.events if event.level == "warning"]
     return [text for text in texts if "running back" in text]
+
+
+def _whose_tares(recordings: Sequence[Recording]) -> list[str]:
+    """The files behind `tare 1`, `tare 2`, where there are several."""
+    named = [f"tare {k} is of {r.source or r.recording_id}" for k, r in enumerate(recordings, start=1)]
+    return [", ".join(named)] if len(named) > 1 else []
 
 
 def _skewed(recordings: Sequence[Recording]) -> list[str]:
