@@ -79,6 +79,7 @@ def clock_offset(driver: Signal, response: Signal, relation: Relation) -> ClockO
         return Undetermined(f"{response.time.size} samples are too few; {LEAST_ROWS} are needed")
     if not np.ptp(driver.value) or not np.ptp(response.value):
         return Undetermined("one of them never changes")
+    driver = _changed_between(driver)
     offsets = _offsets(driver, response)
     coarse = _thinned(response)
     left = np.array([_left(driver, coarse, offset, relation) for offset in offsets.tolist()])
@@ -91,6 +92,18 @@ def clock_offset(driver: Signal, response: Signal, relation: Relation) -> ClockO
     if rival is not None:
         return Undetermined(f"they fit alike at {offsets[best]:+.4g} s and at {offsets[rival]:+.4g} s")
     return _refined(driver, response, relation, float(offsets[best]), float(offsets[1] - offsets[0]))
+
+
+def _changed_between(driver: Signal) -> Signal:
+    """A held driver that is logged, not written at its changes: each change came between two rows, on the average half
+    a row before the one that shows it."""
+    if not _logged(driver):
+        return driver
+    return Signal(driver.time - 0.5 * float(np.median(np.diff(driver.time))), driver.value, held=True)
+
+
+def _logged(driver: Signal) -> bool:
+    return driver.held and float(np.mean(np.diff(driver.value) != 0)) < 0.5
 
 
 def _offsets(driver: Signal, response: Signal) -> Floats:
@@ -165,8 +178,7 @@ def _refined(driver: Signal, response: Signal, relation: Relation, at: float, st
 def _grain(driver: Signal, response: Signal) -> float:
     """s, standard deviation of what sampling leaves open: the finer spacing; of a logged command its own too."""
     ours, theirs = (float(np.median(np.diff(s.time))) for s in (driver, response))
-    logged = driver.held and float(np.mean(np.diff(driver.value) != 0)) < 0.5
-    return float(np.hypot(min(ours, theirs), ours if logged else 0.0) / np.sqrt(12.0))
+    return float(np.hypot(min(ours, theirs), ours if _logged(driver) else 0.0) / np.sqrt(12.0))
 
 
 def _sums(H: Floats, y: Floats) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

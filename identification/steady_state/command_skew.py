@@ -26,8 +26,8 @@ LEAST_LEVEL: Final = 0.5
 LEAST_SAMPLES: Final = 8
 """Of a level of a log."""
 SLOW: Final = 0.5
-"""s: by less than this rotor and water of a sound thruster lag their command (motors 0.05 to 0.3 s, inflow 0.1 to 0.5 s,
-docs/physics); only what lags more may be a clock."""
+"""s: rotor and water of a sound thruster lag their command by less (motors 0.05 to 0.3 s, inflow 0.1 to 0.5 s); only
+what lags more may be a clock."""
 STEADIER: Final = 2.0
 """Times by which the variance within levels must fall with the shift."""
 AS_STEADY: Final = 1.5

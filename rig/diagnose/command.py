@@ -14,8 +14,8 @@ import click
 
 from rig.diagnose.next_plan import write_next
 from rig.diagnose.outputs import PATH, Wanted, answer_options, holdout_option, seed_option, wanted_of
-from rig.diagnose.vehicle import VehicleFiles, diagnose_vehicle_files, is_vehicle, refuse_for_tunnel
 from rig.diagnose.recording_names import file_names, told_by_name, with_names
+from rig.diagnose.vehicle import VehicleFiles, diagnose_vehicle_files, is_vehicle, refuse_for_tunnel
 from rig.errors import RecordingError, RigError
 from rig.list_option import ListCommand
 

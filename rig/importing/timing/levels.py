@@ -21,7 +21,10 @@ the water about them settle in some tenths of a second, /docs/howto/fit.md)."""
 LOG_SHARE: Final = 0.5
 """A log: at most this share of its rows has another command than the row before."""
 JUMP: Final = 0.2
-"""Of the command's range: rows that differ by this much from one to the next (median) are no samples of a course."""
+"""Of the command's range: rows that differ by this much from one to the next (median), and in no even course (a second
+difference is as large as a first), are no samples of a command that moves."""
+LEAST_ROWS: Final = 4
+"""Fewer rows have no course to be told."""
 SAME: Final = 1e-6
 """Of the command's range: a smaller difference is none."""
 
@@ -69,7 +72,8 @@ def _told(time: Floats, command: Floats, size: float) -> Rows:
         return Rows(False, f"rows {spacing:.3g} s apart")
     if share <= LOG_SHARE:
         return Rows(False, f"the command stays as it was in {100 * (1 - share):.0f} % of the rows")
-    if float(np.median(moved)) >= JUMP * size:
+    course = command.size < LEAST_ROWS or float(np.median(np.abs(np.diff(command, 2)))) < float(np.median(moved))
+    if not course and float(np.median(moved)) >= JUMP * size:
         return Rows(True, f"rows {spacing:.3g} s apart and the command jumps from each to the next")
     raise RecordingError(
         f"{command.size} rows {spacing:.3g} s apart, {100 * share:.0f} % of them with another command than the row "

@@ -38,6 +38,16 @@ def test_the_offset_from_command_steps_to_thrust_is_found_to_a_sample():
         assert found.share > 0.9
 
 
+@pytest.mark.parametrize("phase", [0.01, 0.05, 0.09])
+def test_a_command_that_is_logged_changes_between_two_rows(phase):
+    """Rows every 0.1 s: the error is that of the phase, which is in the stated standard deviation."""
+    command, t, thrust = staircase(np.random.default_rng(2))
+    rows = np.arange(phase, t[-1], 0.1)
+    found = clock_offset(Signal(rows, command.at(rows), held=True), Signal(t, thrust), "thrust")
+    assert abs(found.offset) < 0.07
+    assert 0.02 < found.std < 0.06
+
+
 def test_a_motor_lag_cannot_be_told_from_the_clocks_and_makes_the_offset_longer():
     command, t, thrust = staircase(np.random.default_rng(1), lag=0.3)
     found = clock_offset(command, Signal(t, thrust), "thrust")
