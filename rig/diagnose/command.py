@@ -160,9 +160,14 @@ def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = (),
         else:
             wanted.json_path.write_text(text + "\n", encoding="utf-8")
     if not wanted.alone:
-        click.echo(diagnosis_text(told_by_name(found, file_names(files))))
+        click.echo(diagnosis_text(told_by_name(found, _names(files))))
     if wanted.plan is not None and wanted.campaign is not None:
         _plan(found, wanted.campaign, wanted.plan, err=wanted.alone)
+
+
+def _names(files: Iterable[Path]) -> dict[str, str]:
+    """Of the recordings in these files and folders."""
+    return file_names(chain.from_iterable(map(_in, files)))
 
 
 def explain(trace: Trace, wanted: Wanted, files: Sequence[Path] = ()) -> None:
@@ -170,7 +175,7 @@ def explain(trace: Trace, wanted: Wanted, files: Sequence[Path] = ()) -> None:
     from identification.mismatch.answer.explain import explained
     from rig.diagnose.explanation import explanation_text
 
-    text = with_names(explanation_text(explained(trace)), file_names(files))
+    text = with_names(explanation_text(explained(trace)), _names(files))
     click.echo(("" if wanted.alone else "\n") + text, err=wanted.alone)
 
 
@@ -232,10 +237,9 @@ def diagnose_command(
             wanted=wanted,
             watched=traces.append if wants_stages else None,
         )
-        used = [*recordings_in(files), *(recordings_in(holdout) if holdout else [])]
-        tell(found, wanted, read(recordings_in(files)) if wanted.report is not None else (), used)
+        tell(found, wanted, read(recordings_in(files)) if wanted.report is not None else (), (*files, *holdout))
         for trace in traces:
-            explain(trace, wanted, used)
+            explain(trace, wanted, (*files, *holdout))
     except (RigError, OSError) as error:
         click.echo(f"rig diagnose: {error}", err=True)
         raise SystemExit(2) from error

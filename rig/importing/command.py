@@ -71,7 +71,7 @@ def import_file(
         more, second = _converted(beside.source, beside.plan, its)
         offset = offset_between(first, second, beside.offset)
         imported = merged(first, second, offset, (source.name, beside.source.name))
-        attributes = _attributes(source, data, plan, imported, notes) | _attributes_beside(beside, more)
+        attributes = _attributes(source, data, plan, imported, notes, more) | _attributes_beside(beside, more)
     _finish(out, attributes, imported)
     return Summary(out, imported.rows, imported.bad, (*imported.notes, *imported.warnings))
 
@@ -144,10 +144,13 @@ def _write(path: Path, attributes: Mapping[str, Attribute], imported: Imported) 
     file.close("completed", "imported", 0.0)
 
 
-def _attributes(source: Path, data: bytes, plan: ImportMap, imported: Imported, notes: str) -> dict[str, Attribute]:
-    """Root attributes. The id follows from file, map and parameters: the same import has the same id."""
+def _attributes(
+    source: Path, data: bytes, plan: ImportMap, imported: Imported, notes: str, beside: bytes = b""
+) -> dict[str, Attribute]:
+    """Root attributes. The id follows from files, maps and parameters: the same import has the same id."""
     digest = hashlib.sha256(data).hexdigest()
-    identity = "\n".join([digest, plan.text, plan.thruster, plan.kind, *imported.notes])  # notes: of a second file too
+    other = [hashlib.sha256(beside).hexdigest()] if beside else []
+    identity = "\n".join([digest, plan.text, plan.thruster, plan.kind, *imported.notes, *other])
     found: dict[str, Attribute] = {
         "recording_id": str(uuid.uuid5(uuid.NAMESPACE_OID, identity)),
         "thruster": plan.thruster or source.stem,
@@ -272,6 +275,8 @@ def import_command(
         given = {"--set": assignments, "--thruster": thruster, "--kind": kind, "--where": where, "--levels": levels}
         _refuse_without_map(file, given | {"--with": beside, "--with-map": with_map})
         summary = import_plain(file, out, notes)
+        for sentence in summary.sentences:
+            click.echo(sentence)
         click.echo(f"{summary.path}: {summary.rows} rows")
         return
     plan = _plan_of(map_name, levels, where)

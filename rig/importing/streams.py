@@ -98,7 +98,9 @@ def changed_rows(values: Floats) -> NDArray[np.bool_]:
 
 def _spec(channel: ChannelData) -> ChannelSpec:
     facts = channel.facts
-    source = facts.value or f"{facts.sign} * ({facts.factor!r} * column {facts.column!r} + {facts.offset!r})"
+    source = f"{channel.sign:g} * ({facts.factor!r} * column {facts.column!r} + {facts.offset!r})"
+    if facts.value:
+        source = facts.value if channel.sign > 0 else f"-({facts.value})"
     if channel.conversion is not None and channel.conversion.said:
         source += f", {channel.conversion.name} -> {channel.conversion.si}: {channel.conversion.said}"
     return ChannelSpec(
