@@ -17,10 +17,10 @@ from identification.steady_state.points import find_windows
 
 LEAST_SHARE: Final = 0.15
 """Of a level: a smaller shift is left to the settling of rotor and water, which a fit leaves out."""
-FEW: Final = 2
-"""Thrust samples of a level of a table, at most."""
+FEW: Final = 7
+"""Thrust samples of a level of a table, at most; a log has more (points.py)."""
 AT_ITS_EDGE: Final = 0.1
-"""Of a level: a mean that stands so near to an edge was not put into the middle."""
+"""Of a row: a mean that stands so near to the edge of its level was not put into the middle of its row."""
 LEAST_LEVEL: Final = 0.5
 """s: commands that change faster are no levels."""
 LEAST_SAMPLES: Final = 8
@@ -58,7 +58,7 @@ class CommandSkew:
         head = f"thrust {way} its command by {abs(self.seconds):.3g} s, {100 * self.share:.0f} % of a level"
         if self.table:
             return (
-                f"{head}: each level has one thrust sample, at its edge and not in its middle; if a row of the table "
+                f"{head}: the few thrust samples of each level begin or end at its very edge; if a row of the table "
                 "is a level, import it again with [time] levels = true in the map (--levels middle), or level_duration"
             )
         return (
@@ -82,17 +82,19 @@ def _of_table(command: Channel, time: Floats) -> CommandSkew | None:
     begins = command.time[moved]
     if begins.size < 3 or time.size < 3:
         return None
-    length = np.diff(begins)
-    level = float(np.median(length))
-    count = np.diff(np.searchsorted(time, begins))
-    if level < LEAST_LEVEL or float(np.mean((count > 0) & (count <= FEW))) < 0.9:
+    level, row = float(np.median(np.diff(begins))), float(np.median(np.diff(time)))
+    edges = np.searchsorted(time, begins)
+    count = np.diff(edges)
+    if min(level, row) < LEAST_LEVEL or float(np.mean((count > 0) & (count <= FEW))) < 0.9:
         return None
-    place = np.searchsorted(begins, time, side="right") - 1
-    inside = (place >= 0) & (place < length.size)
-    where = float(np.median((time[inside] - begins[place[inside]]) / length[place[inside]]))
-    if AT_ITS_EDGE < where < 1 - AT_ITS_EDGE:
+    held = [
+        (time[a:b] - t) / (u - t) for a, b, t, u in zip(edges, edges[1:], begins, begins[1:], strict=False) if b > a
+    ]
+    off = float(np.median([part.mean() for part in held])) - 0.5
+    nearest = float(np.median([min(part[0], 1 - part[-1]) for part in held]))  # of a level, from its edge
+    if nearest * level > AT_ITS_EDGE * min(row, level) or abs(off) < LEAST_SHARE:
         return None
-    return CommandSkew((where - 0.5) * level, level, table=True)
+    return CommandSkew(off * level, level, table=True)
 
 
 def _of_log(windows: tuple[Window, ...], time: Floats, value: Floats) -> CommandSkew | None:

@@ -18,8 +18,11 @@ from rig.importing.mapping import Time
 LOG_SPACING: Final = 0.5
 """s: rows nearer than this are samples of a log; a stand needs longer to come to rest on a level than that (rotors and
 the water about them settle in some tenths of a second, /docs/howto/fit.md)."""
-LOG_SHARE: Final = 0.5
-"""A log: at most this share of its rows has another command than the row before."""
+LOG_ROWS: Final = 8
+"""Rows with one command, the usual number (median), from which on they are a log's; a fit makes no hold of fewer
+(identification.steady_state.points.MIN_HOLD_SAMPLES), and three rows may be one level measured three times."""
+EACH: Final = 0.5
+"""More than this share of the rows has another command than the row before: a row, a level."""
 JUMP: Final = 0.2
 """Of the command's range: rows that differ by this much from one to the next (median), and in no even course (a second
 difference is as large as a first), are no samples of a command that moves."""
@@ -70,14 +73,16 @@ def _told(time: Floats, command: Floats, size: float) -> Rows:
     share, spacing = float(np.mean(moved > SAME * size)), float(np.median(np.diff(time)))
     if spacing < LOG_SPACING:
         return Rows(False, f"rows {spacing:.3g} s apart")
-    if share <= LOG_SHARE:
-        return Rows(False, f"the command stays as it was in {100 * (1 - share):.0f} % of the rows")
+    begins = np.flatnonzero(np.append(True, moved > SAME * size))
+    usual = float(np.median(np.diff(np.append(begins, command.size))))
+    if usual >= LOG_ROWS:
+        return Rows(False, f"{usual:.0f} rows with one command")
     course = command.size < LEAST_ROWS or float(np.median(np.abs(np.diff(command, 2)))) < float(np.median(moved))
-    if not course and float(np.median(moved)) >= JUMP * size:
+    if share > EACH and not course and float(np.median(moved)) >= JUMP * size:
         return Rows(True, f"rows {spacing:.3g} s apart and the command jumps from each to the next")
     raise RecordingError(
         f"{command.size} rows {spacing:.3g} s apart, {100 * share:.0f} % of them with another command than the row "
-        "before: a table of levels (a row is a level and the means measured on it), or a log of a command that moves? "
+        "before: a table of levels (a row is a level and the means measured on it), or a log (a row is a sample)? "
         "Say it in the map, [time] levels = true or levels = false (or --levels middle, start, end or no: what of its "
         "level the time of a row is)"
     )

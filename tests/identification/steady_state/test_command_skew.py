@@ -42,6 +42,16 @@ def test_a_table_whose_means_stand_at_an_edge_of_their_level_is_told(place, seco
     assert "[time] levels = true" in found.statement
 
 
+def test_a_level_measured_three_times_begins_half_a_row_late():
+    begins = np.arange(LEVELS.size) * 3 * LEVEL
+    time = np.arange(3 * LEVELS.size) * LEVEL
+    thrust = np.repeat(0.4 * LEVELS * np.abs(LEVELS), 3)
+    found = command_skew(recording(begins, LEVELS, time, thrust))
+    assert found is not None
+    assert (found.seconds, found.level) == pytest.approx((-0.5 * LEVEL, 3 * LEVEL))
+    assert command_skew(recording(begins, LEVELS, time + 0.5 * LEVEL, thrust)) is None
+
+
 def test_a_table_whose_means_stand_in_the_middle_is_right():
     assert command_skew(table(0.5)) is None
 
