@@ -14,6 +14,7 @@ import click
 
 from rig.diagnose.next_plan import write_next
 from rig.diagnose.outputs import PATH, Wanted, answer_options, holdout_option, seed_option, wanted_of
+from rig.diagnose.recording_names import file_names, told_by_name, with_names
 from rig.diagnose.vehicle import VehicleFiles, diagnose_vehicle_files, is_vehicle, refuse_for_tunnel
 from rig.errors import RecordingError, RigError
 from rig.list_option import ListCommand
@@ -136,10 +137,11 @@ def traced(
     return found
 
 
-def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = ()) -> None:
+def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = (), files: Sequence[Path] = ()) -> None:
     """Twin, page, JSON and plan where they are wanted; text for a person unless the JSON goes to standard output.
 
-    `recordings`: those diagnosed; with them the page draws each effect by itself. Raises OSError, ConfigError.
+    `recordings`: those diagnosed; with them the page draws each effect by itself. `files`: those of all recordings,
+    whose names the text has in the place of ids. Raises OSError, ConfigError.
     """
     from identification.mismatch.answer.as_json import diagnosis_json
     from rig.diagnose.text import diagnosis_text
@@ -158,17 +160,23 @@ def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = ())
         else:
             wanted.json_path.write_text(text + "\n", encoding="utf-8")
     if not wanted.alone:
-        click.echo(diagnosis_text(found))
+        click.echo(diagnosis_text(told_by_name(found, _names(files))))
     if wanted.plan is not None and wanted.campaign is not None:
         _plan(found, wanted.campaign, wanted.plan, err=wanted.alone)
 
 
-def explain(trace: Trace, wanted: Wanted) -> None:
+def _names(files: Iterable[Path]) -> dict[str, str]:
+    """Of the recordings in these files and folders."""
+    return file_names(chain.from_iterable(map(_in, files)))
+
+
+def explain(trace: Trace, wanted: Wanted, files: Sequence[Path] = ()) -> None:
     """How it came to the answer, after it; on standard error where standard output is for the JSON alone."""
     from identification.mismatch.answer.explain import explained
     from rig.diagnose.explanation import explanation_text
 
-    click.echo(("" if wanted.alone else "\n") + explanation_text(explained(trace)), err=wanted.alone)
+    text = with_names(explanation_text(explained(trace)), _names(files))
+    click.echo(("" if wanted.alone else "\n") + text, err=wanted.alone)
 
 
 def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) -> None:
@@ -229,9 +237,9 @@ def diagnose_command(
             wanted=wanted,
             watched=traces.append if wants_stages else None,
         )
-        tell(found, wanted, read(recordings_in(files)) if wanted.report is not None else ())
+        tell(found, wanted, read(recordings_in(files)) if wanted.report is not None else (), (*files, *holdout))
         for trace in traces:
-            explain(trace, wanted)
+            explain(trace, wanted, (*files, *holdout))
     except (RigError, OSError) as error:
         click.echo(f"rig diagnose: {error}", err=True)
         raise SystemExit(2) from error

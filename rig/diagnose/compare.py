@@ -57,7 +57,7 @@ def compare_command(sim: Path, real: Path, holdout: tuple[Path, ...], seed: int,
     try:
         wanted = wanted_of(**outputs)
         found = compare_files(sim, real, holdout, seed, wanted)
-        tell(found.real, wanted, [found.recording])
+        tell(found.real, wanted, [found.recording], (sim, real, *holdout))
     except (RigError, OSError) as error:
         click.echo(f"rig compare: {error}", err=True)
         raise SystemExit(2) from error

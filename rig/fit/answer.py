@@ -9,6 +9,7 @@ from pathlib import Path
 
 from identification.estimation.least_squares import Method
 from identification.recording import Recording
+from identification.steady_state.command_skew import command_skew
 from identification.thruster.dynamics import DynamicsFit, fit_dynamics
 from identification.thruster.model_choice import Candidate, Remainder, side_by_side, without
 from identification.thruster.thrust import ThrustFit, fit_runs
@@ -90,7 +91,7 @@ def _answer(recordings: Sequence[Recording], runs: Sequence[Run], wanted: Wanted
         for recording in recordings
         if recording.outcome in {"aborted", "tripped"}
     )
-    notes = (*_out_of_order(recordings), *notes)
+    notes = (*_out_of_order(recordings), *_skewed(recordings), *notes, *_whose_tares(recordings))
     others = tuple(_beside(recordings, runs, wanted))
     dynamics = fit_dynamics(recordings) if wanted.dynamics else None
     remainders = tuple(without(fit, name) for name in fit.parameters)
@@ -101,6 +102,18 @@ def _out_of_order(recordings: Sequence[Recording]) -> list[str]:
     """What the reader had to leave out since its time runs backwards."""
     texts = [event.text for recording in recordings for event in recording.events if event.level == "warning"]
     return [text for text in texts if "running back" in text]
+
+
+def _whose_tares(recordings: Sequence[Recording]) -> list[str]:
+    """The files behind `tare 1`, `tare 2`, where there are several."""
+    named = [f"tare {k} is of {r.source or r.recording_id}" for k, r in enumerate(recordings, start=1)]
+    return [", ".join(named)] if len(named) > 1 else []
+
+
+def _skewed(recordings: Sequence[Recording]) -> list[str]:
+    """Recordings whose thrust leads or lags its command by a part of a level."""
+    found = [(recording, command_skew(recording)) for recording in recordings]
+    return [f"{r.source or r.recording_id}: {skew.statement}" for r, skew in found if skew is not None]
 
 
 def _models(runs: Sequence[Run], but: Model | None = None) -> list[Model]:

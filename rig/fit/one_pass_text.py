@@ -35,6 +35,9 @@ def remarks(found: OnePass) -> Iterator[str]:
         )
     if skipped := sum(run.skipped for run in found.passes):
         yield f"{skipped} thrust samples were left out: not a number, or at no known voltage"
+    if len(found.passes) > 1:
+        sources = (run.recording.source or run.recording.recording_id for run in found.passes)
+        yield ", ".join(f"tare {k} is of {source}" for k, source in enumerate(sources, start=1))
     quantity = found.passes[0].source.quantity
     if quantity != "command_voltage":
         yield f"explained by {quantity}, not by the command"

@@ -41,6 +41,13 @@ def load(path: str | Path, rows: int | None = None) -> Recording:
         return _recording(file, path, opened_as, rows)
 
 
+def recording_id_of(path: Path) -> str:
+    """The id alone; empty where the file has none. Raises RecordingError."""
+    file, _ = open_for_reading(path)
+    with file:
+        return text_of(file.attrs.get("recording_id", ""))
+
+
 def is_hdf5(path: Path) -> bool:
     """Whether a file is HDF5, whatever its name."""
     return bool(h5py.is_hdf5(path))

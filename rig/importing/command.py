@@ -14,10 +14,17 @@ import click
 import numpy as np
 
 from rig.errors import ConfigError, RecordingError, RigError
-from rig.importing.convert import Imported, convert
+from rig.importing.convert import Imported, convert, parameters_known
 from rig.importing.json_recording import read_plain
 from rig.importing.mapping import ImportMap, read_map, shipped
+from rig.importing.reading.foreign_formats import foreign
+from rig.importing.reading.row_filter import parse
+from rig.importing.thruster_name import thruster_of
+from rig.importing.timing.two_clocks import ESTIMATED, merged, offset_asked, offset_between
 from rig.link.recorder_messages import Attribute, EventRow, Rows
+
+Levels = Literal["start", "middle", "end", "no"]
+"""What of its level the time of a row is; `no`: rows are no levels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,36 +39,81 @@ class Summary:
     """Assumptions and what was left out; the same as the events of the recording."""
 
 
+@dataclass(frozen=True, slots=True)
+class Beside:
+    """A second file with a clock of its own, to be in the same recording."""
+
+    source: Path
+    plan: ImportMap
+    offset: str | float = ESTIMATED
+    """Seconds from the first row of the first file to that of this one; `auto`: estimated; `clock`: by their stamps."""
+
+
 def import_file(
-    source: Path, plan: ImportMap, out: Path, overrides: Mapping[str, float] | None = None, notes: str = ""
+    source: Path,
+    plan: ImportMap,
+    out: Path,
+    overrides: Mapping[str, float] | None = None,
+    notes: str = "",
+    beside: Beside | None = None,
 ) -> Summary:
     """Write `out`, a new file, from `source`. Raises ConfigError or RecordingError; then there is no `out`."""
+    _refuse_to_overwrite(out)
+    given = dict(overrides or {})
+    if beside is None:
+        data, imported = _converted(source, plan, given)
+        attributes = _attributes(source, data, plan, imported, notes)
+    else:
+        plans = (plan, beside.plan)
+        own, its = ({k: v for k, v in given.items() if k in parameters_known(p)} for p in plans)
+        own |= {name: value for name, value in given.items() if name not in its}  # unknown to both: refused by name
+        data, first = _converted(source, plan, own)
+        more, second = _converted(beside.source, beside.plan, its)
+        offset = offset_between(first, second, beside.offset)
+        imported = merged(first, second, offset, (source.name, beside.source.name))
+        attributes = _attributes(source, data, plan, imported, notes, more) | _attributes_beside(beside, more)
+    _finish(out, attributes, imported)
+    return Summary(out, imported.rows, imported.bad, (*imported.notes, *imported.warnings))
+
+
+def _refuse_to_overwrite(out: Path) -> None:
     if out.exists():
         raise RecordingError(f"{out} exists; a recording is never overwritten: give another name")
+
+
+def _read(source: Path, encoding: str = "utf-8") -> bytes:
+    """Raises RecordingError for a file that is not there, and for one that is no text: what it is and what to do."""
     try:
         data = source.read_bytes()
     except OSError as error:
         raise RecordingError(f"{source} can't be read: {error.strerror}") from error
+    what = foreign(data, source.name, encoding)
+    if what:
+        raise RecordingError(f"{source.name}: {what.replace('FILE', source.name)}")
+    return data
+
+
+def _converted(source: Path, plan: ImportMap, given: Mapping[str, float]) -> tuple[bytes, Imported]:
+    data = _read(source, plan.file.encoding)
     try:
-        imported = convert(data, plan, overrides or {})
+        return data, convert(data, plan, given)
     except RigError as error:
         raise type(error)(f"{source.name}: {error}") from error
+
+
+def _finish(out: Path, attributes: Mapping[str, Attribute], imported: Imported) -> None:
     part = out.with_name(out.name + ".part")
     part.unlink(missing_ok=True)
-    _write(part, _attributes(source, data, plan, imported, notes), imported)
+    _write(part, attributes, imported)
     part.rename(out)
-    return Summary(out, imported.rows, imported.bad, (*imported.notes, *imported.warnings))
 
 
 def import_plain(source: Path, out: Path, notes: str = "") -> Summary:
     """Write `out`, a new file, from JSON in the words of the recording format (`rig.importing.json_recording`)."""
-    if out.exists():
-        raise RecordingError(f"{out} exists; a recording is never overwritten: give another name")
+    _refuse_to_overwrite(out)
+    data = _read(source)
     try:
-        data = source.read_bytes()
         plain = read_plain(data)
-    except OSError as error:
-        raise RecordingError(f"{source} can't be read: {error.strerror}") from error
     except RecordingError as error:
         raise RecordingError(f"{source.name}: {error}") from error
     digest = hashlib.sha256(data).hexdigest()
@@ -72,10 +124,7 @@ def import_plain(source: Path, out: Path, notes: str = "") -> Summary:
         "imported_from": source.name,
         "imported_sha256": digest,
     }
-    part = out.with_name(out.name + ".part")
-    part.unlink(missing_ok=True)
-    _write(part, attributes | plain.attributes | ({"notes": notes} if notes else {}), plain.imported)
-    part.rename(out)
+    _finish(out, attributes | plain.attributes | ({"notes": notes} if notes else {}), plain.imported)
     return Summary(out, plain.imported.rows, 0, plain.imported.notes)
 
 
@@ -95,10 +144,13 @@ def _write(path: Path, attributes: Mapping[str, Attribute], imported: Imported) 
     file.close("completed", "imported", 0.0)
 
 
-def _attributes(source: Path, data: bytes, plan: ImportMap, imported: Imported, notes: str) -> dict[str, Attribute]:
-    """Root attributes. The id follows from file, map and parameters: the same import has the same id."""
+def _attributes(
+    source: Path, data: bytes, plan: ImportMap, imported: Imported, notes: str, beside: bytes = b""
+) -> dict[str, Attribute]:
+    """Root attributes. The id follows from files, maps and parameters: the same import has the same id."""
     digest = hashlib.sha256(data).hexdigest()
-    identity = "\n".join([digest, plan.text, plan.thruster, plan.kind, *imported.notes])
+    other = [hashlib.sha256(beside).hexdigest()] if beside else []
+    identity = "\n".join([digest, plan.text, plan.thruster, plan.kind, *imported.notes, *other])
     found: dict[str, Attribute] = {
         "recording_id": str(uuid.uuid5(uuid.NAMESPACE_OID, identity)),
         "thruster": plan.thruster or source.stem,
@@ -113,6 +165,14 @@ def _attributes(source: Path, data: bytes, plan: ImportMap, imported: Imported, 
         "import_map": plan.text,
     }
     return found if plan.water_density is None else found | {"water_density": plan.water_density}
+
+
+def _attributes_beside(beside: Beside, data: bytes) -> dict[str, Attribute]:
+    return {
+        "imported_with": beside.source.name,
+        "imported_with_sha256": hashlib.sha256(data).hexdigest(),
+        "import_map_with": beside.plan.text,
+    }
 
 
 def _version() -> str:
@@ -138,6 +198,21 @@ def _assignments(texts: tuple[str, ...]) -> dict[str, float]:
     return found
 
 
+def _plan_of(name: str, levels: Levels | None, where: str) -> ImportMap:
+    """The map, with what the command line says of its rows."""
+    plan = read_map(name)
+    if where:
+        parse(where)
+        plan = replace(plan, file=replace(plan.file, where=where))
+    if levels is None:
+        return plan
+    if plan.time.level_duration is not None:
+        raise ConfigError(f"--levels is for files with times; {name} has level_duration: each row is a level already")
+    if levels == "no":
+        return replace(plan, time=replace(plan.time, levels=False))
+    return replace(plan, time=replace(plan.time, levels=True, level_time=levels))
+
+
 def _refuse_without_map(file: Path, options: Mapping[str, object]) -> None:
     """Raises ConfigError where an option was given that changes a map."""
     given = [name for name, value in options.items() if value]
@@ -161,8 +236,22 @@ def _list_maps(context: click.Context, _parameter: click.Parameter, wanted: bool
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="the recording; default: FILE with .h5")
 @click.option("--set", "assignments", multiple=True, metavar="NAME=NUMBER", help="override a parameter of the map")
-@click.option("--thruster", help="id of the thruster; default: the map's, else the file's name")
+@click.option("--thruster", help="id of the thruster; default: the map's, else what the file's name tells")
 @click.option("--kind", type=click.Choice(["tunnel", "bollard", "vehicle"]), help="override the map's kind")
+@click.option("--where", default="", metavar="FILTER", help="rows that are wanted: \"mode == 'run' and c3 > 0\"")
+@click.option(
+    "--levels",
+    type=click.Choice(["start", "middle", "end", "no"]),
+    help="each row is a level, its time the level's start, middle or end; no: each row is a sample of a log",
+)
+@click.option("--with", "beside", type=click.Path(path_type=Path), help="a second file, with a clock of its own")
+@click.option("--with-map", help="the map of the second file; default: that of the first")
+@click.option(
+    "--offset",
+    default=ESTIMATED,
+    show_default=True,
+    help="from the first row of FILE to that of the second, s; clock: by their stamps; auto: estimated",
+)
 @click.option("--notes", default="", help="kept in the recording")
 @click.option("--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_maps, help="list shipped maps")
 def import_command(
@@ -173,17 +262,34 @@ def import_command(
     assignments: tuple[str, ...],
     thruster: str | None,
     kind: Literal["tunnel", "bollard", "vehicle"] | None,
+    where: str,
+    levels: Levels | None,
+    beside: Path | None,
+    with_map: str | None,
+    offset: str,
     notes: str,
 ) -> None:
     """Exit status 0; RigError is for the caller (rig.cli) to print."""
+    out = output or file.with_suffix(".h5")
     if map_name is None:
-        _refuse_without_map(file, {"--set": assignments, "--thruster": thruster, "--kind": kind})
-        summary = import_plain(file, output or file.with_suffix(".h5"), notes)
+        given = {"--set": assignments, "--thruster": thruster, "--kind": kind, "--where": where, "--levels": levels}
+        _refuse_without_map(file, given | {"--with": beside, "--with-map": with_map})
+        summary = import_plain(file, out, notes)
+        for sentence in summary.sentences:
+            click.echo(sentence)
         click.echo(f"{summary.path}: {summary.rows} rows")
         return
-    plan = read_map(map_name)
-    plan = replace(plan, thruster=thruster or plan.thruster, kind=kind or plan.kind)
-    summary = import_file(file, plan, output or file.with_suffix(".h5"), _assignments(assignments), notes)
+    plan = _plan_of(map_name, levels, where)
+    _read(file, plan.file.encoding)  # what it is comes before whose it is
+    whose, known_by = thruster_of(thruster, plan, file)
+    plan = replace(plan, thruster=whose, kind=kind or plan.kind)
+    second = None if beside is None else Beside(beside, read_map(with_map or map_name), offset_asked(offset))
+    _tell(import_file(file, plan, out, _assignments(assignments), notes, second), whose, known_by)
+
+
+def _tell(summary: Summary, whose: str, known_by: str) -> None:
     for sentence in summary.sentences:
         click.echo(sentence)
+    other = "; --thruster NAME for another" if known_by == "the file's name" else ""
+    click.echo(f"thruster {whose} (by {known_by}{other})")
     click.echo(f"{summary.path}: {summary.rows} rows, {summary.bad} left out")

@@ -12,7 +12,7 @@ Times are s, ascending; null is a value that was not given.
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -20,7 +20,8 @@ import numpy as np
 
 from identification.recording import QUANTITY_UNITS, Floats
 from rig.errors import RecordingError
-from rig.importing.convert import Imported, StreamData
+from rig.importing.convert import Imported
+from rig.importing.streams import StreamData
 from rig.link.recorder_messages import Attribute, ChannelSpec, StepRow, StreamSpec
 
 FORMAT = "thruster-rig-recording"
@@ -55,8 +56,19 @@ def read_plain(data: bytes) -> Plain:
     except (KeyError, TypeError, AttributeError, ValueError) as error:
         raise RecordingError(f"the JSON is not as rig/importing/json_recording.py shows: {error!r}") from None
     rows = sum(stream.time.size for stream in streams)
-    imported = Imported(streams, steps, ("read from JSON in the words of the recording format",), (), "", rows, 0)
-    return Plain(attributes, imported)
+    notes = ("read from JSON in the words of the recording format", _understood(streams, steps))
+    return Plain(attributes, Imported(streams, steps, notes, (), "", rows, 0))
+
+
+def _understood(streams: Sequence[StreamData], steps: Sequence[StepRow]) -> str:
+    """Nothing of it is an assumption: the file itself says all."""
+    ends = [(float(s.time[0]), float(s.time[-1])) for s in streams if s.time.size]
+    span = f"{min(a for a, _ in ends):.4g} to {max(b for _, b in ends):.4g} s" if ends else "no rows"
+    told = [c for s in streams for c in s.spec.channels if c.quantity is not None]
+    command = [c.name for c in told if c.quantity == "command_voltage"]
+    units = ", ".join(f"{c.quantity} {c.unit}" for c in told if c.quantity != "command_voltage")
+    driven = f"command {', '.join(command)} in V, {len(steps)} steps" if command else "no command"
+    return f"understood: time in s, {span}; {driven}; units {units or 'none'}"
 
 
 def _attributes(found: Mapping[str, Any]) -> dict[str, Attribute]:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Any, Literal
@@ -16,6 +17,8 @@ from pydantic import TypeAdapter, ValidationError
 from identification.recording import QUANTITY_UNITS
 from rig.errors import ConfigError
 from rig.importing.expression import names_in
+from rig.importing.reading.row_filter import parse
+from rig.importing.units import FROM_HEADER, conversion, factor_to_si, seconds
 
 ColumnRef = str | int
 """Name in the header, or number counted from 1."""
@@ -25,7 +28,8 @@ ColumnRef = str | int
 class Column:
     """A column with a name to use in expressions. `any_of`: the first that the header has, times its factor."""
 
-    any_of: tuple[tuple[ColumnRef, float], ...]
+    any_of: tuple[tuple[ColumnRef, float | str], ...]
+    """The factor is a number, or the name of a unit that is only a factor: `["Thrust (gf)", "gf"]`."""
     optional: bool = False
     """Channels that need a column which is not there are left out."""
     not_given: float | None = None
@@ -45,13 +49,17 @@ class Time:
     """Exactly one of `column`, `rate` and `level_duration`."""
 
     column: ColumnRef | None = None
-    unit: Literal["s", "ms", "us", "min"] = "s"
+    unit: str = "s"
     format: str = ""
     """`iso`, or a pattern of strptime; empty: a number in `unit`."""
     rate: float | None = None
     """Hz, when the file has no time."""
     level_duration: float | None = None
     """s: each row is a level held so long; its measured values stand in the middle of it."""
+    levels: bool | None = None
+    """Each row of a file with times is a level and what was measured on it; None: told by the rows, or asked."""
+    level_time: Literal["start", "middle", "end"] = "middle"
+    """What of a level the time of its row is."""
 
 
 @dataclass(frozen=True)
@@ -60,11 +68,13 @@ class ChannelMap:
 
     quantity: str | None = None
     unit: str = ""
+    """Of what `column` or `value` gives; of a quantity any that rig.importing.units knows, or `header`."""
     column: ColumnRef | None = None
     value: str = ""
     factor: float = 1.0
     offset: float = 0.0
-    sign: Literal[1, -1] = 1
+    sign: Literal[1, -1] | str = 1
+    """1, -1, or the name of a parameter that is one of them."""
     unwrap: bool = False
     """Take jumps of more than pi out of an angle in rad."""
     integer: bool = False
@@ -83,8 +93,8 @@ class StreamMap:
     source: str = "import"
     device_id: str = ""
     note: str = ""
-    changes: bool = False
-    """Keep only the rows in which a value differs from the row before: what a command needs."""
+    changes: bool | None = None
+    """Keep only the rows in which a value differs from the row before. When a command holds does not depend on it."""
     time: Time | None = None
     """A clock of its own."""
 
@@ -105,6 +115,8 @@ class FileMap:
     width: int | None = None
     """Columns of a row; by default those of the header, without one the most frequent number."""
     decimal: Literal[".", ","] = "."
+    where: str = ""
+    """Rows that are wanted, as rig.importing.reading.row_filter reads it; empty: all."""
 
 
 @dataclass(frozen=True)
@@ -199,24 +211,46 @@ def _check(found: ImportMap, where: str) -> None:
             raise ConfigError(
                 f"{where}: {owner} needs exactly one of column, rate, level_duration; has {given or 'none'}"
             )
+        if clock.level_duration is not None and clock.levels is False:
+            raise ConfigError(
+                f"{where}: {owner}: level_duration is for a table of levels, and levels = false says none"
+            )
+        _told(partial(seconds, clock.unit), f"{where}: {owner}.unit")
     if found.file.delimiter not in ("tab", "whitespace") and len(found.file.delimiter) != 1:
         raise ConfigError(
             f"{where}: file.delimiter must be one character, tab or whitespace, got {found.file.delimiter!r}"
         )
+    if found.file.where:
+        _told(partial(parse, found.file.where), f"{where}: file.where")
+    for name, column in found.columns.items():
+        for factor in (factor for _, factor in column.any_of if isinstance(factor, str)):
+            _told(partial(factor_to_si, factor), f"{where}: columns.{name}")
     for stream, channels in found.streams.items():
         for name, channel in channels.channels.items():
-            _check_channel(channel, f"{where}: {stream}/{name}")
+            _check_channel(channel, f"{where}: {stream}/{name}", found.parameters)
 
 
-def _check_channel(channel: ChannelMap, who: str) -> None:
+def _told(check: Callable[[], object], who: str) -> None:
+    """Runs a check; what it refuses is said with the key before it."""
+    try:
+        check()
+    except ConfigError as error:
+        raise ConfigError(f"{who}: {error}") from error
+
+
+def _check_channel(channel: ChannelMap, who: str, parameters: Mapping[str, float]) -> None:
+    if isinstance(channel.sign, str) and channel.sign not in parameters:
+        raise ConfigError(f"{who}: sign must be 1, -1 or a name of [parameters], got {channel.sign!r}")
     if (channel.column is None) == (not channel.value):
         raise ConfigError(f"{who} needs either column or value")
     if channel.value:
         names_in(channel.value)
     if channel.quantity is None:
         return
-    units = QUANTITY_UNITS.get(channel.quantity)
-    if units is None:
+    if channel.quantity not in QUANTITY_UNITS:
         raise ConfigError(f"{who}: {channel.quantity} is no quantity of the format: {', '.join(QUANTITY_UNITS)}")
-    if channel.unit not in units:
-        raise ConfigError(f"{who}: {channel.quantity} must be in {' or '.join(units)}, got {channel.unit!r}")
+    quantity, unit = channel.quantity, channel.unit
+    if unit == FROM_HEADER and not isinstance(channel.column, str):
+        raise ConfigError(f"{who}: unit = 'header' is for a channel whose `column` is a name of the header")
+    if unit != FROM_HEADER:
+        _told(partial(conversion, quantity, unit), who)

@@ -77,7 +77,8 @@ def _leave(experiment: SequentialExperiment, found: Diagnosis, course: Course, e
         elif wanted.json_path is not None:
             wanted.json_path.write_text(answer + "\n", encoding="utf-8")
         with contextlib.redirect_stdout(sys.stderr) if wanted.alone else contextlib.nullcontext():
-            tell(found, Wanted(report=wanted.report), read(experiment.files) if wanted.report is not None else ())
+            recordings = read(experiment.files) if wanted.report is not None else ()
+            tell(found, Wanted(report=wanted.report), recordings, experiment.files)
     except OSError as error:
         raise RigError(
             f"the answer can't be written: {error}; rig diagnose makes it again of the recordings"

@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from datetime import UTC, datetime
-from typing import Final
 
 import numpy as np
 
 from identification.recording import Floats
 from rig.importing.mapping import Time
-
-SECONDS: Final = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0}
+from rig.importing.units import seconds
 
 
 def reader(clock: Time) -> Callable[[str], float]:
     """A function from a cell to seconds on the file's own clock; raises ValueError for what is no time."""
     if clock.format:
         return lambda cell: _stamp(cell, clock.format).timestamp()
-    factor = SECONDS[clock.unit]
+    factor = seconds(clock.unit)
     return lambda cell: float(cell) * factor
 
 
@@ -42,10 +40,10 @@ def wall_clock(clock: Time, cell: str) -> tuple[str, bool]:
     return (when.astimezone(UTC) if known else when.replace(tzinfo=None)).isoformat(), known
 
 
-def regular(clock: Time, n: int, *, command: bool) -> Floats:
-    """Times of n rows for a rate or for levels; a level's command stands at its start, its values in its middle."""
+def regular(clock: Time, n: int) -> Floats:
+    """Times of n rows for a rate, s from the first; for levels of one length, those of their starts."""
     if clock.level_duration is not None:
-        return (np.arange(n, dtype=np.float64) + (0.0 if command else 0.5)) * clock.level_duration
+        return np.arange(n, dtype=np.float64) * clock.level_duration
     if clock.rate is None:
         raise ValueError("a clock without rate and level_duration has a column")
     return np.arange(n, dtype=np.float64) / np.float64(clock.rate)

@@ -9,10 +9,12 @@ from math import isnan
 import numpy as np
 
 from identification.recording import Floats
-from rig.importing.clock import reader
 from rig.importing.expression import names_in
 from rig.importing.mapping import ChannelMap, Column, ImportMap, Time
-from rig.importing.table import Refused, Table, index_of, no_such_column
+from rig.importing.reading.row_filter import columns_of, parse, refuse_empty, row_passes
+from rig.importing.reading.table import Refused, Table, index_of, no_such_column
+from rig.importing.timing.clock import reader
+from rig.importing.units import factor_to_si
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +24,8 @@ class Cells:
     columns: Mapping[str, Floats]
     time: Mapping[Time, Floats]
     rows: int
+    filtered: int = 0
+    """Rows that the map's filter did not want."""
 
 
 def columns_used(plan: ImportMap, table: Table, parameters: Mapping[str, float]) -> dict[str, Column]:
@@ -55,7 +59,7 @@ def _place(table: Table, column: Column) -> tuple[int, float] | None:
     for reference, factor in column.any_of:
         index = index_of(table, reference)
         if index is not None:
-            return index, factor
+            return index, factor_to_si(factor) if isinstance(factor, str) else factor
     return None
 
 
@@ -117,16 +121,49 @@ def read_cells(plan: ImportMap, table: Table, columns: Mapping[str, Column], ref
         frozenset(plan.file.missing),
         plan.file.decimal == ",",
     )
-    times, values = _good_rows(table, row_reader, refused)
+    wanted, filtered = _wanted(plan, table, refused)
+    times, values = _good_rows(wanted, row_reader, refused)
     by_index = {index: values[:, k] for k, index in enumerate(indices)}
     named = {name: _scaled(by_index[index], factor, columns[name]) for name, (index, factor) in places.items()}
-    return Cells(named, {clock: times[:, k] for k, clock in enumerate(clocks)}, len(values))
+    return Cells(named, {clock: times[:, k] for k, clock in enumerate(clocks)}, len(values), filtered)
 
 
-def _good_rows(table: Table, row_reader: RowReader, refused: Refused) -> tuple[Floats, Floats]:
+def _wanted(plan: ImportMap, table: Table, refused: Refused) -> tuple[Sequence[tuple[int, Sequence[str]]], int]:
+    """Rows that the map's filter lets through, and the number of those that it does not."""
+    if not plan.file.where:
+        return table.rows, 0
+    wanted, comma = parse(plan.file.where), plan.file.decimal == ","
+    places = {name: _filter_place(plan, table, name) for name in columns_of(wanted)}
+    kept, filtered = [], 0
+    for line, row in table.rows:
+        try:
+            passes = row_passes(wanted, row, places, comma)
+        except ValueError:
+            refused.add("the filter compares a cell with a number that is none", line)
+            continue
+        if passes:
+            kept.append((line, row))
+        filtered += not passes
+    refuse_empty(plan.file.where, len(kept), len(table.rows))
+    return kept, filtered
+
+
+def _filter_place(plan: ImportMap, table: Table, name: str) -> int:
+    """0-based column that a filter means: an alias of [columns], a name of the header, or c1, c2 ... by number."""
+    number = name[1:] if name.startswith("c") and name[1:].isdigit() else ""
+    column = plan.columns.get(name) or Column(((name, 1.0), *(((int(number), 1.0),) if number else ())))
+    place = _place(table, column)
+    if place is None:
+        raise no_such_column(table, name)
+    return place[0]
+
+
+def _good_rows(
+    rows: Sequence[tuple[int, Sequence[str]]], row_reader: RowReader, refused: Refused
+) -> tuple[Floats, Floats]:
     kept: list[tuple[list[float], list[float]]] = []
     latest = [-np.inf] * len(row_reader.clocks)
-    for line, row in table.rows:
+    for line, row in rows:
         try:
             times, values = row_reader.read(row)
         except ValueError as error:
