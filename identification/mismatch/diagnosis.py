@@ -52,6 +52,21 @@ class Finding:
     bic_gain: float
     probability: float
     rivals: tuple[RivalFinding, ...]
+    share: float | None = None
+    """Of the squared error on what was not fitted that anything could take off, how much this does, 0 to 1."""
+    heldout: tuple[float, float] | None = None
+    """RMSE per sample on what was not fitted, without it and with it."""
+    doubts: tuple[str, ...] = ()
+    """Why it is not the whole of it: checks of its shape that it failed."""
+
+    @property
+    def grade(self) -> Literal["all", "mostly", "partly"]:
+        """How much of what could be explained it is."""
+        if self.share is None:
+            return "all"
+        if self.share >= policy.unnamed.ALL_SHARE and not self.doubts:
+            return "all"
+        return "mostly" if self.share >= policy.unnamed.MOSTLY_SHARE else "partly"
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,8 +296,22 @@ class Diagnosis:
                 known = f" Left out besides: {sure}" if sure else ""
                 return f"These recordings cannot tell {rivals}: run the next experiment.{known}"
             case Unexplained(findings, remainder):
-                known = " Known: " + " ".join(f.statement for f in findings) if findings else ""
-                return remainder.statement + known
+                most = [f for f in findings if f.doubts]
+                sure = " ".join(f.statement for f in findings if not f.doubts)
+                known = f" Known: {sure}" if sure else ""
+                return " ".join([*map(_mostly, most), remainder.statement]) + known
+
+
+def _mostly(f: Finding) -> str:
+    """With what it does on what was not fitted."""
+    says = f"Mostly {f.statement[:1].lower()}{f.statement[1:]}"
+    if f.heldout is None or f.share is None:
+        return says
+    without, with_it = f.heldout
+    return (
+        f"{says} It takes the error on what was not fitted from {without:.3g} to {with_it:.3g}, "
+        f"{100 * f.share:.0f} % of what any shape could take off."
+    )
 
 
 def _either(f: Finding) -> str:

@@ -98,6 +98,11 @@ def _finding(f: Finding) -> Iterator[str]:
     yield from _para(
         f"{rarity(f.p_value)}, BIC better by {f.bic_gain:.4g}, probability among its rivals {f.probability:.2g}", "  "
     )
+    if f.share is not None and f.heldout is not None and f.grade != "all":
+        without, with_it = f.heldout
+        told = f"{f.grade}: not fitted {without:.4g} without it, {with_it:.4g} with it, "
+        told += f"{100 * f.share:.0f} % of what any shape could take off"
+        yield from _para("; ".join((told, *f.doubts)), "  ")
     for rival in f.rivals:
         yield from _para(f"- or {rival.effect} (BIC worse by {rival.bic_loss:.1f}): {rival.statement}", "  ")
 

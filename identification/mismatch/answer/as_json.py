@@ -87,6 +87,12 @@ def _finding(f: Finding) -> dict[str, object]:
         "p_value": _number(f.p_value),
         "bic_gain": _number(f.bic_gain),
         "probability": _number(f.probability),
+        "share": None if f.share is None else _number(f.share),
+        "grade": f.grade,
+        "heldout": None
+        if f.heldout is None
+        else {"rmse_without": _number(f.heldout[0]), "rmse_with": _number(f.heldout[1])},
+        "doubts": list(f.doubts),
         "rivals": [r.effect for r in f.rivals],
         "rival_details": [
             {

@@ -59,6 +59,9 @@ def finding_of(named: NamedTerm[T, F], scale: Any, known: Mapping[T, tuple[Inter
         named.bic_gain,
         named.probability,
         tuple(_rival(r, scale) for r in named.rivals),
+        None if named.attained is None else named.attained.share,
+        None if named.attained is None else (named.attained.without, named.attained.with_it),
+        named.failed_checks,
     )
 
 

@@ -28,6 +28,17 @@ class Check:
     """Whether it says nothing here."""
 
 
+@dataclass(frozen=True, slots=True)
+class Attained:
+    """What a name does on what was not fitted."""
+
+    without: float
+    """RMSE per sample without it, N."""
+    with_it: float
+    share: float
+    """Of what anything could improve there, 0 to 1."""
+
+
 @dataclass(frozen=True, eq=False)
 class NamedTerm(Generic[T, F]):
     """One term of the final model and what speaks for its name."""
@@ -45,6 +56,7 @@ class NamedTerm(Generic[T, F]):
     """All that it was asked."""
     forms: tuple[RivalTerm[T, F], ...] = ()
     """The same effect in its other textbook forms, best first, however much worse."""
+    attained: Attained | None = None
     chi2_of_all: float = 0.0
     """Of the whole model, beside which the fits of rivals and forms stand."""
 
@@ -87,7 +99,7 @@ def named_term(
         tuple(unique.values()),
         asked,
         tuple(r for r in others if effect_of(r.term) == effect_of(term)),
-        fitted.chi2,
+        chi2_of_all=fitted.chi2,
     )
 
 

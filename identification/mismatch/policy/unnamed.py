@@ -87,3 +87,13 @@ BROKEN_LINE_BIC = Threshold(
         "of 6 to 10 is strong, above 10 very strong."
     ),
 )
+MOSTLY_SHARE = Threshold(
+    0.5,
+    unit="share of the squared error that could be taken off what was not fitted",
+    reason="A name whose shape is not quite the textbook's is said where it makes most of what any shape could.",
+)
+ALL_SHARE = Threshold(
+    0.95,
+    unit="share of the squared error that could be taken off what was not fitted",
+    reason="Less than a twentieth left beside a name is nothing that a person would look for.",
+)

@@ -101,7 +101,7 @@ class System(Protocol[T, F, S, Judged]):
         """Whether `other` is the ordinary one of two, and is named where both do as well."""
 
     def merged(self, state: S, best: tuple[float, F] | None, /) -> tuple[float, F] | None:
-        """The better of `best`, a BIC loss and a fit, and a smaller model: one term in the place of two, or one less."""
+        """The better of `best`, a BIC loss and a fit, and a smaller model: one term for two, or one term less."""
 
 
 def forward(

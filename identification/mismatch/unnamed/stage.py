@@ -19,6 +19,7 @@ from identification.mismatch.name.naming import Named
 from identification.mismatch.select.forward_selection import STATIC, Selected
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
+from identification.mismatch.unnamed.shares import Mostly, mostly_right, with_shares
 from identification.mismatch.validate.prediction import predicting, predicts
 from identification.mismatch.validate.stage import Validated
 from identification.physics.term import Term
@@ -33,7 +34,7 @@ class Completed:
 
     after: Estimate
     earned: tuple[Named, ...]
-    """With their values in it, the largest gain first."""
+    """Those that are mostly right among them. With their values in it, the largest gain first."""
     intervals: Mapping[Term, tuple[Interval, ...]]
     """Of their parameters."""
     unearned: tuple[Named, ...]
@@ -53,6 +54,8 @@ def run(
     """Flexible terms where they predict better; else the named model, without unnamed terms that predict no better."""
     data, before, now = selected.data, selected.before, located.estimate
     earned, unearned, split = validated.earned, validated.unearned, validated.split
+    mostly = mostly_right(split, unearned) if located.structured else Mostly((), unearned)
+    earned, unearned = (*earned, *mostly.right), mostly.others
     open_ended = (located.structured or bool(unearned)) and bool(located.left.groups)
     bare, left, flexible = now, located.left, None
     if open_ended and unearned:
@@ -67,6 +70,7 @@ def run(
         over = foremost_covariate(left, unearned, data)
         flexible = extend(now, before, data, over, unearned, split, rng)
     if flexible is not None:
+        earned = with_shares(split, earned, [n.term for n in unearned], flexible.held)
         valued, known = _with_values(earned, now, flexible.estimate, data, flexible)
         return Completed(flexible.estimate, valued, known, unearned, flexible, open_ended, bare, left)
     after = predicting(now, split, data, selected.terms, [n.term for n in unearned], unseen)
@@ -76,6 +80,7 @@ def run(
         bare, left = _without(now, data, unearned, rng)
         if left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM:
             bare, left = now, located.left
+    earned = with_shares(split, earned, [n.term for n in unearned], split.judge(split.estimate.fit).rmse)
     valued, known = _with_values(earned, now, after, data, None)
     return Completed(after, valued, known, unearned, None, open_ended, bare, left)
 

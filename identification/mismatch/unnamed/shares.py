@@ -1,0 +1,107 @@
+"""How much each effect is of what anything could explain, judged on what was not fitted; and which names are mostly right.
+
+A textbook's shape never fits a real recording whole: something stays over its own covariate, or its parameter is not
+quite the same everywhere. Where a name by itself makes most of the improvement that any shape could make, it is said,
+with what is left beside it; a free shape is for what is left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from identification.mismatch import policy
+from identification.mismatch.estimate.fitting import Fit, at_bound, fit
+from identification.mismatch.name.named_term import Attained
+from identification.mismatch.name.naming import Named
+from identification.mismatch.validate.held_out import Score
+from identification.mismatch.validate.train_test_split import TrainTestSplit, better
+from identification.physics.term import Term
+
+IMPOSSIBLE = frozenset(
+    {
+        "its values are possible",
+        "the samples can show it",
+        "noise vanishes where it clips",
+        "no other term undoes it",
+        "predicts what was not fitted",
+    }
+)
+"""What a name is asked that no share makes up for."""
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Mostly:
+    """Names that are mostly right, and those that are not."""
+
+    right: tuple[Named, ...]
+    others: tuple[Named, ...]
+
+
+def mostly_right(split: TrainTestSplit, unearned: Sequence[Named]) -> Mostly:
+    """Of the names that were not earned those that make most of what the whole model does, one after the other.
+
+    `split`: the whole model fitted to a part of the data, and what judges it on the rest.
+    """
+    whole = split.judge(split.estimate.fit)
+    now = _fitted(split, split.estimate.fit, [n.term for n in unearned])
+    left = [n for n in unearned if not IMPOSSIBLE & {check.asked for check in n.checks if check.failed}]
+    right: list[Named] = []
+    while left:
+        score = split.judge(now)
+        tried = [(n, one) for n in left if (one := _with(split, now, n)) is not None]
+        if not tried:
+            break
+        best, one = min(tried, key=lambda each: split.judge(each[1]).rmse)
+        new = split.judge(one)
+        gains = better(new, score, len(best.theta))
+        if not gains or share(score, new, _least(whole, new)) < policy.unnamed.MOSTLY_SHARE:
+            break
+        right.append(best)
+        left.remove(best)
+        now = one
+    return Mostly(tuple(right), tuple(n for n in unearned if n not in right))
+
+
+def with_shares(
+    split: TrainTestSplit, named: Sequence[Named], others: Sequence[Term], best: float
+) -> tuple[Named, ...]:
+    """The names with their shares: beside each other, without the terms `others`, which have no name.
+
+    `best`: RMSE in N of the model that predicts best, free shapes and all.
+    """
+    if not named:
+        return ()
+    now = _fitted(split, split.estimate.fit, others)
+    score = split.judge(now)
+    least = min(best, score.rmse)
+    out = []
+    for n in named:
+        less = split.judge(_fitted(split, now, [n.term]))
+        out.append(replace(n, attained=Attained(less.rmse, score.rmse, share(less, score, least))))
+    return tuple(out)
+
+
+def share(without: Score, with_it: Score, least: float) -> float:
+    """Of the squared error that could be taken off, down to `least` N, how much is (0 to 1).
+
+    >>> share(Score(2.0, 0.0), Score(1.2, 0.0), 1.0)
+    0.8533333333333333
+    """
+    could = without.rmse**2 - least**2
+    return min(max((without.rmse**2 - with_it.rmse**2) / could, 0.0), 1.0) if could > 0 else 0.0
+
+
+def _least(*scores: Score) -> float:
+    return min(score.rmse for score in scores)
+
+
+def _fitted(split: TrainTestSplit, now: Fit, without: Sequence[Term]) -> Fit:
+    there = [t for t in without if t in now.model.terms]
+    return fit(*now.less(*there), split.data, split.estimate.weights) if there else now
+
+
+def _with(split: TrainTestSplit, now: Fit, named: Named) -> Fit | None:
+    """The model with that term as well; None where its values are none that it can have."""
+    new = fit(*now.more(named.term, named.theta), split.data, split.estimate.weights)
+    return None if at_bound(named.term, new, split.data, split.estimate.weights) else new
