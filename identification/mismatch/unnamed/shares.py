@@ -1,4 +1,4 @@
-"""How much each effect is of what anything could explain, judged on what was not fitted; and which names are mostly right.
+"""How much each effect is of what anything could explain, judged on what was not fitted; which names are mostly right.
 
 A textbook's shape never fits a real recording whole: something stays over its own covariate, or its parameter is not
 quite the same everywhere. Where a name by itself makes most of the improvement that any shape could make, it is said,
