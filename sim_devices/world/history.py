@@ -32,6 +32,8 @@ class History:
     input_current: Floats
     bus_voltage: Floats
     motor_rise: Floats
+    terminals: Floats
+    flux: Floats
     rate_per_volt: float = 1.0
     thrust_constant: float = 0.4
     drag: float = 0.25
@@ -63,6 +65,8 @@ def instant(s: State) -> History:
         input_current=one([s.input_current]),
         bus_voltage=one([s.bus_voltage]),
         motor_rise=one([s.motor_rise]),
+        terminals=one([s.terminals]),
+        flux=one([s.flux]),
         rate_per_volt=s.rate_per_volt,
         thrust_constant=s.thrust_constant,
         drag=s.drag,

@@ -14,7 +14,11 @@ class State:
     command: float = 0.0
     """V the drive means to apply, before any effect; 0 when released."""
     volts: float = 0.0
-    """V that the rotor answers to, after the effects of the command stage."""
+    """V that the rotor answers to, after the effects of the stages command and motor."""
+    terminals: float = 0.0
+    """V at the motor, before what winding and magnets make of it."""
+    flux: float = 1.0
+    """Of the magnets, of what they have when cold: back-EMF and torque go with it."""
     driven: bool = True
     """False: the windings carry a set current (0 = coasting) instead of a voltage."""
     n: float = 0.0

@@ -26,6 +26,7 @@ class World:
         self._noise = {c: NoiseSource(settings.noise.get(c, Noise()), rng) for c in CHANNELS}
         self._effects = make_effects(settings.effects)
         self._command = self._of_stage("command")
+        self._motor = self._of_stage("motor")
         self._rotor = self._of_stage("rotor")
         self._hydro = self._of_stage("hydro")
         self._stand = self._of_stage("stand")
@@ -67,11 +68,15 @@ class World:
         n = self._spin
         k, alpha = th.rate_per_volt, th.drag
         if volts is None:
-            s.driven, s.command, s.volts = False, 0.0, n / k
-            push, pull = th.torque_acceleration * amps, th.friction
+            s.driven, s.command = False, 0.0
+            s.volts, s.terminals = n / k, s.flux * n / k
+            push, pull = th.torque_acceleration * s.flux * amps, th.friction
         else:
             s.driven, s.command = True, volts
             for e in self._command:
+                volts = e.apply(volts, s, dt)
+            s.terminals = volts
+            for e in self._motor:
                 volts = e.apply(volts, s, dt)
             s.volts = volts
             pull = th.stiffness
@@ -84,13 +89,13 @@ class World:
         if instant:
             n = k * s.volts
         self._spin = n
-        s.current = amps if volts is None else (push - pull * n) / th.torque_acceleration
+        s.current = amps if volts is None else (push - pull * n) / (th.torque_acceleration * s.flux)
         for e in self._rotor:
             n = e.apply(n, s, dt)
         s.n = n
         if instant:
-            s.current = (alpha * n * abs(n) + s.acceleration) / th.torque_acceleration
-        s.input_current = s.current * s.volts / s.bus_voltage if s.bus_voltage > 1.0 else 0.0
+            s.current = (alpha * n * abs(n) + s.acceleration) / (th.torque_acceleration * s.flux)
+        s.input_current = s.current * s.terminals / s.bus_voltage if s.bus_voltage > 1.0 else 0.0
         s.motor_rise += (th.heating * s.current * s.current - s.motor_rise) * dt / th.heating_time
         self._forces(dt)
 

@@ -32,6 +32,7 @@ VARIANTS: dict[str, tuple[str, ...]] = {
     "command_saturation": ("soft",),
     "winding_resistance": ("linearised",),
     "motor_lag": ("two_lags",),
+    "heating": ("both",),
     "cavitation": ("exponential",),
     "recirculation": ("late",),
     "zero_drift": ("root",),

@@ -9,10 +9,13 @@ from typing import Any
 import numpy as np
 
 from sim_devices.concealed.cases.forms import FORMS, NEIGHBOURS, VARIANTS
+from sim_devices.world.effects.motor import NEODYMIUM
 
 Rng = np.random.Generator
 
 
+FERRITE = 0.002
+"""1/K: of all magnets in motors these lose their remanence fastest."""
 LEAST = 0.002
 """Of the highest amount: below it nobody would speak of the effect."""
 
@@ -157,6 +160,18 @@ def _winding(s: Scale, _rng: Rng, form: str) -> Shape:
     return Shape("winding_resistance", "resistance", 1.0, s.voltage / s.current)
 
 
+def _heating(s: Scale, rng: Rng, form: str) -> Shape:
+    """Amount: the drop in the cold winding at the largest command, of that command; of magnets what they lose per K.
+
+    Both: magnets of NdFeB (0.11 % per K) where a fifth of the command is lost, weaker with it.
+    """
+    fixed = {"form": form, "time_constant": _log(rng, 30.0, 120.0)}
+    if form == "magnet":
+        return Shape("heating", "magnet", FERRITE, fixed=fixed)
+    beside = {"magnet": NEODYMIUM / 0.2 * s.current / s.voltage} if form == "both" else {}
+    return Shape("heating", "resistance", 0.5, s.voltage / s.current, fixed=fixed, with_knob=beside)
+
+
 def _clipped(effect: str, highest: float, limit: float, rng: Rng, form: str) -> Shape:
     """A soft limit also bends what lies far below it: it may lie above the largest value."""
     if form == "knee":
@@ -195,9 +210,7 @@ SHAPES: dict[str, Callable[[Scale, Rng, str], Shape]] = {
         "inflow_dynamics", "share", 1.0, fixed={"time_constant": _log(r, 0.2, 1.5)}
     ),
     "cavitation": _cavitation,
-    "heating": lambda s, r, f: Shape(
-        "heating", "loss_per_kelvin", 0.4, 1.0 / s.rise, fixed={"form": f, "time_constant": _log(r, 30.0, 120.0)}
-    ),
+    "heating": _heating,
     "reversal_loss": lambda _s, r, _f: Shape("reversal_loss", "loss", 0.8, fixed={"time_constant": _log(r, 0.5, 4.0)}),
     "linear_term": lambda s, r, _f: Shape("linear_term", "coefficient", 0.4, _sign(r) * s.thrust / s.voltage),
     "speed_of_advance": lambda s, _r, _f: Shape("speed_of_advance", "coefficient", 0.5, s.thrust / (s.rate * s.flow)),

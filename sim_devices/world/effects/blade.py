@@ -9,7 +9,6 @@ from typing import ClassVar
 import numpy as np
 
 from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
-from sim_devices.world.filters import low_pass
 from sim_devices.world.history import History
 from sim_devices.world.state import State
 
@@ -98,37 +97,6 @@ class Cavitation:
         if self.form == "exponential":
             return np.asarray(value * np.exp(-lost))
         return np.asarray(value * np.maximum(1.0 - (lost if self.form == "linear" else lost * lost), 0.0))
-
-
-@dataclass(slots=True)
-class Heating:
-    """Winding and magnet warm up: T (1 - loss_per_kelvin * rise).
-
-    form "winding": the rise is the motor's own, the one its thermometer sees. form "magnet": the magnets follow it
-    with a lag of their own, `time_constant`.
-    """
-
-    stage: ClassVar[Stage] = "hydro"
-    loss_per_kelvin: float
-    """1/K."""
-    form: str = "winding"
-    time_constant: float = 60.0
-    """s; only for "magnet"."""
-    rise: float = field(init=False, default=0.0)
-    """K, of the magnets."""
-
-    def __post_init__(self) -> None:
-        require_choice("form", self.form, ("winding", "magnet"))
-        require_positive(time_constant=self.time_constant)
-
-    def apply(self, value: float, s: State, dt: float) -> float:
-        self.rise += (s.motor_rise - self.rise) * min(dt / self.time_constant, 1.0)
-        rise = s.motor_rise if self.form == "winding" else self.rise
-        return value * (1.0 - self.loss_per_kelvin * rise)
-
-    def over(self, value: Floats, h: History) -> Floats:
-        rise = h.motor_rise if self.form == "winding" else low_pass(h.motor_rise, self.time_constant, h.dt)
-        return np.asarray(value * (1.0 - self.loss_per_kelvin * rise))
 
 
 @dataclass(slots=True)

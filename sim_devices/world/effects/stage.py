@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sim_devices.world.history import History
 from sim_devices.world.state import State
 
-Stage = Literal["command", "rotor", "hydro", "stand", "cell", "output"]
+Stage = Literal["command", "motor", "rotor", "hydro", "stand", "cell", "output"]
 Floats = NDArray[np.float64]
 
 

@@ -36,7 +36,7 @@ OTHER_FORMS = [
     ("dead_band", {"half_width": 0.9, "form": "jump"}),
     ("cavitation", {"onset": 15.0, "slope": 0.05, "form": "square"}),
     ("recirculation", {"coefficient": 0.02, "time_constant": 5.0, "form": "thrust"}),
-    ("heating", {"loss_per_kelvin": 0.01, "form": "magnet", "time_constant": 5.0}),
+    ("heating", {"magnet": 0.01, "form": "magnet", "time_constant": 5.0}),
     ("periodic_disturbance", {"amplitude": 0.5, "blades": 3, "phase": 1.0}),
     ("torque_crosstalk", {"coefficient": 0.01, "form": "torque"}),
     ("load_cell_creep", {"share": 0.02, "time_constant": 3.0, "share_2": 0.02, "time_constant_2": 20.0}),

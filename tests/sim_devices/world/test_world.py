@@ -26,7 +26,7 @@ SHOWN = {
     "asymmetry": {"ratio": 0.85},
     "inflow_dynamics": {"share": 0.3, "time_constant": 0.4},
     "cavitation": {"onset": 15.0, "slope": 0.02},
-    "heating": {"loss_per_kelvin": 0.002},
+    "heating": {"resistance": 0.3, "copper": 0.05},
     "reversal_loss": {"loss": 0.2, "time_constant": 1.5},
     "linear_term": {"coefficient": 0.5},
     "speed_of_advance": {"coefficient": 0.5},
