@@ -39,6 +39,8 @@ class History:
     drag: float = 0.25
     torque_acceleration: float = 7.2
     nominal_bus: float = 48.0
+    stand_frequency: float = 0.0
+    stand_damping: float = 0.0
 
 
 def clock(count: int, dt: float) -> Floats:
@@ -72,4 +74,6 @@ def instant(s: State) -> History:
         drag=s.drag,
         torque_acceleration=s.torque_acceleration,
         nominal_bus=s.nominal_bus,
+        stand_frequency=s.stand_frequency,
+        stand_damping=s.stand_damping,
     )

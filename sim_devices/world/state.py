@@ -45,10 +45,13 @@ class State:
     """degC."""
     motor_rise: float = 0.0
     """K, winding over water."""
-    # constants of the mounted thruster and the supply, here so that effects need no second argument
+    # constants of the mounted thruster, the supply and the stand, here so that effects need no second argument
     rate_per_volt: float = 1.0
     thrust_constant: float = 0.4
     """C_t = C / k^2, N/(rev/s)^2."""
     drag: float = 0.25
     torque_acceleration: float = 7.2
     nominal_bus: float = 48.0
+    stand_frequency: float = 0.0
+    """Hz of a stand that rings; 0: rigid."""
+    stand_damping: float = 0.0

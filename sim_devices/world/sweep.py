@@ -14,6 +14,7 @@ from sim_devices.world.effects.motor import Heating
 from sim_devices.world.filters import low_pass
 from sim_devices.world.history import History, clock
 from sim_devices.world.settings import WorldSettings, make_effects
+from sim_devices.world.world import stand_of
 
 Floats = NDArray[np.float64]
 
@@ -35,6 +36,7 @@ def sweep(
     effects = make_effects(settings.effects)
     h = _at_rest(settings, dt, command, flow, water_temperature)
     h.t = start + h.t
+    h.stand_frequency, h.stand_damping = stand_of(effects)
     _rotor(settings, effects, h)
     warms = any(isinstance(e, Heating) for e in effects)
     for _ in range(_passes(effects)):

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sim_devices.tables import check_known
 from sim_devices.world.effects import Effect
 from sim_devices.world.effects.channel import ChannelFault
+from sim_devices.world.effects.stand import StandResonance
 from sim_devices.world.noise import CHANNELS, Noise, NoiseSource
 from sim_devices.world.settings import WorldSettings, make_effects
 from sim_devices.world.state import State
@@ -25,6 +28,7 @@ class World:
         self.state.water_temperature = settings.tunnel.water_temperature
         self._noise = {c: NoiseSource(settings.noise.get(c, Noise()), rng) for c in CHANNELS}
         self._effects = make_effects(settings.effects)
+        self.state.stand_frequency, self.state.stand_damping = stand_of(self._effects)
         self._command = self._of_stage("command")
         self._motor = self._of_stage("motor")
         self._rotor = self._of_stage("rotor")
@@ -151,6 +155,11 @@ class World:
                 return s.water_temperature + 5.0 + 0.5 * s.motor_rise
             case _:
                 raise ValueError(f"sample: expected one of {', '.join(CHANNELS)}, got {channel!r}")
+
+
+def stand_of(effects: Sequence[Effect]) -> tuple[float, float]:
+    """Hz and damping of the stand, (0, 0) where it is rigid."""
+    return next(((e.frequency, e.damping) for e in effects if isinstance(e, StandResonance)), (0.0, 0.0))
 
 
 def _concerns(effect: Effect, channel: str) -> bool:

@@ -62,8 +62,15 @@ class Shape:
     """Further parameters in proportion to gain * amount."""
     lowest: float = 0.0
     """Least amount worth the name; 0: LEAST of the highest."""
+    start: float = 0.0
+    """Amount that a search begins with; 0: a twentieth of the highest."""
     quantum: float = 0.0
     """gain * amount comes in whole multiples of it, one at least; 0: it is continuous."""
+
+    @property
+    def first(self) -> float:
+        """Amount that a search begins with."""
+        return max(self.start or 0.05 * self.highest, self.lowest or LEAST * self.highest)
 
     def parameters(self, amount: float) -> dict[str, Any]:
         """Of the world's effect."""
@@ -101,8 +108,12 @@ def _sign(rng: Rng) -> float:
 
 
 def _exponent(s: Scale, rng: Rng, form: str) -> Shape:
-    fixed = {"reference_voltage": s.voltage * _uniform(rng, 0.4, 1.0)}
-    return Shape("exponent", "exponent", 0.8, -1.0 if form == "below" else 1.0, base=2.0, fixed=fixed)
+    """Above 2 by 0.8 at most; below down to the 2/3 of a drive that holds its power."""
+    fixed: dict[str, Any] = {"reference_voltage": s.voltage * _uniform(rng, 0.4, 1.0)}
+    if form == "above":
+        return Shape("exponent", "exponent", 0.8, base=2.0, fixed=fixed)
+    fixed |= {"form": form} if form == "drive" else {}
+    return Shape("exponent", "exponent", 4.0 / 3.0, -1.0, base=2.0, fixed=fixed, lowest=LEAST * 0.8, start=0.05 * 0.8)
 
 
 def _creep(_s: Scale, rng: Rng, form: str) -> Shape:
@@ -134,10 +145,14 @@ def _drift(s: Scale, rng: Rng, form: str) -> Shape:
 
 def _line(s: Scale, rng: Rng, form: str) -> Shape:
     fixed: dict[str, float | int] = {"phase": _uniform(rng, 0.0, 6.28)}
-    if form == "blades":
+    if form in ("blades", "blades_resonant"):
         fixed["blades"] = int(rng.integers(2, 6))
+        fixed["reference_voltage"] = s.voltage
     else:
         fixed["frequency"] = s.sampling * _uniform(rng, 0.05, 0.45)
+    if form == "blades_resonant":
+        fixed["resonance"] = fixed["blades"] * s.rate * _uniform(rng, 0.3, 0.9)  # within the rates of the run
+        fixed["damping"] = _log(rng, 0.02, 0.1)
     return Shape("periodic_disturbance", "amplitude", 0.2, s.thrust, fixed=fixed)
 
 
@@ -174,12 +189,24 @@ def _heating(s: Scale, rng: Rng, form: str) -> Shape:
 
 def _clipped(effect: str, highest: float, limit: float, rng: Rng, form: str) -> Shape:
     """A soft limit also bends what lies far below it: it may lie above the largest value."""
+    if form == "before_noise":
+        return Shape(effect, "limit", highest, -limit, base=limit, fixed={"place": "cell"})
     if form == "knee":
         fixed = {"onset": limit * _uniform(rng, 0.3, 0.9), "form": form}
         return Shape(effect, "bend", 2.0, 1.0 / limit, fixed=fixed)
     if form:
         return Shape(effect, "limit", highest + 0.3, -limit, base=1.3 * limit, fixed={"form": form})
     return Shape(effect, "limit", highest, -limit, base=limit)
+
+
+def _inflow(s: Scale, rng: Rng, form: str) -> Shape:
+    """Of the jet that forms in a tank 0.2 to 1.5 s; of the water column in the disc alone, L g / (4 u), 8 to 17 ms with
+    76 mm and 40 to 80 ms with 300 mm of diameter at full drive, longer at less.
+    """
+    if form == "water_column":
+        fixed: dict[str, Any] = {"time_constant": _log(rng, 0.008, 0.08), "form": "momentum"}
+        return Shape("inflow_dynamics", "share", 1.0, fixed=fixed | {"reference_voltage": s.voltage})
+    return Shape("inflow_dynamics", "share", 1.0, fixed={"time_constant": _log(rng, 0.2, 1.5)})
 
 
 def _recirculation(s: Scale, rng: Rng, form: str) -> Shape:
@@ -191,8 +218,8 @@ def _recirculation(s: Scale, rng: Rng, form: str) -> Shape:
 
 def _neighbour(s: Scale, rng: Rng, _form: str) -> Shape:
     period = s.duration / _uniform(rng, 4.0, 9.0)
-    fixed = {"neighbour_thrust": s.thrust, "thrust_scale": s.thrust, "period": period, "on_time": 0.5 * period}
-    return Shape("thruster_interaction", "loss", 0.5, fixed=fixed)
+    fixed = {"neighbour_thrust": s.thrust, "period": period, "on_time": 0.5 * period}
+    return Shape("thruster_interaction", "loss", 0.65, fixed=fixed)
 
 
 SHAPES: dict[str, Callable[[Scale, Rng, str], Shape]] = {
@@ -206,9 +233,7 @@ SHAPES: dict[str, Callable[[Scale, Rng, str], Shape]] = {
     ),
     "exponent": _exponent,
     "asymmetry": lambda _s, _r, f: Shape("asymmetry", "ratio", 0.6, -1.0 if f == "weak_reverse" else 1.0, base=1.0),
-    "inflow_dynamics": lambda _s, r, _f: Shape(
-        "inflow_dynamics", "share", 1.0, fixed={"time_constant": _log(r, 0.2, 1.5)}
-    ),
+    "inflow_dynamics": _inflow,
     "cavitation": _cavitation,
     "heating": _heating,
     "reversal_loss": lambda _s, r, _f: Shape("reversal_loss", "loss", 0.8, fixed={"time_constant": _log(r, 0.5, 4.0)}),

@@ -127,7 +127,7 @@ def _signals_of(
     """The rival alone in place of the effect, about as strong."""
     others = tuple(c for c in case.effects if c.effect not in (effect, drawn.effect))
     lowest = drawn.lowest or 1e-3 * drawn.highest
-    amount = max(0.05 * drawn.highest, lowest)
+    amount = max(drawn.start or 0.05 * drawn.highest, lowest)
     for _ in range(2):
         instead = signals(replace(case, effects=(*others, Concealed(drawn, amount))))
         own = screen.product(instead, instead, without)

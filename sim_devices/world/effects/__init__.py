@@ -11,7 +11,6 @@ from sim_devices.world.effects.cell import (
     LoadCellCreep,
     LoadCellEvenBend,
     LoadCellNonlinearity,
-    PeriodicDisturbance,
     ZeroDrift,
     ZeroOffset,
 )
@@ -19,6 +18,7 @@ from sim_devices.world.effects.channel import ChannelFault
 from sim_devices.world.effects.electrical import DeadBand, SupplySag
 from sim_devices.world.effects.flow import InflowDynamics, Recirculation, SpeedOfAdvance, ThrusterInteraction
 from sim_devices.world.effects.limit import CommandSaturation, LoadCellSaturation
+from sim_devices.world.effects.line import PeriodicDisturbance
 from sim_devices.world.effects.motor import Heating, WindingResistance
 from sim_devices.world.effects.rotor import MotorLag, RotationCoupling
 from sim_devices.world.effects.stage import Effect

@@ -267,7 +267,7 @@ def test_a_lie_that_cannot_be_told(tables, sentence):
 
 
 def test_blade_pass_is_silent_at_rest():
-    effects = {"periodic_disturbance": {"amplitude": 0.5, "blades": 3}}
+    effects = {"periodic_disturbance": {"amplitude": 0.5, "blades": 3, "reference_voltage": 10.0}}
     assert at(effects, 0.0) == 0.0
     rng = np.random.default_rng(1)
     trace = run(read_world({**PLAIN, "effects": effects}), [0.0], [10.0], 20.0, rates={"thrust": 500.0}, rng=rng)
