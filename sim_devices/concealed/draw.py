@@ -10,9 +10,10 @@ import numpy as np
 from sim_devices.concealed.cases.bystanders import with_bystanders
 from sim_devices.concealed.cases.definition import Case, Concealed, Run, Sensor
 from sim_devices.concealed.cases.faults import fault
+from sim_devices.concealed.cases.knob import Scale
 from sim_devices.concealed.cases.needs import NEEDS_DRIFT, NEEDS_FLOW, NEEDS_REVERSED_FLOW, NEEDS_ROTATION, NEEDS_SLEW
 from sim_devices.concealed.cases.plans import KINDS, profile
-from sim_devices.concealed.cases.shapes import Scale, shape
+from sim_devices.concealed.cases.shapes import shape
 from sim_devices.concealed.cases.wide_noise import WIDE_NOISE_KINDS, Setting, usual_hold, wide_noise
 from sim_devices.concealed.visibility.oracle import OutOfReach, levelled, scaled_to
 from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, flicker

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_devices.concealed.cases.definition import Case, Concealed
-from sim_devices.concealed.cases.shapes import LEAST
+from sim_devices.concealed.cases.knob import LEAST
 from sim_devices.concealed.visibility.projection import Projection, Screen, signals
 from sim_devices.world.noise_law import scaled
 

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from sim_devices.concealed.cases.definition import Case, Concealed
 from sim_devices.concealed.cases.forms import FORMS, NEIGHBOURS
+from sim_devices.concealed.cases.knob import Shape
 from sim_devices.concealed.cases.needs import NEEDS_DRIFT, NEEDS_FLOW
-from sim_devices.concealed.cases.shapes import Shape, shape
+from sim_devices.concealed.cases.shapes import shape
 from sim_devices.concealed.visibility.projection import Screen, signals
 
 Floats = NDArray[np.float64]
