@@ -18,8 +18,10 @@ from sim_devices.world.state import State
 class PeriodicDisturbance:
     """With `frequency` pick-up of one size, + amplitude sin(2 pi p + phase) with p' = frequency.
 
+    That of the mains has 50 or 60 Hz (IEC 60196) and their multiples.
+
     With `blades` a force of the rotor, p' = blades |n|, that grows as n^2 and then meets the stand: imbalance m e (2
-    pi n)^2 at once per turn, blade pass b rho n^2 D^4 at z n (Carlton 2007, Marine Propellers and Propulsion, ch. 11),
+    pi n)^2 at once per turn, blade pass b rho n^2 D^4 at z n (Carlton 2007, Marine Propellers and Propulsion),
     so + amplitude (n / n_ref)^2 |H| sin(2 pi p + phase + arg H), n_ref = k reference_voltage. H is what a mass on a
     spring makes of a force of blades |n| Hz, settled: of `resonance` and `damping` where given, else of the world's
     `stand_resonance`; 1 on a rigid stand.
