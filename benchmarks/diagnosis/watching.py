@@ -26,7 +26,7 @@ from identification.recording import Floats
 from identification.watching import Alarm, Settings, Watch
 from sim_devices import concealed
 from sim_devices.concealed.cases.definition import Case, Concealed
-from sim_devices.concealed.cases.shapes import Scale, Shape
+from sim_devices.concealed.cases.knob import Scale, Shape
 
 EFFECTS = ("zero_drift", "fouling", "supply_sag")
 RIGHT = {

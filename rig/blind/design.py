@@ -29,6 +29,8 @@ PAIR_STRENGTH: Final = 20.0
 PAIRS_PER_SEED = 10
 CLEAN_PER_SEED = 50
 """Clean runs of all kinds of noise together: 20 seeds are 1,000 runs."""
+WIDE_PER_SEED = 25
+"""Clean runs of all kinds of wide noise together: 20 seeds are 500 runs."""
 
 NOT_REMOVABLE: Final = frozenset({"periodic_disturbance"})
 """Found by a search for lines, which is no term of the catalogue."""
@@ -47,6 +49,8 @@ class Kinds:
     noise: tuple[str, ...]
     version: str = ""
     """Of the world that conceals."""
+    wide_noise: tuple[str, ...] = ()
+    """Noise of laws drawn wide, there when asked for only."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -178,5 +182,6 @@ def _others(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -> 
         seed = replace(job, draw=draw).seed
         two = np.random.default_rng(seed).choice(known, 2, replace=False).tolist()
         yield place, Job(job.id, {"effects": two, "strength": PAIR_STRENGTH}, job.orders)
-    for kind in world.noise:
-        yield from _many("clean", kind, -(-CLEAN_PER_SEED * seeds // len(world.noise)), {"noise": kind})
+    for cell, kinds, per_seed in (("clean", world.noise, CLEAN_PER_SEED), ("wide", world.wide_noise, WIDE_PER_SEED)):
+        for kind in kinds:
+            yield from _many(cell, kind, -(-per_seed * seeds // len(kinds)), {"noise": kind})

@@ -28,6 +28,7 @@ from sim_devices.concealed.cases.faults import Column
 from sim_devices.concealed.cases.forms import FORMS, VARIANTS
 from sim_devices.concealed.cases.plans import KINDS as PLAN_KINDS
 from sim_devices.concealed.cases.shapes import SHAPES
+from sim_devices.concealed.cases.wide_noise import WIDE_NOISE_KINDS
 from sim_devices.concealed.draw import NOISE_KINDS, case
 from sim_devices.concealed.sealing.records import Rows, rows, truth
 from sim_devices.concealed.visibility.oracle import OutOfReach, scaled_to, strength
@@ -40,6 +41,7 @@ __all__ = [
     "PLAN_KINDS",
     "SHAPES",
     "VARIANTS",
+    "WIDE_NOISE_KINDS",
     "Case",
     "Column",
     "OutOfReach",

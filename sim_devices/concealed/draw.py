@@ -10,9 +10,11 @@ import numpy as np
 from sim_devices.concealed.cases.bystanders import with_bystanders
 from sim_devices.concealed.cases.definition import Case, Concealed, Run, Sensor
 from sim_devices.concealed.cases.faults import fault
+from sim_devices.concealed.cases.knob import Scale
 from sim_devices.concealed.cases.needs import NEEDS_DRIFT, NEEDS_FLOW, NEEDS_REVERSED_FLOW, NEEDS_ROTATION, NEEDS_SLEW
 from sim_devices.concealed.cases.plans import KINDS, profile
-from sim_devices.concealed.cases.shapes import Scale, shape
+from sim_devices.concealed.cases.shapes import shape
+from sim_devices.concealed.cases.wide_noise import WIDE_NOISE_KINDS, Setting, usual_hold, wide_noise
 from sim_devices.concealed.visibility.oracle import OutOfReach, levelled, scaled_to
 from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, flicker
 from sim_devices.world.settings import Thruster
@@ -45,10 +47,10 @@ def case(
 ) -> Case:
     """A case in which each of `effects` is seen by the oracle at `strength` sigma (all of them there together).
 
-    What is not given is drawn: `forms` one per effect ("" draws), `plan` of plans.KINDS, `noise` of NOISE_KINDS,
-    `voltage` V and `thrust` N at full command, `sampling` 1/s, `duration` s of each of `runs` recordings, `channels`
-    beside command and thrust (where drawn, and none lies, with bystanders). `lie`: of faults.KINDS, about a channel,
-    beside the effects; none when not given.
+    What is not given is drawn: `forms` one per effect ("" draws), `plan` of plans.KINDS, `noise` of NOISE_KINDS
+    (WIDE_NOISE_KINDS by name only), `voltage` V and `thrust` N at full command, `sampling` 1/s, `duration` s of each of
+    `runs` recordings, `channels` beside command and thrust (where drawn, and none lies, with bystanders). `lie`: of
+    faults.KINDS, about a channel, beside the effects; none when not given.
     Raises OutOfReach when no case of TRIES can show the effects so; ValueError for a name that is not known.
     """
     for _ in range(TRIES):
@@ -108,7 +110,7 @@ def _bare(
         first=int(rng.integers(every)),
         runs=tuple(made),
         noise_kind=noise_kind,
-        noise=noise_law(noise_kind, loud, rate, rng),
+        noise=_noise(noise_kind, Setting(loud, rate, usual_hold(made[0].profile), long, full), rng),
         sensors=_sensors(rng, scale, grid, channels, forced, flow=with_flow, drift=drift != 0.0),
         decoys=_decoys(rng, scale, named),
         temperature_drift=drift / (long * runs),
@@ -168,6 +170,10 @@ def flow_steps(rng: Rng, top: float, duration: float, *, reversed_too: bool) -> 
     return ((0.0, 0.0), *zip(times.tolist(), speeds, strict=True))
 
 
+def _noise(kind: str, s: Setting, rng: Rng) -> NoiseLaw:
+    return wide_noise(kind, s, rng) if kind in WIDE_NOISE_KINDS else noise_law(kind, s.std, s.rate, rng)
+
+
 def noise_law(kind: str, std: float, rate: float, rng: Rng) -> NoiseLaw:
     """A law of `kind` whose stationary standard deviation is `std` (N). Raises ValueError for an unknown kind."""
     match kind:
@@ -186,7 +192,8 @@ def noise_law(kind: str, std: float, rate: float, rng: Rng) -> NoiseLaw:
             frequency = rate * float(rng.uniform(0.05, 0.4))
             return NoiseLaw(0.6 * std, peak=Peak(0.8 * std, frequency, frequency * float(rng.uniform(0.02, 0.1))))
         case _:
-            raise ValueError(f"noise must be one of {', '.join(NOISE_KINDS)}, got {kind!r}")
+            known = (*NOISE_KINDS, *WIDE_NOISE_KINDS)
+            raise ValueError(f"noise must be one of {', '.join(known)}, got {kind!r}")
 
 
 def _sensors(

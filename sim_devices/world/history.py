@@ -32,11 +32,15 @@ class History:
     input_current: Floats
     bus_voltage: Floats
     motor_rise: Floats
+    terminals: Floats
+    flux: Floats
     rate_per_volt: float = 1.0
     thrust_constant: float = 0.4
     drag: float = 0.25
     torque_acceleration: float = 7.2
     nominal_bus: float = 48.0
+    stand_frequency: float = 0.0
+    stand_damping: float = 0.0
 
 
 def clock(count: int, dt: float) -> Floats:
@@ -63,9 +67,13 @@ def instant(s: State) -> History:
         input_current=one([s.input_current]),
         bus_voltage=one([s.bus_voltage]),
         motor_rise=one([s.motor_rise]),
+        terminals=one([s.terminals]),
+        flux=one([s.flux]),
         rate_per_volt=s.rate_per_volt,
         thrust_constant=s.thrust_constant,
         drag=s.drag,
         torque_acceleration=s.torque_acceleration,
         nominal_bus=s.nominal_bus,
+        stand_frequency=s.stand_frequency,
+        stand_damping=s.stand_damping,
     )

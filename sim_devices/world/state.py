@@ -14,7 +14,11 @@ class State:
     command: float = 0.0
     """V the drive means to apply, before any effect; 0 when released."""
     volts: float = 0.0
-    """V that the rotor answers to, after the effects of the command stage."""
+    """V that the rotor answers to, after the effects of the stages command and motor."""
+    terminals: float = 0.0
+    """V at the motor, before what winding and magnets make of it."""
+    flux: float = 1.0
+    """Of the magnets, of what they have when cold: back-EMF and torque go with it."""
     driven: bool = True
     """False: the windings carry a set current (0 = coasting) instead of a voltage."""
     n: float = 0.0
@@ -41,10 +45,13 @@ class State:
     """degC."""
     motor_rise: float = 0.0
     """K, winding over water."""
-    # constants of the mounted thruster and the supply, here so that effects need no second argument
+    # constants of the mounted thruster, the supply and the stand, here so that effects need no second argument
     rate_per_volt: float = 1.0
     thrust_constant: float = 0.4
     """C_t = C / k^2, N/(rev/s)^2."""
     drag: float = 0.25
     torque_acceleration: float = 7.2
     nominal_bus: float = 48.0
+    stand_frequency: float = 0.0
+    """Hz of a stand that rings; 0: rigid."""
+    stand_damping: float = 0.0

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from sim_devices.tables import check_known
 from sim_devices.world.effects import Effect
 from sim_devices.world.effects.channel import ChannelFault
+from sim_devices.world.effects.stand import StandResonance
 from sim_devices.world.noise import CHANNELS, Noise, NoiseSource
 from sim_devices.world.settings import WorldSettings, make_effects
 from sim_devices.world.state import State
@@ -25,7 +28,9 @@ class World:
         self.state.water_temperature = settings.tunnel.water_temperature
         self._noise = {c: NoiseSource(settings.noise.get(c, Noise()), rng) for c in CHANNELS}
         self._effects = make_effects(settings.effects)
+        self.state.stand_frequency, self.state.stand_damping = stand_of(self._effects)
         self._command = self._of_stage("command")
+        self._motor = self._of_stage("motor")
         self._rotor = self._of_stage("rotor")
         self._hydro = self._of_stage("hydro")
         self._stand = self._of_stage("stand")
@@ -67,11 +72,15 @@ class World:
         n = self._spin
         k, alpha = th.rate_per_volt, th.drag
         if volts is None:
-            s.driven, s.command, s.volts = False, 0.0, n / k
-            push, pull = th.torque_acceleration * amps, th.friction
+            s.driven, s.command = False, 0.0
+            s.volts, s.terminals = n / k, s.flux * n / k
+            push, pull = th.torque_acceleration * s.flux * amps, th.friction
         else:
             s.driven, s.command = True, volts
             for e in self._command:
+                volts = e.apply(volts, s, dt)
+            s.terminals = volts
+            for e in self._motor:
                 volts = e.apply(volts, s, dt)
             s.volts = volts
             pull = th.stiffness
@@ -84,13 +93,13 @@ class World:
         if instant:
             n = k * s.volts
         self._spin = n
-        s.current = amps if volts is None else (push - pull * n) / th.torque_acceleration
+        s.current = amps if volts is None else (push - pull * n) / (th.torque_acceleration * s.flux)
         for e in self._rotor:
             n = e.apply(n, s, dt)
         s.n = n
         if instant:
-            s.current = (alpha * n * abs(n) + s.acceleration) / th.torque_acceleration
-        s.input_current = s.current * s.volts / s.bus_voltage if s.bus_voltage > 1.0 else 0.0
+            s.current = (alpha * n * abs(n) + s.acceleration) / (th.torque_acceleration * s.flux)
+        s.input_current = s.current * s.terminals / s.bus_voltage if s.bus_voltage > 1.0 else 0.0
         s.motor_rise += (th.heating * s.current * s.current - s.motor_rise) * dt / th.heating_time
         self._forces(dt)
 
@@ -146,6 +155,11 @@ class World:
                 return s.water_temperature + 5.0 + 0.5 * s.motor_rise
             case _:
                 raise ValueError(f"sample: expected one of {', '.join(CHANNELS)}, got {channel!r}")
+
+
+def stand_of(effects: Sequence[Effect]) -> tuple[float, float]:
+    """Hz and damping of the stand, (0, 0) where it is rigid."""
+    return next(((e.frequency, e.damping) for e in effects if isinstance(e, StandResonance)), (0.0, 0.0))
 
 
 def _concerns(effect: Effect, channel: str) -> bool:

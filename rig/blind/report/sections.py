@@ -72,7 +72,7 @@ def _twins(rows: Sequence[dict[str, Any]]) -> Table:
 
 
 def alarms_section(scores: Sequence[Score]) -> Section | None:
-    groups = by_label(scores, "clean")
+    groups = {**by_label(scores, "clean"), **by_label(scores, "wide")}
     if not groups:
         return None
     rows = [Row(kind, (rate(not s.right for s in group),)) for kind, group in groups.items()]

@@ -18,7 +18,9 @@ STEP: Final = frozenset({"time_since_step", "previous_voltage", "direction_of_ch
 FLOW: Final = frozenset({"flow_speed"})
 SLIP: Final = frozenset({"rotation_rate"})
 """Where the rotor leaves the command, a measured rate shows it."""
-UPSTREAM: Final = frozenset({"dead_band", "winding_resistance", "command_saturation", "supply_sag", "motor_lag"})
+UPSTREAM: Final = frozenset(
+    {"dead_band", "winding_resistance", "command_saturation", "supply_sag", "motor_lag", "heating"}
+)
 """Act before the rotor: with the rate recorded, "thrust follows the rate" (rotation_coupling) is as true of them."""
 
 PLACES: Final = {
@@ -34,7 +36,7 @@ PLACES: Final = {
     "asymmetry": SIDE,
     "torque_crosstalk": SIDE,
     "supply_sag": LEVEL | LOAD | SLIP | {"bus_voltage"},
-    "heating": LOAD,
+    "heating": LOAD | LEVEL | SLIP,
     "motor_lag": STEP | SLIP,
     "time_skew": STEP,
     "stand_resonance": STEP | {"frequency"},

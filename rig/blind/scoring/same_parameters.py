@@ -1,7 +1,7 @@
 """Parameters that mean the same in the world and in the catalogue: for the coverage of the intervals. Pure.
 
 The world speaks of rev/s and amperes, the catalogue of volts: n = k V, k = rate / voltage of the scale. What the two
-put differently (the loss of a heated motor, lags referred to different voltages, two-constant creep) is left out.
+put differently (what warmth costs, lags referred to different voltages, two-constant creep) is left out.
 """
 
 from __future__ import annotations
@@ -70,10 +70,10 @@ def _line(p: Table, _form: str, k: float, _truth: Table) -> Table:
 
 
 def _heating(p: Table, form: str, _k: float, truth: Table) -> Table:
+    """What warmth costs goes with the level: no one number of the world's is the catalogue's loss."""
     world = p.get("form")
     if form == f"measured_{world}":
-        late = {"magnet_time_constant": p["time_constant"]} if world == "magnet" else {}
-        return {"loss_per_kelvin": p["loss_per_kelvin"]} | late
+        return {"magnet_time_constant": p["time_constant"]} if world == "magnet" else {}
     return {"time_constant": truth["thruster"]["heating_time"]} if form == world == "winding" else {}
 
 
@@ -89,7 +89,7 @@ SAME: Final[Mapping[str, Callable[[Table, str, float, Table], Table]]] = {
         {"time_constant": p["time_constant"]} if form == p.get("form") == "first_order" else {}
     ),
     "inflow_dynamics": lambda p, form, _k, _truth: (
-        {} if form else {name: p[name] for name in ("share", "time_constant")}
+        {} if form or p.get("form") else {name: p[name] for name in ("share", "time_constant")}
     ),
     "cavitation": _cavitation,
     "heating": _heating,

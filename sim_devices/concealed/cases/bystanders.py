@@ -56,7 +56,6 @@ def _neighbour(case: Case, rng: Rng) -> dict[str, float]:
     return {
         "loss": 0.0,
         "neighbour_thrust": thrust,
-        "thrust_scale": thrust,
         "period": period,
         "on_time": 0.5 * period,
     }

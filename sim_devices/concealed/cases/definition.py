@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim_devices.concealed.cases.knob import Scale, Shape
 from sim_devices.concealed.cases.plans import Profile, held
-from sim_devices.concealed.cases.shapes import Scale, Shape
 from sim_devices.world.history import History, clock
 from sim_devices.world.noise_law import NoiseLaw
 from sim_devices.world.settings import Supply, Thruster, WorldSettings, make_effects

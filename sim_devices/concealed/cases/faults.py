@@ -80,4 +80,4 @@ def lying(columns: Sequence[Column], told: Mapping[str, Any], start: float) -> t
 def _at(times: Floats) -> History:
     """A history that knows nothing but its times."""
     zero = clock(times.size, 0.0)
-    return History(times, 0.0, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero)
+    return History(times, 0.0, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero, zero)

@@ -32,9 +32,13 @@ VARIANTS: dict[str, tuple[str, ...]] = {
     "command_saturation": ("soft",),
     "winding_resistance": ("linearised",),
     "motor_lag": ("two_lags",),
+    "exponent": ("drive",),
+    "inflow_dynamics": ("water_column",),
+    "periodic_disturbance": ("blades_resonant",),
+    "heating": ("both",),
     "cavitation": ("exponential",),
     "recirculation": ("late",),
     "zero_drift": ("root",),
-    "load_cell_saturation": ("soft",),
+    "load_cell_saturation": ("soft", "before_noise"),
 }
 """Further textbook forms, there when asked for by name only: the same physics in other words."""

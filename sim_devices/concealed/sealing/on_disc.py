@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from sim_devices.concealed.cases.faults import KINDS as LIES
 from sim_devices.concealed.cases.forms import FORMS, VARIANTS
 from sim_devices.concealed.cases.shapes import SHAPES
+from sim_devices.concealed.cases.wide_noise import WIDE_NOISE_KINDS
 from sim_devices.concealed.draw import NOISE_KINDS
 from sim_devices.concealed.draw import case as drawn
 from sim_devices.concealed.sealing.another import another
@@ -42,6 +43,7 @@ KINDS: Mapping[str, Any] = {
     "variants": {effect: list(forms) for effect, forms in VARIANTS.items()},
     "lies": list(LIES),
     "noise": list(NOISE_KINDS),
+    "wide_noise": list(WIDE_NOISE_KINDS),
     "version": version(),
 }
 """What may be asked for, and of what world."""

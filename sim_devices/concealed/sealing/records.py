@@ -14,7 +14,7 @@ from sim_devices.concealed.cases.faults import Column, lying
 from sim_devices.concealed.cases.plans import Step
 from sim_devices.concealed.visibility.oracle import strength
 from sim_devices.world.history import History, clock
-from sim_devices.world.noise_law import drawn
+from sim_devices.world.noise_law import drawn, rounded
 
 Floats = NDArray[np.float64]
 
@@ -45,10 +45,11 @@ def _one(case: Case, run: Run, thruster: str) -> Rows:
     rng = np.random.default_rng(run.seed)
     h = history(case, run)
     noise = drawn(case.noise, h.reading[case.first :: case.every], case.rate, rng)
+    read = rounded(case.noise, thrust_of(case, run, h, noise))
     seconds = clock(h.t.size, case.dt)
     columns = [
         Column("command", "command_voltage", "command_voltage", "V", run.profile.time, run.profile.volts),
-        Column("cell", "thrust", "thrust", "N", seconds[case.first :: case.every], thrust_of(case, run, h, noise)),
+        Column("cell", "thrust", "thrust", "N", seconds[case.first :: case.every], read),
         *(_sensed(case, sensor, h, seconds, rng) for sensor in case.sensors),
         *_neighbour(case, run),
     ]

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim_devices.concealed.cases.definition import Case, Concealed
-from sim_devices.concealed.cases.shapes import LEAST
+from sim_devices.concealed.cases.knob import LEAST
 from sim_devices.concealed.visibility.projection import Projection, Screen, signals
 from sim_devices.world.noise_law import scaled
 
@@ -87,7 +87,7 @@ def _with_strength(case: Case, effect: str, screen: Screen, without: list[Floats
         return screen.strength(signals(with_amount(case, effect, amount)), without)
 
     lowest = shape.lowest or LEAST * shape.highest
-    return with_amount(case, effect, _searched(seen, target, lowest, shape.highest))
+    return with_amount(case, effect, _searched(seen, target, shape.first, lowest, shape.highest))
 
 
 def with_amount(case: Case, effect: str, amount: float) -> Case:
@@ -115,10 +115,12 @@ def _with_noise(case: Case, effect: str, factor: float) -> Case:
     return louder if len(case.effects) > 1 else measured(louder)
 
 
-def _searched(seen: Callable[[float], float], target: float, lowest: float, highest: float) -> float:
-    """Amount that is seen at `target`: false position on log d' against log amount, which is nearly a straight line."""
+def _searched(seen: Callable[[float], float], target: float, amount: float, lowest: float, highest: float) -> float:
+    """Amount that is seen at `target`: false position on log d' against log amount, which is nearly a straight line.
+
+    `amount` is tried first.
+    """
     low, high, best = _Point(0.0, 0.0), _Point(np.inf, np.inf), _Point(lowest, 0.0)
-    amount = min(max(0.05 * highest, lowest), highest)
     for _ in range(EVALUATIONS):
         point = _Point(amount, seen(amount))
         if abs(point.log_ratio(target)) <= abs(best.log_ratio(target)):

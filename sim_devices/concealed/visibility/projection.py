@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
@@ -12,7 +10,7 @@ from sim_devices.concealed.cases.definition import Case, history, thrust_of
 from sim_devices.concealed.cases.plans import held
 from sim_devices.concealed.visibility.whitening import Whitening
 from sim_devices.world.history import clock
-from sim_devices.world.noise_law import spectrum
+from sim_devices.world.noise_law import spectrum, stationary
 
 Floats = NDArray[np.float64]
 
@@ -53,8 +51,7 @@ class Screen:
         self._length: list[int] = []
         for run, value, columns in zip(case.runs, values, _baseline(case, values), strict=True):
             n = next_fast_len(value.size, real=True)
-            white = np.mean(case.noise.white_std(value - run.tare) ** 2)
-            law = replace(case.noise, white=float(np.sqrt(white)), proportional=0.0)
+            law = stationary(case.noise, value - run.tare, case.rate)
             frequency = np.asarray(np.fft.rfftfreq(n, 1.0 / case.rate), dtype=np.float64)
             # one-sided density S: sum over the positive lines of 4 |X|^2 / (n rate S) is x' K^-1 x
             self._weights.append(4.0 / (n * case.rate * spectrum(law, frequency, case.rate)))

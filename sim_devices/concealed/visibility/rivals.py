@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from sim_devices.concealed.cases.definition import Case, Concealed
 from sim_devices.concealed.cases.forms import FORMS, NEIGHBOURS
+from sim_devices.concealed.cases.knob import Shape
 from sim_devices.concealed.cases.needs import NEEDS_DRIFT, NEEDS_FLOW
-from sim_devices.concealed.cases.shapes import Shape, shape
+from sim_devices.concealed.cases.shapes import shape
 from sim_devices.concealed.visibility.projection import Screen, signals
 
 Floats = NDArray[np.float64]
@@ -127,7 +128,7 @@ def _signals_of(
     """The rival alone in place of the effect, about as strong."""
     others = tuple(c for c in case.effects if c.effect not in (effect, drawn.effect))
     lowest = drawn.lowest or 1e-3 * drawn.highest
-    amount = max(0.05 * drawn.highest, lowest)
+    amount = max(drawn.start or 0.05 * drawn.highest, lowest)
     for _ in range(2):
         instead = signals(replace(case, effects=(*others, Concealed(drawn, amount))))
         own = screen.product(instead, instead, without)

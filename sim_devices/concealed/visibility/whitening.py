@@ -1,7 +1,8 @@
 """Exact Gaussian inner products under a noise law: K = diag(white variance) + sum of Markov processes.
 
 The inverse of a Markov process is banded, so by Woodbury's identity every product with K^-1 costs one banded solve:
-K^-1 = D^-1 - D^-1 H M^-1 H' D^-1 with M = Q + H' D^-1 H, Q the joint inverse covariance of the latent processes.
+K^-1 = D^-1 - D^-1 H M^-1 H' D^-1 with M = Q + H' D^-1 H, Q the joint inverse covariance of the latent processes and H
+how much of each reaches a sample: all of it, of unrest its size there.
 """
 
 from __future__ import annotations
@@ -22,21 +23,25 @@ class Whitening:
 
     def __init__(self, law: NoiseLaw, value: Floats, rate: float) -> None:
         self._precision = 1.0 / law.white_std(value) ** 2
-        self._parts = len(law.slow) + (law.peak is not None)
-        self._factor = self._factorised(law, value.size, rate) if self._parts else None
-
-    def _factorised(self, law: NoiseLaw, n: int, rate: float) -> Floats:
-        """Cholesky factor (lower band) of M, latents of one instant side by side."""
-        parts = self._parts
         latents: list[Slow | Peak] = [*law.slow, *([law.peak] if law.peak else [])]
-        band = np.zeros((max(parts * (2 if law.peak else 1), parts - 1) + 1, n * parts))
+        self._reach = np.ones((value.size, len(latents)))
+        if law.unrest:
+            latents.append(Slow(1.0, law.unrest.time_constant))
+            self._reach = np.column_stack([self._reach, law.unrest.size(value, rate)])
+        self._factor = self._factorised(latents, value.size, rate) if latents else None
+
+    def _factorised(self, latents: list[Slow | Peak], n: int, rate: float) -> Floats:
+        """Cholesky factor (lower band) of M, latents of one instant side by side."""
+        parts = len(latents)
+        longest = 2 if any(isinstance(latent, Peak) for latent in latents) else 1
+        band = np.zeros((max(parts * longest, parts - 1) + 1, n * parts))
         for j, latent in enumerate(latents):
             diagonals = _ar2(latent, n, rate) if isinstance(latent, Peak) else _ar1(latent, n, rate)
             for lag, diagonal in enumerate(diagonals):
                 band[lag * parts, j::parts][: n - lag] += diagonal
         for j in range(parts):
             for other in range(j, parts):
-                band[other - j, j::parts] += self._precision
+                band[other - j, j::parts] += self._precision * self._reach[:, j] * self._reach[:, other]
         return np.asarray(cholesky_banded(band, lower=True, check_finite=False, overwrite_ab=True))
 
     def solve(self, columns: Floats) -> Floats:
@@ -44,9 +49,9 @@ class Whitening:
         light = self._precision[:, None] * columns
         if self._factor is None:
             return np.asarray(light)
-        spread = np.repeat(light, self._parts, axis=0)
+        spread = (light[:, None, :] * self._reach[:, :, None]).reshape(self._reach.size, -1)
         latent = cho_solve_banded((self._factor, True), spread, check_finite=False)
-        explained = latent.reshape(len(light), self._parts, -1).sum(axis=1)
+        explained = (latent.reshape(*self._reach.shape, -1) * self._reach[:, :, None]).sum(axis=1)
         return np.asarray(light - self._precision[:, None] * explained)
 
 

@@ -1,23 +1,25 @@
 """The effects a world can conceal, one small class each, by their catalogue id.
 
-An effect has a `stage` and changes one number there: `command` (V that the rotor answers to), `rotor` (rotation rate),
+An effect has a `stage` and changes one number there: `command` (V at the motor's
+terminals), `motor` (V that the rotor answers to), `rotor` (rotation rate),
 `hydro` (propeller thrust), `stand` (force that reaches the cell), `cell` (reading), `output` (after noise and offset).
 An effect that is not named in the world file is not there at all: its stage holds no object for it.
 """
 
-from sim_devices.world.effects.blade import Asymmetry, Cavitation, Exponent, Heating, LinearTerm, ReversalLoss
+from sim_devices.world.effects.blade import Asymmetry, Cavitation, Exponent, LinearTerm, ReversalLoss
 from sim_devices.world.effects.cell import (
     LoadCellCreep,
     LoadCellEvenBend,
     LoadCellNonlinearity,
-    PeriodicDisturbance,
     ZeroDrift,
     ZeroOffset,
 )
 from sim_devices.world.effects.channel import ChannelFault
-from sim_devices.world.effects.electrical import DeadBand, SupplySag, WindingResistance
+from sim_devices.world.effects.electrical import DeadBand, SupplySag
 from sim_devices.world.effects.flow import InflowDynamics, Recirculation, SpeedOfAdvance, ThrusterInteraction
 from sim_devices.world.effects.limit import CommandSaturation, LoadCellSaturation
+from sim_devices.world.effects.line import PeriodicDisturbance
+from sim_devices.world.effects.motor import Heating, WindingResistance
 from sim_devices.world.effects.rotor import MotorLag, RotationCoupling
 from sim_devices.world.effects.stage import Effect
 from sim_devices.world.effects.stand import Hysteresis, StandResonance, StrutDrag, TimeSkew, TorqueCrosstalk

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import exp
+from math import copysign, exp
 from typing import ClassVar
 
 import numpy as np
 
 from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
-from sim_devices.world.filters import low_pass
 from sim_devices.world.history import History
 from sim_devices.world.state import State
 
@@ -19,21 +18,39 @@ TURNING = 0.5
 
 @dataclass(slots=True)
 class Exponent:
-    """Thrust grows as |V|^exponent: T (|n| / n_ref)^(exponent - 2), equal to C V|V| at reference_voltage."""
+    """Thrust grows as |V|^exponent, equal to C V|V| at reference_voltage.
 
-    stage: ClassVar[Stage] = "hydro"
+    form "propeller": the water does it, T (|n| / n_ref)^(exponent - 2). form "drive": the drive holds something else
+    than a voltage, and rate and current follow: V_eff = V_ref (|V| / V_ref)^(exponent / 2), so that the thrust has the
+    exponent 2 where it holds the rate, 1 the torque or the current, 2/3 the power (Smogeli 2006, Control of marine
+    propellers, NTNU 2006:187: speed, torque and power control; T ~ n^2, Q ~ n^2, P ~ n^3).
+    """
+
     exponent: float
     reference_voltage: float = 12.0
     """V where both laws agree."""
+    form: str = "propeller"
 
     def __post_init__(self) -> None:
         require_positive(exponent=self.exponent, reference_voltage=self.reference_voltage)
+        require_choice("form", self.form, ("propeller", "drive"))
+
+    @property
+    def stage(self) -> Stage:
+        return "hydro" if self.form == "propeller" else "command"
 
     def apply(self, value: float, s: State, _dt: float) -> float:
+        if self.form == "drive":
+            return copysign(
+                self.reference_voltage * (abs(value) / self.reference_voltage) ** (self.exponent / 2), value
+            )
         ratio = abs(s.n) / (s.rate_per_volt * self.reference_voltage)
         return float(value * ratio ** (self.exponent - 2.0)) if ratio > 0.0 else 0.0
 
     def over(self, value: Floats, h: History) -> Floats:
+        if self.form == "drive":
+            share = np.abs(value / self.reference_voltage)
+            return np.asarray(np.copysign(self.reference_voltage * share ** (self.exponent / 2), value))
         ratio = np.abs(h.n) / (h.rate_per_volt * self.reference_voltage)
         turning = ratio > 0.0
         gain = np.power(ratio, self.exponent - 2.0, where=turning, out=np.zeros_like(ratio))
@@ -98,37 +115,6 @@ class Cavitation:
         if self.form == "exponential":
             return np.asarray(value * np.exp(-lost))
         return np.asarray(value * np.maximum(1.0 - (lost if self.form == "linear" else lost * lost), 0.0))
-
-
-@dataclass(slots=True)
-class Heating:
-    """Winding and magnet warm up: T (1 - loss_per_kelvin * rise).
-
-    form "winding": the rise is the motor's own, the one its thermometer sees. form "magnet": the magnets follow it
-    with a lag of their own, `time_constant`.
-    """
-
-    stage: ClassVar[Stage] = "hydro"
-    loss_per_kelvin: float
-    """1/K."""
-    form: str = "winding"
-    time_constant: float = 60.0
-    """s; only for "magnet"."""
-    rise: float = field(init=False, default=0.0)
-    """K, of the magnets."""
-
-    def __post_init__(self) -> None:
-        require_choice("form", self.form, ("winding", "magnet"))
-        require_positive(time_constant=self.time_constant)
-
-    def apply(self, value: float, s: State, dt: float) -> float:
-        self.rise += (s.motor_rise - self.rise) * min(dt / self.time_constant, 1.0)
-        rise = s.motor_rise if self.form == "winding" else self.rise
-        return value * (1.0 - self.loss_per_kelvin * rise)
-
-    def over(self, value: Floats, h: History) -> Floats:
-        rise = h.motor_rise if self.form == "winding" else low_pass(h.motor_rise, self.time_constant, h.dt)
-        return np.asarray(value * (1.0 - self.loss_per_kelvin * rise))
 
 
 @dataclass(slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import exp, pi, sin, sqrt
+from math import exp, sqrt
 from typing import ClassVar
 
 import numpy as np
@@ -75,44 +75,6 @@ class LoadCellEvenBend:
 
     def over(self, value: Floats, _h: History) -> Floats:
         return np.asarray(value + self.coefficient * value**2)
-
-
-@dataclass(slots=True)
-class PeriodicDisturbance:
-    """Pick-up, mains or blade pass: + amplitude sin(2 pi p + phase).
-
-    p' = frequency, or with `blades` p' = blades |n| (then the line stands still with the rotor and is silent).
-    """
-
-    stage: ClassVar[Stage] = "cell"
-    amplitude: float
-    """N."""
-    frequency: float = 0.0
-    """Hz; not used with blades."""
-    blades: int = 0
-    phase: float = 0.0
-    """rad."""
-    turns: float = field(init=False, default=0.0)
-
-    def __post_init__(self) -> None:
-        if (self.frequency > 0) == (self.blades > 0):
-            raise ValueError("give either frequency (Hz) or blades, not both and not neither")
-
-    def apply(self, value: float, s: State, dt: float) -> float:
-        if self.blades:
-            self.turns = (self.turns + self.blades * abs(s.n) * dt) % 1.0
-            if abs(s.n) < 0.1:  # rev/s: stands still
-                return value
-        else:
-            self.turns = (self.turns + self.frequency * dt) % 1.0
-        return value + self.amplitude * sin(2.0 * pi * self.turns + self.phase)
-
-    def over(self, value: Floats, h: History) -> Floats:
-        if not self.blades:
-            return np.asarray(value + self.amplitude * np.sin(2.0 * pi * self.frequency * h.t + self.phase))
-        turns = np.cumsum(self.blades * np.abs(h.n)) * h.dt
-        wave = self.amplitude * np.sin(2.0 * pi * turns + self.phase)
-        return np.where(np.abs(h.n) < 0.1, value, value + wave)
 
 
 @dataclass(slots=True)

@@ -22,7 +22,6 @@ class Limit:
     form "knee": from `onset` on the slope falls evenly, `bend` per unit of x, until nothing more is passed.
     """
 
-    stage: ClassVar[Stage]
     limit: float = 0.0
     """In the unit of the stage; of "hard" and "soft"."""
     form: str = "hard"
@@ -63,6 +62,17 @@ class CommandSaturation(Limit):
 
 @dataclass(slots=True)
 class LoadCellSaturation(Limit):
-    """Cell or amplifier clips at `limit` N, noise and all."""
+    """Cell or amplifier clips at `limit` N. place "output": the converter, noise and all, so that the reading stands.
 
-    stage: ClassVar[Stage] = "output"
+    place "cell": the cell itself (an overload stop), before its amplifier's noise and zero are added: noise remains.
+    """
+
+    place: str = "output"
+
+    def __post_init__(self) -> None:
+        Limit.__post_init__(self)
+        require_choice("place", self.place, ("output", "cell"))
+
+    @property
+    def stage(self) -> Stage:
+        return "output" if self.place == "output" else "cell"

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from math import atan, exp, pi, sin, tan, tanh
+from math import exp, pi, sin
 from typing import ClassVar
 
 import numpy as np
 
 from sim_devices.world.effects.stage import Floats, Stage, require_choice, require_positive
-from sim_devices.world.filters import changes, low_pass
+from sim_devices.world.filters import low_pass
 from sim_devices.world.history import History
+from sim_devices.world.square_law import square_law, square_law_step
 from sim_devices.world.state import State
 
 
@@ -46,7 +47,7 @@ class MotorLag:
         elif self.form == "two_lags":
             self._two_lags(value, dt)
         else:
-            self.n = _quadratic_step(before, value, self._alpha(s.rate_per_volt), dt)
+            self.n = square_law_step(before, value, self._alpha(s.rate_per_volt), dt)
         s.acceleration = (self.n - before) / dt
         return self.n
 
@@ -56,7 +57,7 @@ class MotorLag:
         elif self.form == "two_lags":
             n = low_pass(low_pass(value, self.time_constant / 2.0, h.dt), self.time_constant / 2.0, h.dt)
         else:
-            n = self._quadratic(value, self._alpha(h.rate_per_volt), h.dt)
+            n = square_law(value, self._alpha(h.rate_per_volt), h.dt)
         h.acceleration = np.diff(n, prepend=0.0) / h.dt
         return n
 
@@ -70,60 +71,6 @@ class MotorLag:
     def _alpha(self, rate_per_volt: float) -> float:
         """1/rev."""
         return 1.0 / (2.0 * rate_per_volt * self.reference_voltage * self.time_constant)
-
-    @staticmethod
-    def _quadratic(value: Floats, alpha: float, dt: float) -> Floats:
-        """Segment by segment of a held target, which changes halfway to its first point."""
-        n, old, at = 0.0, 0.0, changes(value)
-        out = np.empty_like(value)
-        for start, stop, target in zip(at.tolist(), [*at[1:].tolist(), value.size], value[at].tolist(), strict=True):
-            n = _quadratic_step(n, old, alpha, dt / 2.0)
-            if stop - start < SHORT:
-                n = out[start] = _quadratic_step(n, target, alpha, dt / 2.0)
-                for i in range(start + 1, stop):
-                    n = out[i] = _quadratic_step(n, target, alpha, dt)
-            else:
-                out[start:stop] = _quadratic_path(n, target, alpha, (np.arange(stop - start) + 0.5) * dt)
-                n = float(out[stop - 1])
-            old = target
-        return out
-
-
-SHORT = 16
-"""points: a shorter segment is quicker step by step."""
-
-
-def _quadratic_step(n: float, target: float, alpha: float, t: float) -> float:
-    """Solve n' = alpha (N|N| - n|n|) over t (s), N the target, exactly.
-
-    With N >= 0 (else mirrored): n = N (n0 + N tanh)/(N + n0 tanh) from n0 >= 0, and with tan and a minus sign below 0
-    until it crosses there; tanh and tan of alpha N t.
-    """
-    if target < 0.0:
-        return -_quadratic_step(-n, -target, alpha, t)
-    if target == 0.0:
-        return n / (1.0 + alpha * abs(n) * t)
-    if n < 0.0:
-        crossing = atan(-n / target) / (alpha * target)
-        if t < crossing:
-            turn = tan(alpha * target * t)
-            return target * (n + target * turn) / (target - n * turn)
-        n, t = 0.0, t - crossing
-    turn = tanh(alpha * target * t)
-    return target * (n + target * turn) / (target + n * turn)
-
-
-def _quadratic_path(n: float, target: float, alpha: float, t: Floats) -> Floats:
-    """The same at each time of t (n,)."""
-    if target < 0.0:
-        return -_quadratic_path(-n, -target, alpha, t)
-    if target == 0.0:
-        return np.asarray(n / (1.0 + alpha * abs(n) * t))
-    crossing = atan(max(-n, 0.0) / target) / (alpha * target)
-    turn = np.tan(alpha * target * np.minimum(t, crossing))
-    backwards = target * (n + target * turn) / (target - n * turn)
-    turn, n = np.tanh(alpha * target * (t - crossing)), max(n, 0.0)
-    return np.where(t < crossing, backwards, target * (n + target * turn) / (target + n * turn))
 
 
 @dataclass(slots=True)

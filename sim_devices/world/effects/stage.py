@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal, Protocol
+from typing import Literal, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,14 +10,17 @@ from numpy.typing import NDArray
 from sim_devices.world.history import History
 from sim_devices.world.state import State
 
-Stage = Literal["command", "rotor", "hydro", "stand", "cell", "output"]
+Stage = Literal["command", "motor", "rotor", "hydro", "stand", "cell", "output"]
 Floats = NDArray[np.float64]
 
 
 class Effect(Protocol):
     """Changes one number of the world at its stage."""
 
-    stage: ClassVar[Stage]
+    @property
+    def stage(self) -> Stage:
+        """Where it acts: of most effects a constant of the class."""
+        ...
 
     def apply(self, value: float, s: State, dt: float, /) -> float:
         """The number with this effect in it. `dt` in s; called once per world step (stage `output`: per sample)."""

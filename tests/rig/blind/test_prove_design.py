@@ -5,6 +5,8 @@ from dataclasses import replace
 import pytest
 
 from rig.blind.design import design, matches
+from rig.blind.workers import concealable
+from sim_devices.concealed import NOISE_KINDS, WIDE_NOISE_KINDS
 from sim_devices.concealed.sealing.on_disc import conceal
 from sim_devices.tables import WorldError
 from tests.rig.blind_scores import CATALOGUE, WORLD
@@ -61,6 +63,19 @@ def test_a_case_is_of_one_world(tmp_path):
     with pytest.raises(WorldError, match="asked was abc"):
         conceal(job.asked(), tmp_path)
     assert job.digest != replace(job, world="abd").digest
+
+
+def test_wide_noise_is_a_cell_of_its_own_and_changes_no_other():
+    wide = replace(WORLD, wide_noise=("wide_slow", "wide_mixture"))
+    before, after = (design(world, CATALOGUE, 20) for world in (WORLD, wide))
+    more = [job for job in after if job.id.startswith("wide/")]
+    assert [job for job in after if job not in more] == before
+    assert {job.spec["noise"]: sum(j.spec == job.spec for j in more) for job in more} == {
+        "wide_slow": 250,
+        "wide_mixture": 250,
+    }
+    assert concealable().wide_noise == WIDE_NOISE_KINDS
+    assert concealable().noise == NOISE_KINDS
 
 
 def test_orders_are_asked_for_by_pattern():

@@ -138,6 +138,26 @@ def test_parameters_that_mean_the_same_are_known_for_effects_of_the_world():
     assert line == {"amplitude": 0.3, "periods_per_turn": 4.0, "periods_per_volt_second": 8.0}
 
 
+def test_what_warmth_costs_is_no_parameter_of_both_sides_but_its_time_is():
+    hidden = truth("heating", form="magnet", magnet=0.001, time_constant=50.0) | {"thruster": {"heating_time": 90.0}}
+    assert true_values("heating", "measured_magnet", hidden) == {"magnet_time_constant": 50.0}
+    copper = truth("heating", form="winding", resistance=0.3, time_constant=50.0) | {"thruster": {"heating_time": 90.0}}
+    assert true_values("heating", "winding", copper) == {"time_constant": 90.0}
+    assert true_values("heating", "measured_winding", copper) == {}
+    column = truth("inflow_dynamics", form="momentum", share=0.1, time_constant=0.01)
+    assert true_values("inflow_dynamics", "", column) == {}
+
+
+def test_alarms_under_wide_noise_are_goals_beside_the_plain_ones():
+    clean = [Score(order(f"clean/white/{i}"), (), "adequate") for i in range(9)]
+    alarm = [Score(order(f"wide/wide_slow/{i}"), (), "adequate" if i else "explained") for i in range(10)]
+    told = {g.what: g for g in goals([*clean, *alarm])}
+    assert told["false alarms, clean recordings"].value == 0.0
+    assert told["false alarms, clean recordings with wide noise"].value == pytest.approx(0.1)
+    assert told["false alarms, wide_slow noise"].value == pytest.approx(0.1)
+    assert not [name for name in (g.what for g in goals(clean)) if "wide" in name]
+
+
 def test_rates_have_wilson_s_interval_and_goals_four_states():
     assert (Rate(0, 20).low, Rate(0, 20).high) == (0.0, pytest.approx(0.1611, abs=1e-4))
     assert (Rate(20, 20).low, Rate(20, 20).high) == (pytest.approx(0.8389, abs=1e-4), pytest.approx(1.0))

@@ -14,7 +14,7 @@ from sim_devices.concealed.visibility.oracle import with_amount
 from sim_devices.concealed.visibility.projection import history_volts
 from sim_devices.concealed.visibility.rivals import BOTH_SIGNS
 from sim_devices.concealed.visibility.whitening import Whitening
-from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, drawn, peak_coefficients
+from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, Unrest, drawn, peak_coefficients
 from tests.concealed.recordings import recording, recordings
 
 SHORT = {"duration": 90.0, "sampling": 40.0, "plan": "interleaved"}
@@ -78,11 +78,16 @@ def test_each_effect_is_as_strong_as_asked_and_changes_what_it_should(effect):
     assert told["effects"][0]["d_prime"] == pytest.approx(40.0, rel=1e-3)
 
 
+SHOWN_BY = {"water_column": "momentum", "blades_resonant": "resonance", "before_noise": "place"}
+"""Variant -> the word of the world's parameters that tells it; else it has the same name there."""
+
+
 @pytest.mark.parametrize(("effect", "form"), [(e, f) for e, forms in concealed.VARIANTS.items() for f in forms])
 def test_a_variant_is_there_when_asked_for_and_as_strong(effect, form):
     case = concealed.case(rng(3), [effect], 40.0, forms=[form], noise="white", sampling=40.0, duration=200.0)
     assert concealed.strength(case, effect) == pytest.approx(40.0, rel=1e-3)
-    assert form in (case.effects[0].parameters.get("form"), case.effects[0].shape.knob)
+    parameters = case.effects[0].parameters
+    assert SHOWN_BY.get(form, form) in (*parameters, *parameters.values())
     assert form not in concealed.FORMS.get(effect, ())  # never drawn by chance
 
 
@@ -111,7 +116,10 @@ def test_an_oracle_sees_what_it_should_in_noise_that_is_drawn():
 
 def test_whitening_is_the_inverse_of_the_covariance():
     n, rate = 80, 20.0
-    law = NoiseLaw(0.1, 0.01, slow=(Slow(0.2, 0.5), Slow(0.3, 3.0)), peak=Peak(0.2, 3.0, 0.2))
+    unrest = Unrest(0.02, 0.4, 0.3)
+    law = NoiseLaw(
+        0.1, 0.01, slow=(Slow(0.2, 0.5), Slow(0.3, 3.0)), peak=Peak(0.2, 3.0, 0.2), unrest=unrest, quantum=0.3
+    )
     value = 10.0 * rng(1).standard_normal(n)
     lag = np.abs(np.subtract.outer(np.arange(n), np.arange(n)))
     a, b, _ = peak_coefficients(law.peak, rate)
@@ -119,13 +127,15 @@ def test_whitening_is_the_inverse_of_the_covariance():
     for _ in range(n - 2):
         correlation.append(a * correlation[-1] + b * correlation[-2])
     covariance = np.diag(law.white_std(value) ** 2) + law.peak.std**2 * np.array(correlation)[lag]
+    size = unrest.size(value, rate)
+    covariance += np.outer(size, size) * np.exp(-lag / rate / unrest.time_constant)
     for slow in law.slow:
         covariance += slow.std**2 * np.exp(-lag / rate / slow.time_constant)
     x = rng(2).standard_normal((n, 3))
     assert Whitening(law, value, rate).solve(x) == pytest.approx(np.linalg.solve(covariance, x), rel=1e-8)
 
 
-@pytest.mark.parametrize("noise", concealed.NOISE_KINDS)
+@pytest.mark.parametrize("noise", [*concealed.NOISE_KINDS, *concealed.WIDE_NOISE_KINDS])
 def test_every_noise_kind_can_hide_an_effect(noise):
     case = concealed.case(rng(8), ["asymmetry"], 8.0, noise=noise, **SHORT)
     assert case.noise_kind == noise

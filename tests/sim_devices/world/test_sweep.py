@@ -36,7 +36,7 @@ OTHER_FORMS = [
     ("dead_band", {"half_width": 0.9, "form": "jump"}),
     ("cavitation", {"onset": 15.0, "slope": 0.05, "form": "square"}),
     ("recirculation", {"coefficient": 0.02, "time_constant": 5.0, "form": "thrust"}),
-    ("heating", {"loss_per_kelvin": 0.01, "form": "magnet", "time_constant": 5.0}),
+    ("heating", {"magnet": 0.01, "form": "magnet", "time_constant": 5.0}),
     ("periodic_disturbance", {"amplitude": 0.5, "blades": 3, "phase": 1.0}),
     ("torque_crosstalk", {"coefficient": 0.01, "form": "torque"}),
     ("load_cell_creep", {"share": 0.02, "time_constant": 3.0, "share_2": 0.02, "time_constant_2": 20.0}),
@@ -52,6 +52,11 @@ OTHER_FORMS = [
     ("load_cell_saturation", {"limit": 100.0, "form": "soft"}),
     ("load_cell_saturation", {"onset": 80.0, "form": "knee", "bend": 0.02}),
     ("recirculation", {"coefficient": 0.02, "time_constant": 5.0, "form": "circuit"}),
+    ("heating", {"resistance": 0.3, "copper": 0.05, "magnet": 0.01, "form": "both", "time_constant": 5.0}),
+    ("exponent", {"exponent": 2.0 / 3.0, "form": "drive"}),
+    ("inflow_dynamics", {"share": 0.3, "time_constant": 0.4, "form": "momentum"}),
+    ("periodic_disturbance", {"amplitude": 0.5, "blades": 2, "resonance": 30.0, "damping": 0.1}),
+    ("load_cell_saturation", {"limit": 100.0, "place": "cell"}),
 ]
 SLOWER = {
     "stand_resonance": {"frequency": 2.0, "damping": 0.05},

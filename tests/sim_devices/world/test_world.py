@@ -26,7 +26,7 @@ SHOWN = {
     "asymmetry": {"ratio": 0.85},
     "inflow_dynamics": {"share": 0.3, "time_constant": 0.4},
     "cavitation": {"onset": 15.0, "slope": 0.02},
-    "heating": {"loss_per_kelvin": 0.002},
+    "heating": {"resistance": 0.3, "copper": 0.05},
     "reversal_loss": {"loss": 0.2, "time_constant": 1.5},
     "linear_term": {"coefficient": 0.5},
     "speed_of_advance": {"coefficient": 0.5},
@@ -267,7 +267,7 @@ def test_a_lie_that_cannot_be_told(tables, sentence):
 
 
 def test_blade_pass_is_silent_at_rest():
-    effects = {"periodic_disturbance": {"amplitude": 0.5, "blades": 3}}
+    effects = {"periodic_disturbance": {"amplitude": 0.5, "blades": 3, "reference_voltage": 10.0}}
     assert at(effects, 0.0) == 0.0
     rng = np.random.default_rng(1)
     trace = run(read_world({**PLAIN, "effects": effects}), [0.0], [10.0], 20.0, rates={"thrust": 500.0}, rng=rng)
