@@ -84,6 +84,8 @@ class Traits:
     """The parameter that is an instant, anywhere in the run."""
     frequency: str = ""
     """The parameter that is a frequency in Hz: beyond half the sampling rate it has an alias below."""
+    quick: str = ""
+    """The parameter that is a time which the thrust samples must show: at its least it is a size without a time."""
     even: bool = False
     """Goes as x^2 whatever the sign: one curve with every other such term, unless a torque was recorded."""
     flow: bool = False
@@ -93,6 +95,8 @@ class Traits:
     seen_by: str = ""
     """The quantity that shows the effect: forms that do without it are none where it was recorded."""
     proxy: Proxy | None = None
+    winding: str = ""
+    """The parameter by which voltage is lost in the winding, in proportion to the square of the rate."""
     limits: Literal["", "command", "reading"] = ""
     """It clips: LimitsCommand or LimitsReading."""
     dynamics: Callable[[Any, tuple[float, ...], float], Dynamics] | None = None

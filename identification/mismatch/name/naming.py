@@ -26,6 +26,8 @@ from identification.physics.term import Term
 from identification.recording import Floats
 
 Named = NamedTerm[Term, Fit]
+AT_LEAST = 0.01
+"""Of the least time that samples can show: what is no longer ends there."""
 
 
 def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check, ...]:
@@ -81,9 +83,13 @@ def _constancy(estimate: Estimate, change: list[Floats], data: Data, many: int) 
 
 
 def _unseen(now: Fit, term: Term, data: Data) -> bool:
-    """Ringing beyond half the sampling rate: between the samples it may be any other delay."""
-    named = dict(zip((p.name for p in term.parameters(data.scale)), now.values[term], strict=True))
-    return bool(term.traits.frequency) and named[term.traits.frequency] > 0.5 / min(h.spacing for h in data.histories)
+    """Ringing beyond half the sampling rate: between the samples it may be any other delay. Or over within a sample."""
+    known = {p.name: (p, value) for p, value in zip(term.parameters(data.scale), now.values[term], strict=True)}
+    if term.traits.quick:
+        least, value = known[term.traits.quick]
+        return value <= least.low * (1 + AT_LEAST)
+    spacing = min(h.spacing for h in data.histories)
+    return bool(term.traits.frequency) and known[term.traits.frequency][1] > 0.5 / spacing
 
 
 def _cancelled(now: Fit, term: Term, change: list[Floats], data: Data) -> list[Term]:
