@@ -11,7 +11,6 @@ from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
-
 LEAST = 0.5
 """Below the least that a drive makes: 2 where speed or voltage is regulated, 1 for torque, 2/3 for power
 (Smogeli 2006, *Control of marine propellers*, NTNU 2006:187), and something lost beside it."""

@@ -70,7 +70,7 @@ class Heating:
             case "magnet":
                 return Parameter("flux_loss", "1", 0.0, MOST_FLUX, 0.0), tau, later
             case _:
-                return loss, tau, Parameter("flux_loss", "1", 0.0, MOST_FLUX), later
+                return loss, tau, Parameter("flux_loss", "1", 0.0, MOST_FLUX, 0.0), later
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         if self.form == "winding":
@@ -104,7 +104,9 @@ class Heating:
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         copper, flux, _ = self._amounts(theta)
-        said = [f"its copper costs {100 * copper:.2g} % of the thrust there, and less at lower levels"] if copper else []
+        said = (
+            [f"its copper costs {100 * copper:.2g} % of the thrust there, and less at lower levels"] if copper else []
+        )
         said += [f"its magnets lose {100 * flux:.2g} % of their flux, so that it turns faster"] if flux else []
         return (
             f"Heating: at full load for long {' and '.join(said) or 'nothing changes'} (time constant "
@@ -141,7 +143,7 @@ class MeasuredHeating:
             case "measured_magnet":
                 return Parameter("flux_loss_per_kelvin", "1/K", 0.0, MOST_FLUX_PER_KELVIN, 0.0), later
             case _:
-                return loss, Parameter("flux_loss_per_kelvin", "1/K", 0.0, MOST_FLUX_PER_KELVIN), later
+                return loss, Parameter("flux_loss_per_kelvin", "1/K", 0.0, MOST_FLUX_PER_KELVIN, 0.0), later
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         if self.form == "measured_winding":

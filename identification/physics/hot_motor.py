@@ -25,7 +25,7 @@ TYPICAL_LOSS = 0.15
 
 
 def cold_motor(known: float | None, driver: float) -> tuple[float, float]:
-    """w in 1/(unit of the driver) by the model, or the typical one; and the cold rate at the largest `driver`.
+    """W in 1/(unit of the driver) by the model, or the typical one; and the cold rate at the largest `driver`.
 
     Where the model says nothing of the winding, rates are in units of what the cold motor makes of the command.
     """
@@ -35,7 +35,7 @@ def cold_motor(known: float | None, driver: float) -> tuple[float, float]:
 
 
 def hot_rate(cold: Floats, winding: float, copper: Floats | float, flux: Floats | float) -> Floats:
-    """y of a motor that would turn at `cold` (M,): `copper` is w c, 1/(unit of the driver); `flux` is m.
+    """Y of a motor that would turn at `cold` (M,): `copper` is w c, 1/(unit of the driver); `flux` is m.
 
     At 20 % of the voltage lost and 40 K, and magnets 20 K up (shares by which thrust, y^2, rises):
 
@@ -62,7 +62,7 @@ def voltage_of(size: Floats, winding: float) -> Floats:
 
 
 def copper_at_full(loss: float, winding: float, cold: float) -> float:
-    """w c of which thrust falls by the share `loss` where the cold motor turns at `cold`.
+    """W c of which thrust falls by the share `loss` where the cold motor turns at `cold`.
 
     >>> w = 0.3125
     >>> round(float(hot_rate(np.array([0.8]), w, copper_at_full(0.1, w, 0.8), 0.0)[0]) ** 2 / 0.64, 9)
@@ -73,5 +73,5 @@ def copper_at_full(loss: float, winding: float, cold: float) -> float:
 
 
 def weaker_at_full(winding: float, cold: float) -> float:
-    """w c for each small share of the thrust that is lost where the cold motor turns at `cold`."""
+    """W c for each small share of the thrust that is lost where the cold motor turns at `cold`."""
     return (1 + 2 * winding * cold) / (2 * cold)

@@ -12,7 +12,6 @@ from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import lag, lowpass
 
-
 QUICKEST = 0.004
 """s, half of the least that a small thruster has."""
 SLOW_ENOUGH = 0.05

@@ -38,10 +38,10 @@ class Scale:
     """N, the largest |thrust| that was read, tare and all."""
     noise: float = 0.0
     """N, standard deviation of one thrust sample between neighbours."""
-    spacing: float = 0.0
-    """s between thrust samples, the shortest of all runs: what is over within one of them has no time of its own."""
     torque: float = 0.0
     """N m: |torque| at the largest driver, by a square law through all of it; 0 where none was recorded."""
+    spacing: float = 0.0
+    """s between thrust samples, the shortest of all runs: what is over within one of them has no time of its own."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,10 @@ class LimitsReading(Protocol):
     def sharp(self) -> bool:
         """Whether readings end at one value, and not over a knee."""
 
+    @property
+    def silent(self) -> bool:
+        """Whether the amplifier's own noise is clipped too."""
+
     def shown(self, history: History, C: float, x: Floats, reading: Floats, theta: tuple[float, ...]) -> Floats:
         """(M,) share of what the force does within each interval that the cell shows."""
 

@@ -18,8 +18,8 @@ from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.name.named_term import Check, NamedTerm, named_term, part_check
 from identification.mismatch.prepare.preparing import DRIVERS
+from identification.mismatch.select.clipping import contradiction
 from identification.mismatch.select.family_wise import orthogonal_basis
-from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import STATIC, SwapTest, Thruster, static_curve
 from identification.mismatch.select.stepwise import stands
 from identification.physics.term import Term
@@ -36,15 +36,13 @@ def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check
     `many`: terms of the model, all of which are asked.
     """
     ended, unseen = at_bound(term, estimate.fit, data, estimate.weights), _unseen(estimate.fit, term, data)
-    scatters = noise_goes_on(estimate.fit, term, estimate.noise, data)
+    elsewhere = contradiction(estimate.fit, term, estimate.noise, data)
     change = _raw_effect(estimate.fit, (term,), data)
     cancelled = _cancelled(estimate.fit, term, change, data)
     return (
         Check("its values are possible", "its parameters end at what is physically possible" if ended else ""),
         Check("the samples can show it", "it is faster than the samples can show" if unseen else ""),
-        Check(
-            "noise vanishes where it clips", "the noise goes on where the readings should be flat" if scatters else ""
-        ),
+        *((Check("what else was recorded clips with it, or does not", elsewhere),) if term.traits.limits else ()),
         *(Check("no other term undoes it", f"it and {other.id} nearly cancel") for other in cancelled),
         *(() if cancelled else (Check("no other term undoes it"),)),
         *_constancy(estimate, change, data, many),

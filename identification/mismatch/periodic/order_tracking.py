@@ -22,8 +22,6 @@ from identification.recording import Floats
 
 TRIED = np.linspace(-1.0, 1.0, 41)
 """Ratios near a candidate, in its reach."""
-LAW_CHI2 = 4.0
-"""Two sigma, by which another law than that of a force must be better."""
 BESIDE = (-7, -6, -5, -4, 4, 5, 6, 7)
 """Independent ratios of a stretch beside a line."""
 
@@ -114,7 +112,8 @@ def find_locked(
 ) -> RotorOrder | None:
     """The most significant rotor-locked line; None without one.
 
-    `in_turns`: angles are those of the propeller, whose waves come a whole number of times a turn. `ring`: of the stand.
+    `in_turns`: angles are those of the propeller, whose waves come a whole number of times a turn. `ring`:
+    of the stand.
     """
     top = max(float(np.quantile(speed_of(r), 0.99)) for _, r in runs)
     if not top > 0:
@@ -148,7 +147,8 @@ def _of_best_law(
 ) -> RotorOrder:
     """With the size over the speeds that explains most; where the speeds tell nothing, as a force grows."""
     found = [(law, _fitted(law.on(parts, candidate.ratio, top), candidate)) for law in laws(ring)]
-    law, best = max(found, key=lambda each: each[1].law_gain - (0.0 if each[0] is found[0][0] else LAW_CHI2))
+    behind = policy.periodic.ORDER_LAW_CHI2
+    law, best = max(found, key=lambda each: each[1].law_gain - (0.0 if each[0] == FORCE else behind))
     return replace(best, law=law, top=top)
 
 

@@ -107,8 +107,10 @@ class SteadySegment:
         return 0 if abs(change) < least else 1 if change > 0 else 2
 
     def wave(self, z: float) -> complex:
-        """Sum of white exp(-2 pi i z turns), by the weight of the stretch: whitened, for a loud resonance leaks into all
-        frequencies of a stretch."""
+        """Sum of white exp(-2 pi i z turns), by the weight of the stretch.
+
+        Whitened, for a loud resonance leaks into all frequencies of a stretch.
+        """
         return complex(np.conj(self.weight) * (self.white @ np.exp(-2j * np.pi * z * self.turns)))
 
 
