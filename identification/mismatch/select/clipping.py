@@ -26,13 +26,13 @@ POWERS = {"current": 2.0, "rotation_rate": 1.0, "motor_voltage": 1.0}
 
 @dataclass(frozen=True, slots=True)
 class GoesOn:
-    """Of one quantity beyond a limit: its rise there, 1 as below the limit and 0 where it stays."""
+    """Of one quantity: its rise from the last level below a limit to those beyond it, 1 where it rises as below."""
 
     quantity: str
     share: float
     std: float
     allowed: float
-    """The share at the limit if the term is right and the quantity clips with it."""
+    """The share that it has if it clips with the term: up to the limit it rises still."""
 
 
 def contradiction(fitted: Fit, term: Term, noise: Noise, data: Data) -> str:
