@@ -58,7 +58,7 @@ class Heating:
         told_by=((THERMOMETER, "the motor temperature"),),
         revealed_by=REVEALED,
     )
-    form: Literal["winding", "magnet", "both"] = "winding"
+    form: Literal["winding", "magnet", "winding_and_magnet"] = "winding"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         tau = Parameter("time_constant", "s", 5.0, _slowest(scale))
@@ -132,7 +132,7 @@ class MeasuredHeating:
         told_by=((THERMOMETER, "the motor temperature"),),
         revealed_by=REVEALED,
     )
-    form: Literal["measured_winding", "measured_magnet", "measured_both"] = "measured_winding"
+    form: Literal["measured_winding", "measured_magnet", "measured_winding_and_magnet"] = "measured_winding"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         loss = Parameter("loss_per_kelvin", "1/K", 0.0, MOST_PER_KELVIN, 0.0)
@@ -185,8 +185,8 @@ class MeasuredHeating:
 FORMS = (
     Heating("winding"),
     Heating("magnet"),
-    Heating("both"),
+    Heating("winding_and_magnet"),
     MeasuredHeating("measured_winding"),
     MeasuredHeating("measured_magnet"),
-    MeasuredHeating("measured_both"),
+    MeasuredHeating("measured_winding_and_magnet"),
 )

@@ -31,7 +31,10 @@ class OrderLaw:
         return [replace(p, weight=self.weight(order, p.speed, top)) for p in parts]
 
 
-FORCE, PICK_UP = OrderLaw(2), OrderLaw(0)
+FORCE = OrderLaw(2)
+"""Of the rotor, by the square of its rate."""
+PICK_UP = OrderLaw(0)
+"""Electrical, of one size at all speeds."""
 
 
 def laws(ring: Ring | None) -> tuple[OrderLaw, ...]:

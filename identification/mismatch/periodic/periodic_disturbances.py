@@ -40,7 +40,7 @@ EFFECT = "periodic_disturbance"
 TRIED = 6
 """Peaks that are looked at before a spectrum holds no line."""
 MAINS = (50.0, 60.0)
-"""Hz; IEC 60038 systems."""
+"""Hz; standard frequencies of IEC 60196."""
 HARMONICS = (1, 2, 3, 4, 5)
 """Of the mains that are told by name: rectifiers make the lower ones."""
 

@@ -81,7 +81,7 @@ def test_weaker_magnets_give_thrust_at_every_level_and_follow_the_copper():
     assert full[-1] > 12.1
     s = m.history.middle / 40
     assert (full - 12) / (full[-1] - 12) == pytest.approx(1 - (1 + s) * np.exp(-s), abs=0.01)
-    both = term("heating", "both").apply(np.full(2400, 12.0), m, (0.1, 40.0, 0.02, 40.0))
+    both = term("heating", "winding_and_magnet").apply(np.full(2400, 12.0), m, (0.1, 40.0, 0.02, 40.0))
     copper = term("heating", "winding").apply(np.full(2400, 12.0), m, (0.1, 40.0))
     assert copper[-1] < both[-1] < full[-1]
 
@@ -96,12 +96,12 @@ def test_by_the_thermometer():
     later = term("heating", "measured_magnet").apply(V, m, (0.0011, 40.0))
     since = warm.middle - 20.0
     assert (later[since > 0] - 12) / (later[-1] - 12) == pytest.approx(1 - np.exp(-since[since > 0] / 40), abs=0.02)
-    both = term("heating", "measured_both").apply(V, m, (0.001, 0.0011, 40.0))
+    both = term("heating", "measured_winding_and_magnet").apply(V, m, (0.001, 0.0011, 40.0))
     assert both[85] < 12 < both[-1] < later[-1], "the copper at once, the magnets later"
 
 
 def test_what_is_said_of_it_names_what_is_hot():
-    heating = term("heating", "both")
+    heating = term("heating", "winding_and_magnet")
     said = heating.statement((0.05, 60.0, 0.02, 100.0), S)
     assert "copper costs 5 %" in said
     assert "magnets lose 2 %" in said
