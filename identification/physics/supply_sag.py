@@ -154,7 +154,7 @@ class Loaded:
     traits: ClassVar[Traits] = Traits(
         moving=True,
         seen_by="bus_voltage",
-        proxy=Proxy("bus_voltage", UNKNOWN, "the power drawn by a switching drive, |V|^3,"),
+        proxy=Proxy("bus_voltage", UNKNOWN, "the power drawn, |V|^3,"),
         shown_over="bus_voltage",
         shown_as="gain",
         told_by=(("bus_voltage", "the bus voltage"),),
