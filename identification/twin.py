@@ -45,7 +45,7 @@ TERMS: Mapping[tuple[str, str], Term] = {(term.id, term.form): term for term in 
 
 @dataclass(frozen=True, slots=True)
 class TwinLine:
-    """A periodic disturbance of the reading: a sin(2 pi f t + p), or a sin(2 pi z theta + p) while the rotor turns."""
+    """A periodic disturbance of the reading: a sin(2 pi f t + p), or a (n/n_a)^q sin(2 pi z theta + p)."""
 
     amplitude: float
     """N."""
@@ -61,6 +61,10 @@ class TwinLine:
     phase: float | None = None
     """p, rad, on the clock of the first recording behind it; None where it slipped."""
     phase_std: float = 0.0
+    growth: float = 0.0
+    """q: 2 of a force of the rotor, 0 of one size at all speeds."""
+    at_speed: float = 0.0
+    """n_a, `turns` per s; 0 where the size is the same at all."""
 
     @property
     def kind(self) -> Literal["fixed", "rotation"]:

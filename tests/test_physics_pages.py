@@ -32,12 +32,13 @@ LONG = Scale(
     thrust=131.0,
     duration=611.0,
     interval=0.013,
+    spacing=0.1,
     flow=0.7,
     reading=139.0,
     noise=0.1,
     torque=6.1,
 )
-SHORT = replace(LONG, driver=44.0, thrust=2.3, duration=37.0, interval=0.002, reading=3.1, torque=0.09)
+SHORT = replace(LONG, driver=44.0, thrust=2.3, duration=37.0, interval=0.002, reading=3.1, torque=0.09, spacing=0.01)
 
 
 def page(effect: str) -> str:
@@ -65,6 +66,7 @@ def size(expression: str, scale: Scale) -> float:
         "Q_max": scale.torque,
         "duration": scale.duration,
         "interval": scale.interval,
+        "spacing": scale.spacing,
         "reading": scale.reading,
     }
     value, over = -1.0 if expression.startswith("-") else 1.0, False

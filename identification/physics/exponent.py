@@ -1,4 +1,4 @@
-"""Thrust grows as |V|^p, not as its square (Reynolds number, open-water curve)."""
+"""Thrust grows as |V|^p, not as its square (Reynolds number, open-water curve), or as what the drive regulates."""
 
 from __future__ import annotations
 
@@ -11,10 +11,14 @@ from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
+LEAST = 0.5
+"""Below the least that a drive makes: 2 where speed or voltage is regulated, 1 for torque, 2/3 for power
+(Smogeli 2006, *Control of marine propellers*, NTNU 2006:187), and something lost beside it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Exponent:
-    """Thrust grows as |V|^p, not as its square (Reynolds number, open-water curve)."""
+    """Thrust grows as |V|^p, not as its square: 2 - p small by the Reynolds number, p = 1 or 2/3 by the drive."""
 
     id: ClassVar[str] = "exponent"
     stage: ClassVar[Stage] = "hydro"
@@ -25,10 +29,10 @@ class Exponent:
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("exponent", "1", 0.8, 3.5, 2.0),)
+        return (Parameter("exponent", "1", LEAST, 3.5, 2.0),)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return ((1.95,), (1.7,), (2.3,))
+        return ((1.95,), (1.7,), (2.3,), (1.0,), (0.7,))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()

@@ -1,4 +1,4 @@
-"""Winding and magnets warm up and thrust falls in proportion: by the thermometer, or by the power drawn before."""
+"""A motor fed with a voltage that warms up: copper costs it rate, magnets that weaken give it some (hot_motor.py)."""
 
 from __future__ import annotations
 
@@ -7,15 +7,19 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from identification.physics.hot_motor import cold_motor, copper_at_full, hot_rate, weaker_at_full
 from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
-from identification.run_history.history import History
 
 THERMOMETER = "motor_temperature"
 MOST_PER_KELVIN = 1.0
-"""1/K. Copper has 0.004, neodymium magnets 0.001; a thermometer outside sees only a part of their rise."""
+"""1/K. Copper has 0.004, of which thrust loses a fourth; a thermometer outside sees only a part of their rise."""
+MOST_FLUX = 0.3
+"""Magnets that have lost more do not come back (Pyrhonen et al. 2008: 0.001 to 0.0012 1/K of NdFeB)."""
+MOST_FLUX_PER_KELVIN = 0.1
+"""1/K, a hundred times that of the magnet itself: a thermometer outside sees only a part of its rise."""
 
 
 def _slowest(scale: Scale) -> float:
@@ -29,14 +33,19 @@ POWER = Proxy(
     "the power drawn before, the fourth power of the rotor's rate as the model has it, low-passed",
     better=("current", "the power drawn before, the recorded current squared, low-passed"),
 )
+REVEALED = "minutes at full load, then high and low levels straight after and once more cold; the motor's temperature"
 
 
 @dataclass(frozen=True, slots=True)
 class Heating:
-    """No thermometer: T (1 - h Theta), Theta' = (power - Theta)/tau, power as V^4 or I^2; magnets follow later."""
+    """No thermometer: both follow the power, V^4 or I^2, with a time constant; magnets follow the copper later.
+
+    `loss`: share of the thrust at the largest driver that hot copper costs, at full load for long. `flux_loss`: share
+    of k_e that hot magnets lose there.
+    """
 
     id: ClassVar[str] = "heating"
-    stage: ClassVar[Stage] = "hydro"
+    stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "winding and magnets warm up under load"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time",)
@@ -47,47 +56,71 @@ class Heating:
         shown_over="time",
         shown_as="gain",
         told_by=((THERMOMETER, "the motor temperature"),),
-        revealed_by="a long load, a rest of minutes, the same load again; the motor's temperature",
+        revealed_by=REVEALED,
     )
-    form: Literal["winding", "magnet"] = "winding"
+    form: Literal["winding", "magnet", "winding_and_magnet"] = "winding"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        known = (Parameter("loss", "1", 0.0, 0.95, 0.0), Parameter("time_constant", "s", 5.0, _slowest(scale)))
-        if self.form == "winding":
-            return known
-        return (*known, Parameter("magnet_time_constant", "s", 5.0, _slowest(scale)))
+        tau = Parameter("time_constant", "s", 5.0, _slowest(scale))
+        later = Parameter("magnet_time_constant", "s", 5.0, _slowest(scale))
+        loss = Parameter("loss", "1", 0.0, 0.95, 0.0)
+        match self.form:
+            case "winding":
+                return loss, tau
+            case "magnet":
+                return Parameter("flux_loss", "1", 0.0, MOST_FLUX, 0.0), tau, later
+            case _:
+                return loss, tau, Parameter("flux_loss", "1", 0.0, MOST_FLUX, 0.0), later
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         if self.form == "winding":
             return tuple((0.05, tau) for tau in (15.0, 40.0, 100.0, 300.0) if tau < 0.7 * scale.duration)
-        return tuple((0.05, tau, later) for tau, later in ((30.0, 30.0), (120.0, 60.0)) if tau < 0.7 * scale.duration)
+        times = tuple(pair for pair in ((30.0, 30.0), (120.0, 60.0)) if pair[0] < 0.7 * scale.duration)
+        if self.form == "magnet":
+            return tuple((0.02, *pair) for pair in times)
+        return tuple((0.05, tau, 0.02, later) for tau, later in times)
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        history = now.history
-        current = history.others.get("current")
-        load = (now.x / now.scale.driver) ** 4 if current is None else (current / np.nanmax(np.abs(current))) ** 2
+        history, current = now.history, now.history.others.get("current")
+        winding, full = cold_motor(now.winding, now.scale.driver)
+        load = (value / full) ** 4 if current is None else (current / np.nanmax(np.abs(current))) ** 2
+        copper, flux, later = self._amounts(theta)
         warm = lowpass(load, history.dt, theta[1])[1]
-        if self.form == "magnet":
-            warm = lowpass(warm, history.dt, theta[2])[1]
-        out: Floats = value * np.maximum(1 - theta[0] * warm, 0.0)
-        return out
+        magnets = lowpass(warm, history.dt, later)[1] if later is not None else warm
+        return hot_rate(value, winding, copper_at_full(copper, winding, full) * warm, flux * magnets)
+
+    def _amounts(self, theta: tuple[float, ...]) -> tuple[float, float, float | None]:
+        """Loss by copper, loss of flux, time constant of the magnets behind the copper."""
+        match self.form:
+            case "winding":
+                return theta[0], 0.0, None
+            case "magnet":
+                return 0.0, theta[0], theta[2]
+            case _:
+                return theta[0], theta[2], theta[3]
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        copper, flux, _ = self._amounts(theta)
+        said = (
+            [f"its copper costs {100 * copper:.2g} % of the thrust there, and less at lower levels"] if copper else []
+        )
+        said += [f"its magnets lose {100 * flux:.2g} % of their flux, so that it turns faster"] if flux else []
         return (
-            f"Heating: at full load for long thrust falls by {100 * theta[0]:.2g} %, with a time "
-            f"constant of {theta[1]:.3g} s; rest between loads, or record the motor temperature."
+            f"Heating: at full load for long {' and '.join(said) or 'nothing changes'} (time constant "
+            f"{theta[1]:.3g} s); rest between loads, or record the motor temperature."
         )
 
 
 @dataclass(frozen=True, slots=True)
 class MeasuredHeating:
-    """T (1 - b (T_m - T_0)): the recorded temperature, from where it began; magnets follow it later."""
+    """By the recorded temperature, from where it began: `loss_per_kelvin` of the thrust at the largest driver by
+    copper, `flux_loss_per_kelvin` of k_e by magnets, which follow the thermometer later."""
 
     id: ClassVar[str] = "heating"
-    stage: ClassVar[Stage] = "hydro"
+    stage: ClassVar[Stage] = "command"
     physics: ClassVar[str] = "winding and magnets warm up under load"
     needs: ClassVar[tuple[str, ...]] = (THERMOMETER,)
     covariates: ClassVar[tuple[str, ...]] = (THERMOMETER, "time")
@@ -97,41 +130,63 @@ class MeasuredHeating:
         shown_over="time",
         shown_as="gain",
         told_by=((THERMOMETER, "the motor temperature"),),
-        revealed_by="a long load, a rest of minutes, the same load again; the motor's temperature",
+        revealed_by=REVEALED,
     )
-    form: Literal["measured_winding", "measured_magnet"] = "measured_winding"
+    form: Literal["measured_winding", "measured_magnet", "measured_winding_and_magnet"] = "measured_winding"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        known = (Parameter("loss_per_kelvin", "1/K", 0.0, MOST_PER_KELVIN, 0.0),)
-        if self.form == "measured_winding":
-            return known
-        return (*known, Parameter("magnet_time_constant", "s", 5.0, _slowest(scale)))
+        loss = Parameter("loss_per_kelvin", "1/K", 0.0, MOST_PER_KELVIN, 0.0)
+        later = Parameter("magnet_time_constant", "s", 5.0, _slowest(scale))
+        match self.form:
+            case "measured_winding":
+                return (loss,)
+            case "measured_magnet":
+                return Parameter("flux_loss_per_kelvin", "1/K", 0.0, MOST_FLUX_PER_KELVIN, 0.0), later
+            case _:
+                return loss, Parameter("flux_loss_per_kelvin", "1/K", 0.0, MOST_FLUX_PER_KELVIN, 0.0), later
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         if self.form == "measured_winding":
             return ((0.001,),)
-        return tuple((0.001, tau) for tau in (15.0, 60.0, 200.0) if tau < 0.7 * scale.duration)
+        amounts = (0.001,) if self.form == "measured_magnet" else (0.001, 0.001)
+        return tuple((*amounts, tau) for tau in (15.0, 60.0, 200.0) if tau < 0.7 * scale.duration)
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        warm = _rise(now.history)
-        if self.form == "measured_magnet":
-            warm = lowpass(warm, now.history.dt, theta[1])[1]
-        out: Floats = value * np.maximum(1 - theta[0] * warm, 0.0)
-        return out
+        copper, flux, later = self._amounts(theta)
+        measured = now.history.others[THERMOMETER]
+        rise = measured - measured[0]
+        magnets = lowpass(rise, now.history.dt, later)[1] if later is not None else rise
+        winding, full = cold_motor(now.winding, now.scale.driver)
+        weaker = np.minimum(flux * magnets, MOST_FLUX)
+        return hot_rate(value, winding, copper * weaker_at_full(winding, full) * rise, weaker)
+
+    def _amounts(self, theta: tuple[float, ...]) -> tuple[float, float, float | None]:
+        """Loss by copper and of flux per kelvin, time constant of the magnets behind the thermometer."""
+        match self.form:
+            case "measured_winding":
+                return theta[0], 0.0, None
+            case "measured_magnet":
+                return 0.0, theta[0], theta[1]
+            case _:
+                return theta[0], theta[1], theta[2]
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        later = "" if self.form == "measured_winding" else f", {theta[1]:.3g} s late"
-        return f"Heating: thrust falls by {100 * theta[0]:.2g} % per kelvin of the motor temperature{later}."
+        copper, flux, later = self._amounts(theta)
+        full = f"{scale.driver:.3g} {scale.driver_unit}"
+        said = [f"the copper costs {100 * copper:.2g} % of the thrust at {full}, less below"] if copper else []
+        said += [f"the magnets lose {100 * flux:.2g} % of their flux and the motor turns faster"] if flux else []
+        late = "" if later is None else f", the magnets {later:.3g} s late"
+        return f"Heating: per kelvin of the motor temperature {' and '.join(said) or 'nothing changes'}{late}."
 
 
-def _rise(history: History) -> Floats:
-    """(M,) K beyond where the run began."""
-    measured = history.others[THERMOMETER]
-    out: Floats = measured - measured[0]
-    return out
-
-
-FORMS = (Heating("winding"), Heating("magnet"), MeasuredHeating("measured_winding"), MeasuredHeating("measured_magnet"))
+FORMS = (
+    Heating("winding"),
+    Heating("magnet"),
+    Heating("winding_and_magnet"),
+    MeasuredHeating("measured_winding"),
+    MeasuredHeating("measured_magnet"),
+    MeasuredHeating("measured_winding_and_magnet"),
+)

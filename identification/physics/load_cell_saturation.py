@@ -1,4 +1,8 @@
-"""Cell or amplifier clips: clip(F, -limit, limit); or shows less and less from an onset on, until a knee is passed."""
+"""Cell or amplifier clips: clip(F, -limit, limit); or shows less and less from an onset on, until a knee is passed.
+
+An amplifier or a converter that clips takes the noise with it. A cell on its stop does not: what the amplifier behind
+it adds goes on, so that silence speaks for a clip but noise does not speak against it.
+"""
 
 from __future__ import annotations
 
@@ -52,26 +56,32 @@ class LoadCellSaturation:
     covariates: ClassVar[tuple[str, ...]] = ("thrust",)
     traits: ClassVar[Traits] = Traits(
         limits="reading",
-        told_by=(("", "dead weights on the cell"),),
+        told_by=(("rotation_rate", "the measured rotation rate"), ("current", "the measured current")),
         revealed_by="current or rotation rate at the highest levels: they go on rising",
     )
-    form: Literal["hard", "knee"] = "hard"
+    form: Literal["hard", "before_noise", "knee"] = "hard"
 
     @property
     def sharp(self) -> bool:
         """Whether readings end at one value, and not over a knee."""
-        return self.form == "hard"
+        return self.form != "knee"
+
+    @property
+    def silent(self) -> bool:
+        """Whether the amplifier's own noise is clipped too."""
+        return self.form != "before_noise"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         most = 1.3 * scale.reading
-        if self.form == "hard":
+        if self.sharp:
             return (Parameter("limit", "N", 0.1 * scale.reading, most, most),)
         bend = Parameter("bend", "1/N", 0.0, 50.0 / scale.reading, 0.0)
         return bend, Parameter("onset", "N", 0.1 * scale.reading, 0.98 * scale.reading)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        if self.form == "hard":
-            return tuple((share * scale.reading,) for share in (0.99, 0.95, 0.88, 0.75, 0.6))
+        if self.sharp:
+            shares = (0.99, 0.95, 0.88, 0.75, 0.6) if self.silent else (0.95, 0.88, 0.75, 0.6)
+            return tuple((share * scale.reading,) for share in shares)
         return tuple((0.5 / scale.reading, share * scale.reading) for share in (0.3, 0.5, 0.7, 0.88))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
@@ -79,7 +89,7 @@ class LoadCellSaturation:
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         # the mean of noisy samples that clip one by one while the force moves within the interval
-        noise, tails = now.history.scatter or (now.scale.noise, 0.0)
+        noise, tails = (now.history.scatter or (now.scale.noise, 0.0)) if self.silent else (0.0, 0.0)
         half = np.maximum(
             _half_moved(now.history, now.C, now.x), max(LEAST_MOVE * now.scale.reading, LEAST_BLUR * noise)
         )
@@ -109,18 +119,18 @@ class LoadCellSaturation:
     def slope(self, reading: Floats, theta: tuple[float, ...]) -> Floats:
         """What the cell would show of a small change where it reads `reading` N if it were endless."""
         beyond = np.abs(reading) - self.start(theta)
-        if self.form == "hard":
+        if self.sharp:
             return np.where(beyond > 0, 0.0, 1.0)
         out: Floats = np.clip(1 - theta[0] * np.maximum(beyond, 0.0), 0.0, 1.0)
         return out
 
     def start(self, theta: tuple[float, ...]) -> float:
         """N: where the cell begins to show less."""
-        return theta[0] if self.form == "hard" else theta[1]
+        return theta[0] if self.sharp else theta[1]
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         advice = "change the range of the amplifier or the cell"
-        if self.form == "hard":
+        if self.sharp:
             return f"Load-cell saturation: readings end at +-{theta[0]:.4g} N; {advice}."
         return f"Load-cell saturation: from {theta[1]:.4g} N on readings show less and less of the force; {advice}."
 
@@ -131,4 +141,4 @@ def _half_moved(history: History, C: float, x: Floats) -> Floats:
     return out
 
 
-FORMS = (LoadCellSaturation("hard"), LoadCellSaturation("knee"))
+FORMS = (LoadCellSaturation("hard"), LoadCellSaturation("before_noise"), LoadCellSaturation("knee"))

@@ -139,8 +139,12 @@ class Discharge:
 
 @dataclass(frozen=True, slots=True)
 class Loaded:
-    """The proxy for a source that gives way at once: V_eff = V (1 - d |V/V_max|^3), its current times its own voltage
-    being the power, |V|^3."""
+    """The proxy for a source that gives way at once behind a switching drive: V_eff = V - (V/V_b)^2 R_s i.
+
+    The drive draws D i of the source, D = V/V_b its duty, and gives D of what is left; i goes as V_eff^2. A share of
+    V^3 is lost; behind a linear amplifier it would be R_s i, a share of V as in the winding. `drop`: the share lost at
+    the largest V.
+    """
 
     id: ClassVar[str] = "supply_sag"
     stage: ClassVar[Stage] = "command"
@@ -153,8 +157,8 @@ class Loaded:
         proxy=Proxy("bus_voltage", UNKNOWN, "the power drawn, |V|^3,"),
         shown_over="bus_voltage",
         shown_as="gain",
-        told_by=OTHER_SUPPLY,
-        revealed_by="the same level at another supply voltage",
+        told_by=(("bus_voltage", "the bus voltage"),),
+        revealed_by="levels at 0.3, 0.6 and 1.0 of the highest, the bus voltage recorded",
     )
     form: ClassVar[str] = "loaded"
 
@@ -168,7 +172,9 @@ class Loaded:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        out: Floats = value * (1 - theta[0] * np.minimum(np.abs(value / now.scale.driver), 1.0) ** 3)
+        # e + a V^2 e^2 = V, and e = (1 - d) V_max at V_max
+        a = theta[0] / ((1 - theta[0]) ** 2 * now.scale.driver**3)
+        out: Floats = 2 * value / (1 + np.sqrt(1 + 4 * a * np.abs(value) ** 3))
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:

@@ -40,6 +40,8 @@ class Scale:
     """N, standard deviation of one thrust sample between neighbours."""
     torque: float = 0.0
     """N m: |torque| at the largest driver, by a square law through all of it; 0 where none was recorded."""
+    spacing: float = 0.0
+    """s between thrust samples, the shortest of all runs: what is over within one of them has no time of its own."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +72,9 @@ class TermContext:
     """N, of this run."""
     x: Floats
     """Rate of the rotor in units of the driver: thrust is C x|x| without any term. In stage command: the driver."""
+    winding: float | None = None
+    """Voltage that the model loses in the cold winding, by the square of the rate, 1/(unit of the driver); None where
+    it says nothing of it."""
 
     @property
     def history(self) -> History:

@@ -1,4 +1,4 @@
-"""A neighbour runs: T (1 - e |T_j| / max |T_j|), the largest of the run."""
+"""A neighbour's jet flows through the disc: T - C_s |n| U_j, U_j = sqrt(2 |T_j| / (rho A)) at the neighbour's disc."""
 
 from __future__ import annotations
 
@@ -14,19 +14,24 @@ from identification.recording import Floats
 
 @dataclass(frozen=True, slots=True)
 class ThrusterInteraction:
-    """A neighbour runs: T (1 - e |T_j| / max |T_j|), the largest of the run."""
+    """T - loss C |x| V_max sqrt(|T_j| / max |T_j|): a jet is as fast as the root of the thrust that makes it.
+
+    Nienhuis (1992), *Analysis of thruster effectivity for dynamic positioning and low speed manoeuvring*, Delft: the
+    jet of momentum theory; what a flow takes of a turning disc is C_s |n| U. `loss` is the share that is lost where
+    both are at full; at less of its own the thruster loses a larger share, and may be driven backwards.
+    """
 
     id: ClassVar[str] = "thruster_interaction"
     stage: ClassVar[Stage] = "hydro"
-    physics: ClassVar[str] = "a neighbouring thruster takes thrust when it runs"
+    physics: ClassVar[str] = "the jet of a neighbouring thruster takes thrust"
     needs: ClassVar[tuple[str, ...]] = ("neighbour_thrust",)
     covariates: ClassVar[tuple[str, ...]] = ("neighbour_thrust",)
     traits: ClassVar[Traits] = Traits(
         neighbour=True,
         shown_over="neighbour_thrust",
         shown_as="gain",
-        told_by=(("", "the neighbour switched on and off at one level"),),
-        revealed_by="the neighbour switched on and off at one level",
+        told_by=(("", "three levels of each of the two thrusters"),),
+        revealed_by="three levels of the neighbour at three levels of the thruster itself",
     )
     form: ClassVar[str] = ""
 
@@ -41,11 +46,15 @@ class ThrusterInteraction:
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         neighbour = np.abs(now.history.others["neighbour_thrust"])
-        out: Floats = value * (1 - theta[0] * neighbour / max(float(np.max(neighbour)), 1e-12))
+        jet = np.sqrt(neighbour / max(float(np.max(neighbour)), 1e-12))
+        out: Floats = value - theta[0] * now.C * now.scale.driver * np.abs(now.x) * jet
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Thruster interaction: with the neighbour at full thrust {100 * theta[0]:.3g} % of the thrust is lost."
+        return (
+            f"Thruster interaction: with the neighbour and itself at full {100 * theta[0]:.3g} % of the thrust is lost "
+            "in its jet, and as the root of either thrust at less."
+        )
 
 
 FORMS = (ThrusterInteraction(),)

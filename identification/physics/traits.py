@@ -54,6 +54,10 @@ class LimitsReading(Protocol):
     def sharp(self) -> bool:
         """Whether readings end at one value, and not over a knee."""
 
+    @property
+    def silent(self) -> bool:
+        """Whether the amplifier's own noise is clipped too."""
+
     def shown(self, history: History, C: float, x: Floats, reading: Floats, theta: tuple[float, ...]) -> Floats:
         """(M,) share of what the force does within each interval that the cell shows."""
 
@@ -84,6 +88,8 @@ class Traits:
     """The parameter that is an instant, anywhere in the run."""
     frequency: str = ""
     """The parameter that is a frequency in Hz: beyond half the sampling rate it has an alias below."""
+    quick: str = ""
+    """The parameter that is a time which the thrust samples must show: at its least it is a size without a time."""
     even: bool = False
     """Goes as x^2 whatever the sign: one curve with every other such term, unless a torque was recorded."""
     rare: bool = False
@@ -95,6 +101,8 @@ class Traits:
     seen_by: str = ""
     """The quantity that shows the effect: forms that do without it are none where it was recorded."""
     proxy: Proxy | None = None
+    winding: str = ""
+    """The parameter by which voltage is lost in the winding, in proportion to the square of the rate."""
     limits: Literal["", "command", "reading"] = ""
     """It clips: LimitsCommand or LimitsReading."""
     dynamics: Callable[[Any, tuple[float, ...], float], Dynamics] | None = None

@@ -1,4 +1,8 @@
-"""Voltage lost in the winding: |V| = e + loss e^2, e the back-EMF (motor balance, current as e^2)."""
+"""Voltage lost in the winding: |V| = e + loss e^2, e the back-EMF (motor balance, current as e^2).
+
+Of what is asked a share in proportion to V is lost. So is it in any resistance in series behind a linear amplifier;
+behind a switching drive the share goes as V^3 (supply_sag, loaded).
+"""
 
 from __future__ import annotations
 
@@ -22,8 +26,9 @@ class WindingResistance:
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     traits: ClassVar[Traits] = Traits(
+        winding="loss",
         told_by=(("rotation_rate", "the measured rotation rate"), ("current", "the measured current")),
-        revealed_by="the measured rotation rate or current at high levels",
+        revealed_by="the measured rotation rate or current at 0.3, 0.6 and 1.0 of the highest level",
     )
     form: ClassVar[str] = ""
 

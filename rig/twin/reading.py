@@ -256,6 +256,8 @@ def _line(table: Table) -> TwinLine:
         "rev" if turns == "rev" else "V s",
         phase,
         phase_std,
+        table.number("growth", 0.0) if "growth" in table.content else 0.0,
+        table.number("at_speed", 0.0) if "at_speed" in table.content else 0.0,
     )
 
 

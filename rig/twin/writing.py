@@ -64,6 +64,7 @@ def _line_json(line: TwinLine) -> dict[str, object]:
         "frequency": entry(line.frequency, line.frequency_std, "Hz"),
         "ratio": None if line.ratio is None else entry(line.ratio, line.ratio_std, f"1/({line.turns})"),
         "phase": None if line.phase is None else entry(line.phase, line.phase_std, "rad"),
+        **({"growth": line.growth, "at_speed": line.at_speed} if line.growth else {}),
     }
 
 

@@ -30,6 +30,7 @@ def twin_line(line: Line) -> TwinLine:
         line.unit,
         line.phase,
         line.phase_std or 0.0,
+        *((float(line.law.growth), line.top) if line.law.growth else ()),
     )
 
 
@@ -41,6 +42,9 @@ def line_values(line: TwinLine) -> dict[str, Value]:
     if line.ratio is not None:
         name, unit = ("periods_per_turn", "1") if line.turns == "rev" else ("periods_per_volt_second", "1/(V s)")
         out[name] = Value(line.ratio, line.ratio_std, unit)
+    if line.growth:
+        out["growth"] = Value(line.growth, 0.0, "1")
+        out["at_speed"] = Value(line.at_speed, 0.0, "rev/s" if line.turns == "rev" else "V")
     if line.phase is not None:
         out["phase"] = Value(line.phase, line.phase_std, "rad")
     return out

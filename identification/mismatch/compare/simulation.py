@@ -78,12 +78,14 @@ def waves(twin: Twin, history: History, x: Floats, times: Floats) -> Floats:
     """(n,) N, the twin's periodic disturbances; `x` (M,) the rotor's rate in units of the driver. A phase that is not
     known is 0."""
     out = np.zeros(times.size)
-    turning = within_intervals(np.abs(x), history.edges, times) > TURNING * (twin.highest_driver or 1.0)
+    rate = within_intervals(np.abs(x), history.edges, times)
+    turning = rate > TURNING * (twin.highest_driver or 1.0)
     for line in twin.lines:
         scale = 1.0 if line.turns == "V s" else twin.rate_per_driver or 1.0
         moving = line.ratio is not None
         cycles = line.frequency * times if line.ratio is None else line.ratio * turned(history.edges, scale * x, times)
-        out += np.where(turning | (not moving), line.amplitude * np.sin(2 * pi * cycles + (line.phase or 0.0)), 0.0)
+        size = line.amplitude * ((scale * rate / line.at_speed) ** line.growth if line.at_speed > 0 else 1.0)
+        out += np.where(turning | (not moving), size * np.sin(2 * pi * cycles + (line.phase or 0.0)), 0.0)
     return out
 
 

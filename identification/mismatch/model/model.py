@@ -11,6 +11,8 @@ from identification.physics.term import STAGES, Parameter, Scale, Term
 
 ORDER = {term: i for i, term in enumerate(sorted(CATALOGUE, key=lambda t: STAGES.index(t.stage)))}
 """Stage by stage, and in the order of the catalogue within one."""
+Acting = tuple[Term, tuple[float, ...], Scale]
+"""A term with its values, and the sizes that they refer to."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -52,7 +54,7 @@ def _place(term: Term) -> tuple[int, int]:
     return STAGES.index(term.stage), ORDER.get(term, len(ORDER))
 
 
-def acting(model: Model, theta: Theta, scale: Scale) -> list[tuple[Term, tuple[float, ...], Scale]]:
+def acting(model: Model, theta: Theta, scale: Scale) -> list[Acting]:
     """Every term with its values and sizes in the order in which they act; a given one before a found one."""
     found = [(term, values, scale) for term, values in zip(model.terms, theta.terms, strict=True)]
     if not model.given:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.mismatch.model.model import Model, acting
+from identification.mismatch.model.model import Acting, Model, acting
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.noise.covariance import Shapes
 from identification.physics.term import STAGES, Scale, Term, TermContext
@@ -60,7 +60,9 @@ def predict(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: 
     x = value
     stage = 0
     key: object = scale
-    for term, values, sizes in acting(model, theta, scale):
+    terms = acting(model, theta, scale)
+    winding = _winding(terms)
+    for term, values, sizes in terms:
         at = STAGES.index(term.stage)
         if stage < HYDRO <= at:
             x = value
@@ -72,12 +74,20 @@ def predict(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: 
         if "rotation_rate" in term.needs and modelled is None:
             modelled = value
         key = (key, term, values)
-        now = TermContext(run, sizes, theta.C, tare, x if stage >= HYDRO else value)
+        now = TermContext(run, sizes, theta.C, tare, x if stage >= HYDRO else value, winding)
         value = run.predictions(key, _applied(term, value, now, values))
     if stage < HYDRO:
         x = value
         value = theta.C * x * np.abs(x)
     return value, x if modelled is None else modelled
+
+
+def _winding(terms: list[Acting]) -> float | None:
+    """The voltage that the model loses in the winding, 1/(unit of the driver); None where no term says so."""
+    for term, values, sizes in terms:
+        if term.traits.winding:
+            return dict(zip((p.name for p in term.parameters(sizes)), values, strict=True))[term.traits.winding]
+    return None
 
 
 def _applied(term: Term, value: Floats, now: TermContext, values: tuple[float, ...]) -> Callable[[], Floats]:

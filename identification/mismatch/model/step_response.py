@@ -5,15 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from identification.mismatch.model.data import Data
-from identification.mismatch.model.model import Model, acting
+from identification.mismatch.model.model import Acting, Model, acting
 from identification.mismatch.model.parameters import Theta
-from identification.physics.term import Scale, Term
 from identification.physics.traits import Dynamics
 from identification.recording import Floats
 from identification.run_history.filters import lowpass, resonant
 from identification.run_history.step_response_rows import TickRows
-
-Acting = tuple[Term, tuple[float, ...], Scale]
 
 
 def ticked(model: Model, theta: Theta, data: Data) -> list[Floats]:

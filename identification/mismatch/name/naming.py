@@ -18,14 +18,16 @@ from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.name.named_term import Check, NamedTerm, named_term, part_check
 from identification.mismatch.prepare.preparing import DRIVERS
+from identification.mismatch.select.clipping import contradiction
 from identification.mismatch.select.family_wise import orthogonal_basis
-from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import STATIC, SwapTest, Thruster, static_curve
 from identification.mismatch.select.stepwise import stands
 from identification.physics.term import Term
 from identification.recording import Floats
 
 Named = NamedTerm[Term, Fit]
+AT_LEAST = 0.01
+"""Of the least time that samples can show: what is no longer ends there."""
 
 
 def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check, ...]:
@@ -34,15 +36,13 @@ def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check
     `many`: terms of the model, all of which are asked.
     """
     ended, unseen = at_bound(term, estimate.fit, data, estimate.weights), _unseen(estimate.fit, term, data)
-    scatters = noise_goes_on(estimate.fit, term, estimate.noise, data)
+    elsewhere = contradiction(estimate.fit, term, estimate.noise, data)
     change = _raw_effect(estimate.fit, (term,), data)
     cancelled = _cancelled(estimate.fit, term, change, data)
     return (
         Check("its values are possible", "its parameters end at what is physically possible" if ended else ""),
         Check("the samples can show it", "it is faster than the samples can show" if unseen else ""),
-        Check(
-            "noise vanishes where it clips", "the noise goes on where the readings should be flat" if scatters else ""
-        ),
+        *((Check("what else was recorded clips with it, or does not", elsewhere),) if term.traits.limits else ()),
         *(Check("no other term undoes it", f"it and {other.id} nearly cancel") for other in cancelled),
         *(() if cancelled else (Check("no other term undoes it"),)),
         *_constancy(estimate, change, data, many),
@@ -81,9 +81,13 @@ def _constancy(estimate: Estimate, change: list[Floats], data: Data, many: int) 
 
 
 def _unseen(now: Fit, term: Term, data: Data) -> bool:
-    """Ringing beyond half the sampling rate: between the samples it may be any other delay."""
-    named = dict(zip((p.name for p in term.parameters(data.scale)), now.values[term], strict=True))
-    return bool(term.traits.frequency) and named[term.traits.frequency] > 0.5 / min(h.spacing for h in data.histories)
+    """Ringing beyond half the sampling rate: between the samples it may be any other delay. Or over within a sample."""
+    known = {p.name: (p, value) for p, value in zip(term.parameters(data.scale), now.values[term], strict=True)}
+    if term.traits.quick:
+        least, value = known[term.traits.quick]
+        return value <= least.low * (1 + AT_LEAST)
+    spacing = min(h.spacing for h in data.histories)
+    return bool(term.traits.frequency) and known[term.traits.frequency][1] > 0.5 / spacing
 
 
 def _cancelled(now: Fit, term: Term, change: list[Floats], data: Data) -> list[Term]:

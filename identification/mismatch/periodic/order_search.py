@@ -85,7 +85,8 @@ def _of_powers(parts: Sequence[SteadySegment], top: float) -> OrderCandidate:
     by_group = np.zeros((SPEEDS + 1, grid.ratios.size))
     for p, g in zip(parts, _groups(parts, top), strict=True):
         window = np.hanning(p.time.size + 2)[1:-1]
-        by_group[g] += p.colour.out_of(grid.power(p.turns, p.value * window), grid.ratios, p.speeds)
+        power = p.colour.out_of(grid.power(p.turns, p.value * window), grid.ratios, p.speeds)
+        by_group[g] += abs(p.weight) ** 2 * power
     kept = by_group[by_group.any(axis=1)]
     if kept.shape[0] < 2:
         return OrderCandidate(1.0, 1.0, 1.0)
@@ -106,8 +107,9 @@ def _of_waves(parts: Sequence[SteadySegment], top: float, seconds: float) -> Ord
     grid = _grid(max(float(s[-1][0].turns[-1] - s[0][0].turns[0]) for s in pieces.values()), top)
     total = np.zeros(grid.ratios.size)
     for piece in pieces.values():
-        turns, white = (np.concatenate([getattr(p, of) for p, _ in piece]) for of in ("turns", "white"))
-        total += grid.power(turns, white) / turns.size
+        turns = np.concatenate([p.turns for p, _ in piece])
+        white = np.concatenate([abs(p.weight) * p.white for p, _ in piece])
+        total += grid.power(turns, white) / sum(p.information for p, _ in piece)
     strong, shape = _standing(total)
     at, p_value = _highest(strong, shape, grid, 1.0 / grid.longest)
     ratio = float(grid.ratios[at])
@@ -118,14 +120,14 @@ def _even(pieces: Sequence[Sequence[tuple[SteadySegment, int]]], ratio: float) -
     """p-value of the waves without the group of speed that gives most of them; 1 when they differ between groups.
 
     A plan that comes again turns the rotor as often, and what the model lacks comes again with it: but not as one wave,
-    of one size and phase at every speed, going up and going down.
+    of one phase at every speed, and of the size that its law gives it there, going up and going down.
     """
     sums = np.zeros((len(pieces), 3 * (SPEEDS + 1)), dtype=np.complex128)
     n = np.zeros(sums.shape)
     for i, piece in enumerate(pieces):
         for p, g in piece:
             sums[i, 3 * g + p.trend(policy.periodic.STEADY_SPEED)] += p.wave(ratio)
-            n[i, 3 * g + p.trend(policy.periodic.STEADY_SPEED)] += p.time.size
+            n[i, 3 * g + p.trend(policy.periodic.STEADY_SPEED)] += p.information
     used = n > 0
     each = float(np.sum(np.abs(sums[used]) ** 2 / n[used]))
     lost = each - float(np.sum(np.abs(sums.sum(axis=1)) ** 2 / n.sum(axis=1)))
@@ -137,7 +139,7 @@ def _even(pieces: Sequence[Sequence[tuple[SteadySegment, int]]], ratio: float) -
     if np.count_nonzero(there) < 2:
         return 1.0
     rest, left = by_speed.sum(axis=1)[:, None] - by_speed, size.sum(axis=1)[:, None] - size
-    powers = np.where(left > 0, np.abs(rest) ** 2 / np.maximum(left, 1.0), 0.0).sum(axis=0)
+    powers = np.where(left > 0, np.abs(rest) ** 2 / np.maximum(left, 1e-300), 0.0).sum(axis=0)
     loudest = int(np.argmin(np.where(there, powers, np.inf)))
     return AROUND * float(gamma_sf(powers[loudest], float(np.count_nonzero(left[:, loudest]))))
 

@@ -1,4 +1,4 @@
-"""Lines locked to the rotor: a sin(2 pi z theta + p), theta the angle turned.
+"""Lines locked to the rotor: a (n / n_max)^q sin(2 pi z theta + p), theta the angle turned, q by `order_law`.
 
 Found by `rotor_search`; fitted here by least squares with one phase for as long as the data bear it: a whole run, a
 minute, or a stretch of steady turning. Each stretch counts by the noise that it has at the line.
@@ -7,13 +7,14 @@ minute, or a stretch of steady turning. Each stretch counts by the noise that it
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
+from identification.mismatch.periodic.order_law import FORCE, PICK_UP, OrderLaw, Ring, laws
 from identification.mismatch.periodic.order_search import LASTING, OrderCandidate, most_significant
 from identification.mismatch.periodic.spectrum import Series
 from identification.mismatch.periodic.steady_segments import SteadySegment, speed_of, stretches
@@ -51,6 +52,7 @@ class RotorOrder:
     ratio: float
     ratio_std: float
     amplitude: float
+    """N, at the highest speed."""
     amplitude_std: float
     phase: float | None
     phase_std: float | None
@@ -60,6 +62,11 @@ class RotorOrder:
     """Mean speed of the turning rotor, turns per s."""
     parts: tuple[Part, ...]
     """One for each stretch."""
+    law: OrderLaw = PICK_UP
+    top: float = 0.0
+    """Highest speed, turns per s."""
+    law_gain: float = 0.0
+    """Chi-square of waves of the size that the law gives them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,15 +97,23 @@ class _Waves:
         return float(2 * np.sum(np.abs(self.sums) ** 2 / self.weights))
 
     @property
+    def of_one_size(self) -> float:
+        """The same of waves whose size is one, whatever their phases."""
+        return float(2 * np.sum(np.abs(self.sums)) ** 2 / np.sum(self.weights))
+
+    @property
     def earned(self) -> float:
         """The same without what noise would give, one phase being free."""
         return self.gain - 2.0 * (self.weights.size - 1)
 
 
-def find_locked(runs: Sequence[tuple[int, Series]], alarm: float, *, in_turns: bool = True) -> RotorOrder | None:
+def find_locked(
+    runs: Sequence[tuple[int, Series]], alarm: float, *, in_turns: bool = True, ring: Ring | None = None
+) -> RotorOrder | None:
     """The most significant rotor-locked line; None without one.
 
-    `in_turns`: angles are those of the propeller, whose waves come a whole number of times a turn.
+    `in_turns`: angles are those of the propeller, whose waves come a whole number of times a turn. `ring`:
+    of the stand.
     """
     top = max(float(np.quantile(speed_of(r), 0.99)) for _, r in runs)
     if not top > 0:
@@ -106,23 +121,35 @@ def find_locked(runs: Sequence[tuple[int, Series]], alarm: float, *, in_turns: b
     parts = list(stretches(runs, top))
     if len(parts) < 2:
         return None
-    candidate = most_significant(parts, top)
+    found_by = [most_significant(law.on(parts, 0.0, top), top) for law in (FORCE, PICK_UP)]
+    candidate = min(found_by, key=lambda each: each.p_value)
+    candidate = replace(candidate, p_value=min(len(found_by) * candidate.p_value, 1.0))
     if not candidate.p_value < (
         alarm if not in_turns or _is_whole(candidate) else policy.periodic.ODD_ORDER_SHARE * alarm
     ):
         return None
-    found = _fitted(parts, candidate)
+    found = _of_best_law(parts, candidate, top, ring)
     if not found.gain > policy.periodic.LOCKED_LINE_GAIN:
         return None
     # a loud line was part of its own noise
     loud = [wave_of(found.parts, i, r.time, 2 * np.pi * found.ratio * r.turns) for i, r in runs if r.turns is not None]
-    return _fitted(list(stretches(runs, top, loud)), candidate)
+    return _of_best_law(list(stretches(runs, top, loud)), candidate, top, ring)
 
 
 def _is_whole(candidate: OrderCandidate) -> bool:
     return abs(candidate.ratio - max(round(candidate.ratio), 1)) < max(
         candidate.reach, policy.periodic.WHOLE_ORDER_NEAR * candidate.ratio
     )
+
+
+def _of_best_law(
+    parts: Sequence[SteadySegment], candidate: OrderCandidate, top: float, ring: Ring | None
+) -> RotorOrder:
+    """With the size over the speeds that explains most; where the speeds tell nothing, as a force grows."""
+    found = [(law, _fitted(law.on(parts, candidate.ratio, top), candidate)) for law in laws(ring)]
+    behind = policy.periodic.ORDER_LAW_CHI2
+    law, best = max(found, key=lambda each: each[1].law_gain - (0.0 if each[0] == FORCE else behind))
+    return replace(best, law=law, top=top)
 
 
 def _fitted(parts: Sequence[SteadySegment], candidate: OrderCandidate) -> RotorOrder:
@@ -147,11 +174,11 @@ def _noise_at(parts: Sequence[SteadySegment], ratio: float) -> _LocalNoise:
 
 def _beside(parts: Sequence[SteadySegment], ratio: float) -> float:
     """How much louder than its noise the residual is on either side of a line: of repeated shapes there are many."""
-    powers, n = 0.0, 0
+    powers = n = 0.0
     for p in parts:
         own = float(np.ptp(p.turns))
         powers += float(np.mean([abs(p.wave(ratio + j / own)) ** 2 for j in BESIDE]))
-        n += p.time.size
+        n += p.information
     return max(powers / n, 1.0)
 
 
@@ -170,7 +197,7 @@ def _sums(parts: Sequence[SteadySegment], noise: _LocalNoise, ratio: float) -> N
 
 
 def _weights(parts: Sequence[SteadySegment], noise: _LocalNoise, piece: NDArray[np.intp]) -> Floats:
-    n = np.array([p.time.size for p in parts]) / (noise.own * noise.beside)
+    n = np.array([p.information for p in parts]) / (noise.own * noise.beside)
     return np.asarray(np.bincount(piece, n), dtype=np.float64)
 
 
@@ -221,7 +248,7 @@ def _told(parts: Sequence[SteadySegment], waves: _Waves, p_value: float) -> Roto
         amplitude = float(np.sqrt(max(amplitude**2 - bias, 0.0)))
         size_std = float(np.sqrt(std**2 + 0.5 * std**2 * bias / max(amplitude, std) ** 2))
     size = max(amplitude, std)
-    n = np.array([p.time.size for p in parts], dtype=np.float64)
+    n = np.array([p.information for p in parts], dtype=np.float64)
     ratio_std = std / (2 * np.pi * size * _spread(parts, n, waves.piece))
     mean_turns = float(np.average([p.turns.mean() for p in parts], weights=n))
     return RotorOrder(
@@ -236,8 +263,9 @@ def _told(parts: Sequence[SteadySegment], waves: _Waves, p_value: float) -> Roto
         speed=float(np.average([p.speed for p in parts], weights=n)),
         parts=tuple(
             Part(p.run, float(p.time[0]), float(np.nextafter(p.time[-1], np.inf)), float(c.real), float(-c.imag))
-            for p, c in zip(parts, each[waves.piece], strict=True)
+            for p, c in zip(parts, each[waves.piece] * np.array([p.weight for p in parts]), strict=True)
         ),
+        law_gain=waves.of_one_size,
     )
 
 

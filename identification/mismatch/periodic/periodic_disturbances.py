@@ -1,7 +1,8 @@
 """Periodic disturbances in the residual at full rate: mains, pick-up, blade pass.
 
-A line of fixed frequency a sin(2 pi f t + p), or one locked to the rotor, a sin(2 pi z theta + p) with theta the angle
-turned. The most significant of either kind is found, fitted by least squares and taken out, until none passes.
+A line of fixed frequency a sin(2 pi f t + p), or one locked to the rotor, a (n/n_max)^q sin(2 pi z theta + p) with
+theta the angle turned; q is 2 of a force of the rotor, 0 of a pick-up (order_law). The most significant of either kind
+is found, fitted by least squares and taken out, until none passes.
 
 A line must stand above the noise of its neighbours at a family-wise false-alarm rate over all that is searched
 (spectrum), and a Lorentz peak of noise must not explain it as well (Whittle likelihood, see `peak_p_value`).
@@ -18,6 +19,7 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.periodic.line_or_order import as_turning
 from identification.mismatch.periodic.line_width import peak_p_value
+from identification.mismatch.periodic.order_law import PICK_UP, OrderLaw, Ring
 from identification.mismatch.periodic.order_tracking import Part, RotorOrder, find_locked, wave_of
 from identification.mismatch.periodic.spectrum import (
     FAR,
@@ -38,7 +40,7 @@ EFFECT = "periodic_disturbance"
 TRIED = 6
 """Peaks that are looked at before a spectrum holds no line."""
 MAINS = (50.0, 60.0)
-"""Hz; IEC 60038 systems."""
+"""Hz; standard frequencies of IEC 60196."""
 HARMONICS = (1, 2, 3, 4, 5)
 """Of the mains that are told by name: rectifiers make the lower ones."""
 
@@ -55,7 +57,7 @@ class Line:
     """Periods per `unit`, of a rotor-locked line."""
     ratio_std: float | None
     amplitude: float
-    """N."""
+    """N; of a rotor-locked line at `top`."""
     amplitude_std: float
     phase: float | None
     """rad of a sin(2 pi f t + phase) in the first run; None where it differs from stretch to stretch."""
@@ -73,6 +75,10 @@ class Line:
     band: tuple[float, float] = (0.0, 0.0)
     """Hz, in which it shows: the frequency -+ 1/T of the longest run; of a rotor-locked line over nine tenths of the
     time in which it turns."""
+    law: OrderLaw = PICK_UP
+    """How a rotor-locked line grows with the speed."""
+    top: float = 0.0
+    """Highest speed of the rotor, turns per s."""
     power: float = 0.0
     """N^2, mean square over all samples."""
 
@@ -84,16 +90,19 @@ class Line:
         return wave_of(self.parts, run, time, angle)
 
 
-def find_lines(runs: Sequence[Series], *, turns_unit: Literal["rev", "V s"] = "rev") -> tuple[Line, ...]:
+def find_lines(
+    runs: Sequence[Series], *, turns_unit: Literal["rev", "V s"] = "rev", ring: Ring | None = None
+) -> tuple[Line, ...]:
     """Every line in the residuals of one thruster's runs, the most significant first.
 
     `Series.turns`: see `turned`. Rotor-locked lines are searched where all runs have them; where the rotor stands
-    still they are silent. Runs of fewer than LINE_SAMPLES samples are left out.
+    still they are silent. `ring`: of a stand that is known to ring. Runs of fewer than LINE_SAMPLES samples are left
+    out.
     """
     left = [finite(r) for r in runs]
     found: list[Line] = []
     while len(found) < policy.periodic.LINES:
-        best = _best(left, turns_unit)
+        best = _best(left, turns_unit, ring)
         if best is None:
             break
         found.append(_placed(best, left))
@@ -116,7 +125,7 @@ def _placed(line: Line, runs: Sequence[Series]) -> Line:
     return replace(line, band=(max(float(low) - resolution, 0.0), float(high) + resolution), power=power)
 
 
-def _best(runs: Sequence[Series], unit: Literal["rev", "V s"]) -> Line | None:
+def _best(runs: Sequence[Series], unit: Literal["rev", "V s"], ring: Ring | None) -> Line | None:
     alarm = policy.periodic.LINE_FALSE_ALARM
     long = [(i, r) for i, r in enumerate(runs) if r.time.size >= policy.periodic.LINE_SAMPLES]
     if not long:
@@ -124,7 +133,8 @@ def _best(runs: Sequence[Series], unit: Literal["rev", "V s"]) -> Line | None:
     fixed = _fixed(long)
     locked = None
     if all(r.turns is not None for _, r in long):
-        found = find_locked(long, policy.periodic.LOCKED_LINE_SHARE * alarm, in_turns=unit == "rev")
+        share = policy.periodic.LOCKED_LINE_SHARE
+        found = find_locked(long, share * alarm, in_turns=unit == "rev", ring=ring)
         locked = None if found is None else _locked(found, unit)
     if fixed is not None and locked is None and all(r.turns is not None for _, r in long):
         turning = as_turning(long, fixed.frequency, fixed.amplitude_std, fixed.p_value)
@@ -248,7 +258,14 @@ def _locked(found: RotorOrder, unit: Literal["rev", "V s"]) -> Line:
         and near >= 1
         and abs(found.ratio - near) < max(policy.periodic.BLADE_RATIO_NEAR, 4 * found.ratio_std)
     )
-    says = f"Periodic disturbance of {found.amplitude:.3g} N locked to the rotor, {found.ratio:.4g} periods per {per}"
+    grows = (
+        f" at {found.top:.3g} {'turns/s' if unit == 'rev' else 'V'}, as the square of the speed at less,"
+        if found.law.growth
+        else ""
+    )
+    ringing = " and as the stand rings" if found.law.ring else ""
+    says = f"Periodic disturbance of {found.amplitude:.3g} N{grows}{ringing} locked to the rotor, {found.ratio:.4g} "
+    says += f"periods per {per}"
     says += f" (blade pass of {near} blades, or the {near}. order of the shaft)" if blades and near > 1 else ""
     says += ": silent at rest."
     speed = found.speed
@@ -267,4 +284,6 @@ def _locked(found: RotorOrder, unit: Literal["rev", "V s"]) -> Line:
         says,
         parts=found.parts,
         unit=unit,
+        law=found.law,
+        top=found.top,
     )

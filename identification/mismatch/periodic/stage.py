@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import acting
 from identification.mismatch.periodic.full_rate import scale_std_of, series_of, with_scale
 from identification.mismatch.periodic.periodic_disturbances import Line, find_lines
 from identification.mismatch.periodic.resonances import find_bands
@@ -57,11 +58,20 @@ def run(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned:
 def _lines(fitted: Fit, data: Data, series: Sequence[Series]) -> tuple[Line, ...]:
     has_rate = all("rotation_rate" in (h.driver_quantity, *h.others) for h in data.histories)
     unit: Literal["rev", "V s"] = "rev" if has_rate else "V s"
-    lines = find_lines(series, turns_unit=unit)
+    lines = find_lines(series, turns_unit=unit, ring=_ring(fitted, data))
     if not lines or not data.with_rate:
         return lines
     scale_std = scale_std_of(fitted, data)
     return tuple(with_scale(line, scale_std, series) for line in lines)
+
+
+def _ring(fitted: Fit, data: Data) -> tuple[float, float, float] | None:
+    """Of the stand, where the model has it ring."""
+    for term, values, sizes in acting(fitted.model, fitted.theta, data.scale):
+        known = None if term.traits.dynamics is None else term.traits.dynamics(term, values, sizes.driver)
+        if known is not None and known.ring is not None:
+            return known.ring
+    return None
 
 
 def _still(series: Sequence[Series], lines: Sequence[Line], data: Data) -> list[Series]:

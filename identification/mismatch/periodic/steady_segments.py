@@ -84,6 +84,13 @@ class SteadySegment:
     speeds: Floats
     """Turns per s, QUANTILES of it."""
     colour: Colour
+    weight: complex = 1.0
+    """What a wave has here of its size and phase at the highest speed."""
+
+    @property
+    def information(self) -> float:
+        """Samples, each by what it holds of a wave."""
+        return abs(self.weight) ** 2 * self.time.size
 
     @property
     def speed(self) -> float:
@@ -100,8 +107,11 @@ class SteadySegment:
         return 0 if abs(change) < least else 1 if change > 0 else 2
 
     def wave(self, z: float) -> complex:
-        """Sum of white exp(-2 pi i z turns): whitened, for a loud resonance leaks into all frequencies of a stretch."""
-        return complex(self.white @ np.exp(-2j * np.pi * z * self.turns))
+        """Sum of white exp(-2 pi i z turns), by the weight of the stretch.
+
+        Whitened, for a loud resonance leaks into all frequencies of a stretch.
+        """
+        return complex(np.conj(self.weight) * (self.white @ np.exp(-2j * np.pi * z * self.turns)))
 
 
 def quick(series: Series, residual: Floats) -> Floats:

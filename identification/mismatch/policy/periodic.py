@@ -134,6 +134,14 @@ LOCKED_LINE_GAIN = Threshold(
         "less well known."
     ),
 )
+ORDER_LAW_CHI2 = Threshold(
+    4.0,
+    unit="chi-square",
+    reason=(
+        "Forces of a rotor grow with the square of its speed, so that a wave of one size at all speeds, or one that a "
+        "ringing stand makes larger, must explain more by two sigma."
+    ),
+)
 COHERENT_PHASE_P = Threshold(
     0.01,
     unit="probability",

@@ -178,6 +178,34 @@ CLIPPED_SAMPLES = Count(
     unit="samples",
     reason="A variance of fewer samples tells nothing of flatness: its own standard error is half of it.",
 )
+GOES_ON_SIGMA = Threshold(
+    3.0,
+    unit="sigma",
+    reason=(
+        "Current or rate place a saturation only where they differ by three standard errors from half-way between "
+        "clipping with it and going on as below it."
+    ),
+)
+GOES_ON_SETTLED = Threshold(
+    0.5,
+    unit="s",
+    reason="Sooner after a step current and rate are on their way: a motor's peak of current would be a rise.",
+)
+GOES_ON_DEPTH = Threshold(
+    0.01,
+    unit="share of what is asked",
+    reason="Nearer to a limit than this its own error decides on which side a row is.",
+)
+GOES_ON_BELOW = Threshold(
+    0.25,
+    unit="share of the limit",
+    reason="Below a limit a quantity is followed over its last part only: a straight line holds over no more.",
+)
+GOES_ON_ROWS = Count(
+    10,
+    unit="rows",
+    reason="Fewer rows on either side of a limit tell neither a rise nor its error.",
+)
 ALIAS_LOSS = Threshold(
     4.0,
     unit="chi-square",

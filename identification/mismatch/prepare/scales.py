@@ -30,6 +30,7 @@ def scale_of(runs: Sequence[RememberedRun], C: float) -> Scale:
         reading=max(float(np.nanmax(np.abs(h.thrust))) for h in histories),
         noise=float(np.median([_scatter(h) for h in histories])),
         torque=_full_torque(histories) * driver**2,
+        spacing=min(h.spacing for h in histories),
     )
 
 

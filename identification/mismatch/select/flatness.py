@@ -1,4 +1,7 @@
-"""Where a cell or its amplifier clips, it clips the noise too: readings are flatter there, as no drive makes them."""
+"""Where a cell or its amplifier clips, it clips noise too: readings are flatter there, as no drive makes them.
+
+An amplifier clips all of it; a cell on its stop only the noise of the force itself, which is in proportion to it.
+"""
 
 from __future__ import annotations
 
@@ -33,13 +36,14 @@ def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
             reached = np.minimum(side * first, side * last) + side * fitted.theta.tares[i]  # not on the way there
             slope = cell.slope(reached, values)
             deep = (reached > cell.start(values)) & (slope < policy.select.KNEE_SLOPE)
+            behind = 0.0 if cell.silent else variance - noise.proportional * force**2
             if cell.sharp:
                 deep &= reached > values[0] + policy.select.CLIPPED_DEPTH * np.sqrt(variance)
             count, beside = h.count[rows][deep].astype(np.float64), h.thrust[rows][deep] - shown[deep]
             if count.sum() > 1:
                 left += float(count @ (beside - np.average(beside, weights=count)) ** 2 + h.within[rows][deep].sum())
                 scatter += float(count @ variance[deep])
-                told += float(count @ (slope[deep] ** 2 * variance[deep]))
+                told += float(count @ np.broadcast_to(np.maximum(slope**2 * variance, behind), variance.shape)[deep])
                 samples += float(count.sum())
     missing = policy.select.CLIPPED_VARIANCE_MISSING * (scatter - told)
     return (

@@ -16,7 +16,7 @@ from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
-from identification.mismatch.select.flatness import noise_goes_on
+from identification.mismatch.select.clipping import contradiction
 from identification.mismatch.select.nearby_start import best_forms
 from identification.mismatch.select.rivals import one_for_two, one_less, swaps
 from identification.mismatch.select.rounds import Candidate, Round, Unhidden
@@ -203,9 +203,9 @@ class Thruster:
         return swaps(estimate, term, less, self.data, self.terms)
 
     def impossible(self, estimate: Estimate, term: Term) -> bool:
-        """Its values end at what is possible, or noise goes on where it clips."""
-        return at_bound(term, estimate.fit, self.data, estimate.weights) or noise_goes_on(
-            estimate.fit, term, estimate.noise, self.data
+        """Its values end at what is possible, or what else was recorded contradicts that it clips."""
+        return at_bound(term, estimate.fit, self.data, estimate.weights) or bool(
+            contradiction(estimate.fit, term, estimate.noise, self.data)
         )
 
     def rarer(self, term: Term, other: Term) -> bool:

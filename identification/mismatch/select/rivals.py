@@ -12,8 +12,8 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, fit_without
 from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, fit
 from identification.mismatch.model.data import Data, price
+from identification.mismatch.select.clipping import contradiction
 from identification.mismatch.select.family_wise import orthogonal_basis
-from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.nearby_start import best_forms, nearer
 from identification.mismatch.select.screening import directions, refined
 from identification.mismatch.select.stepwise import RivalTerm
@@ -136,7 +136,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
             )
         if new.chi2 - now.chi2 + extra < FORMS_BEYOND * policy.select.RIVAL_STATED_BIC:
             new = best_forms(new, [t for t in terms if t.id != other.id], data, estimate.weights)
-        if at_bound(other, new, data, estimate.weights) or noise_goes_on(new, other, estimate.noise, data):
+        if at_bound(other, new, data, estimate.weights) or contradiction(new, other, estimate.noise, data):
             continue
         loss = new.chi2 - now.chi2 + extra
         out.append(RivalTerm(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))

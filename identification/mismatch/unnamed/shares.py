@@ -22,7 +22,7 @@ IMPOSSIBLE = frozenset(
     {
         "its values are possible",
         "the samples can show it",
-        "noise vanishes where it clips",
+        "what else was recorded clips with it, or does not",
         "no other term undoes it",
         "predicts what was not fitted",
     }

@@ -117,7 +117,7 @@ def test_a_whole_number_of_periods_per_turn_is_found_fainter_than_any_other() ->
         for seed in range(4):
             series, speed = run(seed)
             assert series.turns is not None
-            wave = np.where(speed > 0, 0.065 * np.sin(2 * np.pi * ratio * series.turns + 1.0), 0.0)
+            wave = np.where(speed > 0, 0.072 * np.sin(2 * np.pi * ratio * series.turns + 1.0), 0.0)
             hits += len(find_lines([Series(series.time, series.residual + wave, series.turns)]))
         found[ratio] = hits
     assert found[4.0] > found[4.37]

@@ -1,0 +1,84 @@
+"""How a wave of the rotor grows with its speed: told by the speeds, and by a stand that rings."""
+
+import numpy as np
+import pytest
+
+from identification.mismatch import policy
+from identification.mismatch.answer.periodic_findings import line_finding, twin_line
+from identification.mismatch.periodic.order_law import FORCE, PICK_UP, OrderLaw, response
+from identification.mismatch.periodic.order_tracking import find_locked, wave_of
+from identification.mismatch.periodic.periodic_disturbances import find_lines
+from identification.mismatch.periodic.rotor_angle import turned
+from identification.mismatch.periodic.spectrum import Series
+from identification.run_history.filters import resonant
+from tests.identification.mismatch.small import rng
+
+RATE, LENGTH, TOP = 100.0, 150.0, 14.0
+ALARM = policy.periodic.LINE_FALSE_ALARM
+RING = (1.0, 25.0, 0.1)
+
+
+def turning(seed, size, *, ring=None, noise=1.0):
+    """Random levels up to 14 turns/s, three waves a turn of `size(speed)` N at each; a stand that takes them."""
+    draw = rng(seed)
+    t = np.arange(int(LENGTH * RATE)) / RATE
+    edges = np.concatenate([[0.0], np.cumsum(draw.uniform(2, 6, 90))])
+    speed = draw.uniform(3, TOP, 90)
+    turns = turned(edges, speed, t)
+    at = speed[np.searchsorted(edges, t, side="right") - 1]
+    wave = size(at) * np.sin(2 * np.pi * 3 * turns + 0.7)
+    if ring is not None:
+        fine = np.arange(20 * t.size) / (20 * RATE)
+        at = speed[np.searchsorted(edges, fine, side="right") - 1]
+        force = size(at) * np.sin(2 * np.pi * 3 * turned(edges, speed, fine) + 0.7)
+        wave = resonant(force, np.full(fine.size, 1 / (20 * RATE)), ring[1], ring[2])[::20]
+    return Series(t, noise * draw.standard_normal(t.size) + wave, turns)
+
+
+def test_imbalance_grows_as_the_square_and_its_size_is_that_at_full_speed():
+    off = []
+    for seed in range(5):
+        found = find_locked([(0, turning(seed, lambda n: 0.6 * (n / TOP) ** 2))], ALARM)
+        assert found.law == FORCE
+        assert 0.8 * TOP < found.top <= TOP
+        off.append((found.amplitude * (TOP / found.top) ** 2 - 0.6) / found.amplitude_std)
+        assert found.phase == pytest.approx(0.7, abs=5 * found.phase_std)
+    assert np.sqrt(np.mean(np.square(off))) < 2.0
+
+
+def test_a_pick_up_of_one_size_is_told_as_one():
+    for seed in range(4):
+        found = find_locked([(0, turning(seed, lambda n: 0.5 + 0 * n))], ALARM)
+        assert found.law == PICK_UP
+        assert found.amplitude == pytest.approx(0.5, abs=4 * found.amplitude_std)
+
+
+def test_a_stand_that_rings_makes_some_speeds_louder():
+    series = turning(1, lambda n: 0.5 * (n / TOP) ** 2, ring=RING)
+    without, with_ring = (find_locked([(0, series)], ALARM, ring=ring) for ring in (None, RING))
+    assert with_ring.law == OrderLaw(2, RING)
+    assert with_ring.law_gain > without.law_gain + 50
+    assert with_ring.amplitude * (TOP / with_ring.top) ** 2 == pytest.approx(0.5, abs=5 * with_ring.amplitude_std)
+    made = wave_of(with_ring.parts, 0, series.time, 2 * np.pi * with_ring.ratio * series.turns)
+    noise = np.std(series.residual - made)
+    assert noise == pytest.approx(1.0, abs=0.05), "what is taken out has the stand in it"
+
+
+def test_the_response_is_that_of_a_mass_on_a_spring():
+    t = np.arange(0.0, 20.0, 1e-4)
+    for f in (5.0, 25.0, 60.0):
+        out = resonant(np.sin(2 * np.pi * f * t), np.full(t.size, 1e-4), *RING[1:])
+        late = t > 10
+        found = 2 * np.mean(out[late] * np.exp(-1j * (2 * np.pi * f * (t[late] + 5e-5) - np.pi / 2)))
+        assert found == pytest.approx(response(RING, f), abs=0.02 * abs(response(RING, f)))
+
+
+def test_it_is_said_and_handed_to_a_twin():
+    (line,) = find_lines([turning(2, lambda n: 0.8 * (n / TOP) ** 2)])
+    assert "as the square of the speed" in line.statement
+    values = line_finding(line).parameters
+    assert values["growth"].value == 2.0
+    assert values["at_speed"].value == pytest.approx(line.top)
+    assert twin_line(line).growth == 2.0
+    (steady,) = find_lines([turning(2, lambda n: 0.6 + 0 * n)])
+    assert "growth" not in line_finding(steady).parameters
