@@ -7,17 +7,16 @@ the sequencer.
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, nan
-from typing import Protocol
 
 from drivers.errors import LinkError
 from drivers.protocols import MotorController, Sample
 from rig.campaign.bench import COMMAND_STREAM, Bench
 from rig.campaign.limits import guarded_channels
+from rig.control.clocks import Clock
 from rig.control.readings import Readings
 from rig.link.clients import Clients
 from rig.link.front_end_messages import Request
@@ -26,6 +25,7 @@ from rig.recording.recorder_link import RecorderLink
 from rig.safety import guard
 from rig.safety.guard import Recorder, Trip, Vitals
 from rig.safety.lateness import Lateness
+from rig.safety.lost_time import STILL, HostClocks, LostTime
 from rig.safety.pace import Pace
 from rig.watch.watch_link import WatchLink
 
@@ -33,24 +33,6 @@ PUBLISH_PERIOD = 0.1
 """s between snapshots to the front ends."""
 TRACE_PERIOD = 0.05
 """s between rows of the live trace."""
-
-
-class Clock(Protocol):
-    """The machine's monotonic clock, or a test's."""
-
-    def now_ns(self) -> int: ...
-
-    def sleep_until_ns(self, t_ns: int) -> None: ...
-
-
-class MonotonicClock:
-    """CLOCK_MONOTONIC, the clock of every sample."""
-
-    def now_ns(self) -> int:
-        return time.monotonic_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        time.sleep(max(t_ns - time.monotonic_ns(), 0) * 1e-9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +72,10 @@ class Loop:
     publish: Callable[[float], None]
     watcher: WatchLink | None = None
     """Sees what is recorded; None: nobody watches."""
+    host: Callable[[], HostClocks] = lambda: STILL
+    """The machine's other clocks. In virtual time it neither sleeps nor is set."""
+    notice: Callable[[str], None] | None = None
+    """Hears what an analyst should know of the machine."""
     signals: deque[Request] = field(default_factory=deque)
     """Requests that came by another way than a front end; a signal handler may append at any instant."""
     guarded: bool = False
@@ -106,6 +92,8 @@ class Loop:
     """s, when the command last left 0 V; None: it is 0 V."""
     has_driven: bool = False
     _command_error: str = ""
+    _lapse: str = ""
+    """Why a set-point was not sent."""
     _recorded_command: tuple[float | None] | None = None
     """Last row of the command stream; (None,) while nothing is sent, which is recorded as NaN."""
     _due_ns: int = 0
@@ -123,7 +111,8 @@ class Loop:
         essential = [self.thrust_channel] + ([self.rotation_channel] if self.rotation_channel else [])
         streams = self.readings.streams.values()
         self.guarded_channels = guarded_channels(config.limits, streams, essential, self.thrust_channel)
-        self.allowed = guard.allowances(config.loop_rate)
+        self.allowed = guard.allowances(config.loop_rate, self.bench.motor.watchdog.timeout_s)
+        self._lost = LostTime(self.allowed.lateness + 1.0 / config.loop_rate)
         self.readings.watch_sameness(c.channel for c in self.guarded_channels if c.max_frozen is not None)
 
     def begin_guarding(self) -> None:
@@ -153,9 +142,8 @@ class Loop:
         requests = self._requests(now)
         trip = self._judge(now) if self.guarded else None
         decision = decide(Inputs(now, tuple(samples), requests, trip, self.rotation(now)))
-        if motor is not None:
-            self._send(motor, decision, now)
-        self._record(samples, decision, now_ns)
+        sent = self._send(motor, decision, now) if motor is not None else decision.volts
+        self._record(samples, sent, now_ns)
         self._show(now)
         self.clock.sleep_until_ns(self._due_ns)
 
@@ -196,6 +184,9 @@ class Loop:
         self.lateness = max(behind, 0) * 1e-9
         self.late.add(self.lateness)
         self._due_ns = (self._due_ns if 0 <= behind < self.period_ns else now_ns) + self.period_ns
+        self._lost.look(self.host())
+        if self._lost.utc_step and self.notice is not None:
+            self.notice(f"the clock of this machine was set by {self._lost.utc_step:+.3f} s; no time here is by it")
         return now_ns
 
     def _judge(self, now: float) -> Trip | None:
@@ -203,6 +194,8 @@ class Loop:
             return Trip(
                 f"the motor did not take a command: {self._command_error}", "link", now, self.bench.config.motor
             )
+        if self._lapse:
+            return Trip(self._lapse, "late", now)
         if not self.unattended and self.clients.last_lease is not None and not self.clients.connected:
             return Trip("the operator is gone: the last front end has closed its connection", "lease", now)
         newest = {one.channel: self.readings.newest(one.channel) for one in self.guarded_channels}
@@ -223,21 +216,40 @@ class Loop:
         lease = None if self.unattended else self.clients.lease_age(now)
         driven = 0.0 if self.driven_since is None else now - self.driven_since
         recorder = Recorder(self.recorder.failed, self.recorder.silence(now), self.recorder.free_bytes)
-        return Vitals(now, self.guarded_since, self.lateness, links, recorder, self.ledger.error, lease, driven)
+        error, slept = self.ledger.error, self._lost.slept
+        return Vitals(now, self.guarded_since, self.lateness, links, recorder, error, lease, driven, slept)
 
-    def _send(self, motor: MotorController, decision: Decision, now: float) -> None:
-        """The second way to stop is tried also when the first is refused."""
-        if decision.volts is not None:
-            self._note_command(decision.volts, now)
-            try:
-                motor.command(decision.volts)
-            except LinkError as error:
-                self._command_error = str(error)
+    def _send(self, motor: MotorController, decision: Decision, now: float) -> float | None:
+        """What was sent, in V. The second way to stop is tried also when the first is refused.
+
+        A set-point is judged once more at the last instant, and again after it: one that left old is followed by 0 V.
+        """
+        volts = 0.0 if decision.volts and self._lapsed() else decision.volts
+        self._lost.told(self.clock.now_ns(), self.host())
+        self._command(motor, volts, now)
+        if volts and self._lapsed():
+            volts = 0.0
+            self._command(motor, volts, now)
         if decision.release:
             try:
                 motor.release()
             except LinkError as error:
                 self._command_error = str(error)
+
+        return volts
+
+    def _lapsed(self) -> bool:
+        self._lapse = self._lapse or self._lost.lapse(self.clock.now_ns(), self.host())
+        return bool(self._lapse)
+
+    def _command(self, motor: MotorController, volts: float | None, now: float) -> None:
+        if volts is None:
+            return
+        self._note_command(volts, now)
+        try:
+            motor.command(volts)
+        except LinkError as error:
+            self._command_error = str(error)
 
     def _note_command(self, volts: float, now: float) -> None:
         self.command = volts
@@ -247,14 +259,14 @@ class Loop:
         elif self.driven_since is None:
             self.driven_since = now
 
-    def _record(self, samples: list[Sample], decision: Decision, now_ns: int) -> None:
+    def _record(self, samples: list[Sample], volts: float | None, now_ns: int) -> None:
         since = self.recording_since_ns
         if since is None:
             return
         rows = [sample for sample in samples if sample.t_ns >= since]
-        if self._recorded_command != (decision.volts,):
-            self._recorded_command = (decision.volts,)
-            rows.append(Sample(COMMAND_STREAM, now_ns, (nan if decision.volts is None else decision.volts,)))
+        if self._recorded_command != (volts,):
+            self._recorded_command = (volts,)
+            rows.append(Sample(COMMAND_STREAM, now_ns, (nan if volts is None else volts,)))
         self.recorder.rows(rows)
         if self.watcher is not None:
             self.watcher.rows(rows, now_ns * 1e-9)
