@@ -17,6 +17,8 @@ from drivers.protocols import MotorController, Sample
 from rig.campaign.bench import COMMAND_STREAM, Bench
 from rig.campaign.limits import guarded_channels
 from rig.control.clocks import Clock
+from rig.control.motor_watch import MotorWatch
+from rig.control.paces import Paces
 from rig.control.readings import Readings
 from rig.link.clients import Clients
 from rig.link.front_end_messages import Request
@@ -26,7 +28,7 @@ from rig.safety import guard
 from rig.safety.guard import Recorder, Trip, Vitals
 from rig.safety.lateness import Lateness
 from rig.safety.lost_time import STILL, HostClocks, LostTime
-from rig.safety.pace import Pace
+from rig.safety.thrust_rest import ThrustRest
 from rig.watch.watch_link import WatchLink
 
 PUBLISH_PERIOD = 0.1
@@ -45,6 +47,8 @@ class Inputs:
     trip: Trip | None
     rotation: float | None
     """rev/s, newest and fresh; None otherwise."""
+    thrust_rest: bool | None = None
+    """Whether the force sensor says that nothing pushes; None: it is no witness."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,6 +92,8 @@ class Loop:
     """s, of the running tick."""
     late: Lateness = field(default_factory=Lateness)
     """Of all ticks since the recording began."""
+    thrust_rest: ThrustRest = field(default_factory=ThrustRest)
+    """Of the thruster that is on the bench."""
     driven_since: float | None = None
     """s, when the command last left 0 V; None: it is 0 V."""
     has_driven: bool = False
@@ -99,15 +105,17 @@ class Loop:
     _due_ns: int = 0
     _published: float = -inf
     _traced: float = -inf
-    _paces: tuple[tuple[str, Pace], ...] = ()
-    _counted: dict[str, int] = field(default_factory=dict)
+    _paces: Paces | None = None
+    _sent: float | None = None
+    """V of the last tick; None: nothing was sent."""
 
     def __post_init__(self) -> None:
         config = self.bench.config
         self.period_ns = round(1e9 / config.loop_rate)
         force = self.bench.instruments[config.force].streams[0].name
         self.thrust_channel = f"{force}.thrust"
-        self.rotation_channel = rotation_channel(self.bench)
+        self.motor_watch = MotorWatch(self.bench)
+        self.rotation_channel = self.motor_watch.channel
         essential = [self.thrust_channel] + ([self.rotation_channel] if self.rotation_channel else [])
         streams = self.readings.streams.values()
         self.guarded_channels = guarded_channels(config.limits, streams, essential, self.thrust_channel)
@@ -119,13 +127,7 @@ class Loop:
         """From now on the guard judges every tick."""
         now = self.now
         self.guarded, self.guarded_since = True, now
-        judged = {self.readings.place[one.channel][0] for one in self.guarded_channels}
-        self._paces = tuple(
-            (stream.name, Pace(stream.name, device, stream.period_s, now))
-            for device, stream in self.bench.streams()
-            if stream.name in judged
-        )
-        self._counted = dict(self.readings.rows)
+        self._paces = Paces(self.bench, self.readings, self.guarded_channels, now)
 
     @property
     def now(self) -> float:
@@ -140,9 +142,13 @@ class Loop:
         self.readings.update(samples)
         self.recorder.poll(now)
         requests = self._requests(now)
+        self._watch_motor(tuple(samples), now)
         trip = self._judge(now) if self.guarded else None
-        decision = decide(Inputs(now, tuple(samples), requests, trip, self.rotation(now)))
+        self.thrust_rest.add(self.thrust_rows(tuple(samples), 0))
+        rotation, thrust_rest = self.rotation(now), self.thrust_rest.judge(now)
+        decision = decide(Inputs(now, tuple(samples), requests, trip, rotation, thrust_rest))
         sent = self._send(motor, decision, now) if motor is not None else decision.volts
+        self._sent = sent
         self._record(samples, sent, now_ns)
         self._show(now)
         self.clock.sleep_until_ns(self._due_ns)
@@ -152,8 +158,10 @@ class Loop:
         self._send(motor, Decision(0.0, release=True), self.now)
 
     def rotation(self, now: float) -> float | None:
-        """Newest rotation rate in rev/s, None when it is not measured, NaN or old."""
-        return None if self.rotation_channel is None else self.readings.fresh(self.rotation_channel, now)
+        """Newest rotation rate in rev/s, None when it is not measured, NaN, old or found frozen."""
+        if self.rotation_channel is None or not self.motor_watch.believed:
+            return None
+        return self.readings.fresh(self.rotation_channel, now)
 
     def thrust_rows(self, samples: tuple[Sample, ...], since_ns: int) -> tuple[tuple[float, float], ...]:
         """(s since `since_ns`, N) of the force device's rows, oldest first."""
@@ -189,6 +197,10 @@ class Loop:
             self.notice(f"the clock of this machine was set by {self._lost.utc_step:+.3f} s; no time here is by it")
         return now_ns
 
+    def _watch_motor(self, samples: tuple[Sample, ...], now: float) -> None:
+        in_run = self.recording_since_ns is not None
+        self.motor_watch.advance(samples, self._sent, self.rotation(now), now, in_run=in_run)
+
     def _judge(self, now: float) -> Trip | None:
         if self._command_error:
             return Trip(
@@ -201,15 +213,7 @@ class Loop:
         newest = {one.channel: self.readings.newest(one.channel) for one in self.guarded_channels}
         vitals = self._vitals(now)
         trip = guard.check(self.guarded_channels, newest, vitals, self.allowed)
-        return trip or self._pace(vitals)
-
-    def _pace(self, vitals: Vitals) -> Trip | None:
-        trips = []
-        for stream, pace in self._paces:
-            rows = self.readings.rows.get(stream, 0)
-            trips.append(pace.advance(rows - self._counted.get(stream, 0), vitals))
-            self._counted[stream] = rows
-        return next((trip for trip in trips if trip), None)
+        return trip or self.motor_watch.trip or (self._paces.advance(vitals) if self._paces else None)
 
     def _vitals(self, now: float) -> Vitals:
         links = {name: instrument.health() for name, instrument in self.bench.instruments.items()}
@@ -280,14 +284,3 @@ class Loop:
         if now - self._published >= PUBLISH_PERIOD - self.period_ns * 0.5e-9:
             self._published = now
             self.publish(now)
-
-
-def rotation_channel(bench: Bench) -> str | None:
-    """The motor's own rotation rate if it has one, else the first on the bench."""
-    names = [
-        (device != bench.config.motor, f"{stream.name}.{channel.name}")
-        for device, stream in bench.streams()
-        for channel in stream.channels
-        if channel.quantity == "rotation_rate"
-    ]
-    return min(names)[1] if names else None

@@ -15,7 +15,19 @@ from drivers.protocols import LinkHealth
 from rig.campaign.limits import GuardedChannel
 
 Source = Literal[
-    "limit", "emergency_stop", "nan", "stale", "frozen", "rate", "corrupt", "late", "slept", "link", "recorder", "lease"
+    "limit",
+    "emergency_stop",
+    "nan",
+    "stale",
+    "frozen",
+    "rate",
+    "corrupt",
+    "late",
+    "slept",
+    "link",
+    "following",
+    "recorder",
+    "lease",
 ]
 
 MIN_LATENESS = 0.25

@@ -119,9 +119,9 @@ class Session:
         stop, confirmed, release = Stop(loop.now, config.rest_rate, config.coast_time), None, True
         while confirmed is None:
             inputs = self._idle_tick(release=release)
-            confirmed, release = stop.advance(inputs.now, inputs.rotation)
+            confirmed, release = stop.advance(inputs.now, inputs.rotation, inputs.thrust_rest)
         self.status.stop_confirmed = confirmed
-        what = turning(loop.rotation(loop.now))
+        what = turning(inputs.rotation, inputs.thrust_rest)
         if confirmed:
             self.say("info", f"at rest: {what}")
         else:
