@@ -174,6 +174,7 @@ class Loop:
 
     def begin_recording(self, t0_ns: int) -> None:
         self.recording_since_ns, self._recorded_command = t0_ns, None
+        self.motor_watch.begin_run()
         self.late.clear()
 
     def end_recording(self) -> None:

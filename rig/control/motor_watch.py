@@ -26,12 +26,14 @@ class MotorWatch:
     def __init__(self, bench: Bench) -> None:
         self.channel = rotation_channel(bench)
         """Of the rotation rate; None: not measured on this bench."""
+        self._config = bench.config
         self._trip: Trip | None = None
-        self._frozen: FrozenMotor | None = None
-        if self.channel is not None:
-            config = bench.config
-            self._frozen = FrozenMotor(_rows(bench, self.channel))
-            self._following = Following(self.channel, config.proof_voltage, config.rest_rate)
+        self._frozen = FrozenMotor(_rows(bench, self.channel)) if self.channel is not None else None
+        self.begin_run()
+
+    def begin_run(self) -> None:
+        """Another thruster may be wired the other way round."""
+        self._following = Following(self.channel or "", self._config.proof_voltage, self._config.rest_rate)
 
     def advance(
         self, samples: tuple[Sample, ...], command: float | None, rate: float | None, now: float, *, in_run: bool

@@ -11,8 +11,9 @@ from rig.safety.stopping import REST_CONFIRM, is_rest
 from rig.safety.watchdog_proof import TURNING
 
 FOLLOW_TIME = 1.0
-"""s for which the command is at or above the proof's voltage, of one sign, until the propeller must turn; and turn the
-same way as before. A rotor in water follows within tenths of a second, also through a reversal."""
+"""s at or above the proof's voltage until the propeller must have turned, counted over all such times since it last
+did; and, of one sign, until it must turn the same way as before. A rotor in water follows within tenths of a second,
+also through a reversal."""
 START_TIME = 0.2
 """s at 0 V, after rest, in which it must turn to be taken for a start: ten status messages at 50 Hz."""
 
@@ -40,7 +41,10 @@ class Following:
         self._way = 0.0
         """Sign of rate over voltage when it first followed; a motor may be wired either way round."""
         self._last_way = 0.0
-        self._driven, self._still, self._wrong, self._right = _Since(), _Since(), _Since(), _Since()
+        self._still = 0.0
+        """s driven since it last turned."""
+        self._last = 0.0
+        self._driven, self._wrong, self._right = _Since(), _Since(), _Since()
         self._rest, self._start = _Since(), _Since()
         self._rested = False
 
@@ -49,21 +53,23 @@ class Following:
 
         `rate`: rev/s, None: unknown, which the guard judges.
         """
+        dt, self._last = now - self._last if self._last else 0.0, now
         if rate is None:
             return None
         at_rest, turns = is_rest(rate, self._rest_rate), abs(rate) > TURNING * self._rest_rate
-        cause = self._not_following(now, command or 0.0, rate, at_rest, turns)
+        cause = self._not_following(now, dt, command or 0.0, rate, at_rest, turns)
         cause = cause or self._by_itself(now, command, rate, at_rest, turns)
         return Trip(cause, "following", now, self._channel, rate) if cause else None
 
-    def _not_following(self, now: float, command: float, rate: float, at_rest: bool, turns: bool) -> str:
+    def _not_following(self, now: float, dt: float, command: float, rate: float, at_rest: bool, turns: bool) -> str:
         way = (command > 0) - (command < 0)
         enough = abs(command) >= self._proof_voltage and way == self._last_way
         self._last_way = way
         driven = self._driven.held(enough, now)
-        if self._still.held(enough and at_rest, now) >= FOLLOW_TIME:
+        self._still = self._still + dt * enough if at_rest else 0.0
+        if self._still >= FOLLOW_TIME:
             return (
-                f"the motor does not follow: {rate:.2f} rev/s after {driven:.1f} s at {command:.3g} V, where "
+                f"the motor does not follow: {rate:.2f} rev/s after {self._still:.1f} s of driving, where "
                 f"{self._proof_voltage:g} V (bench.proof_voltage) are enough to turn the propeller; it is off, has a "
                 "fault, is blocked, or its telemetry is frozen"
             )
