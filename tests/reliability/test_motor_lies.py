@@ -1,4 +1,4 @@
-"""The motor's telemetry hangs, or the motor does not do what it is told: a run over real bytes ends in a stated time."""
+"""The motor's telemetry hangs, or the motor does not do what it is told: a run over real bytes ends, and in time."""
 
 from __future__ import annotations
 
