@@ -52,9 +52,7 @@ class Frame(NamedTuple):
 class CanBus:
     """A bus with one reader thread; each device gets its own inbox of the frames it accepts."""
 
-    def __init__(
-        self, interface: str, channel: str, bitrate: int, capture: str = "", wire: Wire | None = None
-    ) -> None:
+    def __init__(self, interface: str, channel: str, bitrate: int, capture: str = "", wire: Wire | None = None) -> None:
         """`wire`: to an slcan adapter, used instead of the port `channel`, with its stamps and in its time."""
         if not interface or not channel:
             raise ValueError("a CAN bus needs an interface (slcan, socketcan ...) and a channel (port or network name)")
@@ -153,7 +151,7 @@ class CanBus:
         bus = slcanBus("loop://", sleep_after_open=0)
         bus.serialPortOrig.close()
         port = SerialOverWire(wire)
-        bus.serialPortOrig = port
+        bus.serialPortOrig = port  # type: ignore[assignment]  # all that slcanBus asks of a port
 
         def arrived(t_ns: int, data: bytes) -> None:
             port.put(data)
