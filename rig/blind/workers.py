@@ -140,7 +140,15 @@ def concealable() -> Kinds:
     found = json.loads(told.stdout)
     forms, variants = ({e: tuple(names) for e, names in found[part].items()} for part in ("forms", "variants"))
     return Kinds(
-        tuple(found["effects"]), forms, variants, tuple(found["lies"]), tuple(found["noise"]), found["version"]
+        tuple(found["effects"]),
+        forms,
+        variants,
+        tuple(found["lies"]),
+        tuple(found["noise"]),
+        found["version"],
+        tuple(found["benches"]),
+        tuple(found["recorded_effects"]),
+        found["recorded_version"],
     )
 
 

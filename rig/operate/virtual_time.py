@@ -40,8 +40,8 @@ class World(Clock, Protocol):
 def record(campaign_path: Path, folder: Path, world: World, stamp: tuple[str, str]) -> tuple[Path, int]:
     """The recording of a campaign's one thruster, in the new `folder`, and ns of its t = 0 on the world's clock.
 
-    `stamp`: id and date of the recording. Nobody attends: it is started when its checks have passed, and the thruster is there when it is asked for. Raises
-    RigError for a campaign that can't be run, LinkError for a run that did not complete.
+    `stamp`: id and date of the recording. Nobody attends: it is started when its checks have passed, and the thruster
+    is there when it is asked for. Raises RigError for a campaign that can't be run or a run that did not complete.
     """
     campaign = load_campaign(campaign_path)
     folder.mkdir(parents=True)

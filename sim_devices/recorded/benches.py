@@ -1,12 +1,12 @@
 """Benches of several makes, drawn: the devices of the simulated side, and the bench file that tells the rig of them.
 
-What the file states (delay, window, filter) is what the maker would; the device's own delay is off by what the file says
-that it may be, and its clock by some parts in a hundred thousand.
+What the file states (delay, window, filter) is what the maker would; the device's own delay is off by what the file
+says that it may be, and its clock by some parts in a hundred thousand.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -144,7 +144,7 @@ def _acquired(rate: float, average: int, low_pass: float) -> dict[str, float | s
     return told
 
 
-def toml(table: dict[str, float | int | str] | dict[str, object]) -> str:
+def toml(table: Mapping[str, object]) -> str:
     """Lines `key = value`."""
     return "".join(f"{k} = {_said(v)}\n" for k, v in table.items())
 

@@ -1,4 +1,4 @@
-"""Recorded cases on disc, as `sim_devices.concealed.sealing.on_disc` lays its own: `open/<token>/0.h5` is the recording.
+"""Recorded cases on disc, laid as by `sim_devices.concealed.sealing.on_disc`: `open/<token>/0.h5` is the recording.
 
 A case is asked for by a table: `token`, `seed`, `bench` (of BENCHES), and what is not to be left to chance: `effects`,
 `strength`, `plan`, `duration`; `world`: the version that is to make it, where that matters.
