@@ -43,7 +43,7 @@ def record(campaign_path: Path, folder: Path, world: World, stamp: tuple[str, st
     `stamp`: id and date of the recording. Nobody attends: it is started when its checks have passed, and the thruster
     is there when it is asked for. Raises RigError for a campaign that can't be run or a run that did not complete.
     """
-    campaign = load_campaign(campaign_path)
+    campaign = replace(load_campaign(campaign_path), unattended=True)
     folder.mkdir(parents=True)
     ours, theirs = pair("recorder")
     recorder = Recorder(Peer(theirs, "controller"), world.now_ns)
@@ -76,7 +76,7 @@ def assembled(
         clients = Clients(listen(socket_path(folder, SOCKET_NAME)))
         undo.callback(clients.close)
         parts = (bench, recorder, Ledger.open(folder), log, clients, clock)
-        session = begin(replace(campaign, unattended=True), folder, (), parts, before)
+        session = begin(campaign, folder, (), parts, before)
         undo.pop_all()
     return session
 
