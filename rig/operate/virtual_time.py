@@ -44,11 +44,12 @@ def record(campaign_path: Path, folder: Path, world: World, stamp: tuple[str, st
     is there when it is asked for. Raises RigError for a campaign that can't be run or a run that did not complete.
     """
     campaign = replace(load_campaign(campaign_path), unattended=True)
+    bench = build(campaign.bench, world.wires)
     folder.mkdir(parents=True)
     ours, theirs = pair("recorder")
     recorder = Recorder(Peer(theirs, "controller"), world.now_ns)
     clock = RecordingClock(world, recorder)
-    session = assembled(campaign, folder, build(campaign.bench, world.wires), RecorderLink(ours, None), clock)
+    session = assembled(campaign, folder, bench, RecorderLink(ours, None), clock)
     session.stamp = lambda: Stamp(*stamp)
     clock.session = session
     try:
