@@ -36,7 +36,7 @@ def test_the_same_seed_is_the_same_case_and_a_mean_is_as_noisy_as_asked():
     assert one.bench == same.bench != other.bench
     assert one.campaign == same.campaign
     assert one.case.thruster == same.case.thruster
-    assert noises(one)["thrust"].white == pytest.approx(one.case.noise.white * 8**0.5)
+    assert noises(one)["thrust"].white == pytest.approx(one.case.noise.white * 16**0.5)
 
 
 def test_what_a_bench_cannot_show_is_refused():
