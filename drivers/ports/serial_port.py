@@ -81,7 +81,7 @@ class SerialPort(Generic[Record]):
         self._closing.clear()
         self.inbox = Inbox(self.settings.capacity, self._wire)
         if self._wire is not None:
-            self._transcript = Transcript(Path(self.settings.capture)) if self.settings.capture else None
+            self._transcript = self._new_transcript()
             self._wire.connect(self._arrived)
             self._opened = True
             return
@@ -93,14 +93,22 @@ class SerialPort(Generic[Record]):
                 " Check the cable, the path, and that no other program has it open"
             ) from error
         try:
-            self._transcript = Transcript(Path(self.settings.capture)) if self.settings.capture else None
-        except OSError as error:
+            self._transcript = self._new_transcript()
+        except LinkError:
             port.close()
-            raise LinkError(f"{self._name}: cannot write the transcript: {error}") from error
+            raise
         self._serial = port
         self._reader = threading.Thread(target=self._read, args=(port,), name=f"read {self._name}", daemon=False)
         self._reader.start()
         self._opened = True
+
+    def _new_transcript(self) -> Transcript | None:
+        if not self.settings.capture:
+            return None
+        try:
+            return Transcript(Path(self.settings.capture))
+        except OSError as error:
+            raise LinkError(f"{self._name}: cannot write the transcript: {error}") from error
 
     def write(self, data: bytes) -> None:
         """Send bytes. Raises LinkError when the port is closed, lost, or takes nothing for 0.2 s."""
