@@ -27,7 +27,7 @@ def measure(session: Session) -> None:
     path = recording_path(session.folder, thruster)
     attempt = attempts(session.before, thruster) + 1
     t0_ns = loop.clock.now_ns()
-    request = opening(session.campaign, session.bench, thruster, path, t0_ns, attempt)
+    request = opening(session.campaign, session.bench, thruster, path, t0_ns, session.stamp(), attempt)
     session.recorder.open(request, loop.now)
     loop.clients.clear_trace()
     loop.thrust_rest = ThrustRest()

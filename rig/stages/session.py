@@ -24,6 +24,7 @@ from rig.recording.ledger import Fact, Ledger
 from rig.recording.line_writer import LineWriter
 from rig.recording.recorder_link import RecorderLink
 from rig.safety.stopping import Stop, turning
+from rig.stages.recording_header import Stamp, fresh_stamp
 from rig.watch.watch_link import WatchLink
 
 RECORDER_WAIT = 20.0
@@ -63,6 +64,8 @@ class Session:
     """This run is; False once it was said why it is not."""
     measured: set[tuple[int, str]] = field(default_factory=set)
     """(index, phase) of the steps of this run that were run to their end."""
+    stamp: Callable[[], Stamp] = fresh_stamp
+    """Of the next recording."""
 
     def say(self, level: Level, text: str, *, of_bench: bool = False) -> None:
         self.event_log.say(self.loop.clock.now_ns(), level, text, of_bench=of_bench)
