@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import contextlib
 import math
-import time
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -185,7 +184,7 @@ class VescCan:
     def _fault_is_due(self) -> bool:
         if self._options.fault_every:
             return self._commands % self._options.fault_every == 0
-        now_ns = time.monotonic_ns()
+        now_ns = self._bus.now_ns()
         due = self._asked_ns is None or now_ns - self._asked_ns >= FAULT_PERIOD_NS
         self._asked_ns = now_ns if due else self._asked_ns
         return due

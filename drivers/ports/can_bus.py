@@ -125,8 +125,11 @@ class CanBus:
             self.error = self.error or f"{self._channel} refused {frame} ({error}): check adapter, cable and power"
             raise LinkError(f"CAN bus {self.error}") from error
         if self._transcript is not None:
-            now_ns = time.monotonic_ns() if self._wire is None else round(self._wire.now() * 1e9)
-            self._transcript.write(now_ns, ">", str(frame).encode())
+            self._transcript.write(self.now_ns(), ">", str(frame).encode())
+
+    def now_ns(self) -> int:
+        """Of the clock that stamps what arrives."""
+        return time.monotonic_ns() if self._wire is None else round(self._wire.now() * 1e9)
 
     def health(self) -> LinkHealth:
         dropped = sum(inbox.dropped for _, inbox in self._inboxes)
