@@ -12,30 +12,37 @@ from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.model import Model, extended
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
+from identification.mismatch.noise.covariance import Noise
+from identification.mismatch.select.clipping import contradiction
 from identification.physics.term import Term
 from identification.recording import Floats
 
 Start = tuple[Model, Theta]
+NEAR = 0.25
+"""Of what is left without the term, beyond what is left with it: a start that leaves less is near."""
 FORM_STEPS = 15
 """Steps of the fit of another form, begun close by."""
 
 
 def nearer(
-    one: Start, now: Fit, term: Term, other: Term, values: tuple[float, ...], data: Data, weights: Weights
+    less: Fit, now: Fit, term: Term, other: Term, values: tuple[float, ...], data: Data, weights: Weights
 ) -> Start:
-    """Of `one` and the model `now` with `other` in the place of `term` the start that leaves less.
+    """The model `now` with `other` in the place of `term` where that does most of it, else `less` (without it) with it.
 
     From the model without the term the way is long where its effect is large, and valleys lie on it; the whole model,
     with what the term does followed by all that is left and by `other` from `values` on, is near where one curve can
     be written as the other.
     """
     near = _in_place(now, term, other, values, data, weights)
+    one = less.more(other, values)
     if near is None:
         return one
-    return min(one, near, key=lambda start: _left(start, data, weights))
+    beyond = _left(near, data, weights) - now.chi2
+    worth = min(less.chi2, _left(one, data, weights)) - now.chi2
+    return near if beyond < NEAR * worth else one
 
 
-def best_forms(fitted: Fit, terms: Sequence[Term], data: Data, weights: Weights) -> Fit:
+def best_forms(fitted: Fit, terms: Sequence[Term], data: Data, weights: Weights, noise: Noise) -> Fit:
     """The same effects, each in the textbook form that fits best beside the others; `fitted` where that is as it is.
 
     A form is chosen while other effects are still missing, and what is added later makes up for a wrong one: so it is
@@ -44,12 +51,12 @@ def best_forms(fitted: Fit, terms: Sequence[Term], data: Data, weights: Weights)
     for term in fitted.model.terms:
         for other in terms:
             if other.id == term.id and other != term and other not in fitted.model.terms:
-                fitted = _better_form(fitted, term, other, data, weights)
+                fitted = _better_form(fitted, term, other, data, weights, noise)
     return fitted
 
 
-def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights) -> Fit:
-    """The other of two forms where its BIC is less."""
+def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights, noise: Noise) -> Fit:
+    """The other of two forms where its BIC is less, and nothing contradicts it."""
     if term not in now.model.terms:
         return now
     logn = float(np.log(max(now.residual.size, 2)))
@@ -60,7 +67,9 @@ def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights
         return now
     begin = min(possible, key=lambda start: _left(start, data, weights))
     new = fit(*begin, data, weights, FORM_STEPS, wanted)
-    return new if new.chi2 < wanted and not at_bound(other, new, data, weights) else now
+    if new.chi2 >= wanted or at_bound(other, new, data, weights) or contradiction(new, other, noise, data):
+        return now
+    return new
 
 
 def _left(start: Start, data: Data, weights: Weights) -> float:

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.mismatch import policy
 from identification.mismatch.answer.against_twin import twin_of
 from identification.mismatch.compare.saved_model_baseline import given, prior_factor, starting
 from identification.mismatch.compare.simulation import (
@@ -159,9 +160,18 @@ def test_its_uncertainty_is_that_of_its_parameters_by_differences(twin):
         high, low = (static(with_values(twin, values + sign * step), V) for sign in (1, -1))
         slopes.append((high - low) / 2e-5)
     J = np.column_stack(slopes)
-    assert found.thrust[0] @ found.thrust[0].T == pytest.approx(J @ cov @ J.T, abs=2e-2 * np.max(J @ cov @ J.T))
+    neutral = [
+        static(with_values(twin, [0.0 if i == 0 else values[0], 1.0 if i == 1 else values[1]]), V) for i in (0, 1)
+    ]
+    beside = np.column_stack([static(twin, V) - each for each in neutral])
+    forms = policy.compare.FORM_ERROR**2 * beside @ beside.T
+    expected = J @ cov @ J.T + forms
+    assert found.thrust[0] @ found.thrust[0].T == pytest.approx(expected, abs=2e-2 * np.max(expected))
     sure = replace(twin, covariance=tuple((0.0,) * 3 for _ in range(3)))
-    assert prior_factor(sure, data, theta) is None
+    thrust = prior_factor(sure, data, theta).thrust[0]
+    assert thrust @ thrust.T == pytest.approx(forms, abs=2e-2 * np.max(forms)), (
+        "a form may be off where nothing else is"
+    )
     bare = replace(twin, terms=(), covariance=((1.0,),))
     assert prior_factor(bare, data, theta) is None
     assert given(bare) == ()
