@@ -169,9 +169,7 @@ def test_its_uncertainty_is_that_of_its_parameters_by_differences(twin):
     assert found.thrust[0] @ found.thrust[0].T == pytest.approx(expected, abs=2e-2 * np.max(expected))
     sure = replace(twin, covariance=tuple((0.0,) * 3 for _ in range(3)))
     thrust = prior_factor(sure, data, theta).thrust[0]
-    assert thrust @ thrust.T == pytest.approx(forms, abs=2e-2 * np.max(forms)), (
-        "a form may be off"
-    )
+    assert thrust @ thrust.T == pytest.approx(forms, abs=2e-2 * np.max(forms)), "a form may be off"
     bare = replace(twin, terms=(), covariance=((1.0,),))
     assert prior_factor(bare, data, theta) is None
     assert given(bare) == ()
