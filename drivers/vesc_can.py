@@ -260,22 +260,30 @@ def _numbered(number: int) -> Callable[[Frame], bool]:
 
 
 def _streams(name: str, options: Options) -> tuple[Stream, ...]:
-    per_erpm = 1.0 / (60.0 * options.pole_pairs)
+    """The firmware casts each value to an integer (comm_can.c, (int32_t) and (int16_t)): it is cut toward zero."""
+    per_erpm, cut = 1.0 / (60.0 * options.pole_pairs), "toward_zero"
     description = "duty x measured bus voltage; its error is about 0.1 V x duty + 0.001 x bus voltage"
     motor = (
-        Channel("rotation_rate", "rotation_rate", "rev/s", quantum=per_erpm, description="ERPM / pole pairs / 60"),
-        Channel("current", "current", "A", quantum=0.1),
-        Channel("duty", None, "1", quantum=0.001),
+        Channel(
+            "rotation_rate",
+            "rotation_rate",
+            "rev/s",
+            quantum=per_erpm,
+            rounding=cut,
+            description="ERPM / pole pairs / 60",
+        ),
+        Channel("current", "current", "A", quantum=0.1, rounding=cut),
+        Channel("duty", None, "1", quantum=0.001, rounding=cut),
         Channel("motor_voltage", "motor_voltage", "V", description=description),
     )
     supply = (
-        Channel("bus_voltage", "bus_voltage", "V", quantum=0.1),
+        Channel("bus_voltage", "bus_voltage", "V", quantum=0.1, rounding=cut),
         Channel("tachometer", None, "1", integer=True, description="counts, 6 per electrical revolution"),
     )
     thermal = (
-        Channel("motor_temperature", "motor_temperature", "degC", quantum=0.1),
-        Channel("fet_temperature", None, "degC", quantum=0.1),
-        Channel("input_current", None, "A", quantum=0.1),
+        Channel("motor_temperature", "motor_temperature", "degC", quantum=0.1, rounding=cut),
+        Channel("fet_temperature", None, "degC", quantum=0.1, rounding=cut),
+        Channel("input_current", None, "A", quantum=0.1, rounding=cut),
     )
     parts = [
         ("", options.rate, motor),

@@ -221,7 +221,8 @@ def _acquisition(channel: Mapping[str, Any], stream: Mapping[str, Any]) -> Acqui
     said["period"] = said["period"] or None  # a clock that does not tick is none
     said["quantum"] = said["quantum"] or _number(channel.get("resolution"))  # as it was called at first
     known = {key: value for key, value in said.items() if value is not None and np.isfinite(value) and value >= 0}
-    return Acquisition(**known, filter=text_of(channel.get("filter", "")))
+    how, rounding = (text_of(channel.get(key, "")) for key in ("filter", "rounding"))
+    return Acquisition(**known, filter=how, rounding=rounding)
 
 
 def _quantity(channel: str, facts: Mapping[str, Any], findings: Findings) -> tuple[str | None, str]:

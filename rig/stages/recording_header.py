@@ -19,8 +19,11 @@ from rig.link.recorder_messages import Attribute, ChannelSpec, Open, StreamSpec
 BYTES_PER_VALUE = 8
 OVERHEAD_BYTES = 2**20
 """Layout, chunks begun and not filled, events."""
+OBEYED_STD = 0.002
+"""s from a command's row until it is obeyed, which nothing measures: the tick's own work, and two frames of 1 ms of an
+adapter on USB (USB 2.0, section 5.3.3)."""
 COMMAND_CHANNEL = ChannelSpec(
-    "command_voltage", "command_voltage", "V",
+    "command_voltage", "command_voltage", "V", delay_std=OBEYED_STD,
     description="what the motor controller was told; rows are changes; NaN: nothing was sent (watchdog proof)",
 )  # fmt: skip
 
@@ -78,6 +81,7 @@ def _channel_spec(channel: Channel, primary: bool) -> ChannelSpec:
         integer=channel.integer,
         noise_std=channel.noise_std,
         quantum=channel.quantum,
+        rounding=channel.rounding,
         delay=channel.delay,
         delay_std=channel.delay_std,
         window=channel.window,
