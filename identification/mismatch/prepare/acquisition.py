@@ -28,7 +28,7 @@ def as_sampled(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
         if channel.stream not in clocks:
             clocks[channel.stream], told[channel.stream] = _clock(channel)
         channels.append(_uncut(_moved(channel, clocks[channel.stream])))
-        if channels[-1].value is not channel.value:
+        if _is_cut(channel):
             told[channel.stream] += f"; {channel.name} half a step from zero, for its device cuts toward it, as stated"
         late = _late(channel)
         if late > 0:
@@ -58,10 +58,14 @@ def _late(channel: Channel) -> float:
 
 def _uncut(channel: Channel) -> Channel:
     """Values that a device cut toward zero, by the mean as they were; what reads 0 may have been either sign."""
-    how = channel.acquisition
-    if how.rounding != "toward_zero" or not how.quantum:
+    if not _is_cut(channel):
         return channel
-    return replace(channel, value=channel.value + 0.5 * how.quantum * np.sign(channel.value))
+    step = channel.acquisition.quantum or 0.0
+    return replace(channel, value=channel.value + 0.5 * step * np.sign(channel.value))
+
+
+def _is_cut(channel: Channel) -> bool:
+    return channel.acquisition.rounding == "toward_zero" and bool(channel.acquisition.quantum)
 
 
 def _moved(channel: Channel, clock: Floats) -> Channel:

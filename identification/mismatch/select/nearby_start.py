@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, at_bound, bounds_of, change_of, fit, residual_of
@@ -33,7 +34,7 @@ def nearer(
     with what the term does followed by all that is left and by `other` from `values` on, is near where one curve can
     be written as the other.
     """
-    near = _in_place(now, term, other, values, data, weights)
+    near = _in_place(now, term, other, values, data, weights, (less.jacobian, less.free))
     one = less.more(other, values)
     if near is None:
         return one
@@ -61,7 +62,10 @@ def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights
         return now
     logn = float(np.log(max(now.residual.size, 2)))
     wanted = now.chi2 - policy.select.RIVAL_BETTER_BIC - (price(other, data) - price(term, data)) * logn
-    starts = [_in_place(now, term, other, values, data, weights) for values in other.trials(data.scale)]
+    own = now.layout.of(term)
+    kept = np.array([j < own.start or j >= own.stop for j in range(now.free.size)])
+    slopes = now.jacobian[:, kept[now.free]], now.free[kept]
+    starts = [_in_place(now, term, other, values, data, weights, slopes) for values in other.trials(data.scale)]
     possible = [start for start in starts if start is not None]
     if not possible:
         return now
@@ -79,9 +83,15 @@ def _left(start: Start, data: Data, weights: Weights) -> float:
 
 
 def _in_place(
-    now: Fit, term: Term, other: Term, values: tuple[float, ...], data: Data, weights: Weights
+    now: Fit,
+    term: Term,
+    other: Term,
+    values: tuple[float, ...],
+    data: Data,
+    weights: Weights,
+    slopes: tuple[Floats, NDArray[np.bool_]],
 ) -> Start | None:
-    """None where `other` cannot be had in any amount."""
+    """None where `other` cannot be had in any amount. `slopes`: of the rest of the model, and of which values."""
     rest, theta = now.less(term)
     bigger, begun = extended(rest, theta, other, values)
     effect = weights.whiten(*change_of((rest, theta), (now.model, now.theta), data, weights))
@@ -89,12 +99,10 @@ def _in_place(
     size = float(np.linalg.norm(change))
     if size == 0 or not np.isfinite(size):
         return None
-    own = now.layout.of(term)
-    kept = np.array([j < own.start or j >= own.stop for j in range(now.free.size)])
-    slopes = now.jacobian[:, kept[now.free]]
-    steps = _followed(np.column_stack([slopes, change / size]), effect)
+    columns, free = slopes
+    steps = _followed(np.column_stack([columns, change / size]), effect)
     moved = theta.vector
-    moved[now.free[kept]] += steps[:-1]
+    moved[free] += steps[:-1]
     first = other.parameters(data.scale)[0]
     assert first.neutral is not None
     amount = first.neutral + steps[-1] / size * (values[0] - first.neutral)
