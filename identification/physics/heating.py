@@ -85,12 +85,16 @@ class Heating:
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         history, current = now.history, now.history.others.get("current")
-        winding, full = cold_motor(now.winding, now.scale.driver)
+        winding, full = cold_motor(self._winding(now), now.scale.driver)
         load = (value / full) ** 4 if current is None else (current / np.nanmax(np.abs(current))) ** 2
         copper, flux, later = self._amounts(theta)
         warm = lowpass(load, history.dt, theta[1])[1]
         magnets = lowpass(warm, history.dt, later)[1] if later is not None else warm
         return hot_rate(value, winding, copper_at_full(copper, winding, full) * warm, flux * magnets)
+
+    def _winding(self, now: TermContext) -> float | None:
+        """A winding that takes voltage warms with the magnets: magnets alone are of a motor with next to none."""
+        return now.winding or 0.0 if self.form == "magnet" else now.winding
 
     def _amounts(self, theta: tuple[float, ...]) -> tuple[float, float, float | None]:
         """Loss by copper, loss of flux, time constant of the magnets behind the copper."""
@@ -159,7 +163,8 @@ class MeasuredHeating:
         measured = now.history.others[THERMOMETER]
         rise = measured - measured[0]
         magnets = lowpass(rise, now.history.dt, later)[1] if later is not None else rise
-        winding, full = cold_motor(now.winding, now.scale.driver)
+        alone = self.form == "measured_magnet"  # as Heating
+        winding, full = cold_motor(now.winding or 0.0 if alone else now.winding, now.scale.driver)
         weaker = np.minimum(flux * magnets, MOST_FLUX)
         return hot_rate(value, winding, copper * weaker_at_full(winding, full) * rise, weaker)
 

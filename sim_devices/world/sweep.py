@@ -22,6 +22,8 @@ STILL = 1e-7
 """relative change of the bus voltage, or of the motor's warmth, below which a pass changes nothing that matters."""
 PASSES = 12
 """A supply that sags by a quarter stands still after eight."""
+WARM_PASSES = 100
+"""Magnets that lose a ninth of their flux, which lets them draw and lose more, stand still after some forty."""
 
 
 def sweep(
@@ -54,7 +56,9 @@ def sweep(
 def _passes(effects: list[Effect]) -> int:
     """More after the first: what sags or warms with the current moves the current, without an exponent only the bus."""
     sag = [e.exponent for e in effects if isinstance(e, SupplySag)]
-    if any(sag) or any(isinstance(e, Heating) for e in effects):
+    if any(isinstance(e, Heating) for e in effects):
+        return WARM_PASSES
+    if any(sag):
         return PASSES
     return 1 if sag else 0
 

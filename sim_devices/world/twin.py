@@ -8,17 +8,19 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Mapping
-from math import sqrt
 from pathlib import Path
 from typing import Any
 
 from sim_devices.tables import WorldError
 from sim_devices.world.settings import Thruster
+from sim_devices.world.twin_heat import heat_of
 
 FORMAT = "thruster-rig-twin"
 VERSIONS = (1, 2)
 WHOLE = 0.02
 """Of a turn: how far from a whole number the periods per turn of a blade pass may be."""
+FORCE = 2
+"""Power of the rate with which a force of the rotor grows."""
 Values = Mapping[str, float]
 Table = dict[str, Any]
 
@@ -70,22 +72,29 @@ def world_of(content: Mapping[str, Any]) -> tuple[Table, dict[str, Table]]:
     k = float(content["rate_per_driver"] or 1.0)
     thruster: Table = {"C": float(content["C"]), "rate_per_volt": abs(k), "rotor": "instant"}
     effects: dict[str, Table] = {}
+    winding = next((_values(t)["loss"] for t in content["terms"] if t["effect"] == "winding_resistance"), None)
     for term in content["terms"]:
-        name = str(term["effect"])
+        name, form, driver = str(term["effect"]), str(term["form"]), float(term["scale"]["driver"])
         if name in effects:
             raise WorldError(f"the term {name} is there twice; the world has each effect once")
-        if name not in TERMS:
-            raise WorldError(f"the world cannot act the term {name!r}; it knows {', '.join(sorted(TERMS))}")
-        values = {key: float(entry["value"]) for key, entry in term["parameters"].items()}
-        effects[name] = TERMS[name](values, str(term["form"]), abs(k), float(term["scale"]["driver"]))
+        if name not in ACTED:
+            raise WorldError(f"the world cannot act the term {name!r}; it knows {', '.join(ACTED)}")
+        values = _values(term)
         if name == "heating":
+            effects[name] = heat_of(values, form, abs(k), driver, winding)
             thruster["heating_time"] = values["time_constant"]
+        else:
+            effects[name] = TERMS[name](values, form, abs(k), driver)
     lines = content.get("lines", [])
     if len(lines) > 1:
         raise WorldError(f"the twin has {len(lines)} periodic disturbances; the world has one at a time")
     if lines:
         effects["periodic_disturbance"] = _line(lines[0], abs(k))
     return thruster, effects
+
+
+def _values(term: Mapping[str, Any]) -> Values:
+    return {key: float(entry["value"]) for key, entry in term["parameters"].items()}
 
 
 def _line(line: Mapping[str, Any], k: float) -> Table:
@@ -100,13 +109,17 @@ def _line(line: Mapping[str, Any], k: float) -> Table:
         raise WorldError(
             f"the twin has a periodic disturbance of {per_turn:.4g} periods per turn; the world has whole numbers only"
         )
-    return {**table, "blades": round(per_turn)}
+    growth = float(line.get("growth", 0.0))
+    if growth != FORCE:
+        raise WorldError(
+            f"the twin has a periodic disturbance of the rotor that grows with the power {growth:g} of its rate; those "
+            f"of the world grow with its square ({FORCE})"
+        )
+    at = float(line["at_speed"]) / (k if line["turns"] == "rev" else 1.0)
+    return {**table, "blades": round(per_turn), "reference_voltage": at}
 
 
 _PLAIN = Thruster(C=1.0)
-COLD_SHARE = 0.25
-"""Drop in the cold winding over back-EMF at the largest voltage: a fifth of the whole. A twin says what warmth costs
-there, not what the winding takes."""
 
 
 def _same(values: Values, _form: str, _k: float, _driver: float) -> Table:
@@ -121,13 +134,14 @@ def _limit(values: Values, form: str, _k: float, _driver: float) -> Table:
     return {**values, "form": form or "hard"}
 
 
+def _cell_limit(values: Values, form: str, _k: float, _driver: float) -> Table:
+    before = form in ("before_noise", "before_zero")
+    return {**values, "place": "cell"} if before else {**values, "form": form or "hard"}
+
+
 def _winding(values: Values, _form: str, k: float, _driver: float) -> Table:
-    return {"resistance": values["loss"] * _ohm(k)}
-
-
-def _ohm(k: float) -> float:
-    """Of a winding whose voltage is V = e + e^2 times 1/V."""
-    return _PLAIN.torque_acceleration / (_PLAIN.drag * k**2)
+    """V = e + loss e^2."""
+    return {"resistance": values["loss"] * _PLAIN.torque_acceleration / (_PLAIN.drag * k**2)}
 
 
 def _lag(values: Values, form: str, _k: float, driver: float) -> Table:
@@ -142,30 +156,14 @@ def _cavitation(values: Values, form: str, k: float, _driver: float) -> Table:
     return {"onset": k * values["onset"], "slope": values["slope"] / k, "form": form}
 
 
-def _heating(values: Values, form: str, k: float, driver: float) -> Table:
-    if form.startswith("measured_"):
-        raise WorldError("the twin's heating follows a recorded motor temperature, which the bench cannot foresee")
-    rise = _PLAIN.heating * (_PLAIN.drag * (k * driver) ** 2 / _PLAIN.torque_acceleration) ** 2
-    left = sqrt(1.0 - values["loss"])  # of the rate
-    if form == "winding":
-        # hot: left + share warmer left^2 = 1 + share, with the driver's largest voltage as 1
-        warmer = (1.0 - left + COLD_SHARE) / (COLD_SHARE * left**2)
-        return {"resistance": COLD_SHARE * _ohm(k) / driver, "copper": (warmer - 1.0) / rise, "form": form}
-    if left <= 1.0:
-        raise WorldError("the twin's motor slows down as its magnets warm; in the world it turns faster")
-    return {"magnet": (1.0 - 1.0 / left) / rise, "form": form, "time_constant": values["magnet_time_constant"]}
-
-
 def _reversal(values: Values, form: str, _k: float, _driver: float) -> Table:
     if form != "wake":
         raise WorldError(f"the world has reversal_loss in the form 'wake' only, got {form!r}")
     return dict(values)
 
 
-def _inflow(values: Values, form: str, _k: float, _driver: float) -> Table:
-    if form:
-        raise WorldError(f"the world has inflow_dynamics of first order only, got the form {form!r}")
-    return dict(values)
+def _inflow(values: Values, form: str, _k: float, driver: float) -> Table:
+    return {**values, "form": "momentum", "reference_voltage": driver} if form else dict(values)
 
 
 def _linear(values: Values, _form: str, _k: float, _driver: float) -> Table:
@@ -213,7 +211,6 @@ TERMS: Mapping[str, Callable[[Values, str, float, float], Table]] = {
     "asymmetry": _same,
     "inflow_dynamics": _inflow,
     "cavitation": _cavitation,
-    "heating": _heating,
     "reversal_loss": _reversal,
     "linear_term": _linear,
     "speed_of_advance": _per_rate,
@@ -228,7 +225,8 @@ TERMS: Mapping[str, Callable[[Values, str, float, float], Table]] = {
     "load_cell_even_bend": _same,
     "zero_drift": _same,
     "zero_offset": _offset,
-    "load_cell_saturation": _limit,
+    "load_cell_saturation": _cell_limit,
 }
-"""Effect id -> (values, form, k, the driver that the form refers to) -> `[effects.<id>]`. The rest (supply_sag,
-rotation_coupling, thruster_interaction) follow a channel that the world makes itself."""
+"""Effect id -> (values, form, k, the driver that the form refers to) -> `[effects.<id>]`; heating is of twin_heat. The
+rest (supply_sag, rotation_coupling, thruster_interaction) follow a channel that the world makes itself."""
+ACTED = tuple(sorted((*TERMS, "heating")))

@@ -260,7 +260,8 @@ def intervals(findings: list[Table], truth: Table) -> tuple[Interval, ...]:
     """Of the right findings' parameters that mean the same on both sides."""
     found = []
     for finding in findings:
-        for name, value in true_values(finding["effect"], finding["form"], truth).items():
+        chosen = {name: told["value"] for name, told in finding["parameters"].items()}
+        for name, value in true_values(finding["effect"], finding["form"], truth, chosen).items():
             told = finding["parameters"].get(name)
             if told is not None and told["value"] is not None:
                 std = told["std"] or 0.0

@@ -4,12 +4,9 @@ import numpy as np
 import pytest
 
 from rig.blind.scoring.metrics import goals, half, half_named
-from rig.blind.scoring.places import PLACES
 from rig.blind.scoring.rates import Goal, Rate, of_rate
-from rig.blind.scoring.same_parameters import SAME, true_values
 from rig.blind.scoring.score import Near, Score, scored
 from rig.blind.scoring.tables import twins
-from rig.blind.workers import concealable
 from tests.rig.blind_scores import answer, finding, order, truth
 
 
@@ -126,26 +123,6 @@ def test_intervals_and_held_out_errors():
     assert found.held_out.baseline > 2.0
     other = scored(asked, hidden, answer("explained", finding("dead_band", form="jump", half_width=(0.5, 0.1))))
     assert other.intervals == ()
-
-
-def test_parameters_that_mean_the_same_are_known_for_effects_of_the_world():
-    known = set(concealable().effects)
-    assert set(SAME) <= known
-    assert known == set(PLACES)
-    told = truth("cavitation", form="linear", slope=0.1, onset=12.0)
-    assert true_values("cavitation", "linear", told) == {"slope": 0.2, "onset": 6.0}
-    line = true_values("periodic_disturbance", "rotation", truth("periodic_disturbance", amplitude=0.3, blades=4))
-    assert line == {"amplitude": 0.3, "periods_per_turn": 4.0, "periods_per_volt_second": 8.0}
-
-
-def test_what_warmth_costs_is_no_parameter_of_both_sides_but_its_time_is():
-    hidden = truth("heating", form="magnet", magnet=0.001, time_constant=50.0) | {"thruster": {"heating_time": 90.0}}
-    assert true_values("heating", "measured_magnet", hidden) == {"magnet_time_constant": 50.0}
-    copper = truth("heating", form="winding", resistance=0.3, time_constant=50.0) | {"thruster": {"heating_time": 90.0}}
-    assert true_values("heating", "winding", copper) == {"time_constant": 90.0}
-    assert true_values("heating", "measured_winding", copper) == {}
-    column = truth("inflow_dynamics", form="momentum", share=0.1, time_constant=0.01)
-    assert true_values("inflow_dynamics", "", column) == {}
 
 
 def test_alarms_under_wide_noise_are_goals_beside_the_plain_ones():

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from rig.twin.reading import read_twin
+from tests.rig.diagnose.acted_twins import SCALE, entry, file_of
 from tests.rig.diagnose.diagnosed_files import with_line
 
 
@@ -58,31 +59,20 @@ def test_every_term_of_the_catalogue_that_the_world_knows_builds_its_effect():
 
     left = []
     for (effect, form), term in TERMS.items():
-        scale = read_scale()
-        parameters = {
-            p.name: {"value": v, "unit": p.unit}
-            for p, v in zip(term.parameters(scale), term.trials(scale)[0], strict=True)
-        }
-        content = {
-            "driver": "command_voltage",
-            "rate_per_driver": 2.0,
-            "C": 0.4,
-            "terms": [{"effect": effect, "form": form, "parameters": parameters, "scale": {"driver": 20.0}}],
-        }
+        content = file_of(entry(effect, form, *term.trials(SCALE)[0]))
         try:
             make_effects(world_twin.world_of(content)[1])
         except WorldError:
             left.append((effect, form))
-    assert set(left) <= {
-        ("heating", "magnet"),  # the world's warm magnets let the motor turn faster: no loss of thrust
+    assert set(left) == {
         ("heating", "measured_winding"),
         ("heating", "measured_magnet"),
+        ("heating", "measured_winding_and_magnet"),
         ("supply_sag", ""),
         ("supply_sag", "buffered"),
         ("supply_sag", "discharge"),
         ("supply_sag", "loaded"),
         ("motor_lag", "mixed"),
-        ("inflow_dynamics", "momentum"),
         ("rotation_coupling", ""),
         ("thruster_interaction", ""),
         ("torque_crosstalk", "measured"),
@@ -102,17 +92,18 @@ def test_the_simulated_bench_has_the_line_or_says_that_it_cannot(dead, tmp_path)
         return with_twin({"twin": path.name}, tmp_path)["effects"]["periodic_disturbance"]
 
     assert effects() == {"amplitude": 0.3, "frequency": 7.3, "phase": 1.0}
-    assert effects(kind="rotation", ratio=RATIO, phase=None) == {"amplitude": 0.3, "blades": 3}
+    force = {"growth": 2.0, "at_speed": 18.0, "phase": None}
+    turning = effects(kind="rotation", ratio=RATIO, **force)
+    per_volt = json.loads(dead[2].read_text())["rate_per_driver"] or 1.0
+    assert turning == {"amplitude": 0.3, "blades": 3, "reference_voltage": pytest.approx(18.0 / per_volt)}
+    by_volts = RATIO | {"value": 3.0 * per_volt}
+    assert effects(kind="rotation", turns="V s", ratio=by_volts, **force)["reference_voltage"] == 18.0
     with pytest.raises(WorldError, match=r"2\.4 periods per turn; the world has whole numbers only"):
-        effects(kind="rotation", ratio=RATIO | {"value": 2.4})
+        effects(kind="rotation", ratio=RATIO | {"value": 2.4}, **force)
+    with pytest.raises(WorldError, match=r"power 0 of its rate; those of the world grow with its square"):
+        effects(kind="rotation", ratio=RATIO)
     path = with_line(tmp_path, dead)
     content = json.loads(path.read_text())
     path.write_text(json.dumps(content | {"lines": 2 * content["lines"]}))
     with pytest.raises(WorldError, match="2 periodic disturbances; the world has one at a time"):
         with_twin({"twin": path.name}, tmp_path)
-
-
-def read_scale():
-    from identification.physics.term import Scale
-
-    return Scale(20.0, "V", 160.0, 300.0, 0.01, 1.0, 170.0, 0.2, 7.0)

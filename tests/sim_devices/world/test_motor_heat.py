@@ -101,6 +101,16 @@ def test_the_live_world_warms_as_the_sweep_does():
     assert servo.state.n == pytest.approx(told.n[-1], rel=1e-4)
 
 
+def test_the_sweep_passes_until_magnets_that_make_themselves_hotter_stand_still():
+    """As (1 - m)^-6: cold they would lose 5.5 % here; at rest m (1 - m)^6 = 0.055."""
+    cold = (DRAG * (THRUSTER["rate_per_volt"] * TOP) ** 2 / B) ** 2
+    effects = {"heating": {"magnet": 0.055 / cold, "form": "magnet", "time_constant": 2.0}}
+    told = settled(TOP, effects, heating=1.0, heating_time=1.0, seconds=150.0)
+    lost = brentq(lambda m: m * (1.0 - m) ** 6 - 0.055, 0.0, 1.0 / 7.0)
+    assert 1.0 - told.flux[-1] == pytest.approx(lost, rel=1e-3)
+    assert lost > 0.1
+
+
 @pytest.mark.parametrize(
     ("effect", "sentence"),
     [
