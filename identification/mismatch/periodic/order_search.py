@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.fft import next_fast_len
@@ -58,11 +58,10 @@ class _Grid:
         return out
 
 
-def most_significant(parts: Sequence[SteadySegment], top: float) -> OrderCandidate:
-    """Of all ways to look; `top`: highest speed, turns per s."""
+def candidates(parts: Sequence[SteadySegment], top: float) -> list[OrderCandidate]:
+    """The best by each way to look, its p-value that of all ways; `top`: highest speed, turns per s."""
     found = [_of_powers(parts, top), *(_of_waves(parts, top, seconds) for seconds in LASTING)]
-    best = min(found, key=lambda each: each.p_value)
-    return OrderCandidate(best.ratio, best.reach, min(len(found) * best.p_value, 1.0))
+    return [replace(each, p_value=min(len(found) * each.p_value, 1.0)) for each in found]
 
 
 def _grid(longest: float, top: float) -> _Grid:

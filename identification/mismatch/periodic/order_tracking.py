@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.periodic.order_law import FORCE, PICK_UP, OrderLaw, Ring, laws
-from identification.mismatch.periodic.order_search import LASTING, OrderCandidate, most_significant
+from identification.mismatch.periodic.order_search import LASTING, OrderCandidate, candidates
 from identification.mismatch.periodic.spectrum import Series
 from identification.mismatch.periodic.steady_segments import SteadySegment, speed_of, stretches
 from identification.recording import Floats
@@ -121,19 +121,25 @@ def find_locked(
     parts = list(stretches(runs, top))
     if len(parts) < 2:
         return None
-    found_by = [most_significant(law.on(parts, 0.0, top), top) for law in (FORCE, PICK_UP)]
-    candidate = min(found_by, key=lambda each: each.p_value)
-    candidate = replace(candidate, p_value=min(len(found_by) * candidate.p_value, 1.0))
-    if not candidate.p_value < (
-        alarm if not in_turns or _is_whole(candidate) else policy.periodic.ODD_ORDER_SHARE * alarm
-    ):
+    every = [each for law in (FORCE, PICK_UP) for each in candidates(law.on(parts, 0.0, top), top)]
+    every = [replace(each, p_value=min(2 * each.p_value, 1.0)) for each in every]  # of two laws
+    likely = [each for each in every if _passes(each, alarm, in_turns)]
+    if not likely:
         return None
-    found = _of_best_law(parts, candidate, top, ring)
+    # a law that has nearly all at one speed: orders of other ratios look alike by their powers, not by their waves
+    tried = [(_of_best_law(parts, each, top, ring), each) for each in likely]
+    found, candidate = max(tried, key=lambda each: each[0].law_gain)
     if not found.gain > policy.periodic.LOCKED_LINE_GAIN:
         return None
     # a loud line was part of its own noise
     loud = [wave_of(found.parts, i, r.time, 2 * np.pi * found.ratio * r.turns) for i, r in runs if r.turns is not None]
     return _of_best_law(list(stretches(runs, top, loud)), candidate, top, ring)
+
+
+def _passes(candidate: OrderCandidate, alarm: float, in_turns: bool) -> bool:
+    """A ratio that is no whole one must be much clearer, where angles are the propeller's."""
+    whole = not in_turns or _is_whole(candidate)
+    return candidate.p_value < (alarm if whole else policy.periodic.ODD_ORDER_SHARE * alarm)
 
 
 def _is_whole(candidate: OrderCandidate) -> bool:
