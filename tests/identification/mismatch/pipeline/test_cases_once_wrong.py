@@ -10,12 +10,6 @@ from sim_devices import concealed
 from sim_devices.concealed import Case
 from tests.concealed.recordings import recording
 
-BEFORE_NOISE = (
-    [2866143517, 1300235683, 2222917449, 619874147],
-    [2688482787, 1804759238, 646837829, 1924247675],
-)
-"""Seeds of two of them."""
-
 
 def only_finding(case: Case) -> Finding:
     found = diagnose([recording(case)])
@@ -47,27 +41,12 @@ def test_a_coupling_smaller_than_the_noise_of_the_rate_is_found_whole() -> None:
 
 
 def test_a_limit_that_only_the_highest_level_meets_is_named() -> None:
-    """Neither rate nor current tell it from a cell on its stop, whose amplifier adds the zero behind it."""
     seed = [1135716813, 3621408974, 1991715632, 2315461773]
     case = concealed.case(np.random.default_rng(seed), ["command_saturation"], 15.0)
-    found = diagnose([recording(case)])
-    assert isinstance(found, Diagnosis)
-    assert found.verdict == "ambiguous"
-    (finding,) = found.findings
-    told = {(f.effect, f.form): f for f in (finding, *finding.rivals)}
-    assert set(told) == {("command_saturation", "hard"), ("load_cell_saturation", "before_zero")}
-    low, high = told["command_saturation", "hard"].parameters["limit"].interval
+    finding = only_finding(case)
+    assert finding.effect == "command_saturation"
+    low, high = finding.parameters["limit"].interval
     assert low < case.effects[0].parameters["limit"] < high
-
-
-def test_a_cell_on_its_stop_is_named_whose_noise_and_zero_come_after() -> None:
-    """Clipped with its zero it was a cavitation, or nothing that has a name."""
-    for seed in BEFORE_NOISE:
-        case = concealed.case(np.random.default_rng(seed), ["load_cell_saturation"], 40.0, forms=["before_noise"])
-        finding = only_finding(case)
-        assert (finding.effect, finding.form) == ("load_cell_saturation", "before_zero")
-        low, high = finding.parameters["limit"].interval
-        assert low < case.effects[0].parameters["limit"] < high
 
 
 def test_a_dead_band_that_jumps_is_found_beside_a_rate_that_shows_it() -> None:
