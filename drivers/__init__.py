@@ -23,12 +23,14 @@ class Kind:
     build: Callable[..., Instrument]
     """`build(name, options)` for a serial device, `build(name, options, bus)` for one on CAN."""
     link: Literal["serial", "can"]
+    over_wire: bool = True
+    """Of a serial device: `build(name, options, wire)` as well. False: its protocol library opens the port itself."""
 
 
 KINDS: dict[str, Kind] = {
     "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial"),
     "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial"),
     "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial"),
-    "keller": Kind(keller.Options, keller.Keller, "serial"),
+    "keller": Kind(keller.Options, keller.Keller, "serial", over_wire=False),
     "vesc_can": Kind(vesc_can.Options, vesc_can.VescCan, "can"),
 }

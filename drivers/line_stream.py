@@ -25,6 +25,7 @@ from drivers.ports.lines import (
     printable,
 )
 from drivers.ports.serial_port import SerialPort, SerialSettings
+from drivers.ports.wire import Wire
 from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream
 
 GROUPS = frozenset(("value", "raw", "unit", "t"))
@@ -134,7 +135,7 @@ class Options:
 class LineStream:
     """Stream `<name>`: the value, then `raw` and `device_time` when the pattern has those groups."""
 
-    def __init__(self, name: str, options: Options) -> None:
+    def __init__(self, name: str, options: Options, wire: Wire | None = None) -> None:
         self.name = name
         self._options = options
         self._groups = frozenset(re.compile(options.pattern).groupindex)
@@ -142,7 +143,7 @@ class LineStream:
         self._fault: str | None = None
         self._unit: str | None = None
         settings = SerialSettings(options.port, options.baud, options.framing, options.capture)
-        self._port = SerialPort(name, settings, Decoder(options.pattern).feed)
+        self._port = SerialPort(name, settings, Decoder(options.pattern).feed, wire)
 
     @property
     def streams(self) -> tuple[Stream, ...]:

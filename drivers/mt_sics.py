@@ -30,6 +30,7 @@ from drivers.mt_sics_lines import (
 from drivers.ports.inbox import BadRecords
 from drivers.ports.lines import HOST_DELAY_STD, check_acquisition, check_line_rate, line_time, printable
 from drivers.ports.serial_port import SerialPort, SerialSettings
+from drivers.ports.wire import Wire
 from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream
 
 RATE_TOLERANCE = 0.25
@@ -93,11 +94,11 @@ class Options:
 class MtSics:
     """A force sensor: stream `<name>` with `thrust` [N] and `stable` (1 or 0)."""
 
-    def __init__(self, name: str, options: Options) -> None:
+    def __init__(self, name: str, options: Options, wire: Wire | None = None) -> None:
         self.name = name
         self._options = options
         self._port = SerialPort(
-            name, SerialSettings(options.port, options.baud, options.framing, options.capture), Decoder().feed
+            name, SerialSettings(options.port, options.baud, options.framing, options.capture), Decoder().feed, wire
         )
         self._bad = BadRecords()
         self._fault: str | None = None

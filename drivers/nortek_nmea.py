@@ -19,6 +19,7 @@ from drivers.errors import DeviceError
 from drivers.ports.inbox import BadRecords
 from drivers.ports.lines import LineCutter, check_line_rate, printable
 from drivers.ports.serial_port import SerialPort, SerialSettings
+from drivers.ports.wire import Wire
 from drivers.protocols import Channel, LinkHealth, Sample, Stream
 
 LINE_CHARACTERS = 92
@@ -129,12 +130,12 @@ class Options:
 class NortekNmea:
     """A speed sensor: stream `<name>` with `flow_speed` [m/s]."""
 
-    def __init__(self, name: str, options: Options) -> None:
+    def __init__(self, name: str, options: Options, wire: Wire | None = None) -> None:
         self.name = name
         self._options = options
         self._bad = BadRecords()
         settings = SerialSettings(options.port, options.baud, options.framing, options.capture)
-        self._port = SerialPort(name, settings, Decoder().feed)
+        self._port = SerialPort(name, settings, Decoder().feed, wire)
 
     @property
     def streams(self) -> tuple[Stream, ...]:

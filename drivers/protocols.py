@@ -21,6 +21,8 @@ class Channel:
     noise_std: float | None = None
     quantum: float | None = None
     """Step of the device's quantisation, in `unit`."""
+    rounding: str = ""
+    """`toward_zero`: the device cuts off what is beyond a step; empty: it rounds to the nearest."""
     delay: float | None = None
     """s from the quantity to the arrival of an undisturbed row: conversion, group delay of a filter, transport."""
     delay_std: float | None = None

@@ -41,6 +41,9 @@ MAX_DUTY = 0.95
 """motor/mcconf_default.h, MCCONF_L_MAX_DUTY: the firmware clips a larger duty without saying so."""
 REPLY_TIMEOUT = 1.0
 """s for PONG, and then for each status message (slowest factory rate 5 Hz)."""
+FAULT_PERIOD_NS = 200_000_000
+"""ns between two questions for the fault code; the firmware keeps a motor with a fault off for 0.5 s at least
+(m_fault_stop_time_ms, mcconf_default.h), so that none is missed."""
 HARDWARE = {0: "VESC", 1: "VESC battery management", 2: "VESC custom hardware", None: "VESC"}
 """comm_can.h, HW_TYPE."""
 _FROM_VESC = frozenset((STATUS, STATUS_4, STATUS_5, PONG, PROCESS_SHORT_BUFFER))
@@ -70,7 +73,7 @@ class Options:
     thermal_rate: float = 5.0
     """STATUS_4 messages/s (CAN Status Rate 2, factory 5 Hz); 0: not sent."""
     fault_every: int = 0
-    """Ask for the fault code with every n-th command; 0: never."""
+    """Ask for the fault code with every n-th command and record the answers; 0: five times a second, not recorded."""
 
     def __post_init__(self) -> None:
         for field, value in (("vesc_id", self.vesc_id), ("host_id", self.host_id)):
@@ -108,6 +111,7 @@ class VescCan:
         self._supply: tuple[int, float] | None = None
         self._fault: str | None = None
         self._commands = 0
+        self._asked_ns: int | None = None
 
     @property
     def streams(self) -> tuple[Stream, ...]:
@@ -150,7 +154,8 @@ class VescCan:
                     samples.append(Sample(f"{self.name}_thermal", t_ns, (motor, fet, current)))
                 case FaultCode(_, code):
                     self._note_fault(code)
-                    samples.append(Sample(f"{self.name}_fault", t_ns, (float(code),)))
+                    if self._options.fault_every:
+                        samples.append(Sample(f"{self.name}_fault", t_ns, (float(code),)))
                 case NotUnderstood():
                     self._bad.add(str(frame))
         return samples
@@ -173,8 +178,16 @@ class VescCan:
             raise ValueError(f"{self.name}: command must be within +-{self.max_voltage:g} V, not {volts}")
         self._bus.send(set_duty(self._options.vesc_id, volts / self._options.nominal_bus_voltage))
         self._commands += 1
-        if self._options.fault_every and self._commands % self._options.fault_every == 0:
+        if self._fault_is_due():
             self._bus.send(ask_fault(self._options.vesc_id, self._options.host_id))
+
+    def _fault_is_due(self) -> bool:
+        if self._options.fault_every:
+            return self._commands % self._options.fault_every == 0
+        now_ns = self._bus.now_ns()
+        due = self._asked_ns is None or now_ns - self._asked_ns >= FAULT_PERIOD_NS
+        self._asked_ns = now_ns if due else self._asked_ns
+        return due
 
     def release(self) -> None:
         """Current 0: the motor coasts, whatever the duty controller was doing. Raises LinkError."""
@@ -247,22 +260,30 @@ def _numbered(number: int) -> Callable[[Frame], bool]:
 
 
 def _streams(name: str, options: Options) -> tuple[Stream, ...]:
-    per_erpm = 1.0 / (60.0 * options.pole_pairs)
+    """The firmware casts each value to an integer (comm_can.c, (int32_t) and (int16_t)): it is cut toward zero."""
+    per_erpm, cut = 1.0 / (60.0 * options.pole_pairs), "toward_zero"
     description = "duty x measured bus voltage; its error is about 0.1 V x duty + 0.001 x bus voltage"
     motor = (
-        Channel("rotation_rate", "rotation_rate", "rev/s", quantum=per_erpm, description="ERPM / pole pairs / 60"),
-        Channel("current", "current", "A", quantum=0.1),
-        Channel("duty", None, "1", quantum=0.001),
+        Channel(
+            "rotation_rate",
+            "rotation_rate",
+            "rev/s",
+            quantum=per_erpm,
+            rounding=cut,
+            description="ERPM / pole pairs / 60",
+        ),
+        Channel("current", "current", "A", quantum=0.1, rounding=cut),
+        Channel("duty", None, "1", quantum=0.001, rounding=cut),
         Channel("motor_voltage", "motor_voltage", "V", description=description),
     )
     supply = (
-        Channel("bus_voltage", "bus_voltage", "V", quantum=0.1),
+        Channel("bus_voltage", "bus_voltage", "V", quantum=0.1, rounding=cut),
         Channel("tachometer", None, "1", integer=True, description="counts, 6 per electrical revolution"),
     )
     thermal = (
-        Channel("motor_temperature", "motor_temperature", "degC", quantum=0.1),
-        Channel("fet_temperature", None, "degC", quantum=0.1),
-        Channel("input_current", None, "A", quantum=0.1),
+        Channel("motor_temperature", "motor_temperature", "degC", quantum=0.1, rounding=cut),
+        Channel("fet_temperature", None, "degC", quantum=0.1, rounding=cut),
+        Channel("input_current", None, "A", quantum=0.1, rounding=cut),
     )
     parts = [
         ("", options.rate, motor),

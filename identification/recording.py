@@ -55,6 +55,8 @@ class Acquisition:
     """s that a value is averaged over, ending `delay` before its stamp."""
     quantum: float | None = None
     """Step of the values, in the channel's unit."""
+    rounding: str = ""
+    """How a value comes to a step: `toward_zero` where the device cuts what is beyond it off; empty: to the nearest."""
     hold: float | None = None
     """s for which a slow device repeats a value at a faster rate."""
     filter: str = ""

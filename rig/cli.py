@@ -9,11 +9,15 @@ from __future__ import annotations
 import os
 import sys
 from importlib import import_module
-from typing import Final, NamedTuple
+from pathlib import Path
+from typing import TYPE_CHECKING, Final, NamedTuple
 
 import click
 
 from rig.errors import RigError
+
+if TYPE_CHECKING:
+    from rig.operate.virtual_time import World
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """What the libraries of linear algebra read when they are loaded."""
@@ -101,6 +105,19 @@ def main(arguments: list[str] | None = None) -> int:
         click.echo("rig: interrupted", err=True)
         return 130
     return int(result or 0)
+
+
+def record_in_virtual_time(campaign: Path, folder: Path, world: World, stamp: tuple[str, str]) -> tuple[Path, int]:
+    """For a program that brings a bench of its own (`python -m sim_devices`): `rig.operate.virtual_time.record`.
+
+    Raises RuntimeError with a sentence for a campaign that can't be run, or a run that did not complete.
+    """
+    from rig.operate.virtual_time import record
+
+    try:
+        return record(campaign, folder, world, stamp)
+    except RigError as error:
+        raise RuntimeError(str(error)) from error
 
 
 def entry() -> None:

@@ -19,6 +19,8 @@ from sim_devices.bench.process import running
 from sim_devices.bench.settings import load
 from sim_devices.bench.truth_table import SUSPICIOUS, compare, table
 from sim_devices.concealed.sealing.on_disc import KINDS, conceal
+from sim_devices.recorded.on_disc import KINDS as RECORDED_KINDS
+from sim_devices.recorded.on_disc import conceal as conceal_recorded
 from sim_devices.tables import WorldError
 from sim_devices.vehicle.documents import held_out, recorded, trials, truth, tunnel
 from sim_devices.vehicle.settings import load as load_vehicle
@@ -127,8 +129,8 @@ def vehicle(settings: Path, out: Path, seed: int | None) -> None:
 
 @main.command("concealable")
 def concealable() -> None:
-    """What `conceal` can be asked for, as JSON: effects, their forms, lies about channels, kinds of noise."""
-    click.echo(json.dumps(KINDS, indent=1))
+    """What `conceal` can be asked for, as JSON: effects, their forms, lies about channels, kinds of noise, benches."""
+    click.echo(json.dumps({**KINDS, **RECORDED_KINDS}, indent=1))
 
 
 @main.command("conceal")
@@ -137,12 +139,18 @@ def concealable() -> None:
 def conceal_cases(spec: TextIO, out: Path) -> None:
     """Recordings in which effects are concealed, and apart from them the sealed truth, into folder OUT.
 
-    SPEC holds one JSON object a line, - is standard input; the token of each is printed when its case is complete.
+    SPEC holds one JSON object a line, - is standard input; the token of each is printed when its case is complete. A
+    case with a `bench` is recorded on it by the rig's own control loop, drivers and file, in virtual time.
     """
+    from rig.cli import record_in_virtual_time
+
     try:
         for line in filter(str.strip, iter(spec.readline, "")):
             asked = json.loads(line)
-            conceal(asked, out)
+            if "bench" in asked:
+                conceal_recorded(asked, out, record_in_virtual_time)
+            else:
+                conceal(asked, out)
             click.echo(asked["token"])
     except (WorldError, ValueError) as error:
         fail(str(error))

@@ -20,10 +20,12 @@ from typing import Any, NamedTuple
 
 import can
 from can.interfaces import VALID_INTERFACES
+from can.interfaces.slcan import slcanBus
 
 from drivers.errors import LinkError
 from drivers.ports.inbox import BadRecords, Inbox
 from drivers.ports.transcript import Transcript
+from drivers.ports.wire import SerialOverWire, Wire
 from drivers.protocols import LinkHealth
 
 READ_TIMEOUT = 0.05
@@ -50,7 +52,8 @@ class Frame(NamedTuple):
 class CanBus:
     """A bus with one reader thread; each device gets its own inbox of the frames it accepts."""
 
-    def __init__(self, interface: str, channel: str, bitrate: int, capture: str = "") -> None:
+    def __init__(self, interface: str, channel: str, bitrate: int, capture: str = "", wire: Wire | None = None) -> None:
+        """`wire`: to an slcan adapter, used instead of the port `channel`, with its stamps and in its time."""
         if not interface or not channel:
             raise ValueError("a CAN bus needs an interface (slcan, socketcan ...) and a channel (port or network name)")
         if interface not in VALID_INTERFACES:
@@ -59,6 +62,9 @@ class CanBus:
             raise ValueError(f"python-can has no interface {interface!r}; {hint}")
         if bitrate <= 0:
             raise ValueError(f"CAN bitrate must be positive, not {bitrate}")
+        if wire is not None and interface != "slcan":
+            raise ValueError(f"only an slcan adapter can be reached over a wire, not {interface}")
+        self._wire = wire
         self.error: str | None = None
         self._interface, self._channel, self._bitrate, self._capture = interface, channel, bitrate, capture
         self._bus: can.BusABC | None = None
@@ -72,14 +78,18 @@ class CanBus:
 
     @property
     def alive(self) -> bool:
-        return self._reader is not None and self.error is None
+        return self._bus is not None and self.error is None
 
     def open(self) -> None:
         """Open the adapter and start reading. Raises LinkError."""
-        if self._reader is not None:
+        if self._bus is not None:
             return
         self.error, self._bad, self._received = None, BadRecords(), 0
         self._closing.clear()
+        if self._wire is not None:
+            self._transcript = Transcript(Path(self._capture)) if self._capture else None
+            self._bus = self._over(self._wire)
+            return
         try:
             self._lock = self._lock_port()
             self._transcript = Transcript(Path(self._capture)) if self._capture else None
@@ -97,7 +107,7 @@ class CanBus:
 
     def subscribe(self, accept: Callable[[Frame], bool], capacity: int = CAPACITY) -> Inbox[Frame]:
         """An inbox that gets every frame for which `accept` is true, from now until the bus is closed."""
-        inbox: Inbox[Frame] = Inbox(capacity)
+        inbox: Inbox[Frame] = Inbox(capacity, self._wire)
         self._inboxes = (*self._inboxes, (accept, inbox))
         return inbox
 
@@ -115,7 +125,11 @@ class CanBus:
             self.error = self.error or f"{self._channel} refused {frame} ({error}): check adapter, cable and power"
             raise LinkError(f"CAN bus {self.error}") from error
         if self._transcript is not None:
-            self._transcript.write(time.monotonic_ns(), ">", str(frame).encode())
+            self._transcript.write(self.now_ns(), ">", str(frame).encode())
+
+    def now_ns(self) -> int:
+        """Of the clock that stamps what arrives."""
+        return time.monotonic_ns() if self._wire is None else round(self._wire.now() * 1e9)
 
     def health(self) -> LinkHealth:
         dropped = sum(inbox.dropped for _, inbox in self._inboxes)
@@ -134,6 +148,22 @@ class CanBus:
             self._transcript.close()
         self._bus = self._reader = self._lock = self._transcript = None
         self._inboxes = ()
+
+    def _over(self, wire: Wire) -> can.BusABC:
+        """An slcan bus on a wire: opened on a loop of its own, then given the wire and told to begin."""
+        bus = slcanBus("loop://", sleep_after_open=0)
+        bus.serialPortOrig.close()
+        port = SerialOverWire(wire)
+        bus.serialPortOrig = port  # type: ignore[assignment]  # all that slcanBus asks of a port
+
+        def arrived(t_ns: int, data: bytes) -> None:
+            port.put(data)
+            while port.in_waiting:
+                self._read_one(bus, 0.0, lambda: t_ns)
+
+        wire.connect(arrived)
+        bus.set_bitrate(self._bitrate)
+        return bus
 
     def _special(self) -> dict[str, Any]:
         """slcan: no pause after opening, and block in read instead of waking a thousand times a second."""
@@ -156,7 +186,7 @@ class CanBus:
         end: str | None = f"the reader of {self._channel} stopped on an error of this program (see the log)"
         try:
             while not self._closing.is_set():
-                self._read_one(bus)
+                self._read_one(bus, READ_TIMEOUT, time.monotonic_ns)
             end = None
         except (can.CanError, OSError) as error:
             end = f"{self._channel} was lost ({error}): check adapter, cable and power, then open it again"
@@ -165,9 +195,9 @@ class CanBus:
             for _, inbox in self._inboxes:
                 inbox.end()
 
-    def _read_one(self, bus: can.BusABC) -> None:
+    def _read_one(self, bus: can.BusABC, timeout: float, now_ns: Callable[[], int]) -> None:
         try:
-            message = bus.recv(READ_TIMEOUT)
+            message = bus.recv(timeout)
         except (ValueError, IndexError) as error:
             self._bad.add(str(error))
             return
@@ -179,7 +209,7 @@ class CanBus:
             return
         if message is None:
             return
-        t_ns = time.monotonic_ns()
+        t_ns = now_ns()
         frame = Frame(message.arbitration_id, message.is_extended_id, bytes(message.data))
         if message.is_error_frame or message.is_remote_frame or len(frame.data) != message.dlc:
             self._bad.add(f"{frame} of length {message.dlc}" + (" (error frame)" if message.is_error_frame else ""))

@@ -6,7 +6,7 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
-from typing import Generic, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 Record = TypeVar("Record")
 
@@ -27,10 +27,19 @@ class BadRecords:
             self.first = (*self.first, text)
 
 
+class Passing(Protocol):
+    """A time other than the machine's: it passes while somebody waits, and records may be put meanwhile."""
+
+    def now(self) -> float: ...
+
+    def wait(self, seconds: float) -> object: ...
+
+
 class Inbox(Generic[Record]):
     """Records with their arrival time. One thread puts, one takes. When full the oldest go, and are counted."""
 
-    def __init__(self, capacity: int) -> None:
+    def __init__(self, capacity: int, passing: Passing | None = None) -> None:
+        """`passing`: the time that `wait_for` waits in; None: the machine's."""
         if capacity < 1:
             raise ValueError(f"inbox capacity must be at least 1, not {capacity}")
         self.received = 0
@@ -38,6 +47,8 @@ class Inbox(Generic[Record]):
         self._capacity = capacity
         self._rows: deque[tuple[int, Record]] = deque(maxlen=capacity)
         self._arrival = threading.Condition()
+        self._now = time.monotonic if passing is None else passing.now
+        self._wait: Callable[[float], object] = self._arrival.wait if passing is None else passing.wait
         self._open = True
 
     def put(self, t_ns: int, records: Sequence[Record]) -> None:
@@ -60,7 +71,7 @@ class Inbox(Generic[Record]):
 
         With `take` it leaves the inbox; records that do not match stay where they are.
         """
-        deadline = time.monotonic() + timeout
+        deadline = self._now() + timeout
         with self._arrival:
             while True:
                 for index, (_, record) in enumerate(self._rows):
@@ -68,10 +79,10 @@ class Inbox(Generic[Record]):
                         if take:
                             del self._rows[index]
                         return record
-                left = deadline - time.monotonic()
+                left = deadline - self._now()
                 if left <= 0.0 or not self._open:
                     return None
-                self._arrival.wait(left)
+                self._wait(left)
 
     def end(self) -> None:
         """No more records will come: whoever waits is woken."""

@@ -18,6 +18,7 @@ from drivers.errors import LinkError
 from drivers.ports.inbox import Inbox
 from drivers.ports.lines import bits_per_character
 from drivers.ports.transcript import Transcript
+from drivers.ports.wire import Wire
 
 Record = TypeVar("Record")
 
@@ -52,28 +53,38 @@ class SerialSettings:
 class SerialPort(Generic[Record]):
     """Bytes go through `feed` (pure: bytes -> records) and wait in a bounded inbox with their arrival time."""
 
-    def __init__(self, name: str, settings: SerialSettings, feed: Callable[[bytes], Sequence[Record]]) -> None:
+    def __init__(
+        self, name: str, settings: SerialSettings, feed: Callable[[bytes], Sequence[Record]], wire: Wire | None = None
+    ) -> None:
+        """`wire`: used instead of the port that `settings` names, with its stamps and in its time."""
         self.settings = settings
+        self._wire = wire
         self.error: str | None = None
         self._name = name
         self._feed = feed
-        self.inbox: Inbox[Record] = Inbox(settings.capacity)
+        self.inbox: Inbox[Record] = Inbox(settings.capacity, wire)
         self._serial: serial.Serial | None = None
         self._transcript: Transcript | None = None
         self._reader: threading.Thread | None = None
         self._closing = threading.Event()
+        self._opened = False
 
     @property
     def alive(self) -> bool:
-        return self._reader is not None and self.error is None
+        return self._opened and self.error is None
 
     def open(self) -> None:
         """Open exclusively and start reading. Raises LinkError."""
-        if self._reader is not None:
+        if self._opened:
             raise LinkError(f"{self._name}: {self.settings.port} is already open")
         self.error = None
         self._closing.clear()
-        self.inbox = Inbox(self.settings.capacity)
+        self.inbox = Inbox(self.settings.capacity, self._wire)
+        if self._wire is not None:
+            self._transcript = self._new_transcript()
+            self._wire.connect(self._arrived)
+            self._opened = True
+            return
         try:
             port = _open_serial(self.settings)
         except (OSError, ValueError) as error:
@@ -82,25 +93,38 @@ class SerialPort(Generic[Record]):
                 " Check the cable, the path, and that no other program has it open"
             ) from error
         try:
-            self._transcript = Transcript(Path(self.settings.capture)) if self.settings.capture else None
-        except OSError as error:
+            self._transcript = self._new_transcript()
+        except LinkError:
             port.close()
-            raise LinkError(f"{self._name}: cannot write the transcript: {error}") from error
+            raise
         self._serial = port
         self._reader = threading.Thread(target=self._read, args=(port,), name=f"read {self._name}", daemon=False)
         self._reader.start()
+        self._opened = True
+
+    def _new_transcript(self) -> Transcript | None:
+        if not self.settings.capture:
+            return None
+        try:
+            return Transcript(Path(self.settings.capture))
+        except OSError as error:
+            raise LinkError(f"{self._name}: cannot write the transcript: {error}") from error
 
     def write(self, data: bytes) -> None:
         """Send bytes. Raises LinkError when the port is closed, lost, or takes nothing for 0.2 s."""
-        if self._serial is None or not self.alive:
+        port = self._wire or self._serial
+        if port is None or not self.alive:
             raise LinkError(f"{self._name}: {self.error or f'{self.settings.port} is not open'}")
         try:
-            self._serial.write(data)
+            port.write(data)
         except OSError as error:
             self.error = f"{self.settings.port} refused {len(data)} bytes ({error}): check cable and power"
             raise LinkError(f"{self._name}: {self.error}") from error
         if self._transcript is not None:
-            self._transcript.write(time.monotonic_ns(), ">", data)
+            self._transcript.write(self._now_ns(), ">", data)
+
+    def _now_ns(self) -> int:
+        return time.monotonic_ns() if self._wire is None else round(self._wire.now() * 1e9)
 
     def ask(self, request: bytes, match: Callable[[Record], bool], timeout: float) -> Record | None:
         """Send `request`, wait up to `timeout` s for the first record that matches. Others stay in the inbox.
@@ -116,6 +140,8 @@ class SerialPort(Generic[Record]):
     def close(self) -> None:
         """Stop the reader and let the port go. Safe to call twice and after a failure."""
         self._closing.set()
+        if self._wire is not None:
+            self._wire.disconnect()
         if self._reader is not None:
             self._reader.join(JOIN_TIMEOUT)
         if self._serial is not None:
@@ -124,6 +150,7 @@ class SerialPort(Generic[Record]):
         if self._transcript is not None:
             self._transcript.close()
         self._reader = self._serial = self._transcript = None
+        self._opened = False
 
     def _read(self, port: serial.Serial) -> None:
         end: str | None = f"the reader of {self.settings.port} stopped on an error of this program (see the log)"

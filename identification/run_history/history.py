@@ -105,6 +105,8 @@ class History:
     """s by which the time stamps of the thrust may be off."""
     delay_std: float = 0.0
     """s by which all of them may be, against the driver, as the recording itself says."""
+    window: float = 0.0
+    """s that each thrust sample is the mean over, around its time; 0: of an instant."""
     rate_spacing: float = 1.0
     excess: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     """(M,) or (1,): mean of driver |driver| over the interval less that of the mean driver."""

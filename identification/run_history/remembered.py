@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
-from identification.run_history.filters import delayed, lag, lag_ends, places_of
+from identification.run_history.filters import delayed, integral_at, lag, lag_ends, places_of
 from identification.run_history.history import History, Samples
 from identification.run_history.least_recently_used import LeastRecentlyUsed
 from identification.run_history.rate_gap import RateGap, rate_gap
@@ -49,8 +49,8 @@ class RememberedRun:
 
     @cached_property
     def step_responses(self) -> TickRows | None:
-        """What the ticks of the command tell within the intervals; None where they tell nothing."""
-        return tick_rows(self.history)
+        """What the ticks of the command tell within the intervals; None where they tell nothing, or are averaged."""
+        return None if self.history.window > 0 else tick_rows(self.history)
 
     @cached_property
     def rate_gap(self) -> RateGap | None:
@@ -85,6 +85,19 @@ class RememberedRun:
         """(M,) means over each interval of `value` (M,) `delay` s before."""
         edges = self.history.edges
         return delayed(value, edges, delay, self._delays(delay, lambda: places_of(edges, edges - delay)))
+
+    def averaged(self, value: Floats) -> Floats:
+        """(M,) means of `value` (M,) over the window round the samples of each interval."""
+        dt, window = self.history.dt, self.history.window
+        begin, end = self._window_places
+        out: Floats = (integral_at(value, dt, end) - integral_at(value, dt, begin)) / window
+        return out
+
+    @cached_property
+    def _window_places(self) -> tuple[tuple[NDArray[np.intp], Floats], tuple[NDArray[np.intp], Floats]]:
+        h = self.history
+        half = 0.5 * h.window
+        return places_of(h.edges, h.sampled - half), places_of(h.edges, h.sampled + half)
 
     def samples(self, channel: Channel) -> Samples:
         """Every sample of a channel that is in an interval."""

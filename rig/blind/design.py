@@ -27,6 +27,8 @@ LADDER: Final = {"power_2.3": ORACLE, "power_3.5": WITHIN * ORACLE, "power_5": 5
 """d' of the cells below faint, for that strength."""
 PAIR_STRENGTH: Final = 20.0
 PAIRS_PER_SEED = 10
+BENCH_STRENGTHS: Final = ("clear", "plain")
+BENCH_PAIRS_PER_SEED, BENCH_CLEAN_PER_SEED = 2, 3
 CLEAN_PER_SEED = 50
 """Clean runs of all kinds of noise together: 20 seeds are 1,000 runs."""
 WIDE_PER_SEED = 25
@@ -49,6 +51,12 @@ class Kinds:
     noise: tuple[str, ...]
     version: str = ""
     """Of the world that conceals."""
+    benches: tuple[str, ...] = ()
+    """On which it records in virtual time."""
+    recorded: tuple[str, ...] = ()
+    """Effects that a run on such a bench can show."""
+    recorded_version: str = ""
+    """Of the world with its benches."""
     wide_noise: tuple[str, ...] = ()
     """Noise of laws drawn wide, there when asked for only."""
 
@@ -117,13 +125,17 @@ def design(world: Kinds, catalogue: Collection[str], seeds: int, only: Sequence[
     the orders; `draw`: any other text draws other cases.
     """
     rows = chain(
-        _alone(world, catalogue, seeds), _open(world, catalogue, seeds), _others(world, catalogue, seeds, draw)
+        _alone(world, catalogue, seeds),
+        _open(world, catalogue, seeds),
+        _others(world, catalogue, seeds, draw),
+        _recorded(world, catalogue, seeds, draw),
     )
     found = []
     for place, job in rows:
         orders = tuple(order for order in job.orders if matches(order.id, only))
         if orders:
-            found.append((place, job.id, Job(job.id, job.spec, orders, draw, world.version)))
+            version = world.recorded_version if "bench" in job.spec else world.version
+            found.append((place, job.id, Job(job.id, job.spec, orders, draw, version)))
     return [job for _, _, job in sorted(found, key=lambda row: row[:2])]
 
 
@@ -185,3 +197,22 @@ def _others(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -> 
     for cell, kinds, per_seed in (("clean", world.noise, CLEAN_PER_SEED), ("wide", world.wide_noise, WIDE_PER_SEED)):
         for kind in kinds:
             yield from _many(cell, kind, -(-per_seed * seeds // len(kinds)), {"noise": kind})
+
+
+def _recorded(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -> Iterator[tuple[float, Job]]:
+    """Recorded through drivers and bytes, on each bench in turn: single effects, pairs, nothing."""
+    known = [effect for effect in world.recorded if effect in catalogue]
+    cells: list[tuple[str, int, dict[str, Any]]] = [("nothing", BENCH_CLEAN_PER_SEED * seeds, {})]
+    cells += [
+        (f"{name}:{effect}", seeds, {"effects": [effect], "strength": STRENGTHS[name]})
+        for name in BENCH_STRENGTHS
+        for effect in known
+    ]
+    cells += [("pair", BENCH_PAIRS_PER_SEED * seeds if len(known) > 1 else 0, {"strength": PAIR_STRENGTH})]
+    for index, (label, count, spec) in enumerate(cells if world.benches else ()):
+        for number, (place, job) in enumerate(_many("bench", label, count, spec)):
+            on: dict[str, Any] = {"bench": world.benches[(index + number) % len(world.benches)]}
+            if label == "pair":
+                seed = replace(job, draw=draw).seed
+                on["effects"] = np.random.default_rng(seed).choice(known, 2, replace=False).tolist()
+            yield place, Job(job.id, {**spec, **on}, job.orders)

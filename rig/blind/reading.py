@@ -1,4 +1,4 @@
-"""Recordings as the world writes them for the proof (npz: plain arrays), as identification takes them."""
+"""Recordings of a case as identification takes them: plain arrays of the world (npz), or files of the rig (HDF5)."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from pathlib import Path
 import numpy as np
 
 from identification.recording import Channel, Floats, Recording, Step
+from rig.hdf5.load import load
 
 
 def recordings(folder: Path) -> list[Recording]:
-    """Those of one case, in order: 0.npz, 1.npz ..."""
-    return [recording(path) for path in sorted(folder.glob("[0-9]*.npz"), key=lambda path: int(path.stem))]
+    """Those of one case, in order: 0.npz, 1.npz ..., or 0.h5 where it was recorded on a bench."""
+    found = sorted((*folder.glob("[0-9]*.npz"), *folder.glob("[0-9]*.h5")), key=lambda path: int(path.stem))
+    return [load(path) if path.suffix == ".h5" else recording(path) for path in found]
 
 
 def recording(path: Path) -> Recording:

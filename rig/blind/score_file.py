@@ -83,6 +83,7 @@ def _known(row: dict[str, Any]) -> Known:
     row["order"] = Order(row["order"]["id"], tuple(row["order"]["without"]))
     row["near"] = None if row["near"] is None else Near(**row["near"])
     row["held_out"] = None if row["held_out"] is None else HeldOut(**row["held_out"])
+    row["constant"] = Interval(**row["constant"]) if row.get("constant") else None
     row["intervals"] = tuple(Interval(**each) for each in row["intervals"])
     return Known(Score(**row), version, asked)
 

@@ -139,8 +139,18 @@ def concealable() -> Kinds:
         raise ProofError(f"the simulated world does not answer: {told.stderr.decode(errors='replace').strip()}")
     found = json.loads(told.stdout)
     forms, variants = ({e: tuple(names) for e, names in found[part].items()} for part in ("forms", "variants"))
-    lies, noise, wide = (tuple(found[part]) for part in ("lies", "noise", "wide_noise"))
-    return Kinds(tuple(found["effects"]), forms, variants, lies, noise, found["version"], wide)
+    return Kinds(
+        tuple(found["effects"]),
+        forms,
+        variants,
+        tuple(found["lies"]),
+        tuple(found["noise"]),
+        found["version"],
+        tuple(found["benches"]),
+        tuple(found["recorded_effects"]),
+        found["recorded_version"],
+        tuple(found["wide_noise"]),
+    )
 
 
 @dataclass

@@ -10,6 +10,7 @@ from drivers import KINDS
 from drivers.errors import DeviceError as DriverDeviceError
 from drivers.errors import LinkError as DriverLinkError
 from drivers.ports.can_bus import CanBus
+from drivers.ports.wire import Wire
 from drivers.protocols import Instrument, MotorController, Sample, Stream
 from rig.campaign.config import BenchConfig, CanBusConfig
 from rig.errors import ConfigError, DeviceError, LinkError
@@ -67,16 +68,23 @@ class Bench:
             bus.close()
 
 
-def build(config: BenchConfig) -> Bench:
-    """Construct the devices of a bench file; opens nothing. Raises ConfigError."""
-    buses = {name: _bus(name, bus, config) for name, bus in config.can.items()}
+def build(config: BenchConfig, wires: Mapping[str, Wire] | None = None) -> Bench:
+    """Construct the devices of a bench file; opens nothing. Raises ConfigError.
+
+    `wires`: instead of all the ports of the file, by the name of the device or of the bus.
+    """
+    buses = {name: _bus(name, bus, config, wires) for name, bus in config.can.items()}
     instruments: dict[str, Instrument] = {}
     for name, device in config.devices.items():
         kind = KINDS[device.kind]
         if kind.link == "can":
             instruments[name] = kind.build(name, device.options, buses[device.options.bus])
-        else:
+        elif wires is None:
             instruments[name] = kind.build(name, device.options)
+        elif kind.over_wire:
+            instruments[name] = kind.build(name, device.options, _wire(name, config, wires))
+        else:
+            raise ConfigError(f"{config.path}: devices.{name}: a {device.kind} opens its port itself: leave it out")
     return Bench(config, buses, instruments)
 
 
@@ -96,9 +104,16 @@ def _or(end: float | None, otherwise: float) -> float:
     return otherwise if end is None else end
 
 
-def _bus(name: str, bus: CanBusConfig, config: BenchConfig) -> CanBus:
+def _wire(name: str, config: BenchConfig, wires: Mapping[str, Wire]) -> Wire:
+    if name not in wires:
+        raise ConfigError(f"{config.path}: {name} has no wire on this bench; it has {', '.join(wires) or 'none'}")
+    return wires[name]
+
+
+def _bus(name: str, bus: CanBusConfig, config: BenchConfig, wires: Mapping[str, Wire] | None) -> CanBus:
+    wire = None if wires is None else _wire(name, config, wires)
     try:
-        return CanBus(bus.interface, bus.channel, bus.bitrate, bus.capture)
+        return CanBus(bus.interface, bus.channel, bus.bitrate, bus.capture, wire)
     except ValueError as error:
         raise ConfigError(f"{config.path}: can.{name}: {error}") from None
 

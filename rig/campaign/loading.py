@@ -24,6 +24,7 @@ from rig.campaign.limits import guarded_channels
 from rig.campaign.plan import Dwell, FixedDwell, Plan, SteadyDwell, TareConfig
 from rig.campaign.shapes import SHAPES, Shape
 from rig.errors import ConfigError
+from rig.names import require_name
 from rig.toml_tables import Table, construct, decode, joined, read_toml, refuse_unknown, table_at, typed, values
 
 T = TypeVar("T")
@@ -54,6 +55,7 @@ def load_bench(path: Path) -> BenchConfig:
         mount=decode(MountConfig, table_at(path, content, "mount", optional=True), path, "mount"),
         **scalars,
     )
+    _require_bench_names(bench)
     _require_numbers(bench)
     _require_devices(bench)
     return bench
@@ -72,6 +74,9 @@ def load_campaign(path: Path) -> CampaignConfig:
     campaign = CampaignConfig(path=path, text=text, bench=bench, plan=plan, tare=tare, watch=watch, **scalars)
     if not campaign.thrusters or len(set(campaign.thrusters)) != len(campaign.thrusters):
         raise ConfigError(f"{path}: campaign.thrusters must name at least one thruster, and none twice")
+    require_name(path, "campaign.name", campaign.name)
+    for thruster in campaign.thrusters:
+        require_name(path, "campaign.thrusters", thruster)
     _require_twins(campaign)
     if campaign.expected_C is not None:
         _require_above_zero(path, "campaign.expected_C", campaign.expected_C, "N/V^2")
@@ -175,6 +180,13 @@ def _resolved(port: str, path: Path) -> str:
 def _require_above_zero(path: Path, key: str, value: float, unit: str) -> None:
     if not 0 < value < math.inf:
         raise ConfigError(f"{path}: {key} must be above 0 {unit}, but is {value:g}")
+
+
+def _require_bench_names(bench: BenchConfig) -> None:
+    require_name(bench.path, "bench.name", bench.name)
+    for table, names in (("devices", bench.devices), ("can", bench.can)):
+        for name in names:
+            require_name(bench.path, f"the name of a table of [{table}]", name)
 
 
 def _require_numbers(bench: BenchConfig) -> None:

@@ -7,17 +7,18 @@ the sequencer.
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from math import inf, nan
-from typing import Protocol
 
 from drivers.errors import LinkError
 from drivers.protocols import MotorController, Sample
 from rig.campaign.bench import COMMAND_STREAM, Bench
 from rig.campaign.limits import guarded_channels
+from rig.control.clocks import Clock
+from rig.control.motor_watch import MotorWatch
+from rig.control.paces import Paces
 from rig.control.readings import Readings
 from rig.link.clients import Clients
 from rig.link.front_end_messages import Request
@@ -26,31 +27,14 @@ from rig.recording.recorder_link import RecorderLink
 from rig.safety import guard
 from rig.safety.guard import Recorder, Trip, Vitals
 from rig.safety.lateness import Lateness
-from rig.safety.pace import Pace
+from rig.safety.lost_time import STILL, HostClocks, LostTime
+from rig.safety.thrust_rest import ThrustRest
 from rig.watch.watch_link import WatchLink
 
 PUBLISH_PERIOD = 0.1
 """s between snapshots to the front ends."""
 TRACE_PERIOD = 0.05
 """s between rows of the live trace."""
-
-
-class Clock(Protocol):
-    """The machine's monotonic clock, or a test's."""
-
-    def now_ns(self) -> int: ...
-
-    def sleep_until_ns(self, t_ns: int) -> None: ...
-
-
-class MonotonicClock:
-    """CLOCK_MONOTONIC, the clock of every sample."""
-
-    def now_ns(self) -> int:
-        return time.monotonic_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        time.sleep(max(t_ns - time.monotonic_ns(), 0) * 1e-9)
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +47,8 @@ class Inputs:
     trip: Trip | None
     rotation: float | None
     """rev/s, newest and fresh; None otherwise."""
+    thrust_rest: bool | None = None
+    """Whether the force sensor says that nothing pushes; None: it is no witness."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,6 +76,10 @@ class Loop:
     publish: Callable[[float], None]
     watcher: WatchLink | None = None
     """Sees what is recorded; None: nobody watches."""
+    host: Callable[[], HostClocks] = lambda: STILL
+    """The machine's other clocks. In virtual time it neither sleeps nor is set."""
+    notice: Callable[[str], None] | None = None
+    """Hears what an analyst should know of the machine."""
     signals: deque[Request] = field(default_factory=deque)
     """Requests that came by another way than a front end; a signal handler may append at any instant."""
     guarded: bool = False
@@ -102,41 +92,42 @@ class Loop:
     """s, of the running tick."""
     late: Lateness = field(default_factory=Lateness)
     """Of all ticks since the recording began."""
+    thrust_rest: ThrustRest = field(default_factory=ThrustRest)
+    """Of the thruster that is on the bench."""
     driven_since: float | None = None
     """s, when the command last left 0 V; None: it is 0 V."""
     has_driven: bool = False
     _command_error: str = ""
+    _lapse: str = ""
+    """Why a set-point was not sent."""
     _recorded_command: tuple[float | None] | None = None
     """Last row of the command stream; (None,) while nothing is sent, which is recorded as NaN."""
     _due_ns: int = 0
     _published: float = -inf
     _traced: float = -inf
-    _paces: tuple[tuple[str, Pace], ...] = ()
-    _counted: dict[str, int] = field(default_factory=dict)
+    _paces: Paces | None = None
+    _sent: float | None = None
+    """V of the last tick; None: nothing was sent."""
 
     def __post_init__(self) -> None:
         config = self.bench.config
         self.period_ns = round(1e9 / config.loop_rate)
         force = self.bench.instruments[config.force].streams[0].name
         self.thrust_channel = f"{force}.thrust"
-        self.rotation_channel = rotation_channel(self.bench)
+        self.motor_watch = MotorWatch(self.bench)
+        self.rotation_channel = self.motor_watch.channel
         essential = [self.thrust_channel] + ([self.rotation_channel] if self.rotation_channel else [])
         streams = self.readings.streams.values()
         self.guarded_channels = guarded_channels(config.limits, streams, essential, self.thrust_channel)
-        self.allowed = guard.allowances(config.loop_rate)
+        self.allowed = guard.allowances(config.loop_rate, self.bench.motor.watchdog.timeout_s)
+        self._lost = LostTime(self.allowed.lateness + 1.0 / config.loop_rate)
         self.readings.watch_sameness(c.channel for c in self.guarded_channels if c.max_frozen is not None)
 
     def begin_guarding(self) -> None:
         """From now on the guard judges every tick."""
         now = self.now
         self.guarded, self.guarded_since = True, now
-        judged = {self.readings.place[one.channel][0] for one in self.guarded_channels}
-        self._paces = tuple(
-            (stream.name, Pace(stream.name, device, stream.period_s, now))
-            for device, stream in self.bench.streams()
-            if stream.name in judged
-        )
-        self._counted = dict(self.readings.rows)
+        self._paces = Paces(self.bench, self.readings, self.guarded_channels, now)
 
     @property
     def now(self) -> float:
@@ -151,11 +142,14 @@ class Loop:
         self.readings.update(samples)
         self.recorder.poll(now)
         requests = self._requests(now)
+        self._watch_motor(tuple(samples), now)
         trip = self._judge(now) if self.guarded else None
-        decision = decide(Inputs(now, tuple(samples), requests, trip, self.rotation(now)))
-        if motor is not None:
-            self._send(motor, decision, now)
-        self._record(samples, decision, now_ns)
+        self.thrust_rest.add(self.thrust_rows(tuple(samples), 0))
+        rotation, thrust_rest = self.rotation(now), self.thrust_rest.judge(now)
+        decision = decide(Inputs(now, tuple(samples), requests, trip, rotation, thrust_rest))
+        sent = self._send(motor, decision, now) if motor is not None else decision.volts
+        self._sent = sent
+        self._record(samples, sent, now_ns)
         self._show(now)
         self.clock.sleep_until_ns(self._due_ns)
 
@@ -164,8 +158,10 @@ class Loop:
         self._send(motor, Decision(0.0, release=True), self.now)
 
     def rotation(self, now: float) -> float | None:
-        """Newest rotation rate in rev/s, None when it is not measured, NaN or old."""
-        return None if self.rotation_channel is None else self.readings.fresh(self.rotation_channel, now)
+        """Newest rotation rate in rev/s, None when it is not measured, NaN, old or found frozen."""
+        if self.rotation_channel is None or not self.motor_watch.believed:
+            return None
+        return self.readings.fresh(self.rotation_channel, now)
 
     def thrust_rows(self, samples: tuple[Sample, ...], since_ns: int) -> tuple[tuple[float, float], ...]:
         """(s since `since_ns`, N) of the force device's rows, oldest first."""
@@ -178,6 +174,7 @@ class Loop:
 
     def begin_recording(self, t0_ns: int) -> None:
         self.recording_since_ns, self._recorded_command = t0_ns, None
+        self.motor_watch.begin_run()
         self.late.clear()
 
     def end_recording(self) -> None:
@@ -196,48 +193,68 @@ class Loop:
         self.lateness = max(behind, 0) * 1e-9
         self.late.add(self.lateness)
         self._due_ns = (self._due_ns if 0 <= behind < self.period_ns else now_ns) + self.period_ns
+        self._lost.look(self.host())
+        if self._lost.utc_step and self.notice is not None:
+            self.notice(f"the clock of this machine was set by {self._lost.utc_step:+.3f} s; no time here is by it")
         return now_ns
+
+    def _watch_motor(self, samples: tuple[Sample, ...], now: float) -> None:
+        in_run = self.recording_since_ns is not None
+        self.motor_watch.advance(samples, self._sent, self.rotation(now), now, in_run=in_run)
 
     def _judge(self, now: float) -> Trip | None:
         if self._command_error:
             return Trip(
                 f"the motor did not take a command: {self._command_error}", "link", now, self.bench.config.motor
             )
+        if self._lapse:
+            return Trip(self._lapse, "late", now)
         if not self.unattended and self.clients.last_lease is not None and not self.clients.connected:
             return Trip("the operator is gone: the last front end has closed its connection", "lease", now)
         newest = {one.channel: self.readings.newest(one.channel) for one in self.guarded_channels}
         vitals = self._vitals(now)
         trip = guard.check(self.guarded_channels, newest, vitals, self.allowed)
-        return trip or self._pace(vitals)
-
-    def _pace(self, vitals: Vitals) -> Trip | None:
-        trips = []
-        for stream, pace in self._paces:
-            rows = self.readings.rows.get(stream, 0)
-            trips.append(pace.advance(rows - self._counted.get(stream, 0), vitals))
-            self._counted[stream] = rows
-        return next((trip for trip in trips if trip), None)
+        return trip or self.motor_watch.trip or (self._paces.advance(vitals) if self._paces else None)
 
     def _vitals(self, now: float) -> Vitals:
         links = {name: instrument.health() for name, instrument in self.bench.instruments.items()}
         lease = None if self.unattended else self.clients.lease_age(now)
         driven = 0.0 if self.driven_since is None else now - self.driven_since
         recorder = Recorder(self.recorder.failed, self.recorder.silence(now), self.recorder.free_bytes)
-        return Vitals(now, self.guarded_since, self.lateness, links, recorder, self.ledger.error, lease, driven)
+        error, slept = self.ledger.error, self._lost.slept
+        return Vitals(now, self.guarded_since, self.lateness, links, recorder, error, lease, driven, slept)
 
-    def _send(self, motor: MotorController, decision: Decision, now: float) -> None:
-        """The second way to stop is tried also when the first is refused."""
-        if decision.volts is not None:
-            self._note_command(decision.volts, now)
-            try:
-                motor.command(decision.volts)
-            except LinkError as error:
-                self._command_error = str(error)
+    def _send(self, motor: MotorController, decision: Decision, now: float) -> float | None:
+        """What was sent, in V. The second way to stop is tried also when the first is refused.
+
+        A set-point is judged once more at the last instant, and again after it: one that left old is followed by 0 V.
+        """
+        volts = 0.0 if decision.volts and self._lapsed() else decision.volts
+        self._lost.told(self.clock.now_ns(), self.host())
+        self._command(motor, volts, now)
+        if volts and self._lapsed():
+            volts = 0.0
+            self._command(motor, volts, now)
         if decision.release:
             try:
                 motor.release()
             except LinkError as error:
                 self._command_error = str(error)
+
+        return volts
+
+    def _lapsed(self) -> bool:
+        self._lapse = self._lapse or self._lost.lapse(self.clock.now_ns(), self.host())
+        return bool(self._lapse)
+
+    def _command(self, motor: MotorController, volts: float | None, now: float) -> None:
+        if volts is None:
+            return
+        self._note_command(volts, now)
+        try:
+            motor.command(volts)
+        except LinkError as error:
+            self._command_error = str(error)
 
     def _note_command(self, volts: float, now: float) -> None:
         self.command = volts
@@ -247,14 +264,14 @@ class Loop:
         elif self.driven_since is None:
             self.driven_since = now
 
-    def _record(self, samples: list[Sample], decision: Decision, now_ns: int) -> None:
+    def _record(self, samples: list[Sample], volts: float | None, now_ns: int) -> None:
         since = self.recording_since_ns
         if since is None:
             return
         rows = [sample for sample in samples if sample.t_ns >= since]
-        if self._recorded_command != (decision.volts,):
-            self._recorded_command = (decision.volts,)
-            rows.append(Sample(COMMAND_STREAM, now_ns, (nan if decision.volts is None else decision.volts,)))
+        if self._recorded_command != (volts,):
+            self._recorded_command = (volts,)
+            rows.append(Sample(COMMAND_STREAM, now_ns, (nan if volts is None else volts,)))
         self.recorder.rows(rows)
         if self.watcher is not None:
             self.watcher.rows(rows, now_ns * 1e-9)
@@ -268,14 +285,3 @@ class Loop:
         if now - self._published >= PUBLISH_PERIOD - self.period_ns * 0.5e-9:
             self._published = now
             self.publish(now)
-
-
-def rotation_channel(bench: Bench) -> str | None:
-    """The motor's own rotation rate if it has one, else the first on the bench."""
-    names = [
-        (device != bench.config.motor, f"{stream.name}.{channel.name}")
-        for device, stream in bench.streams()
-        for channel in stream.channels
-        if channel.quantity == "rotation_rate"
-    ]
-    return min(names)[1] if names else None

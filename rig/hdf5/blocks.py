@@ -11,7 +11,8 @@ import numpy as np
 
 from identification.recording import Channel, Floats
 from rig.errors import RecordingError
-from rig.hdf5.load import numeric_columns, open_for_reading
+from rig.hdf5.load import open_for_reading
+from rig.hdf5.members import numeric_columns
 
 BLOCK = 65_536
 """Rows read at a time: 0.5 MB per column, and one h5py call costs little beside it."""

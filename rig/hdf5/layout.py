@@ -13,6 +13,9 @@ LIBVER: Final = ("v110", "v110")
 """Oldest file version with SWMR; HDF5 1.10 and later read it."""
 CHUNK_ROWS: Final = 1024
 """Rows per chunk: 8 KiB, so that a flush four times a second rewrites little of a slow stream."""
+PAGE_BYTES: Final = 4096
+"""No piece of the file's own structure that is shorter crosses such a boundary. A kill can stop the kernel within a
+write, but only between two pages of memory: so it leaves the piece whole, old or new (measured by replaying writes)."""
 OUTCOME_BYTES: Final = 16
 CAUSE_BYTES: Final = 512
 EVENT_BYTES: Final = 512

@@ -15,6 +15,8 @@ from numpy.typing import NDArray
 from identification.recording import QUANTITY_UNITS, Acquisition, Channel, Event, Recording, Step
 from rig.errors import RecordingError
 from rig.hdf5.layout import FORMAT, FORMAT_VERSION, text_of
+from rig.hdf5.members import DAMAGE, attributes, members, numeric_columns
+from rig.hdf5.unclosed import open_unclosed
 
 UNIT_SPELLINGS: Final = {"Nm": "N.m", "N m": "N.m", "N·m": "N.m", "°C": "degC", "m/s2": "m/s^2", "m/s²": "m/s^2"}
 """Spellings of the format's units that other programs use."""
@@ -37,8 +39,11 @@ def load(path: str | Path, rows: int | None = None) -> Recording:
     """
     path = Path(path)
     file, opened_as = open_for_reading(path)
-    with file:
-        return _recording(file, path, opened_as, rows)
+    try:
+        with file:
+            return _recording(file, path, opened_as, rows)
+    except DAMAGE as error:
+        raise RecordingError(f"{path} is damaged: {error}") from error
 
 
 def recording_id_of(path: Path) -> str:
@@ -61,16 +66,16 @@ def open_for_reading(path: Path) -> tuple[h5py.File, str]:
         raise RecordingError(f"{path} is not an HDF5 file; `rig import` makes recordings of tables and logs")
     try:
         file, opened_as = h5py.File(path, "r"), "plain"
-    except OSError:
-        try:
-            file, opened_as = h5py.File(path, "r", swmr=True), "swmr"
-        except OSError as error:
-            raise RecordingError(f"{path} can't be opened, neither plain nor in SWMR mode: {error}") from error
+    except OSError as error:
+        file, opened_as = open_unclosed(path, error), "swmr"
     try:
         _check_format(file, path)
     except RecordingError:
         file.close()
         raise
+    except DAMAGE as error:
+        file.close()
+        raise RecordingError(f"{path} is damaged: {error}") from error
     return file, opened_as
 
 
@@ -92,17 +97,17 @@ def _recording(file: h5py.File, path: Path, opened_as: str, rows: int | None) ->
     findings = Findings()
     if opened_as == "swmr":
         findings.texts.append(
-            "not closed in order (or still being written): opened in SWMR mode; `rig recover` copies it"
+            "not closed in order, or still being written: opened as it stands; `rig recover` copies it"
         )
-    streams = {name: group for name, group in file["streams"].items() if isinstance(group, h5py.Group)}
+    streams = {name: group for name, group in members(file["streams"]) if isinstance(group, h5py.Group)}
     channels = tuple(channel for name, group in streams.items() for channel in _channels(name, group, rows, findings))
     if not channels:
         raise RecordingError(f"{path} says it is a recording, but no stream in it has a time and a channel")
     steps = _steps(file, findings)
     events = _events(file, findings)
+    root = {name: _plain(value) for name, value in attributes(file, findings.texts).items()}
     latest = max((float(channel.time[-1]) for channel in channels if channel.time.size), default=0.0)
     warnings = [Event(latest, "warning", text) for text in findings.texts]
-    root = {name: _plain(value) for name, value in file.attrs.items()}
     return Recording(
         recording_id=str(root.get("recording_id", "")),
         thruster=str(root.get("thruster", "")),
@@ -114,17 +119,17 @@ def _recording(file: h5py.File, path: Path, opened_as: str, rows: int | None) ->
         water_density=_number(root.get("water_density")),
         source=path.name,
         attributes=_rest(root) | {"opened_as": opened_as, "streams": {n: _facts(g) for n, g in streams.items()}},
-        **_end(file),
+        **_end(file, root),
     )
 
 
-def _end(file: h5py.File) -> dict[str, Any]:
+def _end(file: h5py.File, root: Mapping[str, object]) -> dict[str, Any]:
     """`complete`, `outcome` and `cause`: /end is believed before the root attributes."""
     end = file.get("end")
     end = end if isinstance(end, h5py.Group) else {}
 
     def fact(name: str, absent: object) -> Any:
-        return end[name][()] if name in end else file.attrs.get(name, absent)
+        return end[name][()] if name in end else root.get(name, absent)
 
     return {
         "complete": bool(_number(fact("complete", False))),
@@ -141,12 +146,6 @@ def _facts(group: h5py.Group) -> dict[str, str]:
     return {name: text_of(group.attrs.get(name, "")) for name in ("source", "device_id", "note")}
 
 
-def numeric_columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
-    """Datasets of a stream that are one-dimensional and numeric, `time` among them."""
-    columns = {name: item for name, item in group.items() if isinstance(item, h5py.Dataset)}
-    return {name: item for name, item in columns.items() if item.ndim == 1 and item.dtype.kind in "iufb"}
-
-
 def _channels(stream: str, group: h5py.Group, rows: int | None, findings: Findings) -> list[Channel]:
     columns = numeric_columns(group)
     if "time" not in columns:
@@ -154,20 +153,32 @@ def _channels(stream: str, group: h5py.Group, rows: int | None, findings: Findin
         return []
     ignored = sorted(set(group) - set(columns))
     if ignored:
-        findings.texts.append(f"stream {stream}: {', '.join(ignored)} left out: not one-dimensional numbers")
+        findings.texts.append(
+            f"stream {stream}: {', '.join(ignored)} left out: no one-dimensional numbers that can be read"
+        )
     lengths = {name: len(item) for name, item in columns.items()}
     n = min(lengths.values())
     if max(lengths.values()) > n:
         longest = max(lengths.values())
         findings.texts.append(f"stream {stream}: cut to its shortest dataset, {n} rows; {longest - n} were unfinished")
     n = n if rows is None else min(n, rows)
-    time = columns.pop("time")[:n].astype(np.float64)
+    try:
+        time = columns.pop("time")[:n].astype(np.float64)
+    except DAMAGE as error:
+        findings.texts.append(f"stream {stream}: left out, for its times can't be read: {error}")
+        return []
     good = _rising(time)
     if not good.all():
         findings.texts.append(
             f"stream {stream}: {np.count_nonzero(~good)} rows left out: time not finite or running back"
         )
-    return [_channel(stream, item, time, good, findings) for item in columns.values()]
+    found = []
+    for name, item in columns.items():
+        try:
+            found.append(_channel(stream, item, time, good, findings))
+        except DAMAGE as error:
+            findings.texts.append(f"{stream}/{name}: left out, for it can't be read: {error}")
+    return found
 
 
 def _rising(time: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -210,7 +221,8 @@ def _acquisition(channel: Mapping[str, Any], stream: Mapping[str, Any]) -> Acqui
     said["period"] = said["period"] or None  # a clock that does not tick is none
     said["quantum"] = said["quantum"] or _number(channel.get("resolution"))  # as it was called at first
     known = {key: value for key, value in said.items() if value is not None and np.isfinite(value) and value >= 0}
-    return Acquisition(**known, filter=text_of(channel.get("filter", "")))
+    how, rounding = (text_of(channel.get(key, "")) for key in ("filter", "rounding"))
+    return Acquisition(**known, filter=how, rounding=rounding)
 
 
 def _quantity(channel: str, facts: Mapping[str, Any], findings: Findings) -> tuple[str | None, str]:
@@ -250,13 +262,19 @@ def _events(file: h5py.File, findings: Findings) -> tuple[Event, ...]:
 
 
 def _table(file: h5py.File, name: str, fields: tuple[str, ...], findings: Findings) -> list[tuple[Any, ...]]:
-    item = file.get(name)
+    item = dict(members(file)).get(name)
     if item is None:
+        if name in file:
+            findings.texts.append(f"/{name} can't be read: left out")
         return []
     if not isinstance(item, h5py.Dataset) or not set(fields) <= set(item.dtype.names or ()):
         findings.texts.append(f"/{name} is not a table with the fields {', '.join(fields)}: left out")
         return []
-    rows = np.atleast_1d(item[()])
+    try:
+        rows = np.atleast_1d(item[()])
+    except DAMAGE as error:
+        findings.texts.append(f"/{name} can't be read: left out: {error}")
+        return []
     return list(zip(*(rows[field].tolist() for field in fields), strict=True))
 
 

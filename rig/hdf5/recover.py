@@ -8,10 +8,12 @@ from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from rig.errors import RecordingError
-from rig.hdf5.layout import CAUSE_BYTES, FLUSH_PERIOD, OUTCOME_BYTES, fixed, text_of
-from rig.hdf5.load import numeric_columns, open_for_reading
+from rig.hdf5.layout import CAUSE_BYTES, EVENT_TYPE, FLUSH_PERIOD, OUTCOME_BYTES, fixed, text_of
+from rig.hdf5.load import open_for_reading
+from rig.hdf5.members import DAMAGE, attributes, members, numeric_columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,31 +42,47 @@ def recover(path: str | Path, out: str | Path) -> tuple[Loss, ...]:
         if opened_as == "plain":
             raise RecordingError(f"{path} opens as it is; there is nothing to recover")
         part = out.with_name(out.name + ".part")
-        with h5py.File(part, "w") as target:
-            losses = _copy(source, target)
-            _mark(source, target, path, losses)
+        lost: list[str] = []
+        try:
+            with h5py.File(part, "w") as target:
+                losses = _copy(source, target, lost)
+                _mark(source, target, path, [*lost, *(sentence(loss) for loss in losses)])
+        except DAMAGE as error:
+            part.unlink(missing_ok=True)
+            raise RecordingError(f"{path} is damaged beyond recovery: {error}") from error
         part.rename(out)
     return losses
 
 
-def _copy(source: h5py.File, target: h5py.File) -> tuple[Loss, ...]:
-    _copy_attributes(source, target)
-    for name in source:
-        if name not in ("streams", "events"):
-            source.copy(source[name], target, name=name)
+def _copy(source: h5py.File, target: h5py.File, lost: list[str]) -> tuple[Loss, ...]:
+    """What can't be read is named in `lost`."""
+    _copy_attributes(source, target, lost)
+    for name, item in members(source):
+        if name in ("streams", "events"):
+            continue
+        try:
+            source.copy(item, target, name=name)
+        except DAMAGE as error:
+            lost.append(f"/{name} can't be read: {error}")
     streams = target.create_group("streams", track_order=True)
-    _copy_attributes(source["streams"], streams)
-    return tuple(_copy_stream(name, item, streams) for name, item in source["streams"].items() if len(item))
+    _copy_attributes(source["streams"], streams, lost)
+    return tuple(_copy_stream(name, item, streams, lost) for name, item in members(source["streams"]) if len(item))
 
 
-def _copy_stream(name: str, source: h5py.Group, streams: h5py.Group) -> Loss:
+def _copy_stream(name: str, source: h5py.Group, streams: h5py.Group, lost: list[str]) -> Loss:
     target = streams.create_group(name, track_order=True)
-    _copy_attributes(source, target)
+    _copy_attributes(source, target, lost)
     columns = numeric_columns(source)
-    lengths = [len(item) for item in columns.values()]
+    lost += [f"{name}/{column} can't be read" for column in source if column not in columns]
+    lengths = [len(item) for item in columns.values()] or [0]
     n = min(lengths)
     for column, item in columns.items():
-        _copy_attributes(item, target.create_dataset(column, data=item[:n]))
+        try:
+            values = item[:n]
+        except DAMAGE as error:
+            lost.append(f"{name}/{column} can't be read: {error}")
+            continue
+        _copy_attributes(item, target.create_dataset(column, data=values), lost)
     return Loss(name, n, max(lengths) - n, _unflushed(columns, n))
 
 
@@ -75,27 +93,35 @@ def _unflushed(columns: dict[str, h5py.Dataset], n: int) -> int:
     return int(np.ceil(2 * FLUSH_PERIOD * (n - 1) / (last - first))) if last > first else 0
 
 
-def _copy_attributes(source: Any, target: Any) -> None:
-    for name in source.attrs:
-        h5py_type = source.attrs.get_id(name).dtype
-        target.attrs.create(name, source.attrs[name], dtype=h5py_type)
+def _copy_attributes(source: Any, target: Any, lost: list[str]) -> None:
+    for name, value in attributes(source, lost).items():
+        target.attrs.create(name, value, dtype=source.attrs.get_id(name).dtype)
 
 
-def _mark(source: h5py.File, target: h5py.File, path: Path, losses: tuple[Loss, ...]) -> None:
+def _mark(source: h5py.File, target: h5py.File, path: Path, lost: list[str]) -> None:
     cause = f"recovered from {path.name}, which was not closed in order"
     if "end" in target and text_of(target["end/outcome"][()]) == "running":
         target["end/outcome"][...] = fixed("aborted", OUTCOME_BYTES)
         target["end/cause"][...] = fixed(cause, CAUSE_BYTES)
         target.attrs["outcome"] = fixed("aborted", OUTCOME_BYTES)
-    sentences = [cause, *(sentence(loss) for loss in losses)]
+    sentences = [cause, *lost]
     if "events" in source:
-        old = source["events"][()]
+        old = _old_events(source["events"], sentences)
         new = np.zeros(len(sentences), dtype=old.dtype)
         new["time"] = _latest(target)
         new["level"] = b"warning"
         new["text"] = [text.encode() for text in sentences]
         table = target.create_dataset("events", data=np.concatenate([old, new]))
-        _copy_attributes(source["events"], table)
+        _copy_attributes(source["events"], table, [])
+
+
+def _old_events(table: h5py.Dataset, sentences: list[str]) -> NDArray[Any]:
+    try:
+        rows: NDArray[Any] = table[()]
+    except DAMAGE as error:
+        sentences.append(f"/events can't be read: {error}")
+        return np.zeros(0, EVENT_TYPE)
+    return rows
 
 
 def _latest(file: h5py.File) -> float:

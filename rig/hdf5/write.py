@@ -23,6 +23,7 @@ from rig.hdf5.layout import (
     LIBVER,
     MISSING,
     OUTCOME_BYTES,
+    PAGE_BYTES,
     STEP_TYPE,
     fixed,
     pieces,
@@ -114,12 +115,13 @@ class RecordingFile:
         """Create the file with its whole layout. Raises RecordingError when it exists or can't be laid out."""
         _check_names(attributes, streams)
         try:
-            self._file = h5py.File(path, "x", libver=LIBVER)
+            self._file = h5py.File(path, "x", libver=LIBVER, fs_strategy="page", fs_page_size=PAGE_BYTES)
         except OSError as error:
             raise RecordingError(f"{path}: cannot create the recording: {error}") from error
         self.path = path
         _attributes(self._file, {"format": FORMAT, "format_version": FORMAT_VERSION, "complete": False})
-        _attributes(self._file, {"outcome": "running", **attributes})
+        self._file.attrs.create("outcome", fixed("running", OUTCOME_BYTES))
+        _attributes(self._file, attributes)
         groups = self._file.create_group("streams", track_order=True)
         self.streams = [StreamWriter(groups.create_group(spec.name, track_order=True), spec, t0_ns) for spec in streams]
         self._steps = Column(_table(self._file, "steps", STEP_TYPE, 64))
@@ -171,7 +173,7 @@ class RecordingFile:
         end["cause"][0] = fixed(cause, CAUSE_BYTES)
         end["outcome"][0] = fixed(outcome, OUTCOME_BYTES)
         end["complete"][0] = True
-        h5py.h5a.open(self._file.id, b"outcome").write(np.array(outcome, dtype=h5py.string_dtype()))
+        h5py.h5a.open(self._file.id, b"outcome").write(fixed(outcome, OUTCOME_BYTES))
         h5py.h5a.open(self._file.id, b"complete").write(np.array(True))
         self.flush()
         self._file.close()
@@ -202,7 +204,7 @@ def _check_calibration(channel: str, calibration: str) -> None:
 
 def _attributes(target: h5py.Group | h5py.Dataset, attributes: Mapping[str, Attribute | None]) -> None:
     """Those that say something. Text is variable-length, which h5py and MATLAB read as text; it is on the disk before
-    the first row and, but for `outcome` at the very end, never touched again: a kill can't hurt it as it can tables.
+    the first row and never touched again: a kill can't hurt it as it can tables.
     """
     for name, value in attributes.items():
         if value is not None and value != "":
@@ -218,7 +220,7 @@ def _channel(group: h5py.Group, spec: ChannelSpec) -> h5py.Dataset:
     facts: dict[str, Attribute | None] = {
         name: getattr(spec, name) for name in ("quantity", "unit", "noise_std", "range_min", "range_max")
     }
-    facts |= {name: getattr(spec, name) for name in ("quantum", "delay", "delay_std", "window", "filter")}
+    facts |= {name: getattr(spec, name) for name in ("quantum", "rounding", "delay", "delay_std", "window", "filter")}
     facts |= {name: getattr(spec, name) for name in ("calibration", "thruster", "axis", "description")}
     if spec.integer:
         facts["missing_value"] = MISSING

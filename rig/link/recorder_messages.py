@@ -29,6 +29,7 @@ class ChannelSpec:
     """True: int64 raw counts. A row without a count is written as `missing_value`, an attribute of the dataset."""
     noise_std: float | None = None
     quantum: float | None = None
+    rounding: str = ""
     delay: float | None = None
     """s, as `delay_std` and `window`."""
     delay_std: float | None = None

@@ -16,6 +16,7 @@ import signal
 import socket
 import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from rig.errors import RecordingError, RigError
@@ -32,8 +33,10 @@ FAREWELL = 2.0
 class Recorder:
     """One link, several files one after another."""
 
-    def __init__(self, peer: Peer) -> None:
+    def __init__(self, peer: Peer, now_ns: Callable[[], int] = time.monotonic_ns) -> None:
+        """`now_ns`: the clock of what comes over the link."""
         self._peer = peer
+        self._now_ns = now_ns
         self._file: RecordingFile | None = None
         self._t0_ns = 0
         self._due = 0.0
@@ -50,15 +53,22 @@ class Recorder:
     def _serve(self) -> None:
         while not self._peer.closed:
             self._wait()
-            for message in self._peer.receive():
-                self._take(message)
-            if self._file is not None and time.monotonic() >= self._due:
-                self._flush(self._file)
-        if self._file is not None:
+            self.turn()
+
+    def turn(self) -> None:
+        """Take what has come, write it when that is due; an end of the link closes the file. Never waits."""
+        for message in self._peer.receive():
+            self._take(message)
+        if self._file is not None and self._now() >= self._due:
+            self._flush(self._file)
+        if self._peer.closed and self._file is not None:
             self._abandon(self._file)
 
+    def _now(self) -> float:
+        return self._now_ns() * 1e-9
+
     def _wait(self) -> None:
-        timeout = max(self._due - time.monotonic(), 0.0) if self._file else None
+        timeout = max(self._due - self._now(), 0.0) if self._file else None
         writing = [self._peer] if self._peer.waiting else []
         select.select([self._peer], writing, [], timeout)
         self._peer.flush()
@@ -94,12 +104,12 @@ class Recorder:
             self._peer.send(Failed(str(error)))
             return
         self._t0_ns = request.t0_ns
-        self._due = time.monotonic() + FLUSH_PERIOD
+        self._due = self._now() + FLUSH_PERIOD
         self._peer.send(Ready(request.path))
 
     def _flush(self, file: RecordingFile) -> None:
         rows = file.flush()
-        self._due = time.monotonic() + FLUSH_PERIOD
+        self._due = self._now() + FLUSH_PERIOD
         self._peer.send(Ack(rows, self._seconds(), shutil.disk_usage(file.path.parent).free))
 
     def _close(self, file: RecordingFile, outcome: str, cause: str) -> None:
@@ -116,7 +126,7 @@ class Recorder:
         self._file = None
 
     def _seconds(self) -> float:
-        return (time.monotonic_ns() - self._t0_ns) * 1e-9
+        return (self._now_ns() - self._t0_ns) * 1e-9
 
 
 def _check_space(folder: Path, expected_bytes: int) -> None:

@@ -16,6 +16,7 @@ from drivers.protocols import Sample
 from rig.errors import LinkError
 from rig.link.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Outcome, Ready, Rows, StepRow
 from rig.link.sockets import Overrun, Peer, pair
+from rig.names import file_inside
 
 SHUT_DOWN_TIMEOUT = 10.0
 """s for the recorder to close its file after the motor has been stopped."""
@@ -132,10 +133,13 @@ def _rows(stream: int, samples: Sequence[Sample]) -> Rows:
 
 
 def recording_path(folder: Path, thruster: str) -> Path:
-    """`<folder>/<thruster>.h5`, or `<thruster>-2.h5` ... when it is there: a recording is never overwritten."""
-    path = folder / f"{thruster}.h5"
+    """`<folder>/<thruster>.h5`, or `<thruster>-2.h5` ... when it is there: a recording is never overwritten.
+
+    Raises RecordingError for a thruster whose name would lead out of the folder.
+    """
+    path = file_inside(folder, thruster, ".h5")
     number = 1
     while path.exists():
         number += 1
-        path = folder / f"{thruster}-{number}.h5"
+        path = file_inside(folder, thruster, f"-{number}.h5")
     return path

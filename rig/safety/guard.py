@@ -15,7 +15,19 @@ from drivers.protocols import LinkHealth
 from rig.campaign.limits import GuardedChannel
 
 Source = Literal[
-    "limit", "emergency_stop", "nan", "stale", "frozen", "rate", "corrupt", "late", "link", "recorder", "lease"
+    "limit",
+    "emergency_stop",
+    "nan",
+    "stale",
+    "frozen",
+    "rate",
+    "corrupt",
+    "late",
+    "slept",
+    "link",
+    "following",
+    "recorder",
+    "lease",
 ]
 
 MIN_LATENESS = 0.25
@@ -84,6 +96,8 @@ class Vitals:
     """s since an operator said `I am here`; None: unattended, no lease asked for."""
     driven: float = 0.0
     """s for which the command has been other than 0 V without a break; a sensor may stand still at rest."""
+    slept: float = 0.0
+    """s that the machine slept since the last tick."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,9 +114,13 @@ class Allowances:
     """Four leases missed at two a second."""
 
 
-def allowances(loop_rate: float) -> Allowances:
-    """Allowances for a loop of `loop_rate` Hz: 5 periods of lateness, 0.25 s at least."""
-    return Allowances(lateness=max(5 / loop_rate, MIN_LATENESS))
+def allowances(loop_rate: float, motor_timeout: float | None = None) -> Allowances:
+    """Allowances for a loop of `loop_rate` Hz: 5 periods of lateness, 0.25 s at least, and never so much that the
+    motor's own timeout (s) has let go meanwhile: it would be driven again without having been armed."""
+    late = max(5 / loop_rate, MIN_LATENESS)
+    return Allowances(
+        lateness=late if motor_timeout is None else min(late, max(motor_timeout, 2 / loop_rate) - 1 / loop_rate)
+    )
 
 
 def check(
@@ -110,9 +128,13 @@ def check(
 ) -> Trip | None:
     """First reason to stop, or None.
 
-    The records come first: a stale value or a late tick is passed over while nothing is driven, and must not hide that
-    nothing is saved. Then limits, which name what happened to the bench, then the rest of the rig.
+    Sleep comes before all: nothing that was known before it holds. Then the records: a stale value or a late tick is
+    passed over while nothing is driven, and must not hide that nothing is saved. Then limits, which name what happened
+    to the bench, then the rest of the rig.
     """
+    if vitals.slept > allowed.lateness:
+        cause = f"this machine slept for {vitals.slept:.1f} s; look at the bench, then start anew"
+        return Trip(cause, "slept", vitals.now, value=vitals.slept, limit=allowed.lateness)
     if trip := _records_trip(vitals, allowed):
         return trip
     readings = (assess(guarded, latest.get(guarded.channel), vitals, allowed) for guarded in channels)

@@ -25,9 +25,12 @@ class Stop:
         self._start, self._rest_rate, self._coast_time = start, rest_rate, coast_time
         self._rest_since: float | None = None
 
-    def advance(self, time: float, rotation: float | None) -> StopStep:
-        """`rotation` in rev/s, None: unknown, which is no rest. After half the coast time the motor is released too."""
-        if not is_rest(rotation, self._rest_rate):
+    def advance(self, time: float, rotation: float | None, thrust_rest: bool | None = None) -> StopStep:
+        """`rotation` in rev/s, None: unknown, which is no rest. After half the coast time the motor is released too.
+
+        `thrust_rest`: what the force sensor says; None: it is no witness.
+        """
+        if not is_rest(rotation, self._rest_rate) or thrust_rest is False:
             self._rest_since = None
         elif self._rest_since is None:
             self._rest_since = time
@@ -43,6 +46,13 @@ def is_rest(rotation: float | None, rest_rate: float) -> bool:
     return rotation is not None and abs(rotation) <= rest_rate
 
 
-def turning(rotation: float | None) -> str:
-    """The rotation in words, for messages."""
-    return "the rotation rate is unknown" if rotation is None else f"the propeller turns {rotation:.2f} rev/s"
+def turning(rotation: float | None, thrust_rest: bool | None = None) -> str:
+    """The rotation in words, and on what it rests, for messages."""
+    if rotation is None:
+        return "the rotation rate is unknown"
+    witness = {
+        True: "and the thrust is back at its tare",
+        False: "says its rotation rate alone: the thrust is not back at its tare",
+        None: "by its rotation rate alone: the thrust is no witness",
+    }[thrust_rest]
+    return f"the propeller turns {rotation:.2f} rev/s, {witness}"

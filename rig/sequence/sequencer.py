@@ -248,11 +248,12 @@ class Sequencer:
 
     def _stopping(self, tick: Tick) -> bool:
         """0 V until measured rest."""
-        confirmed, self._release = self._stop.advance(tick.time, tick.rotation)
+        confirmed, self._release = self._stop.advance(tick.time, tick.rotation, tick.thrust_rest)
         if confirmed is not None:
             self._end_row(tick.time)
             self._stop_confirmed, self._state = confirmed, "run_done"
-            after = f"{tick.time - self._since:.2f} s after command 0 V: {turning(tick.rotation)}"
+            told = turning(tick.rotation, tick.thrust_rest)
+            after = f"{tick.time - self._since:.2f} s after command 0 V: {told}"
             text = f"at rest {after}" if confirmed else f"STOP NOT CONFIRMED {after}; cut the power"
             self._journal.say(tick.time, "info" if confirmed else "error", text)
         return False

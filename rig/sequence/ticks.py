@@ -53,6 +53,8 @@ class Tick:
     """(s, N) rows since the last tick, raw (no tare subtracted)."""
     rotation: float | None = None
     """rev/s, newest; None: none, or none that is fresh."""
+    thrust_rest: bool | None = None
+    """Whether the force sensor says that nothing pushes; None: it is no witness."""
     trip: Trip | None = None
     requests: tuple[Request, ...] = ()
     """`stop`, `pause`, `resume`, `skip` are obeyed, others are ignored."""

@@ -11,7 +11,8 @@ from typing import Literal
 
 from rig.campaign.bench import build
 from rig.campaign.config import CampaignConfig
-from rig.control.loop import IDLE, MonotonicClock
+from rig.control.clocks import MonotonicClock, host_clocks
+from rig.control.loop import IDLE
 from rig.errors import RigError
 from rig.link.clients import Clients
 from rig.link.sockets import listen, socket_path
@@ -41,6 +42,7 @@ def open_session(campaign: CampaignConfig, folder: Path, thrusters: tuple[str, .
     own_log = LineWriter((folder / LOG_NAME).open("ab"), sync=False)
     parts = (build(campaign.bench), recorder, ledger, own_log, clients, MonotonicClock())
     session = begin(campaign, folder, thrusters, parts, before, watch)
+    session.loop.host = host_clocks
     session.status.files.extend(finished_runs(before).values())
     return session
 

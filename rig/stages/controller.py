@@ -12,6 +12,7 @@ import signal
 import sys
 from pathlib import Path
 
+from rig.campaign.config import CampaignConfig
 from rig.campaign.loading import load_campaign
 from rig.errors import RigError
 from rig.link.front_end_messages import Request
@@ -26,6 +27,7 @@ def main(campaign_path: str, folder_path: str, *thrusters: str) -> int:
     folder = Path(folder_path)
     try:
         campaign = load_campaign(Path(campaign_path))
+        _require_known(campaign, thrusters)
         with lock_bench(campaign.bench.path):
             session = open_session(campaign, folder, thrusters)
             stop_on_signals(session)
@@ -40,6 +42,16 @@ def main(campaign_path: str, folder_path: str, *thrusters: str) -> int:
         sys.stderr.write(f"rig: {error}\n")
         return 2
     return 0
+
+
+def _require_known(campaign: CampaignConfig, thrusters: tuple[str, ...]) -> None:
+    """What `rig resume` found in a ledger may have been edited: only the campaign's own thrusters are run."""
+    for thruster in thrusters:
+        if thruster not in campaign.thrusters:
+            raise RigError(
+                f"{campaign.path}: asked to run the thruster {thruster!r}, which is not in the campaign; it has "
+                f"{', '.join(campaign.thrusters)}"
+            )
 
 
 def stop_on_signals(session: Session) -> None:

@@ -10,6 +10,7 @@ from rig.control.loop import Decision, Inputs
 from rig.link.recorder_messages import Outcome, StepRow
 from rig.recording.ledger import attempts
 from rig.recording.recorder_link import recording_path
+from rig.safety.thrust_rest import ThrustRest
 from rig.sequence.sequencer import Sequencer
 from rig.sequence.ticks import Output, Tick, settings_for
 from rig.stages.recording_header import opening
@@ -26,9 +27,10 @@ def measure(session: Session) -> None:
     path = recording_path(session.folder, thruster)
     attempt = attempts(session.before, thruster) + 1
     t0_ns = loop.clock.now_ns()
-    request = opening(session.campaign, session.bench, thruster, path, t0_ns, attempt)
+    request = opening(session.campaign, session.bench, thruster, path, t0_ns, session.stamp(), attempt)
     session.recorder.open(request, loop.now)
     loop.clients.clear_trace()
+    loop.thrust_rest = ThrustRest()
     loop.begin_recording(t0_ns)
     begin_watch(session, thruster, t0_ns)  # before the first row is recorded
     status.files.append(str(path))
@@ -48,12 +50,15 @@ def sequence(session: Session, sequencer: Sequencer, t0_ns: int) -> Output:
     loop, status = session.loop, session.status
     begun = loop.now
     begun_ns = round(begun * 1e9)
+    tares = frozenset(step.index for step in session.campaign.plan if step.phase == "tare")
 
     def decide(inputs: Inputs) -> Decision:
         since_begun = inputs.now - begun
         thrust = loop.thrust_rows(inputs.samples, begun_ns)
         trip = replace(inputs.trip, time=since_begun) if inputs.trip else None
-        output = sequencer.advance(Tick(since_begun, thrust, inputs.rotation, trip, inputs.requests))
+        tick = Tick(since_begun, thrust, inputs.rotation, inputs.thrust_rest, trip, inputs.requests)
+        output = sequencer.advance(tick)
+        _tell_tare(loop.thrust_rest, output, tares)
         _take(session, output, t0_ns, begun)
         hear_watch(session)
         session.note(inputs.requests)
@@ -63,6 +68,14 @@ def sequence(session: Session, sequencer: Sequencer, t0_ns: int) -> Output:
     while status.output is None or not status.output.done:
         loop.tick(session.motor, decide)
     return status.output
+
+
+def _tell_tare(witness: ThrustRest, output: Output, tares: Set[int]) -> None:
+    """What the sequencer found out about the zero of the thrust; a tare that was not stable or was cut is `free`."""
+    if output.tare is not None:
+        witness.tared(output.tare)
+    if any(row.index in tares and row.phase == "free" for row in output.rows):
+        witness.doubt()
 
 
 def _take(session: Session, output: Output, t0_ns: int, begun: float) -> None:

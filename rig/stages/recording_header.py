@@ -9,6 +9,7 @@ from collections.abc import Iterable
 from datetime import UTC, datetime
 from importlib.metadata import version
 from pathlib import Path
+from typing import NamedTuple
 
 from drivers.protocols import Channel, Stream
 from rig.campaign.bench import COMMAND_STREAM, Bench
@@ -18,13 +19,30 @@ from rig.link.recorder_messages import Attribute, ChannelSpec, Open, StreamSpec
 BYTES_PER_VALUE = 8
 OVERHEAD_BYTES = 2**20
 """Layout, chunks begun and not filled, events."""
+OBEYED_STD = 0.002
+"""s from a command's row until it is obeyed, which nothing measures: the tick's own work, and two frames of 1 ms of an
+adapter on USB (USB 2.0, section 5.3.3)."""
 COMMAND_CHANNEL = ChannelSpec(
-    "command_voltage", "command_voltage", "V",
+    "command_voltage", "command_voltage", "V", delay_std=OBEYED_STD,
     description="what the motor controller was told; rows are changes; NaN: nothing was sent (watchdog proof)",
 )  # fmt: skip
 
 
-def opening(campaign: CampaignConfig, bench: Bench, thruster: str, path: Path, t0_ns: int, attempt: int = 1) -> Open:
+class Stamp(NamedTuple):
+    """What tells one recording from every other."""
+
+    recording_id: str
+    created: str
+    """ISO 8601, UTC."""
+
+
+def fresh_stamp() -> Stamp:
+    return Stamp(str(uuid.uuid4()), datetime.now(UTC).isoformat())
+
+
+def opening(
+    campaign: CampaignConfig, bench: Bench, thruster: str, path: Path, t0_ns: int, stamp: Stamp, attempt: int = 1
+) -> Open:
     """The Open message of one run; `attempt` counts the runs of that thruster in this campaign, from 1."""
     streams = [
         stream_spec(stream, bench.identities.get(device, ""), device == bench.config.force)
@@ -32,7 +50,7 @@ def opening(campaign: CampaignConfig, bench: Bench, thruster: str, path: Path, t
     ]
     streams.append(StreamSpec(COMMAND_STREAM, "rig", (COMMAND_CHANNEL,)))
     size = expected_bytes((stream for _, stream in bench.streams()), campaign)
-    return Open(str(path), t0_ns, tuple(streams), _attributes(campaign, thruster, attempt), size)
+    return Open(str(path), t0_ns, tuple(streams), _attributes(campaign, thruster, stamp, attempt), size)
 
 
 def stream_spec(stream: Stream, device_id: str, primary: bool) -> StreamSpec:
@@ -63,6 +81,7 @@ def _channel_spec(channel: Channel, primary: bool) -> ChannelSpec:
         integer=channel.integer,
         noise_std=channel.noise_std,
         quantum=channel.quantum,
+        rounding=channel.rounding,
         delay=channel.delay,
         delay_std=channel.delay_std,
         window=channel.window,
@@ -74,10 +93,10 @@ def _channel_spec(channel: Channel, primary: bool) -> ChannelSpec:
     )
 
 
-def _attributes(campaign: CampaignConfig, thruster: str, attempt: int) -> dict[str, Attribute]:
+def _attributes(campaign: CampaignConfig, thruster: str, stamp: Stamp, attempt: int) -> dict[str, Attribute]:
     attributes: dict[str, Attribute] = {
-        "recording_id": str(uuid.uuid4()),
-        "created": datetime.now(UTC).isoformat(),
+        "recording_id": stamp.recording_id,
+        "created": stamp.created,
         "thruster": thruster,
         "attempt": attempt,
         "kind": campaign.kind,

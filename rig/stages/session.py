@@ -11,8 +11,9 @@ from typing import Literal
 from drivers.protocols import MotorController
 from rig.campaign.bench import Bench
 from rig.campaign.config import CampaignConfig
+from rig.control.clocks import Clock
 from rig.control.event_log import EventLog, Level
-from rig.control.loop import IDLE, Clock, Decision, Inputs, Loop
+from rig.control.loop import IDLE, Decision, Inputs, Loop
 from rig.control.readings import Readings
 from rig.control.status import Status
 from rig.errors import LinkError
@@ -23,6 +24,7 @@ from rig.recording.ledger import Fact, Ledger
 from rig.recording.line_writer import LineWriter
 from rig.recording.recorder_link import RecorderLink
 from rig.safety.stopping import Stop, turning
+from rig.stages.recording_header import Stamp, fresh_stamp
 from rig.watch.watch_link import WatchLink
 
 RECORDER_WAIT = 20.0
@@ -62,6 +64,8 @@ class Session:
     """This run is; False once it was said why it is not."""
     measured: set[tuple[int, str]] = field(default_factory=set)
     """(index, phase) of the steps of this run that were run to their end."""
+    stamp: Callable[[], Stamp] = fresh_stamp
+    """Of the next recording."""
 
     def say(self, level: Level, text: str, *, of_bench: bool = False) -> None:
         self.event_log.say(self.loop.clock.now_ns(), level, text, of_bench=of_bench)
@@ -118,9 +122,9 @@ class Session:
         stop, confirmed, release = Stop(loop.now, config.rest_rate, config.coast_time), None, True
         while confirmed is None:
             inputs = self._idle_tick(release=release)
-            confirmed, release = stop.advance(inputs.now, inputs.rotation)
+            confirmed, release = stop.advance(inputs.now, inputs.rotation, inputs.thrust_rest)
         self.status.stop_confirmed = confirmed
-        what = turning(loop.rotation(loop.now))
+        what = turning(inputs.rotation, inputs.thrust_rest)
         if confirmed:
             self.say("info", f"at rest: {what}")
         else:
@@ -197,4 +201,6 @@ def begin(
             clients.publish(status.snapshot(now, time, loop.command, readings.view(now)))
 
     loop = Loop(bench, readings, recorder, ledger, clients, clock, campaign.unattended, publish, watch)
-    return Session(campaign, folder, status, bench, recorder, ledger, log, event_log, loop, before)
+    session = Session(campaign, folder, status, bench, recorder, ledger, log, event_log, loop, before)
+    loop.notice = lambda text: session.say("warning", text)
+    return session

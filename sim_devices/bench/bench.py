@@ -12,13 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from sim_devices.bench.control import clear, fault, obey
-from sim_devices.bench.settings import BenchSettings, ScriptedFault, load
+from sim_devices.bench.devices import say, serial_device, turnaround
+from sim_devices.bench.settings import BenchSettings, DeviceOptions, ScriptedFault, load
 from sim_devices.bench.truth_log import TruthLog, header_fields, state_fields
-from sim_devices.instruments.keller import Keller, KellerOptions
 from sim_devices.instruments.motor_tap import MotorTap
-from sim_devices.instruments.mt_sics import MtSics
-from sim_devices.instruments.mt_sics_options import MtSicsOptions
-from sim_devices.instruments.nortek import Nortek, NortekOptions
 from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.vesc import Vesc, VescOptions
 from sim_devices.wires.can_frame import CanFrame
@@ -26,7 +23,6 @@ from sim_devices.wires.ports import ControlSocket, PtyPort, wait
 from sim_devices.wires.serial_line import Wire
 from sim_devices.wires.slcan import Adapter
 from sim_devices.world import World
-from sim_devices.world.noise import Noise, Normals
 
 LONGEST_SLEEP = 0.01
 """s between two looks at the clock and the stop request."""
@@ -78,24 +74,14 @@ class Bench:
     def _port(self, name: str, baud: int | None) -> PtyPort:
         return PtyPort(self.settings.links / name, Wire(baud, self._wire_rng))
 
-    def _add(self, name: str, options: object) -> None:
-        world = self.world
-        match options:
-            case MtSicsOptions():
-                device = MtSics(options, lambda: world.sample("thrust"))
-                self.serial[name] = (device, self._port(options.port, options.baud), 0.0)
-            case NortekOptions():
-                std = self.settings.world.noise.get("flow_speed", Noise()).white
-                cross = Normals(self._cross_rng)
-                meter = Nortek(options, lambda: world.sample("flow_speed"), lambda: std * cross.draw(), self._epoch)
-                self.serial[name] = (meter, self._port(options.port, options.baud), 0.0)
-            case KellerOptions():
-                slave = Keller(options, lambda: world.sample("pressure"), lambda: world.sample("water_temperature"))
-                self.serial[name] = (slave, self._port(options.port, options.baud), options.turnaround)
-            case VescOptions():
-                self.tap = MotorTap(world, options.pole_pairs, options.vesc_id)
-                self.vesc = Vesc(options, self.settings.world.supply.voltage, self.tap.telemetry, self.log)
-                self.tap.vesc = self.vesc
+    def _add(self, name: str, options: DeviceOptions) -> None:
+        if isinstance(options, VescOptions):
+            self.tap = MotorTap(self.world, options.pole_pairs, options.vesc_id)
+            self.vesc = Vesc(options, self.settings.world.supply.voltage, self.tap.telemetry, self.log)
+            self.tap.vesc = self.vesc
+            return
+        device = serial_device(options, self.world, self._cross_rng, self._epoch)
+        self.serial[name] = (device, self._port(options.port, options.baud), turnaround(options))
 
     # -- time --------------------------------------------------------------------------------------------------------
 
@@ -143,9 +129,9 @@ class Bench:
         if self.vesc is not None and self.vesc.due <= t:
             for frame in self.vesc.tick(t):
                 self._broadcast(frame, t, None)
-        for device, port, _ in self.serial.values():
+        for device, port, late in self.serial.values():
             if device.due <= t:
-                _say(port, device.tick(t), t, 0.0)
+                say(port.wire, device.tick(t), t, late)
 
     def _step_world(self, t: float) -> None:
         dt, world, vesc, tap = self.settings.step, self.world, self.vesc, self.tap
@@ -171,10 +157,10 @@ class Bench:
                 port.wire.put(answer, t)
             for frame in frames:
                 self._broadcast(frame, t, port)
-        for device, port, turnaround in self.serial.values():
+        for device, port, late in self.serial.values():
             data = port.read()
             if data:
-                _say(port, device.feed(data, t), t, turnaround)
+                say(port.wire, device.feed(data, t), t, late)
         self.control.serve(lambda line: obey(self, line))
 
     def _broadcast(self, frame: CanFrame, t: float, sender: PtyPort | None) -> None:
@@ -227,12 +213,3 @@ def _script(faults: tuple[ScriptedFault, ...]) -> list[tuple[float, bool, Script
     begins = [(each.at, True, each) for each in faults]
     ends = [(each.at + each.duration, False, each) for each in faults if each.duration > 0]
     return sorted(begins + ends, key=lambda entry: entry[0])
-
-
-def _say(port: PtyPort, data: bytes, t: float, turnaround: float) -> None:
-    """Hand a device's words to its wire: lines one by one, anything else whole."""
-    if data.endswith(b"\r\n"):
-        for line in data.splitlines(keepends=True):
-            port.wire.put(line, t, turnaround)
-    elif data:
-        port.wire.put(data, t, turnaround)

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sim_devices.instruments.keller import KellerOptions
+from sim_devices.instruments.line_sender import LineOptions
 from sim_devices.instruments.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.nortek import NortekOptions
 from sim_devices.instruments.vesc import VescOptions
@@ -16,9 +17,10 @@ from sim_devices.tables import WorldError, build, check_known
 from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin
 
-DeviceOptions = MtSicsOptions | NortekOptions | KellerOptions | VescOptions
+DeviceOptions = MtSicsOptions | LineOptions | NortekOptions | KellerOptions | VescOptions
 KINDS: dict[str, type[DeviceOptions]] = {
     "mt_sics": MtSicsOptions,
+    "line": LineOptions,
     "nortek": NortekOptions,
     "keller": KellerOptions,
     "vesc": VescOptions,

@@ -87,7 +87,8 @@ class MtSics:
         out = b""
         while self._next <= t:
             each = self._options.average
-            self._next += 1.0 / (self._rate * RATE_FAULTS.get(self._fault, 1.0) * each)
+            ticks = self._rate * RATE_FAULTS.get(self._fault, 1.0) * each * (1.0 + self._options.clock_error)
+            self._next += 1.0 / ticks
             self._conversions.append(self._read())
             if len(self._conversions) >= each:
                 self._sample()

@@ -32,6 +32,8 @@ class MtSicsOptions:
     """N."""
     average: int = 1
     """Conversions, evenly spread over the time between two readings, of which a reading is the mean."""
+    clock_error: float = 0.0
+    """relative: its clock runs faster by so much, and its readings come as much more often."""
 
     def __post_init__(self) -> None:
         if self.unit not in UNITS:

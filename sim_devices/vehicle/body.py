@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from math import copysign, sqrt
+from math import copysign
 
 AXES = ("surge", "sway", "heave", "yaw")
 
@@ -55,7 +55,7 @@ class Hull:
     eta_hull: float = 1.0
     """Share of the thrust left when the jet meets the hull (propeller-hull interaction)."""
     eta_pair: float = 1.0
-    """Share left to each of two equal thrusts of one side that run together (propeller-propeller interaction)."""
+    """Share left to each of two thrusters of one side that run together (propeller-propeller interaction)."""
     current: tuple[float, float] = (0.0, 0.0)
     """m/s, uniform current towards north and east."""
     buoyancy: float = 0.0
@@ -79,20 +79,13 @@ class Hull:
         return copysign(max(abs(V) - self.dead_band, 0.0), V)
 
     def thrust(self, name: str, volts: Mapping[str, float]) -> float:
-        """N of one thruster as installed, all of them at `volts`: (T_i - what its partner's jet takes) eta_hull.
-
-        A jet of the speed sqrt|T_j| takes |n_i| sqrt|T_j| (Nienhuis 1992, Analysis of thruster effectivity): (1 -
-        eta_pair) sqrt(|T_i| |T_j|) with T_j in open water, n_i ~ sqrt|T_i|, and equal water to both propellers. It
-        takes what pushes with it and adds to what pushes against it; a thruster at rest loses nothing.
-        """
+        """N of one thruster as installed, all of them at `volts`."""
         own, V = self.thrusters[name], self.acting(volts.get(name, 0.0))
         force = own.C * V * abs(V)
-        if V != 0 and own.partner:
-            other = self.acting(volts.get(own.partner, 0.0))
-            jet = sqrt(self.thrusters[own.partner].C) * other
-            force -= (1.0 - self.eta_pair) * sqrt(own.C) * abs(V) * jet
         if own.hull_side * V > 0:
             force *= self.eta_hull
+        if V != 0 and own.partner and self.acting(volts.get(own.partner, 0.0)) != 0:
+            force *= self.eta_pair
         return force
 
     def force(self, axis: str, volts: Mapping[str, float]) -> float:

@@ -158,7 +158,7 @@ def test_a_session():
         motor.command(-24.0)
         motor.release()
         duties = [b"T000000174000061A8", b"T000000174FFFF3CB0", b"T00000117400000000"]
-        wait_until(lambda: peer.heard[-3:] == duties)
+        wait_until(lambda: [line for line in peer.heard if not line.startswith(b"T00000817")][-3:] == duties)
         assert motor.health().alive
         assert (motor.watchdog.timeout_s, motor.watchdog.action, motor.watchdog.resumes_by_itself) == (
             0.5,
@@ -249,6 +249,20 @@ def test_fault_polling(code, alive):
         assert samples[0].values == (float(code),)
         assert motor.health().alive is alive
         assert alive or "under-voltage" in motor.health().error
+
+
+def test_a_fault_is_asked_for_without_being_told_to_and_is_no_stream_then():
+    fault = b"T000008FA81701320000800004\r"
+    with adapter(STATUS, STATUS_5, STATUS_4, fault=fault) as peer, Bench(peer) as (motor, _):
+        motor.open()
+        motor.drain()
+        for _ in range(10):
+            motor.command(0.0)
+        wait_until(lambda: motor.drain() is not None and not motor.health().alive)
+        assert "fault 4 (absolute over-current)" in motor.health().error
+        assert "motor_fault" not in {stream.name for stream in motor.streams}
+        asked = [request for request in peer.heard if request.startswith(b"T00000817")]
+        assert len(asked) == 1, "ten commands within 0.2 s"
 
 
 def test_a_frame_of_the_wrong_length_is_counted():

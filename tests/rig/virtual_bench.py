@@ -14,13 +14,12 @@ from rig.campaign.bench import Bench
 from rig.campaign.config import BenchConfig, CampaignConfig, DeviceConfig, LimitConfig, MountConfig
 from rig.campaign.plan import FixedDwell, Plan, TareConfig
 from rig.campaign.shapes import Levels
-from rig.link.clients import Clients
 from rig.link.front_end_messages import Request, Snapshot
-from rig.link.sockets import Peer, connect, listen, pair
-from rig.recording.ledger import Fact, Ledger
-from rig.recording.line_writer import LineWriter
+from rig.link.sockets import Peer, connect, pair
+from rig.operate.virtual_time import assembled
+from rig.recording.ledger import Fact
 from rig.recording.recorder_link import RecorderLink
-from rig.stages.session import Session, begin
+from rig.stages.session import Session
 from tests.rig.virtual_devices import Cell, Input, Motor, RecorderPeer
 
 
@@ -144,17 +143,16 @@ def virtual(
     added = {each.name: DeviceConfig(each.name, "line_stream", None) for each in inputs}
     config = replace(config, devices={**config.devices, **added})
     bench = Bench(config, {}, {"load_cell": world.cell, "motor": motor, **{each.name: each for each in inputs}})
-    log = LineWriter((folder / "controller.log").open("ab"), sync=False)
-    clients = Clients(listen(folder / "controller.sock"))
-    parts = (bench, RecorderLink(ours, None), Ledger.open(folder), log, clients, world.clock)
-    world.session = begin(campaign_config(folder, config, **campaign), folder, (), parts, before)
+    asked = campaign_config(folder, config, **campaign)
+    world.session = assembled(asked, folder, bench, RecorderLink(ours, None), world.clock, before)
     try:
         yield world
     finally:
         world.session.ledger.close()
-        log.close()
+        world.session.log.close()
         ours.close()
         world.recorder.peer.close()
+        clients = world.session.loop.clients
         for client in clients.connected:
             client.peer.close()
         clients.listener.close()

@@ -125,11 +125,17 @@ def _raw(model: Model, theta: Theta, data: Data, there: Theta, *, with_rate: boo
     for run, rows, tare in zip(data.runs, data.rows, theta.tares, strict=True):
         history = run.history
         F, x = predict(model, theta, run, data.scale, tare)
-        more = theta.C * shown(model, theta, history, F, x, tare)
-        more = more * ahead(model, theta, run, x, data.scale, late, tare)
+        share = theta.C * shown(model, theta, history, F, x, tare)
+        if history.window > 0:
+            F = F + share * history.excess
         if theta.shift:
             F = run.delayed(F, theta.shift)
-        thrust.append((reconstructed(F, history.middle, history.sampled) + more)[rows] + tare)
+        if history.window > 0:
+            seen = run.averaged(F)
+        else:
+            more = share * ahead(model, theta, run, x, data.scale, late, tare)
+            seen = reconstructed(F, history.middle, history.sampled) + more
+        thrust.append(seen[rows] + tare)
         if with_rate:
             seen = turning(model, theta, run, x, data.scale, there.rate_shift)
             rate.append(theta.k * seen[history.rate_rows])

@@ -26,6 +26,8 @@ class Check:
     """Its figures, or why it says nothing here."""
     silent: bool = False
     """Whether it says nothing here."""
+    apart: float = 0.0
+    """By how much a parameter differs between parts, as a share of itself, where that is asked."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -152,4 +154,4 @@ def part_check(what: str, column: Floats, basis: Floats, residual: Floats, spare
     p = apart.p_value * tests
     says = f"{100 * apart.share:.0f} % apart"
     failed = f"its parameter is not the same {what} ({says})" if p < policy.name.INCONSTANT_P else ""
-    return Check(asked, failed, f"{says}, +- {100 * apart.error:.0f} %; p {min(p, 1.0):.2g}")
+    return Check(asked, failed, f"{says}, +- {100 * apart.error:.0f} %; p {min(p, 1.0):.2g}", apart=apart.share)

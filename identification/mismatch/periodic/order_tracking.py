@@ -146,15 +146,15 @@ def _of_best_law(
     parts: Sequence[SteadySegment], candidate: OrderCandidate, top: float, ring: Ring | None
 ) -> RotorOrder:
     """With the size over the speeds that explains most; where the speeds tell nothing, as a force grows."""
-    found = [(law, _fitted(law.on(parts, candidate.ratio, top), candidate)) for law in laws(ring)]
+    noise = _noise_at(parts, candidate.ratio)  # one for all laws: their gains are compared
+    found = [(law, _fitted(law.on(parts, candidate.ratio, top), noise, candidate)) for law in laws(ring)]
     behind = policy.periodic.ORDER_LAW_CHI2
     law, best = max(found, key=lambda each: each[1].law_gain - (0.0 if each[0] == FORCE else behind))
     return replace(best, law=law, top=top)
 
 
-def _fitted(parts: Sequence[SteadySegment], candidate: OrderCandidate) -> RotorOrder:
+def _fitted(parts: Sequence[SteadySegment], noise: _LocalNoise, candidate: OrderCandidate) -> RotorOrder:
     """With the fewest phases that keep the power."""
-    noise = _noise_at(parts, candidate.ratio)
     finest = waves = _apart(parts, noise, candidate)
     for seconds in LASTING:
         fewer = _joined(parts, noise, finest.ratio, candidate.reach, _pieces_of(parts, seconds))
@@ -265,7 +265,7 @@ def _told(parts: Sequence[SteadySegment], waves: _Waves, p_value: float) -> Roto
             Part(p.run, float(p.time[0]), float(np.nextafter(p.time[-1], np.inf)), float(c.real), float(-c.imag))
             for p, c in zip(parts, each[waves.piece] * np.array([p.weight for p in parts]), strict=True)
         ),
-        law_gain=waves.of_one_size,
+        law_gain=waves.of_one_size - 2.0 * (waves.weights.size - 1),
     )
 
 

@@ -87,8 +87,13 @@ BROKEN_LINE_BIC = Threshold(
         "of 6 to 10 is strong, above 10 very strong."
     ),
 )
+MOSTLY_APART = Threshold(
+    0.3,
+    unit="share of the parameter",
+    reason="A parameter that differs more between halves, directions or levels is another thing in each of them.",
+)
 MOSTLY_SHARE = Threshold(
-    0.5,
+    0.8,
     unit="share of the squared error that could be taken off what was not fitted",
     reason="A name whose shape is not quite the textbook's is said where it makes most of what any shape could.",
 )

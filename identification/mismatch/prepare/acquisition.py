@@ -19,7 +19,7 @@ def as_sampled(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     """The recording with each sample at the time that its value is of, and a sentence for each stream changed so.
 
     Rows of a device with an even clock of its own (`period` and `clock_drift_std`) are put on that clock; then
-    `delay` and half of `window` are taken off.
+    `delay` and half of `window` are taken off. Values that were cut toward zero get half a `quantum` back.
     """
     clocks: dict[str, Floats] = {}
     told: dict[str, str] = {}
@@ -27,7 +27,9 @@ def as_sampled(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     for channel in recording.channels:
         if channel.stream not in clocks:
             clocks[channel.stream], told[channel.stream] = _clock(channel)
-        channels.append(_moved(channel, clocks[channel.stream]))
+        channels.append(_uncut(_moved(channel, clocks[channel.stream])))
+        if _is_cut(channel):
+            told[channel.stream] += f"; {channel.name} half a step from zero, for its device cuts toward it, as stated"
         late = _late(channel)
         if late > 0:
             told[channel.stream] += f"; {channel.name} {1e3 * late:.3g} ms before its stamp, as stated"
@@ -52,6 +54,18 @@ def _late(channel: Channel) -> float:
     """S by which a stamp is after the middle of what the value is of."""
     how = channel.acquisition
     return (how.delay or 0.0) + 0.5 * (how.window or 0.0)
+
+
+def _uncut(channel: Channel) -> Channel:
+    """Values that a device cut toward zero, by the mean as they were; what reads 0 may have been either sign."""
+    if not _is_cut(channel):
+        return channel
+    step = channel.acquisition.quantum or 0.0
+    return replace(channel, value=channel.value + 0.5 * step * np.sign(channel.value))
+
+
+def _is_cut(channel: Channel) -> bool:
+    return channel.acquisition.rounding == "toward_zero" and bool(channel.acquisition.quantum)
 
 
 def _moved(channel: Channel, clock: Floats) -> Channel:

@@ -172,6 +172,13 @@ def _delay_std(recording: Recording, driver: Channel) -> float:
     return float(np.hypot(thrust.acquisition.delay_std or 0.0, driver.acquisition.delay_std or 0.0))
 
 
+def _window(recording: Recording) -> float:
+    """S that a thrust sample is the mean over, where the recording says so."""
+    thrust = recording.first_of("thrust")
+    assert thrust is not None
+    return thrust.acquisition.window or 0.0
+
+
 def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, time: Floats, force: Floats) -> History:
     _, whole, _ = _binned(time, force, edges)
     time, force = _clear_of_jumps(recording, time, force)
@@ -216,6 +223,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         spacing=float(np.median(np.diff(time))),
         jitter=jitter_of(time),
         delay_std=_delay_std(recording, driver),
+        window=_window(recording),
         rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
         static=_is_table(held, time.size),
     )

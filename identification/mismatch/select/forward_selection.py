@@ -187,7 +187,7 @@ class Thruster:
         return refresh(best.model, best.theta, self.data, plain, estimate)
 
     def reformed(self, estimate: Estimate) -> Estimate:
-        better = best_forms(estimate.fit, self.terms, self.data, estimate.weights)
+        better = best_forms(estimate.fit, self.terms, self.data, estimate.weights, estimate.noise)
         return estimate if better is estimate.fit else self.enlarged(estimate, better)
 
     def unhidden(self, estimate: Estimate, judged: Screening) -> tuple[Unhidden, Estimate] | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, at_bound, bounds_of, change_of, fit, residual_of
@@ -12,30 +13,37 @@ from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.model import Model, extended
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
+from identification.mismatch.noise.covariance import Noise
+from identification.mismatch.select.clipping import contradiction
 from identification.physics.term import Term
 from identification.recording import Floats
 
 Start = tuple[Model, Theta]
+NEAR = 0.25
+"""Of what is left without the term, beyond what is left with it: a start that leaves less is near."""
 FORM_STEPS = 15
 """Steps of the fit of another form, begun close by."""
 
 
 def nearer(
-    one: Start, now: Fit, term: Term, other: Term, values: tuple[float, ...], data: Data, weights: Weights
+    less: Fit, now: Fit, term: Term, other: Term, values: tuple[float, ...], data: Data, weights: Weights
 ) -> Start:
-    """Of `one` and the model `now` with `other` in the place of `term` the start that leaves less.
+    """The model `now` with `other` in the place of `term` where that does most of it, else `less` (without it) with it.
 
     From the model without the term the way is long where its effect is large, and valleys lie on it; the whole model,
     with what the term does followed by all that is left and by `other` from `values` on, is near where one curve can
     be written as the other.
     """
-    near = _in_place(now, term, other, values, data, weights)
+    near = _in_place(now, term, other, values, data, weights, (less.jacobian, less.free))
+    one = less.more(other, values)
     if near is None:
         return one
-    return min(one, near, key=lambda start: _left(start, data, weights))
+    beyond = _left(near, data, weights) - now.chi2
+    worth = min(less.chi2, _left(one, data, weights)) - now.chi2
+    return near if beyond < NEAR * worth else one
 
 
-def best_forms(fitted: Fit, terms: Sequence[Term], data: Data, weights: Weights) -> Fit:
+def best_forms(fitted: Fit, terms: Sequence[Term], data: Data, weights: Weights, noise: Noise) -> Fit:
     """The same effects, each in the textbook form that fits best beside the others; `fitted` where that is as it is.
 
     A form is chosen while other effects are still missing, and what is added later makes up for a wrong one: so it is
@@ -44,23 +52,28 @@ def best_forms(fitted: Fit, terms: Sequence[Term], data: Data, weights: Weights)
     for term in fitted.model.terms:
         for other in terms:
             if other.id == term.id and other != term and other not in fitted.model.terms:
-                fitted = _better_form(fitted, term, other, data, weights)
+                fitted = _better_form(fitted, term, other, data, weights, noise)
     return fitted
 
 
-def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights) -> Fit:
-    """The other of two forms where its BIC is less."""
+def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights, noise: Noise) -> Fit:
+    """The other of two forms where its BIC is less, and nothing contradicts it."""
     if term not in now.model.terms:
         return now
     logn = float(np.log(max(now.residual.size, 2)))
     wanted = now.chi2 - policy.select.RIVAL_BETTER_BIC - (price(other, data) - price(term, data)) * logn
-    starts = [_in_place(now, term, other, values, data, weights) for values in other.trials(data.scale)]
+    own = now.layout.of(term)
+    kept = np.array([j < own.start or j >= own.stop for j in range(now.free.size)])
+    slopes = now.jacobian[:, kept[now.free]], now.free[kept]
+    starts = [_in_place(now, term, other, values, data, weights, slopes) for values in other.trials(data.scale)]
     possible = [start for start in starts if start is not None]
     if not possible:
         return now
     begin = min(possible, key=lambda start: _left(start, data, weights))
     new = fit(*begin, data, weights, FORM_STEPS, wanted)
-    return new if new.chi2 < wanted and not at_bound(other, new, data, weights) else now
+    if new.chi2 >= wanted or at_bound(other, new, data, weights) or contradiction(new, other, noise, data):
+        return now
+    return new
 
 
 def _left(start: Start, data: Data, weights: Weights) -> float:
@@ -70,9 +83,15 @@ def _left(start: Start, data: Data, weights: Weights) -> float:
 
 
 def _in_place(
-    now: Fit, term: Term, other: Term, values: tuple[float, ...], data: Data, weights: Weights
+    now: Fit,
+    term: Term,
+    other: Term,
+    values: tuple[float, ...],
+    data: Data,
+    weights: Weights,
+    slopes: tuple[Floats, NDArray[np.bool_]],
 ) -> Start | None:
-    """None where `other` cannot be had in any amount."""
+    """None where `other` cannot be had in any amount. `slopes`: of the rest of the model, and of which values."""
     rest, theta = now.less(term)
     bigger, begun = extended(rest, theta, other, values)
     effect = weights.whiten(*change_of((rest, theta), (now.model, now.theta), data, weights))
@@ -80,12 +99,10 @@ def _in_place(
     size = float(np.linalg.norm(change))
     if size == 0 or not np.isfinite(size):
         return None
-    own = now.layout.of(term)
-    kept = np.array([j < own.start or j >= own.stop for j in range(now.free.size)])
-    slopes = now.jacobian[:, kept[now.free]]
-    steps = _followed(np.column_stack([slopes, change / size]), effect)
+    columns, free = slopes
+    steps = _followed(np.column_stack([columns, change / size]), effect)
     moved = theta.vector
-    moved[now.free[kept]] += steps[:-1]
+    moved[free] += steps[:-1]
     first = other.parameters(data.scale)[0]
     assert first.neutral is not None
     amount = first.neutral + steps[-1] / size * (values[0] - first.neutral)

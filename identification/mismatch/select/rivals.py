@@ -83,7 +83,7 @@ def one_less(
     for term, without in less.items():
         if without.chi2 - now.chi2 > SMALL_TERM * most:
             continue
-        new = best_forms(without, terms, data, estimate.weights)
+        new = best_forms(without, terms, data, estimate.weights, estimate.noise)
         loss = new.chi2 - now.chi2 - price(term, data) * logn
         if new is not without and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):
             best = (float(loss), new)
@@ -122,7 +122,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
         begin = refined(less, data, estimate.weights, other, values)
         more = price(other, data) - extra_now
         extra = more * logn
-        bigger, begun = nearer(less.more(other, begin), now, term, other, begin, data, estimate.weights)
+        bigger, begun = nearer(less, now, term, other, begin, data, estimate.weights)
         if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
             new = fit(bigger, begun, data, estimate.weights)
         else:
@@ -135,7 +135,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
                 now.chi2 + policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more),
             )
         if new.chi2 - now.chi2 + extra < FORMS_BEYOND * policy.select.RIVAL_STATED_BIC:
-            new = best_forms(new, [t for t in terms if t.id != other.id], data, estimate.weights)
+            new = best_forms(new, [t for t in terms if t.id != other.id], data, estimate.weights, estimate.noise)
         if at_bound(other, new, data, estimate.weights) or contradiction(new, other, estimate.noise, data):
             continue
         loss = new.chi2 - now.chi2 + extra

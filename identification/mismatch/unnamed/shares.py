@@ -38,27 +38,27 @@ class Mostly:
     others: tuple[Named, ...]
 
 
-def mostly_right(split: TrainTestSplit, unearned: Sequence[Named]) -> Mostly:
-    """Of the names that were not earned those that make most of what the whole model does, one after the other.
+def mostly_right(split: TrainTestSplit, unearned: Sequence[Named], best: float) -> Mostly:
+    """Of the names that were not earned those that make most of what any shape could, one after the other.
 
-    `split`: the whole model fitted to a part of the data, and what judges it on the rest.
+    `split`: the whole model fitted to a part of the data, and what judges it on the rest; `best`: RMSE in N there of
+    what predicts best, free shapes and all.
     """
-    whole = split.judge(split.estimate.fit)
     now = _fitted(split, split.estimate.fit, [n.term for n in unearned])
-    left = [n for n in unearned if not IMPOSSIBLE & {check.asked for check in n.checks if check.failed}]
+    left = [n for n in unearned if _possible(n)]
     right: list[Named] = []
     while left:
         score = split.judge(now)
         tried = [(n, one) for n in left if (one := _with(split, now, n)) is not None]
         if not tried:
             break
-        best, one = min(tried, key=lambda each: split.judge(each[1]).rmse)
+        most, one = min(tried, key=lambda each: split.judge(each[1]).rmse)
         new = split.judge(one)
-        gains = better(new, score, len(best.theta))
-        if not gains or share(score, new, _least(whole, new)) < policy.unnamed.MOSTLY_SHARE:
+        gains = better(new, score, len(most.theta))
+        if not gains or share(score, new, min(best, new.rmse)) < policy.unnamed.MOSTLY_SHARE:
             break
-        right.append(best)
-        left.remove(best)
+        right.append(most)
+        left.remove(most)
         now = one
     return Mostly(tuple(right), tuple(n for n in unearned if n not in right))
 
@@ -92,8 +92,10 @@ def share(without: Score, with_it: Score, least: float) -> float:
     return min(max((without.rmse**2 - with_it.rmse**2) / could, 0.0), 1.0) if could > 0 else 0.0
 
 
-def _least(*scores: Score) -> float:
-    return min(score.rmse for score in scores)
+def _possible(named: Named) -> bool:
+    """Whether it failed no more than its shape: values that it can have, and parts that are not too far apart."""
+    failed = [check for check in named.checks if check.failed]
+    return all(c.asked not in IMPOSSIBLE and c.apart <= policy.unnamed.MOSTLY_APART for c in failed)
 
 
 def _fitted(split: TrainTestSplit, now: Fit, without: Sequence[Term]) -> Fit:

@@ -19,7 +19,7 @@ from identification.mismatch.name.naming import Named
 from identification.mismatch.select.forward_selection import STATIC, Selected
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
-from identification.mismatch.unnamed.shares import Mostly, mostly_right, with_shares
+from identification.mismatch.unnamed.shares import mostly_right, with_shares
 from identification.mismatch.validate.prediction import predicting, predicts
 from identification.mismatch.validate.stage import Validated
 from identification.physics.term import Term
@@ -54,8 +54,6 @@ def run(
     """Flexible terms where they predict better; else the named model, without unnamed terms that predict no better."""
     data, before, now = selected.data, selected.before, located.estimate
     earned, unearned, split = validated.earned, validated.unearned, validated.split
-    mostly = mostly_right(split, unearned) if located.structured else Mostly((), unearned)
-    earned, unearned = (*earned, *mostly.right), mostly.others
     open_ended = (located.structured or bool(unearned)) and bool(located.left.groups)
     bare, left, flexible = now, located.left, None
     if open_ended and unearned:
@@ -69,6 +67,11 @@ def run(
     if open_ended:
         over = foremost_covariate(left, unearned, data)
         flexible = extend(now, before, data, over, unearned, split, rng)
+        best = min(split.judge(split.estimate.fit).rmse, np.inf if flexible is None else flexible.held)
+        mostly = mostly_right(split, unearned if located.structured else (), best)
+        if mostly.right:  # back: a free shape is for what they leave
+            earned, unearned = (*earned, *mostly.right), mostly.others
+            flexible = extend(now, before, data, over, unearned, split, rng)
     if flexible is not None:
         earned = with_shares(split, earned, [n.term for n in unearned], flexible.held)
         valued, known = _with_values(earned, now, flexible.estimate, data, flexible)

@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from rig.blind.design import LADDER, ORACLE, PAIR_STRENGTH, STRENGTHS, WITHIN
+from rig.blind.scoring.on_benches import bench_besides, bench_goals
 from rig.blind.scoring.rates import Goal, Rate, of_groups, of_rate, rate
 from rig.blind.scoring.score import LOCATED, OPEN_CELLS, Score
 
@@ -51,7 +52,8 @@ def goals(scores: Sequence[Score]) -> list[Goal]:
         of_rate("open world: unexplained, right place", rate(s.outcome in LOCATED for s in counted), least=0.90),
         of_rate("open world: a wrong name instead", rate(s.outcome == "wrong name" for s in counted), most=0.05),
     ]
-    return [*found, *_alarms(scores), *_errors(scores), *_coverage(scores), *_power(scores)]
+    found += [*_alarms(scores), *_errors(scores), *_coverage(scores), *_power(scores)]
+    return [*found, *bench_goals(cell(scores, "bench"))]
 
 
 def besides(scores: Sequence[Score]) -> list[Goal]:
@@ -91,6 +93,7 @@ def besides(scores: Sequence[Score]) -> list[Goal]:
         of_rate("open world: any name, beside unexplained or instead", rate(bool(s.named) for s in counted)),
         of_rate("models that predict another run", rate(s.held_out is not None for s in cell(scores, *MODELLED))),
         of_rate("crashed, refused or overdue", rate(s.failed for s in scores)),
+        *bench_besides(cell(scores, "bench")),
     ]
 
 

@@ -30,6 +30,8 @@ AS_RIVAL: Final = "among rivals"
 """The answer of a confusion matrix where the truth is a stated rival of what was found."""
 OPEN_CELLS: Final = ("outside", "removed")
 LOCATED: Final = ("located", "located, named")
+REFERRED: Final = frozenset({"exponent"})
+"""Effects that refer C to a voltage, which is not the same on both sides."""
 TELLABLE: Final = 8.0
 """sigma that the best neighbour must leave to an oracle, as much as a faint effect has."""
 
@@ -86,6 +88,8 @@ class Score:
     seconds: float = 0.0
     case: str = ""
     """What the recording was like, in words."""
+    constant: Interval | None = None
+    """C of the model; None where the answer has none, or what is concealed gives it another meaning."""
 
     @property
     def right(self) -> bool:
@@ -175,7 +179,17 @@ def scored(
         intervals=intervals(findings, truth) if len(hidden) == 1 else (),
         seconds=answer["seconds"],
         case=described(truth),
+        constant=thrust_constant(found, truth),
     )
+
+
+def thrust_constant(found: Table, truth: Table) -> Interval | None:
+    """C of the model that was found beside the true one."""
+    told = found.get("model", {}).get("parameters", {}).get("C")
+    if told is None or told["value"] is None or "baseline" not in truth or set(concealed(truth)) & REFERRED:
+        return None
+    value, std = float(truth["baseline"]["C"]), told["std"] or 0.0
+    return Interval("", "C", (told["value"] - value) / std if std > 0.0 else float("inf"), _holds(told, value))
 
 
 def concealed(truth: Table) -> tuple[str, ...]:
@@ -212,6 +226,8 @@ def described(truth: Table) -> str:
         f"{truth['noise_kind']} noise, {truth['rate']:.3g} /s, {plan}, "
         f"{scale['voltage']:.3g} V, {scale['thrust']:.3g} N{with_channels}"
     ]
+    if "bench" in truth:
+        parts.append(f"bench {truth['bench']['name']}, loop at {truth['bench']['loop_rate']:g} Hz")
     for effect in truth["effects"]:
         told = ", ".join(
             f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in effect["parameters"].items()

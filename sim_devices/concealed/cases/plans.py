@@ -35,7 +35,7 @@ class Profile:
     duration: float
 
 
-class _Writer:
+class Writer:
     """Rows and steps as they are laid down, each half a grid step before the grid point that first knows it.
 
     So no sample is ever taken at the very instant of a change.
@@ -103,7 +103,7 @@ def profile(kind: str, top: float, duration: float, dt: float, rng: Rng, *, smoo
         raise ValueError(f"plan must be one of {', '.join(KINDS)}, got {kind!r}")
     tick = 1.0 / float(rng.choice((20.0, 25.0, 50.0, 100.0)))
     slew = 0.0 if rng.random() < 0.5 and not smooth else top / float(rng.uniform(0.3, 3.0))
-    w = _Writer(tick, slew, dt)
+    w = Writer(tick, slew, dt)
     w.hold(0.0, float(rng.uniform(3.0, 10.0)), "tare")
     parts = [kind] if kind != "mixed" else [str(p) for p in rng.permutation(KINDS[:-1])[:3]]
     for i, part in enumerate(parts):
@@ -112,7 +112,7 @@ def profile(kind: str, top: float, duration: float, dt: float, rng: Rng, *, smoo
     return w.profile(kind)
 
 
-def _lay(w: _Writer, part: str, top: float, end: float, rng: Rng) -> None:
+def _lay(w: Writer, part: str, top: float, end: float, rng: Rng) -> None:
     match part:
         case "staircase":
             _levels(w, _staircase(top, rng), end)
@@ -132,7 +132,7 @@ def _staircase(top: float, rng: Rng) -> Floats:
     return np.concatenate([up[1:], up[-2::-1], -up[1:], -up[-2::-1]])
 
 
-def _levels(w: _Writer, levels: Floats, end: float) -> None:
+def _levels(w: Writer, levels: Floats, end: float) -> None:
     """All the levels in the time that is there; again from the start when holds would last longer than 12 s."""
     rounds = max(int(np.ceil((end - w.t) / (12.0 * levels.size))), 1)
     dwell = max((end - w.t) / (rounds * levels.size), 1.0)
@@ -140,7 +140,7 @@ def _levels(w: _Writer, levels: Floats, end: float) -> None:
         w.hold(volts, dwell, "hold" if volts else "rest")
 
 
-def _interleaved(w: _Writer, top: float, end: float, rng: Rng) -> None:
+def _interleaved(w: Writer, top: float, end: float, rng: Rng) -> None:
     """Levels of both signs in turn, a zero return every few holds."""
     count, every, dwell = int(rng.integers(5, 11)), int(rng.integers(2, 6)), float(rng.uniform(3.0, 8.0))
     sizes = np.linspace(top / count, top, count)
@@ -156,7 +156,7 @@ def _interleaved(w: _Writer, top: float, end: float, rng: Rng) -> None:
                 return
 
 
-def _random(w: _Writer, top: float, end: float, rng: Rng) -> None:
+def _random(w: Writer, top: float, end: float, rng: Rng) -> None:
     dwell = float(rng.uniform(2.0, 6.0))
     while w.t < end:
         w.hold(float(rng.uniform(-top, top)), dwell * float(rng.uniform(0.5, 1.5)))
@@ -164,7 +164,7 @@ def _random(w: _Writer, top: float, end: float, rng: Rng) -> None:
             w.hold(0.0, float(rng.uniform(4.0, 15.0)), "rest")
 
 
-def _waves(w: _Writer, end: float, top: float, rng: Rng, phase: str) -> None:
+def _waves(w: Writer, end: float, top: float, rng: Rng, phase: str) -> None:
     """Triangles (`free`) or sines of several sizes and periods, a rest between."""
     while w.t < end:
         period, size = float(rng.uniform(8.0, 50.0)), top * float(rng.uniform(0.3, 1.0))

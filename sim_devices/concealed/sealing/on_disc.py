@@ -67,27 +67,28 @@ def conceal(asked: Mapping[str, Any], out: Path) -> None:
     try:
         case = drawn(np.random.default_rng(seed), **chosen)
     except OutOfReach as error:
-        _write_json(sealed / f"{token}.json", {"asked": dict(asked), "error": str(error)})
+        write_json(sealed / f"{token}.json", {"asked": dict(asked), "error": str(error)})
         return
     except (TypeError, ValueError) as error:
         raise WorldError(f"case {token}: {error}") from error
     folder = out / "open" / token
     folder.mkdir(parents=True, exist_ok=True)
     for i, found in enumerate(rows(case)):
-        _write_rows(folder / f"{i}.npz", found)
+        write_rows(folder / f"{i}.npz", found)
     told = truth(case) | {"asked": dict(asked), "thruster": asdict(case.thruster), "error": None}
     if asked.get("rivals") and case.effects:
         near = twins(case, case.effects[0].effect, list(asked["rivals"]), np.random.default_rng([*seed, 1]))
         told["twins"] = [asdict(twin) for twin in near[:NEAREST]]
     if case.fault is None:
         other = another(case, np.random.default_rng([*seed, 2]))
-        _write_rows(folder / "drive.npz", other.drive, at=other.at)
+        write_rows(folder / "drive.npz", other.drive, at=other.at)
         exact, seen = other.thrust.astype(np.float32), other.measured.astype(np.float32)
         np.savez_compressed(sealed / f"{token}.npz", thrust=exact, measured=seen)
-    _write_json(sealed / f"{token}.json", told)  # last: a seal stands for a case that is complete
+    write_json(sealed / f"{token}.json", told)  # last: a seal stands for a case that is complete
 
 
-def _write_rows(path: Path, found: Rows, at: Floats | None = None) -> None:
+def write_rows(path: Path, found: Rows, at: Floats | None = None) -> None:
+    """One recording as an npz file; `at`: the times at which a prediction is wanted."""
     about = {
         "recording_id": found.recording_id,
         "thruster": found.thruster,
@@ -104,7 +105,7 @@ def _write_rows(path: Path, found: Rows, at: Floats | None = None) -> None:
     np.savez(path, **(arrays if at is None else arrays | {"at": at}))
 
 
-def _write_json(path: Path, table: Mapping[str, Any]) -> None:
+def write_json(path: Path, table: Mapping[str, Any]) -> None:
     """Whole or not at all."""
     part = path.with_name(path.name + ".part")
     part.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")

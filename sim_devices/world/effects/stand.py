@@ -107,24 +107,28 @@ class Hysteresis:
         return play(value, self.width)
 
 
+STEP = 1e-3
+"""s: the world's usual step."""
+
+
 @dataclass(slots=True)
 class TimeSkew:
-    """The force arrives late: F(t - delay), to the nearest world step."""
+    """The force arrives late: F(t - delay), of the step that this instant falls into, to half a millisecond."""
 
     stage: ClassVar[Stage] = "stand"
     delay: float
     """s."""
-    line: deque[float] = field(init=False, default_factory=deque)
+    line: deque[tuple[float, float]] = field(init=False, default_factory=deque)
+    """(s, N) of the steps that are under way; they need not be even."""
 
     def __post_init__(self) -> None:
         require_positive(delay=self.delay)
 
-    def apply(self, value: float, _s: State, dt: float) -> float:
-        self.line.append(value)
-        late = max(round(self.delay / dt), 0)
-        while len(self.line) > late + 1:
+    def apply(self, value: float, s: State, dt: float) -> float:
+        self.line.append((s.t, value))
+        while len(self.line) > 1 and self.line[0][0] < s.t - self.delay - 0.5 * min(dt, STEP):
             self.line.popleft()
-        return self.line[0]
+        return self.line[0][1]
 
     def over(self, value: Floats, h: History) -> Floats:
         return delayed(value, self.delay, h.dt)

@@ -53,20 +53,6 @@ def test_installed_thrust():
     assert hull.force("heave", {"T5": 10.0}) == pytest.approx(40.0)
 
 
-def test_a_jet_takes_with_its_own_rate_and_the_root_of_the_partners_thrust():
-    hull = romeo({"T1": 0.4, "T3": 0.9}, eta_hull=1.0, eta_pair=0.8)
-    alone, beside = hull.thrust("T1", {"T1": 5.0}), hull.thrust("T1", {"T1": 5.0, "T3": 10.0})
-    assert alone - beside == pytest.approx(0.2 * sqrt(alone) * sqrt(0.9 * 100.0))
-    equal = {"T1": 9.0, "T3": 6.0}  # 32.4 N each
-    assert hull.thrust("T1", equal) == pytest.approx(0.8 * 32.4)
-    assert hull.thrust("T3", equal) == pytest.approx(0.8 * 32.4)
-    taken = {v: 0.4 * v * v - hull.thrust("T1", {"T1": v, "T3": 10.0}) for v in (2.0, 4.0)}
-    assert taken[4.0] == pytest.approx(2.0 * taken[2.0])
-    assert hull.thrust("T1", {"T1": 0.5, "T3": 20.0}) < 0.0  # at a small rate more than its own
-    assert hull.thrust("T1", {"T1": 5.0, "T3": -10.0}) > alone  # what comes from behind helps
-    assert hull.thrust("T1", {"T3": 10.0}) == 0.0
-
-
 def test_records_are_named_as_the_format_names_them():
     rng = np.random.default_rng(1)
     records = run_trials(romeo(wander=1.0), [surge_steady()[0], heave_steady()[0], sine("yaw", ALL, 10.0)], rng)

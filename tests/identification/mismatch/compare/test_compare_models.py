@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.mismatch import policy
 from identification.mismatch.answer.against_twin import twin_of
-from identification.mismatch.compare.saved_model_baseline import given, prior_factor, starting
+from identification.mismatch.compare.saved_model_baseline import given, lasting, prior_factor, starting
 from identification.mismatch.compare.simulation import (
     Drive,
     Prediction,
@@ -26,8 +27,9 @@ from identification.physics.asymmetry import Asymmetry
 from identification.physics.dead_band import DeadBand
 from identification.physics.motor_lag import MotorLag
 from identification.physics.speed_of_advance import SpeedOfAdvance
+from identification.physics.zero_offset import ZeroOffset
 from identification.recording import Channel
-from identification.twin import TwinLine, TwinNoise
+from identification.twin import Alternative, TwinLine, TwinNoise
 from tests.identification.diagnosed_runs import NOISE, dead_band
 from tests.identification.mismatch.small import data_of, known_noise, rng, short
 
@@ -159,9 +161,16 @@ def test_its_uncertainty_is_that_of_its_parameters_by_differences(twin):
         high, low = (static(with_values(twin, values + sign * step), V) for sign in (1, -1))
         slopes.append((high - low) / 2e-5)
     J = np.column_stack(slopes)
-    assert found.thrust[0] @ found.thrust[0].T == pytest.approx(J @ cov @ J.T, abs=2e-2 * np.max(J @ cov @ J.T))
+    neutral = [
+        static(with_values(twin, [0.0 if i == 0 else values[0], 1.0 if i == 1 else values[1]]), V) for i in (0, 1)
+    ]
+    beside = np.column_stack([static(twin, V) - each for each in neutral])
+    forms = policy.compare.FORM_ERROR**2 * beside @ beside.T
+    expected = J @ cov @ J.T + forms
+    assert found.thrust[0] @ found.thrust[0].T == pytest.approx(expected, abs=2e-2 * np.max(expected))
     sure = replace(twin, covariance=tuple((0.0,) * 3 for _ in range(3)))
-    assert prior_factor(sure, data, theta) is None
+    thrust = prior_factor(sure, data, theta).thrust[0]
+    assert thrust @ thrust.T == pytest.approx(forms, abs=2e-2 * np.max(forms)), "a form may be off"
     bare = replace(twin, terms=(), covariance=((1.0,),))
     assert prior_factor(bare, data, theta) is None
     assert given(bare) == ()
@@ -216,3 +225,35 @@ def test_physics_that_the_simulation_leaves_out_is_the_finding():
     assert found.real.baseline_model.startswith("the simulation sim.h5")
     (finding,) = found.real.findings
     assert finding.parameters["half_width"].value == pytest.approx(1.2, abs=0.05)
+
+
+# ---------------------------------------------------------------- what of it is true of another run
+
+
+def test_a_jump_of_the_zero_stays_with_the_run_that_had_it():
+    jump = ZeroOffset()
+    data, estimate = known_noise({BAND: (1.0,), jump: (2.0, 40.0)}, [short(volts=dead_band(1.0))])
+    twin = twin_of(estimate, data, [short(volts=dead_band(1.0))], None)
+    assert [t.effect for t in twin.terms] == ["dead_band", "zero_offset"]
+    other = short(seed=3)
+    left = lasting(twin, [other])
+    assert [t.effect for t in left.terms] == ["dead_band"]
+    assert left.names == ("C", "dead_band.half_width")
+    assert np.array(left.covariance) == pytest.approx(np.array(twin.covariance)[:2, :2])
+    own = replace(other, recording_id=twin.sources[0].recording_id)
+    assert lasting(twin, [own]) is twin
+    assert lasting(left, [other]) is left
+
+
+def test_what_another_form_would_have_said_is_a_direction_no_longer_than_it_was_off(twin):
+    data, theta = data_of([short()])
+    theta = replace(theta, C=twin.C)
+    terms = tuple(replace(t, form="jump") if t.effect == "dead_band" else t for t in twin.terms)
+    plain = prior_factor(twin, data, theta).thrust[0]
+    near, far = (
+        prior_factor(replace(twin, alternatives=(Alternative(twin.C, terms, loss, 0.0),)), data, theta).thrust[0]
+        for loss in (1.0, 900.0)
+    )
+    told = [np.sum(each**2) - np.sum(plain**2) for each in (near, far)]
+    assert told[0] > 0
+    assert told[1] == pytest.approx(told[0] * (policy.compare.FORM_ERROR_SIGMA / 30) ** 2, rel=1e-6)

@@ -115,3 +115,17 @@ def test_channels_of_one_stream_share_its_clock_and_have_their_own_delays():
     assert np.max(np.abs(moved.channels[0].time + 0.005 - true)) < 1e-4
     assert np.max(np.abs(moved.channels[1].time - true)) < 1e-4
     assert told[0].startswith("cell: put on its own clock (rows came up to ")
+
+
+def test_values_that_were_cut_toward_zero_get_half_a_step_back():
+    true = np.linspace(-3.0, 3.0, 6001)
+    cut = 0.1 * np.trunc(true / 0.1)
+    whole = Recording("a", "T1", (channel(np.arange(true.size) * 0.01, cut, quantum=0.1, rounding="toward_zero"),))
+    found, (told,) = as_sampled(whole)
+    far = np.abs(true) > 0.1
+    for side in (-1.0, 1.0):
+        which = far & (np.sign(true) == side)
+        assert np.mean(found.channels[0].value[which] - true[which]) == pytest.approx(0.0, abs=1e-3)
+    assert "half a step from zero" in told
+    plain = Recording("a", "T1", (channel(np.arange(true.size) * 0.01, cut, quantum=0.1),))
+    assert as_sampled(plain) == (plain, ())

@@ -60,6 +60,7 @@ class Columns:
     columns: dict[Column, np.ndarray]
     pressed: frozenset[Column] = frozenset()
     hidden: Column | None = None
+    rare: frozenset[Column] = frozenset()
 
     def fit(self, *terms):
         J = np.column_stack([self.columns[t] for t in terms]) if terms else np.empty((ROWS, 0))
@@ -80,6 +81,12 @@ class Columns:
 
     def enlarged(self, state, larger):
         return State(larger)
+
+    def reformed(self, state):
+        return state
+
+    def rarer(self, term, other):
+        return term in self.rare and other not in self.rare
 
     def unhidden(self, state, judged):
         if self.hidden is None or self.hidden in state.fit.values:

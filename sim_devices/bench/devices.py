@@ -1,0 +1,71 @@
+"""The device side of each serial wire of a bench, made of its settings and the world that it measures."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from datetime import datetime
+
+import numpy as np
+
+from sim_devices.bench.settings import DeviceOptions
+from sim_devices.instruments.keller import Keller, KellerOptions
+from sim_devices.instruments.line_sender import LineOptions, LineSender
+from sim_devices.instruments.mt_sics import MtSics
+from sim_devices.instruments.mt_sics_options import MtSicsOptions
+from sim_devices.instruments.nortek import Nortek, NortekOptions
+from sim_devices.instruments.serial_device import SerialDevice
+from sim_devices.instruments.vesc import VescOptions
+from sim_devices.wires.serial_line import Wire
+from sim_devices.world import World
+from sim_devices.world.noise import Noise, Normals
+
+
+def serial_device(
+    options: DeviceOptions,
+    world: World,
+    cross_rng: np.random.Generator,
+    epoch: datetime,
+    force: Callable[[], float] | None = None,
+) -> SerialDevice:
+    """The device of these options. `force`: what a load cell reads, N; None: the world's, as it is.
+
+    Raises ValueError for a motor controller, which is on a bus.
+    """
+    read = force or (lambda: world.sample("thrust"))
+    match options:
+        case MtSicsOptions():
+            return MtSics(options, read)
+        case LineOptions():
+            return LineSender(options, read)
+        case NortekOptions():
+            std = world.settings.noise.get("flow_speed", Noise()).white
+            cross = Normals(cross_rng)
+            return Nortek(options, lambda: world.sample("flow_speed"), lambda: std * cross.draw(), epoch)
+        case KellerOptions():
+            return Keller(options, lambda: world.sample("pressure"), lambda: world.sample("water_temperature"))
+        case VescOptions():
+            raise ValueError("a motor controller is no serial device: it is on a bus")
+
+
+def turnaround(options: DeviceOptions) -> float:
+    """S from the end of a request, or of the last conversion, to the first byte of what the device says.
+
+    A converter that averages sees its quantity all the time; one value in the middle of each piece stands for it here,
+    so that the last piece ends half of it later.
+    """
+    match options:
+        case KellerOptions():
+            return options.turnaround
+        case MtSicsOptions() | LineOptions() if options.average > 1:
+            return 0.5 / (options.rate * options.average)
+        case _:
+            return 0.0
+
+
+def say(wire: Wire, data: bytes, t: float, late: float) -> None:
+    """Hand a device's words to its wire: lines one by one, anything else whole."""
+    if data.endswith(b"\r\n"):
+        for line in data.splitlines(keepends=True):
+            wire.put(line, t, late)
+    elif data:
+        wire.put(data, t, late)

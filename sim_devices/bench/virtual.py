@@ -1,0 +1,158 @@
+"""A bench in virtual time: the world, its devices on their wires and the computer's lateness; sleeping moves it on.
+
+What the desk-top bench is in the machine's time. The host is whoever sleeps on this clock and talks over these wires.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from datetime import UTC, datetime
+from math import inf
+
+import numpy as np
+
+from sim_devices.bench.devices import say, serial_device, turnaround
+from sim_devices.bench.settings import BenchSettings
+from sim_devices.bench.virtual_wire import Host, VirtualWire
+from sim_devices.instruments.low_pass import LowPass
+from sim_devices.instruments.motor_tap import MotorTap
+from sim_devices.instruments.serial_device import SerialDevice
+from sim_devices.instruments.vesc import Vesc, VescOptions
+from sim_devices.tables import WorldError
+from sim_devices.wires.can_frame import CanFrame
+from sim_devices.wires.serial_line import Wire
+from sim_devices.wires.slcan import Adapter
+from sim_devices.world import World
+
+BEGIN_NS = 10**12
+"""Of the host's clock when the bench begins."""
+EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
+SAME = 1e-9
+"""s: two times that are no closer than this are two."""
+
+
+class VirtualBench:
+    """`now_ns` and `sleep_until_ns` are the host's clock, `wires` the near ends by the names of devices and buses."""
+
+    def __init__(
+        self, settings: BenchSettings, host: Host, bus: str, filters: Mapping[str, float] | None = None
+    ) -> None:
+        """`bus`: the host's name for the adapter. `filters`: s, time constant of the low pass in a load cell's
+        amplifier, by the device's name."""
+        world_rng, wire_rng, cross_rng, self._host_rng = np.random.default_rng(settings.seed).spawn(4)
+        self.settings, self.host = settings, host
+        self.world = World(settings.world, world_rng)
+        self.commands: list[tuple[float, float]] = []
+        """(s, V) of every voltage that the drive took up."""
+        self._t, self._told = 0.0, False
+        self._wire_rng = wire_rng
+        self._adapter, self._bus = Adapter(), self._wired(bus, None)
+        self.serial: dict[str, tuple[SerialDevice, VirtualWire, float]] = {}
+        motors = [options for options in settings.devices.values() if isinstance(options, VescOptions)]
+        if len(motors) != 1:
+            raise WorldError(f"devices: a bench in virtual time has one motor controller, this one {len(motors)}")
+        self._tap = MotorTap(self.world, motors[0].pole_pairs, motors[0].vesc_id)
+        self.vesc = Vesc(motors[0], settings.world.supply.voltage, self._tap.telemetry, self._log)
+        self._tap.vesc = self.vesc
+        for name, options in settings.devices.items():
+            if isinstance(options, VescOptions):
+                continue
+            force = LowPass(lambda: self.world.sample("thrust"), (filters or {}).get(name, 0.0), self.now)
+            device = serial_device(options, self.world, cross_rng, EPOCH, force)
+            self.serial[name] = (device, self._wired(name, options.baud), turnaround(options))
+        self._ends = [self._bus, *(wire for _, wire, _ in self.serial.values())]
+        self.wires: Mapping[str, VirtualWire] = {wire.name: wire for wire in self._ends}
+        self._next_stall = self._until_stall()
+
+    def _wired(self, name: str, baud: int | None) -> VirtualWire:
+        return VirtualWire(name, self, Wire(baud, self._wire_rng), self.host, self._host_rng)
+
+    # -- the host's clock --------------------------------------------------------------------------------------------
+
+    def now(self) -> float:
+        """S since the bench began."""
+        return self._t
+
+    def stamp(self, t: float) -> int:
+        return BEGIN_NS + round(t * 1e9)
+
+    def now_ns(self) -> int:
+        return self.stamp(self._t)
+
+    def sleep_until_ns(self, t_ns: int) -> None:
+        """The control loop wakes late, as on any machine."""
+        late = self.host.loop_late * float(self._host_rng.standard_exponential())
+        self._run_to(max((t_ns - BEGIN_NS) * 1e-9 + late, self._busy_until(t_ns)))
+
+    def wait(self, seconds: float) -> None:
+        """Until something was told to the host, or `seconds` are over."""
+        end, self._told = self._t + seconds, False
+        while self._t < end and not self._told:
+            self._run_to(min(self._next_event(), end))
+
+    def _busy_until(self, t_ns: int) -> float:
+        """A stall that is on at that time ends then, and no reader runs before."""
+        t = (t_ns - BEGIN_NS) * 1e-9
+        end = -inf
+        while self._next_stall <= t:
+            end = self._next_stall + self.host.stall * float(self._host_rng.random())
+            for wire in self._ends:
+                wire.stall(end)
+            self._next_stall = max(end, self._next_stall) + self._until_stall()
+        return end
+
+    def _until_stall(self) -> float:
+        every = self.host.stall_every
+        return every * float(self._host_rng.standard_exponential()) if every < inf else inf
+
+    # -- what happens ------------------------------------------------------------------------------------------------
+
+    def _next_event(self) -> float:
+        devices = [device.due for device, _, _ in self.serial.values()]
+        return min([*devices, self.vesc.due, *(wire.due for wire in self._ends)])
+
+    def _run_to(self, t: float) -> None:
+        """Event by event, each in the world of its own instant."""
+        while (due := self._next_event()) <= t:
+            self._move_world(max(due, self._t))
+            self._happen(self._t)
+        self._move_world(t)
+
+    def _move_world(self, t: float) -> None:
+        step, world, vesc, tap = self.settings.step, self.world, self.vesc, self._tap
+        state = world.state
+        while (left := t - state.t) > SAME:
+            dt = min(step, left)
+            volts, amps = vesc.drive(state.n, dt)
+            world.step(dt, volts, amps)
+            tap.after_step(dt)
+        self._t = max(t, self._t)
+
+    def _happen(self, t: float) -> None:
+        if self.vesc.due <= t:
+            for frame in self.vesc.tick(t):
+                self._deliver(frame, t)
+        for device, wire, late in self.serial.values():
+            if device.due <= t:
+                say(wire.wire, device.tick(t), t, late)
+            if data := wire.heard(t):
+                say(wire.wire, device.feed(data, t), t, late)
+        if data := self._bus.heard(t):
+            answer, frames = self._adapter.feed(data)
+            if answer:
+                self._bus.wire.put(answer, t)
+            for answered in (reply for frame in frames for reply in self.vesc.receive(frame, t)):
+                self._deliver(answered, t)
+        for wire in self._ends:
+            if wire.due <= t:
+                self._told = wire.carry(t) or self._told
+
+    def _deliver(self, frame: CanFrame, t: float) -> None:
+        if line := self._adapter.deliver(frame):
+            self._bus.wire.put(line, t)
+
+    def _log(self, event: str, **fields: object) -> None:
+        """Only what the motor was really driven with is of use here."""
+        if event in ("command", "timeout"):
+            volts = fields["volts"]
+            self.commands.append((self._t, float(volts) if isinstance(volts, float | int) else 0.0))
