@@ -59,7 +59,7 @@ class LoadCellSaturation:
         told_by=(("rotation_rate", "the measured rotation rate"), ("current", "the measured current")),
         revealed_by="current or rotation rate at the highest levels: they go on rising",
     )
-    form: Literal["hard", "before_noise", "before_zero", "knee"] = "hard"
+    form: Literal["hard", "before_noise", "knee"] = "hard"
 
     @property
     def sharp(self) -> bool:
@@ -69,12 +69,7 @@ class LoadCellSaturation:
     @property
     def silent(self) -> bool:
         """Whether the amplifier's own noise is clipped too."""
-        return self.form in ("hard", "knee")
-
-    @property
-    def zeroed(self) -> bool:
-        """Whether the zero is clipped with the force."""
-        return self.form != "before_zero"
+        return self.form != "before_noise"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         most = 1.3 * scale.reading
@@ -104,11 +99,10 @@ class LoadCellSaturation:
             bent: Floats = np.copysign(limited(np.abs(reading), spread, *theta), reading) - now.tare
             return bent
         out = value.copy()
-        shown = value + now.tare if self.zeroed else value
         for share, std in ((1 - tails, noise), (tails, TAIL * noise)):
             if share > 0:
-                over = shown - theta[0]
-                under = -theta[0] - shown
+                over = value + now.tare - theta[0]
+                under = -theta[0] - value - now.tare
                 out -= share * (_beyond(over, half, std) - _beyond(under, half, std))
         return out
 
@@ -147,9 +141,4 @@ def _half_moved(history: History, C: float, x: Floats) -> Floats:
     return out
 
 
-FORMS = (
-    LoadCellSaturation("hard"),
-    LoadCellSaturation("before_noise"),
-    LoadCellSaturation("before_zero"),
-    LoadCellSaturation("knee"),
-)
+FORMS = (LoadCellSaturation("hard"), LoadCellSaturation("before_noise"), LoadCellSaturation("knee"))

@@ -58,10 +58,6 @@ class LimitsReading(Protocol):
     def silent(self) -> bool:
         """Whether the amplifier's own noise is clipped too."""
 
-    @property
-    def zeroed(self) -> bool:
-        """Whether the zero is clipped with the force."""
-
     def shown(self, history: History, C: float, x: Floats, reading: Floats, theta: tuple[float, ...]) -> Floats:
         """(M,) share of what the force does within each interval that the cell shows."""
 

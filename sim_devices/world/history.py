@@ -41,6 +41,7 @@ class History:
     nominal_bus: float = 48.0
     stand_frequency: float = 0.0
     stand_damping: float = 0.0
+    zero: float = 0.0
 
 
 def clock(count: int, dt: float) -> Floats:
@@ -76,4 +77,5 @@ def instant(s: State) -> History:
         nominal_bus=s.nominal_bus,
         stand_frequency=s.stand_frequency,
         stand_damping=s.stand_damping,
+        zero=s.zero,
     )

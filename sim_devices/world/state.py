@@ -55,3 +55,5 @@ class State:
     stand_frequency: float = 0.0
     """Hz of a stand that rings; 0: rigid."""
     stand_damping: float = 0.0
+    zero: float = 0.0
+    """N that the cell reads with no load."""

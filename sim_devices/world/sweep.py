@@ -106,4 +106,5 @@ def _at_rest(settings: WorldSettings, dt: float, command: Floats, flow: Floats, 
         drag=thruster.drag,
         torque_acceleration=thruster.torque_acceleration,
         nominal_bus=settings.supply.voltage,
+        zero=settings.cell.zero_offset,
     )

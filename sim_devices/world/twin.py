@@ -135,8 +135,7 @@ def _limit(values: Values, form: str, _k: float, _driver: float) -> Table:
 
 
 def _cell_limit(values: Values, form: str, _k: float, _driver: float) -> Table:
-    before = form in ("before_noise", "before_zero")
-    return {**values, "place": "cell"} if before else {**values, "form": form or "hard"}
+    return {**values, "place": "cell"} if form == "before_noise" else {**values, "form": form or "hard"}
 
 
 def _winding(values: Values, _form: str, k: float, _driver: float) -> Table:

@@ -24,7 +24,7 @@ class World:
     def __init__(self, settings: WorldSettings, rng: np.random.Generator) -> None:
         self.settings = settings
         self.state = State(bus_voltage=settings.supply.voltage, nominal_bus=settings.supply.voltage)
-        self.state.flow = settings.tunnel.flow_speed
+        self.state.flow, self.state.zero = settings.tunnel.flow_speed, settings.cell.zero_offset
         self.state.water_temperature = settings.tunnel.water_temperature
         self._noise = {c: NoiseSource(settings.noise.get(c, Noise()), rng) for c in CHANNELS}
         self._effects = make_effects(settings.effects)

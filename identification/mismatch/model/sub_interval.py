@@ -100,8 +100,7 @@ def shown(model: Model, theta: Theta, history: History, F: Floats, x: Floats, ta
     """(M,) or 1: the share of what the force F (without tare) does within an interval that the cell shows."""
     for term, values in zip(model.terms, theta.terms, strict=True):
         if term.traits.limits == "reading":
-            cell = cast(LimitsReading, term)
-            return cell.shown(history, theta.C, x, F + tare if cell.zeroed else F, values)
+            return cast(LimitsReading, term).shown(history, theta.C, x, F + tare, values)
     return 1.0
 
 

@@ -31,10 +31,9 @@ def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
         shown = predict(fitted.model, fitted.theta, data.runs[i], data.scale, fitted.theta.tares[i])[0][rows]
         edges = np.concatenate([whole[:1], 0.5 * (whole[1:] + whole[:-1]), whole[-1:]])
         force, first, last = whole[rows], edges[:-1][rows], edges[1:][rows]
-        zero = fitted.theta.tares[i] if cell.zeroed else 0.0
         variance = noise.white + noise.proportional * force**2 + sum(noise.slow) + sum(noise.band)
         for side in (1.0, -1.0):
-            reached = np.minimum(side * first, side * last) + side * zero  # not on the way there
+            reached = np.minimum(side * first, side * last) + side * fitted.theta.tares[i]  # not on the way there
             slope = cell.slope(reached, values)
             deep = (reached > cell.start(values)) & (slope < policy.select.KNEE_SLOPE)
             behind = 0.0 if cell.silent else variance - noise.proportional * force**2

@@ -15,10 +15,6 @@ from rig.blind.scoring.hot_copper import COPPER, loss_at_full, loss_per_kelvin
 Table = Mapping[str, Any]
 
 
-LIMITS: Final = frozenset({"hard", "before_noise", "before_zero"})
-"""Forms of the catalogue in which a limit is one value."""
-
-
 class Told(NamedTuple):
     """What a finding says before its numbers are compared."""
 
@@ -66,7 +62,7 @@ def _in_form(**names: str) -> Same:
 
 def _limit(p: Table, told: Told) -> Table:
     """Of a limit that is met at once, wherever the noise comes in; a soft one has no such value."""
-    return {"limit": p["limit"]} if "form" not in p and told.form in LIMITS else {}
+    return {"limit": p["limit"]} if "form" not in p and told.form in ("hard", "before_noise") else {}
 
 
 def _winding(p: Table, told: Told) -> Table:

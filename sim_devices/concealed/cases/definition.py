@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from sim_devices.concealed.cases.knob import Scale, Shape
 from sim_devices.concealed.cases.plans import Profile, held
 from sim_devices.world.history import History, clock
 from sim_devices.world.noise_law import NoiseLaw
-from sim_devices.world.settings import Supply, Thruster, WorldSettings, make_effects
+from sim_devices.world.settings import Cell, Supply, Thruster, WorldSettings, make_effects
 from sim_devices.world.sweep import sweep
 
 Floats = NDArray[np.float64]
@@ -113,7 +113,8 @@ def history(case: Case, run: Run, *, without: frozenset[str] = frozenset()) -> H
     times, speeds = np.array(run.flow, dtype=np.float64).T
     command = held(run.profile.time, run.profile.volts, t)
     water = case.water_temperature + case.temperature_drift * (run.start + t)
-    return sweep(settings(case, without=without), case.dt, command, held(times, speeds, t), water, run.start)
+    world = replace(settings(case, without=without), cell=Cell(zero_offset=run.tare))
+    return sweep(world, case.dt, command, held(times, speeds, t), water, run.start)
 
 
 def thrust_of(

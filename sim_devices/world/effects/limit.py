@@ -64,7 +64,7 @@ class CommandSaturation(Limit):
 class LoadCellSaturation(Limit):
     """Cell or amplifier clips at `limit` N. place "output": the converter, noise and all, so that the reading stands.
 
-    place "cell": the cell itself (an overload stop), before its amplifier's noise and zero are added: noise remains.
+    place "cell": the cell itself (an overload stop) and its zero, a load on it, with the force; noise is added after.
     """
 
     place: str = "output"
@@ -72,6 +72,15 @@ class LoadCellSaturation(Limit):
     def __post_init__(self) -> None:
         Limit.__post_init__(self)
         require_choice("place", self.place, ("output", "cell"))
+
+    def apply(self, value: float, s: State, dt: float) -> float:
+        """What the zero adds later is left out of it."""
+        zero = s.zero if self.place == "cell" else 0.0
+        return Limit.apply(self, value + zero, s, dt) - zero
+
+    def over(self, value: Floats, h: History) -> Floats:
+        zero = h.zero if self.place == "cell" else 0.0
+        return Limit.over(self, value + zero, h) - zero
 
     @property
     def stage(self) -> Stage:

@@ -33,15 +33,6 @@ def test_a_clipping_cell_shows_the_mean_of_samples_that_clip_one_by_one():
     assert hard == pytest.approx(np.clip(value + 7.0, -90.0, 90.0) - 7.0)
 
 
-def test_a_cell_on_its_stop_leaves_the_amplifier_its_noise_and_its_zero():
-    value, still = np.linspace(-110.0, 110.0, 41), np.zeros(41)
-    loud = moment(H, replace(S, noise=4.0), tare=7.0, x=still)
-    loaded = term("load_cell_saturation", "before_noise").apply(value, loud, (90.0,))
-    assert loaded == pytest.approx(np.clip(value + 7.0, -90.0, 90.0) - 7.0, abs=0.02), "the zero is a load"
-    stop = term("load_cell_saturation", "before_zero").apply(value, loud, (90.0,))
-    assert stop == pytest.approx(np.clip(value, -90.0, 90.0), abs=0.02)
-
-
 def of_levels(level, thrust):
     """A run of levels of one second each with their samples (n, 100)."""
     n = level.size

@@ -64,8 +64,7 @@ def test_magnets_that_lose_more_than_a_seventh_would_warm_without_end():
 def test_steps_of_the_water_and_a_clip_before_the_noise_are_the_twin_s():
     water = [entry("inflow_dynamics", "momentum", 0.3, 0.4)]
     assert acted(water, 12.0, 6.0)[1:] == pytest.approx(told(water, 12.0, 6.0)[1:], rel=0.02)
-    for form in ("before_noise", "before_zero"):
-        clipped = world_of(file_of(entry("load_cell_saturation", form, 40.0)))[1]
-        assert clipped == {"load_cell_saturation": {"limit": 40.0, "place": "cell"}}
+    clipped = world_of(file_of(entry("load_cell_saturation", "before_noise", 40.0)))[1]
+    assert clipped == {"load_cell_saturation": {"limit": 40.0, "place": "cell"}}
     clip = world_of(file_of(entry("load_cell_saturation", "hard", 40.0)))[1]
     assert clip == {"load_cell_saturation": {"limit": 40.0, "form": "hard"}}

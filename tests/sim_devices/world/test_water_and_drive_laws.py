@@ -113,6 +113,18 @@ def test_a_cell_that_stops_before_its_amplifier_still_has_noise(place, spread):
     assert np.std([world.sample("thrust") for _ in range(1000)]) == pytest.approx(spread, rel=0.1)
 
 
+@pytest.mark.parametrize("volts", [20.0, -20.0, 5.0])
+def test_the_zero_of_a_cell_that_stops_is_a_load_on_it(volts):
+    tables = {"thrusters": {"T": THRUSTER}, "cell": {"zero_offset": 4.0}}
+    clipped = read_world(tables | {"effects": {"load_cell_saturation": {"limit": 50.0, "place": "cell"}}})
+    live = World(clipped, np.random.default_rng(1))
+    for _ in range(2000):
+        live.step(1e-3, volts)
+    assert live.exact("thrust") == pytest.approx(np.clip(C * volts * abs(volts) + 4.0, -50.0, 50.0), rel=1e-6)
+    told = sweep(clipped, 0.01, np.full(200, volts), np.zeros(200), np.full(200, 18.0))
+    assert told.reading[-1] + 4.0 == pytest.approx(live.exact("thrust"), rel=1e-6)
+
+
 @pytest.mark.parametrize(
     ("effect", "sentence"),
     [

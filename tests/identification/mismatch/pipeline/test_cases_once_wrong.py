@@ -102,3 +102,13 @@ def test_a_jump_of_the_zero_hides_beside_another_effect() -> None:
     found = diagnose([recording(case)])
     assert isinstance(found, Diagnosis)
     assert {f.effect for f in found.findings} == {"zero_offset", "recirculation"}
+
+
+def test_a_cell_on_its_stop_is_named_whose_noise_comes_after() -> None:
+    """Where the zero was no load on the cell of the world it was a cavitation."""
+    seed = [2688482787, 1804759238, 646837829, 1924247675]
+    case = concealed.case(np.random.default_rng(seed), ["load_cell_saturation"], 40.0, forms=["before_noise"])
+    finding = only_finding(case)
+    assert (finding.effect, finding.form) == ("load_cell_saturation", "before_noise")
+    low, high = finding.parameters["limit"].interval
+    assert low < case.effects[0].parameters["limit"] < high
