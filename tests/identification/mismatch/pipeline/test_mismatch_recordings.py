@@ -105,7 +105,7 @@ def test_a_channel_that_lies_is_the_finding_and_its_repair_is_told(lie):
 
 
 ALIASED = pytest.mark.xfail(
-    reason="a wave that goes as the square of the speed is nearly all at one speed: sampled, another order looks like it",
+    reason="a wave that grows as the square of the speed is nearly all at one: sampled, another order looks like it",
     strict=True,
 )
 
