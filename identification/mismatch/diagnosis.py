@@ -8,13 +8,9 @@ from typing import ClassVar, Literal
 
 from identification.mismatch import policy
 from identification.mismatch.value import Value, Where
+from identification.mismatch.verdict_clauses import either, mostly
 from identification.recording import Floats
 from identification.twin import Twin
-
-NOT_WHITE = (
-    "intervals and p-values rest on the noise model, which does not describe all of it: they may be surer than they "
-    "should"
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -291,7 +287,7 @@ class Diagnosis:
             case Explained(findings):
                 return "Left out: " + " ".join(f.statement for f in findings)
             case Ambiguous(findings):
-                rivals = "; ".join(_either(f) for f in findings if f.rivals)
+                rivals = "; ".join(either(f) for f in findings if f.rivals)
                 sure = " ".join(f.statement for f in findings if not f.rivals)
                 known = f" Left out besides: {sure}" if sure else ""
                 return f"These recordings cannot tell {rivals}: run the next experiment.{known}"
@@ -299,23 +295,4 @@ class Diagnosis:
                 most = [f for f in findings if f.doubts]
                 sure = " ".join(f.statement for f in findings if not f.doubts)
                 known = f" Known: {sure}" if sure else ""
-                return " ".join([*map(_mostly, most), remainder.statement]) + known
-
-
-def _mostly(f: Finding) -> str:
-    """With what it does on what was not fitted."""
-    says = f"Mostly {f.statement[:1].lower()}{f.statement[1:]}"
-    if f.heldout is None or f.share is None:
-        return says
-    without, with_it = f.heldout
-    return (
-        f"{says} It takes the error on what was not fitted from {without:.3g} to {with_it:.3g}, "
-        f"{100 * f.share:.0f} % of what any shape could take off."
-    )
-
-
-def _either(f: Finding) -> str:
-    """It or its rivals; by form, where they are one effect."""
-    every = [(f.effect, f.form), *((r.effect, r.form) for r in f.rivals)]
-    same = len({effect for effect, _ in every}) < len(every)
-    return " or ".join(f"{effect} ({form})" if same and form else effect for effect, form in every)
+                return " ".join([*map(mostly, most), remainder.statement]) + known

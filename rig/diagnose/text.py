@@ -6,8 +6,9 @@ from collections.abc import Iterator, Mapping
 from math import floor, isfinite, log10
 from textwrap import wrap
 
-from identification.mismatch.diagnosis import NOT_WHITE, Diagnosis, Finding, FlexibleShape, FormulaFound, Remainder
+from identification.mismatch.diagnosis import Diagnosis, Finding, FlexibleShape, FormulaFound, Remainder
 from identification.mismatch.value import Value, Where
+from identification.mismatch.verdict_clauses import NOT_WHITE
 
 WIDTH = 100
 MOST_STEPS = 12

@@ -11,16 +11,15 @@ from numpy.typing import NDArray
 from identification.estimation.singular_values import thin_svd
 from identification.mismatch import policy
 from identification.mismatch.estimate.bounded_least_squares import MOST_STEPS, least_squares
+from identification.mismatch.model.at_samples import at_samples
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model, extended, parameters, reduced
 from identification.mismatch.model.parameters import Layout, Theta
-from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.step_response import ticked
-from identification.mismatch.model.sub_interval import ahead, delay_of, shown, turning
+from identification.mismatch.model.sub_interval import delay_of, turning
 from identification.mismatch.model.whitening import Weights
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
-from identification.run_history.filters import reconstructed
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,22 +122,11 @@ def _raw(model: Model, theta: Theta, data: Data, there: Theta, *, with_rate: boo
     thrust, rate = [], []
     late = delay_of(model, there) + there.shift
     for run, rows, tare in zip(data.runs, data.rows, theta.tares, strict=True):
-        history = run.history
-        F, x = predict(model, theta, run, data.scale, tare)
-        share = theta.C * shown(model, theta, history, F, x, tare)
-        if history.window > 0:
-            F = F + share * history.excess
-        if theta.shift:
-            F = run.delayed(F, theta.shift)
-        if history.window > 0:
-            seen = run.averaged(F)
-        else:
-            more = share * ahead(model, theta, run, x, data.scale, late, tare)
-            seen = reconstructed(F, history.middle, history.sampled) + more
+        seen, x = at_samples(model, theta, run, data.scale, tare, late)
         thrust.append(seen[rows] + tare)
         if with_rate:
             seen = turning(model, theta, run, x, data.scale, there.rate_shift)
-            rate.append(theta.k * seen[history.rate_rows])
+            rate.append(theta.k * seen[run.history.rate_rows])
     return thrust, rate
 
 

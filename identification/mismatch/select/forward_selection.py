@@ -16,9 +16,9 @@ from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
-from identification.mismatch.select.clipping import contradiction
-from identification.mismatch.select.nearby_start import best_forms
-from identification.mismatch.select.rivals import one_for_two, one_less, swaps
+from identification.mismatch.select.exchange.nearby_start import best_forms
+from identification.mismatch.select.exchange.rivals import one_for_two, one_less, swaps
+from identification.mismatch.select.limits.clipping import contradiction
 from identification.mismatch.select.rounds import Candidate, Round, Unhidden
 from identification.mismatch.select.screening import (
     Screening,

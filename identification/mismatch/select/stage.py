@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.mismatch.estimate.estimate import Estimate
-from identification.mismatch.select.aliases import within_samples
+from identification.mismatch.select.exchange.aliases import within_samples
 from identification.mismatch.select.forward_selection import Selected, SwapTest, Thruster, prune, resumed
 from identification.mismatch.select.stepwise import exchanged
 from identification.physics.term import Term

@@ -7,8 +7,9 @@ from math import isfinite, sqrt
 from pathlib import Path
 
 from identification.mismatch.compare.reported_runs import Run, runs_of
-from identification.mismatch.diagnosis import NOT_WHITE, Diagnosis, NextExperiment
+from identification.mismatch.diagnosis import Diagnosis, NextExperiment
 from identification.mismatch.value import Value
+from identification.mismatch.verdict_clauses import NOT_WHITE
 from identification.recording import Recording
 from rig.diagnose.report.flexible import flexible_pictures, modelled_remarks
 from rig.diagnose.report.pictures import (

@@ -8,7 +8,6 @@ import pytest
 from identification.flexible_terms.flexible import MULTIPLIERS, WORDS
 from identification.mismatch.answer.verdict import decided
 from identification.mismatch.diagnosis import (
-    NOT_WHITE,
     Curves,
     Diagnosis,
     Finding,
@@ -24,6 +23,7 @@ from identification.mismatch.diagnosis import (
 )
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.value import Value, Where
+from identification.mismatch.verdict_clauses import NOT_WHITE
 from identification.physics.term import Scale
 from identification.recording import Channel, Recording
 from identification.twin import Source, Twin, TwinNoise, TwinTerm

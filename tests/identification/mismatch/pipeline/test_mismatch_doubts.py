@@ -11,7 +11,7 @@ from identification.mismatch.name.naming import checks
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.select.baseline import baseline, start
-from identification.mismatch.select.flatness import noise_goes_on
+from identification.mismatch.select.limits.flatness import noise_goes_on
 from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.motor_lag import MotorLag
 from identification.physics.time_skew import TimeSkew

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.mismatch.name.naming import checks
-from identification.mismatch.select.clipping import beyond, contradiction
+from identification.mismatch.select.limits.clipping import beyond, contradiction
 from identification.physics.cavitation import Cavitation
 from identification.physics.command_saturation import CommandSaturation
 from identification.physics.load_cell_saturation import LoadCellSaturation

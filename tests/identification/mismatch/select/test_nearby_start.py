@@ -3,7 +3,7 @@
 import numpy as np
 
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.select.nearby_start import best_forms, nearer
+from identification.mismatch.select.exchange.nearby_start import best_forms, nearer
 from identification.physics.asymmetry import Asymmetry
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.dead_band import DeadBand

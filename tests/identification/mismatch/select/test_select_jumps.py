@@ -11,7 +11,7 @@ from identification.mismatch.estimate.estimate import forces
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
-from identification.mismatch.select.aliases import within_samples
+from identification.mismatch.select.exchange.aliases import within_samples
 from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.likeliest_trials import jumps, likeliest_jumps, likeliest_rings
 from identification.physics.stand_resonance import StandResonance

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.select.baseline import baseline, level_error_factor, raw_directions
 from identification.mismatch.select.covariates import covariates, hats
-from identification.mismatch.select.flatness import noise_goes_on
 from identification.mismatch.select.forward_selection import available, static_curve
+from identification.mismatch.select.limits.flatness import noise_goes_on
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.dead_band import DeadBand
 from identification.physics.load_cell_saturation import LoadCellSaturation

@@ -14,7 +14,7 @@ from identification.mismatch.model.model import Model, extended
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
-from identification.mismatch.select.clipping import contradiction
+from identification.mismatch.select.limits.clipping import contradiction
 from identification.physics.term import Term
 from identification.recording import Floats
 

@@ -16,7 +16,7 @@ from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.noise.covariance import Noise
-from identification.mismatch.select.flatness import noise_goes_on
+from identification.mismatch.select.limits.flatness import noise_goes_on
 from identification.physics.term import Term, TermContext
 from identification.recording import Floats
 

@@ -12,9 +12,9 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, fit_without
 from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, fit
 from identification.mismatch.model.data import Data, price
-from identification.mismatch.select.clipping import contradiction
+from identification.mismatch.select.exchange.nearby_start import best_forms, nearer
 from identification.mismatch.select.family_wise import orthogonal_basis
-from identification.mismatch.select.nearby_start import best_forms, nearer
+from identification.mismatch.select.limits.clipping import contradiction
 from identification.mismatch.select.screening import directions, refined
 from identification.mismatch.select.stepwise import RivalTerm
 from identification.physics.term import Term
