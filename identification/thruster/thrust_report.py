@@ -11,6 +11,8 @@ from identification.thruster.thrust import Parameter, ThrustFit
 
 BOTH_MATTER = 0.01
 """A significant difference of C+ and C- below this share of C is called small: the symmetric model stays useful."""
+MISFIT_P = 1e-3
+"""Probability, under a model that fits, of points so far from it, from which C is not told without a warning."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,6 +96,20 @@ def _difference(fit: ThrustFit) -> str:
     if share < BOTH_MATTER:
         return f"{both} differ significantly ({rarity}) but by {100 * share:.2g} % only"
     return f"{both} differ by {100 * share:.3g} % ({rarity}): the directions are not alike, use --model C+/C-"
+
+
+def misfit(fit: ThrustFit) -> str:
+    """Why the constant is none of the thruster's, in a sentence without an end; empty where the model fits its points.
+
+    At 0.1 %: a table of numbers is read before its verdicts are.
+    """
+    judged = fit.estimate.underfit
+    if judged is None or judged.dof <= 0 or judged.p_value >= MISFIT_P:
+        return ""
+    rarity = "p < 1e-12" if judged.p_value < 1e-12 else f"p = {judged.p_value:.2g}"
+    return (
+        f"{fit.model} does NOT fit its points (chi2/dof {judged.per_dof:.3g}, {rarity}): C holds for these levels only"
+    )
 
 
 def verdicts(fit: ThrustFit, alternatives: Sequence[ThrustFit] = ()) -> Iterator[str]:

@@ -11,7 +11,7 @@ from identification.thruster.comparison import POWER, Change, Difference
 from identification.thruster.dynamics import UNITS
 from identification.thruster.model_choice import Candidate, statement
 from identification.thruster.thrust_data import Unusable
-from identification.thruster.thrust_report import digits, sentence, table, verdicts
+from identification.thruster.thrust_report import digits, misfit, sentence, table, verdicts
 from rig.fit.answer import Answer
 from rig.fit.comparison import Alike, Changed
 
@@ -37,7 +37,7 @@ def _small(value: float | None, pattern: str = "{:.3g}") -> str:
 
 def answer_text(answer: Answer) -> str:
     """Sentence, table, models side by side, verdicts, rotor."""
-    lines = [sentence(answer.fit), ""]
+    lines = [sentence(answer.fit), *_misfit(answer), ""]
     heads = ("", "value", "std", "95 % from", "to", "unit", "error", "(white)", "")
     lines.append(FORM.format(*heads).rstrip())
     for fit in (answer.fit, *answer.alternatives):
@@ -56,6 +56,13 @@ def answer_text(answer: Answer) -> str:
         lines.append(f"  - {statement(answer.candidates)}")
     lines += _rotor(answer)
     return "\n".join(lines)
+
+
+def _misfit(answer: Answer) -> Iterator[str]:
+    """Beside the constant that it is about, with what to type next."""
+    wrong = misfit(answer.fit)
+    if wrong:
+        yield f"  {wrong}; next: rig diagnose FILE (what the model leaves out)"
 
 
 def _models(candidates: Sequence[Candidate]) -> Iterator[str]:

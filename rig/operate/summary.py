@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.table import Table
 
 from identification.thruster.thrust import ThrustFit
+from identification.thruster.thrust_report import misfit
 from rig.errors import RecordingError
 from rig.fit.command import Answer, answer_json, fit_files
 
@@ -22,12 +23,15 @@ WIDTH = 80
 def print_summary(recordings: Sequence[Path], folder: Path) -> None:
     """Fit every recording that allows it, print the table, write fits.json beside the recordings."""
     answers: list[Answer] = []
+    told: list[tuple[Answer, Path]] = []
     for path in recordings:
         if not path.exists():
             click.echo(f"{path}: was not written")
             continue
         try:
-            answers += fit_files([path])
+            found = fit_files([path])
+            answers += found
+            told += [(answer, path) for answer in found]
         except RecordingError as error:
             click.echo(f"no fit: {error}")
     if answers:
@@ -35,6 +39,9 @@ def print_summary(recordings: Sequence[Path], folder: Path) -> None:
         console.width = max(console.width, WIDTH)
         click.echo("thrust = C V|V| + tare; C in N/V^2, n points, tare and RMSE in N")
         console.print(table(answers))
+        for answer, path in told:
+            if wrong := misfit(answer.fit):
+                click.echo(f"{answer.fit.thruster or '?'}: {wrong}; next: rig diagnose {path}")
         text = json.dumps(answer_json(answers), indent=1, allow_nan=False)
         (folder / FIT_FILE).write_text(text + "\n", encoding="utf-8")
     click.echo(f"recordings, fits and logs: {folder}")

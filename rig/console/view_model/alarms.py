@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from rig.console.view_model.running_fit import running_fit
 from rig.console.view_model.view import View
 from rig.console.view_model.wording import age
 from rig.link.front_end_messages import Snapshot
@@ -81,5 +82,14 @@ def _running(view: View, snapshot: Snapshot) -> Alarm:
 def _ended(snapshot: Snapshot) -> Alarm:
     rest = " Propeller measured at rest." if snapshot.stop_confirmed else ""
     if snapshot.outcome == "completed":
-        return Alarm("info", f"COMPLETED.{rest} Press d to leave.")
+        wrong = _misfit(snapshot)
+        return Alarm("warning" if wrong else "info", f"COMPLETED.{rest}{wrong} Press d to leave.")
     return Alarm("warning", f"{snapshot.outcome.upper() or 'ENDED'} — {snapshot.cause}{rest} Press d to leave.")
+
+
+def _misfit(snapshot: Snapshot) -> str:
+    """What to know of the last thruster before its constant is copied from the screen."""
+    fit = running_fit(snapshot.points)
+    if fit is None or fit.misfit is None:
+        return ""
+    return f" {snapshot.thruster}: C V|V| does NOT fit (chi2/dof {fit.misfit:.3g}); next: rig diagnose."

@@ -9,6 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from identification.estimation.least_squares import Rows, estimate
+from identification.thruster.thrust_report import MISFIT_P
 from rig.link.front_end_messages import Point
 
 
@@ -25,6 +26,8 @@ class RunningFit:
     used: int
     left_out: int
     """Points without a usable standard error."""
+    misfit: float | None = None
+    """chi-square per degree of freedom, where points scatter more than their standard errors allow at MISFIT_P."""
 
     def predict(self, v_abs_v: float) -> float:
         """N at V|V| in V^2."""
@@ -56,9 +59,12 @@ def running_fit(points: tuple[Point, ...]) -> RunningFit | None:
         np.array([point.std_error for point in chosen]),
         np.full(len(chosen), np.inf),  # a snapshot does not carry the degrees of freedom behind a standard error
     )
-    fit = estimate(rows).fit
+    found = estimate(rows)
+    fit, judged = found.fit, found.underfit
     std = float(fit.std[0]) if fit.dof > 0 else math.inf
-    return RunningFit(float(fit.theta[0]), std, float(fit.theta[1]), len(chosen), len(points) - len(chosen))
+    poor = judged is not None and judged.dof > 0 and judged.p_value < MISFIT_P
+    misfit = judged.per_dof if judged is not None and poor else None
+    return RunningFit(float(fit.theta[0]), std, float(fit.theta[1]), len(chosen), len(points) - len(chosen), misfit)
 
 
 def in_words(fit: RunningFit | None) -> str:

@@ -12,6 +12,7 @@ from rig.console.dialogs import what_leaving_is
 from rig.console.parting import begin, settled
 from rig.console.session import exit_status
 from rig.console.view_model import wording
+from rig.console.view_model.alarms import alarm
 from rig.console.view_model.axes import reach, thin, ticks
 from rig.console.view_model.keys import key_line
 from rig.console.view_model.running_fit import in_words, running_fit, v_abs_v
@@ -165,3 +166,22 @@ def test_skip_is_offered_where_it_means_something(state, offered):
     line = key_line(absorb(View(), running(state), 0.0)).plain
     assert " p pause" in line
     assert (" k skip" in line) == offered
+
+
+def test_points_that_a_square_law_does_not_fit_are_flagged_when_the_sweep_is_over():
+    held = tuple(replace(p, std_error=0.2) for p in points("T1", 14))
+    weak = tuple(replace(p, thrust=0.7 * p.thrust if p.voltage < 0 else p.thrust) for p in held)
+    good, bad = running_fit(held), running_fit(weak)
+    assert good is not None
+    assert good.misfit is None
+    assert bad is not None
+    assert bad.misfit is not None
+    assert bad.misfit > 100
+    over = absorb(View(), running("done", outcome="completed", stop_confirmed=True, points=weak), 10.0)
+    told = alarm(replace(over, connected=True, now=10.0))
+    assert told.severity == "warning"
+    assert "COMPLETED." in told.text
+    assert "T1: C V|V| does NOT fit" in told.text
+    assert "next: rig diagnose" in told.text
+    fine = absorb(View(), running("done", outcome="completed", stop_confirmed=True, points=held), 10.0)
+    assert alarm(replace(fine, connected=True, now=10.0)).severity == "info"

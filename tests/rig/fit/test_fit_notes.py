@@ -6,6 +6,7 @@ import pytest
 from identification.recording import Channel, Recording, Step
 from rig.fit.answer import fit_recordings
 from rig.fit.command import fit_text
+from tests.rig.fit.test_fit import run, write
 
 LEVELS = np.array([-10.0, -6.0, -3.0, 0.0, 3.0, 6.0, 10.0])
 LEVEL = 4.0
@@ -33,3 +34,12 @@ def test_recordings_are_told_by_their_files():
     text = fit_text(fit_recordings([table("monday.h5", 0.5), table("tuesday.h5", 0.5, seed=1)]))
     assert "tare 1 is of monday.h5, tare 2 is of tuesday.h5" in text
     assert "id-of-" not in text
+
+
+def test_a_constant_of_a_model_that_does_not_fit_is_not_told_without_a_warning(tmp_path):
+    straight, bent = write(tmp_path / "straight.h5"), write(tmp_path / "bent.h5", C_minus=0.3)
+    assert "does NOT fit" not in run(straight).output
+    told = run(bent).output.splitlines()
+    at = next(i for i, line in enumerate(told) if "does NOT fit its points (chi2/dof" in line)
+    assert "next: rig diagnose" in told[at]
+    assert at == 1, "beside the sentence that tells the constant"
