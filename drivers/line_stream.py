@@ -20,6 +20,7 @@ from drivers.ports.lines import (
     HOST_DELAY_STD,
     LineCutter,
     check_acquisition,
+    check_gain_std,
     check_line_rate,
     line_time,
     printable,
@@ -128,6 +129,7 @@ class Options:
                 f"line_stream pattern needs a group (?P<value>...) or (?P<raw>...) and knows only {sorted(GROUPS)}"
             )
         check_acquisition("line_stream", delay=self.delay, delay_std=self.delay_std, window=self.window)
+        check_gain_std("line_stream", self.gain_std)
         if not math.isfinite(self.scale) or self.scale == 0.0 or not math.isfinite(self.offset):
             raise ValueError(f"line_stream scale must be finite and not 0, offset finite: {self.scale}, {self.offset}")
 

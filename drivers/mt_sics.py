@@ -28,7 +28,7 @@ from drivers.mt_sics_lines import (
     number,
 )
 from drivers.ports.inbox import BadRecords
-from drivers.ports.lines import HOST_DELAY_STD, check_acquisition, check_line_rate, line_time, printable
+from drivers.ports.lines import HOST_DELAY_STD, check_acquisition, check_gain_std, check_line_rate, line_time, printable
 from drivers.ports.serial_port import SerialPort, SerialSettings
 from drivers.ports.wire import Wire
 from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream
@@ -84,8 +84,7 @@ class Options:
             raise ValueError(f"mt_sics sign must be 1 or -1, not {self.sign}")
         if self.unit is not None and self.unit not in NEWTONS_PER_UNIT:
             raise ValueError(f"mt_sics unit must be one of {', '.join(NEWTONS_PER_UNIT)}, not {self.unit!r}")
-        if self.gain_std is not None and not 0.0 <= self.gain_std < 1.0:
-            raise ValueError(f"mt_sics gain_std is relative (0.0005 = 0.05 %), it cannot be {self.gain_std}")
+        check_gain_std("mt_sics", self.gain_std)
         check_acquisition("mt_sics", delay=self.delay, delay_std=self.delay_std, window=self.window)
         if not 0.0 < self.timeout <= 60.0:
             raise ValueError(f"mt_sics timeout must be between 0 and 60 s, not {self.timeout}")

@@ -64,6 +64,14 @@ def check_acquisition(who: str, **seconds: float | None) -> None:
             raise ValueError(f"{who} {name} must be between 0 and 60 s, not {value}")
 
 
+def check_gain_std(who: str, gain_std: float | None) -> None:
+    """Raise ValueError for what is no relative error of a calibration: 0.5 is 50 %, and was one in per cent."""
+    if gain_std is not None and not 0.0 <= gain_std < 0.1:
+        raise ValueError(
+            f"{who} gain_std is relative (0.0005 = 0.05 %) and below 0.1, but is {gain_std:g}: is it one in per cent?"
+        )
+
+
 def printable(line: bytes) -> str:
     """A line as it can be shown to a person, shortened to 80 characters."""
     return line[:80].decode("ascii", errors="backslashreplace")

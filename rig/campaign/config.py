@@ -102,6 +102,8 @@ class BenchConfig:
     proof_voltage: float = 4.0
     """V at which the motor's watchdog is proved: low, but enough to turn the propeller."""
     mount: MountConfig = field(default_factory=MountConfig)
+    overrides: Mapping[str, str] = field(default_factory=dict)
+    """`[overrides]`: protection that this file takes away -> why (rig.campaign.disarmed)."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +142,8 @@ class CampaignConfig:
     expected_C: float | None = None
     """N/V^2, for the expected peak thrust of `rig check`; None: peak thrust is not checked and rig check says so."""
     prove_watchdog: bool = True
+    overrides: Mapping[str, str] = field(default_factory=dict)
+    """As in the bench file, for what this one takes away."""
     flow_speed: float | None = None
     """m/s that the campaign is meant for; the operator sets it. None: whatever it is."""
 

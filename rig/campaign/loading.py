@@ -29,9 +29,9 @@ from rig.toml_tables import Table, construct, decode, joined, read_toml, refuse_
 
 T = TypeVar("T")
 
-BENCH_ELSEWHERE = ("path", "text", "devices", "can", "limits", "mount")
+BENCH_ELSEWHERE = ("path", "text", "devices", "can", "limits", "mount", "overrides")
 """Fields of BenchConfig that are no keys of `[bench]`."""
-CAMPAIGN_ELSEWHERE = ("path", "text", "bench", "plan", "tare", "watch")
+CAMPAIGN_ELSEWHERE = ("path", "text", "bench", "plan", "tare", "watch", "overrides")
 """Fields of CampaignConfig that are no keys of `[campaign]`."""
 PLAN_ELSEWHERE = ("shape", "dwell", "coast_time", "tare")
 """Fields of Plan that are no keys of `[plan]`; the keys of its shape are."""
@@ -41,7 +41,7 @@ DWELLS: Mapping[str, type[Dwell]] = {"fixed": FixedDwell, "steady": SteadyDwell}
 def load_bench(path: Path) -> BenchConfig:
     """Read a bench file. Raises ConfigError."""
     text, content = read_toml(path, "bench file")
-    refuse_unknown(path, "", content, ("bench", "can", "devices", "limits", "mount"))
+    refuse_unknown(path, "", content, ("bench", "can", "devices", "limits", "mount", "overrides"))
     scalars = values(BenchConfig, table_at(path, content, "bench"), path, "bench", elsewhere=BENCH_ELSEWHERE)
     buses = table_at(path, content, "can", optional=True)
     limits = table_at(path, content, "limits", optional=True)
@@ -53,6 +53,7 @@ def load_bench(path: Path) -> BenchConfig:
         devices={name: _device(path, name, table_at(path, devices, name, "devices")) for name in devices},
         limits=tuple(_limit(path, channel, table_at(path, limits, channel, "limits")) for channel in limits),
         mount=decode(MountConfig, table_at(path, content, "mount", optional=True), path, "mount"),
+        overrides=_overrides(path, content),
         **scalars,
     )
     _require_bench_names(bench)
@@ -64,14 +65,15 @@ def load_bench(path: Path) -> BenchConfig:
 def load_campaign(path: Path) -> CampaignConfig:
     """Read a campaign file and the bench file it names. Raises ConfigError, or PlanError for an impossible plan."""
     text, content = read_toml(path, "campaign file")
-    refuse_unknown(path, "", content, ("campaign", "tare", "plan", "watch"))
+    refuse_unknown(path, "", content, ("campaign", "tare", "plan", "watch", "overrides"))
     table = table_at(path, content, "campaign")
     scalars = values(CampaignConfig, table, path, "campaign", elsewhere=CAMPAIGN_ELSEWHERE, also=("bench",))
     bench = load_bench((path.parent / _required(str, table, "bench", path, "campaign")).resolve())
     tare = decode(TareConfig, table_at(path, content, "tare", optional=True), path, "tare")
     plan = _plan(path, table_at(path, content, "plan"), tare, bench.coast_time)
     watch = _watch(path, table_at(path, content, "watch", optional=True))
-    campaign = CampaignConfig(path=path, text=text, bench=bench, plan=plan, tare=tare, watch=watch, **scalars)
+    scalars |= {"plan": plan, "tare": tare, "watch": watch, "overrides": _overrides(path, content)}
+    campaign = CampaignConfig(path=path, text=text, bench=bench, **scalars)
     if not campaign.thrusters or len(set(campaign.thrusters)) != len(campaign.thrusters):
         raise ConfigError(f"{path}: campaign.thrusters must name at least one thruster, and none twice")
     require_name(path, "campaign.name", campaign.name)
@@ -111,6 +113,14 @@ def _plan(path: Path, table: Table, tare: TareConfig, coast_time: float) -> Plan
     dwell = _dwell(path, table_at(path, table, "dwell", "plan")) if held else FixedDwell(1.0)
     parts = {"shape": made, "dwell": dwell, "tare": tare, "coast_time": coast_time}
     return construct(Plan, parts | pacing, path, "plan")
+
+
+def _overrides(path: Path, content: Table) -> dict[str, str]:
+    table = table_at(path, content, "overrides", optional=True)
+    for key, reason in table.items():
+        if not isinstance(reason, str) or not reason.strip():
+            raise ConfigError(f"{path}: {joined('overrides', key)} must be a text that says why, but is {reason!r}")
+    return table
 
 
 def _watch(path: Path, table: Table) -> WatchConfig:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from itertools import groupby
 from math import isfinite
@@ -65,6 +65,7 @@ class Template:
     expected_C: float | None = None
     """N/V^2"""
     prove_watchdog: bool = True
+    overrides: Mapping[str, str] = field(default_factory=dict)
     watch: WatchConfig = field(default_factory=WatchConfig)
 
 
@@ -86,6 +87,7 @@ def template_of(campaign: CampaignConfig) -> Template:
         campaign.unattended,
         campaign.expected_C,
         campaign.prove_watchdog,
+        campaign.overrides,
         campaign.watch,
     )
 
@@ -166,7 +168,12 @@ def _head(template: Template, file: Path, flow: float | None) -> list[str]:
     tare = template.tare
     lines += ["", "[tare]", f"duration = {float(tare.duration)!r}   # s"]
     lines += [f"max_std_error = {float(tare.max_std_error)!r}   # N", f"max_drift = {float(tare.max_drift)!r}   # N/s"]
-    return [*lines, f"attempts = {tare.attempts}", "", *_watch(template.watch, file)]
+    return [*lines, f"attempts = {tare.attempts}", "", *_overrides(template.overrides), *_watch(template.watch, file)]
+
+
+def _overrides(overrides: Mapping[str, str]) -> list[str]:
+    lines = [f"{_text(key)} = {_text(reason)}" for key, reason in overrides.items()]
+    return ["[overrides]", *lines, ""] if lines else []
 
 
 def _watch(watch: WatchConfig, file: Path) -> list[str]:

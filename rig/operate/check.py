@@ -13,6 +13,7 @@ from rich.table import Table
 from drivers.protocols import Channel, Instrument, MotorController
 from rig.campaign.bench import build
 from rig.campaign.config import BenchConfig, CampaignConfig
+from rig.campaign.disarmed import Disarmed, disarmed, require_armed
 from rig.campaign.loading import load_campaign
 from rig.campaign.plan import Duration, FixedDwell, Step
 from rig.campaign.shapes import Levels
@@ -35,12 +36,16 @@ class CheckReport:
     """V"""
     peak_thrust: float | None
     """N, expected_C V^2; None: the campaign gives no expected_C and the peak thrust was not checked."""
+    overridden: tuple[Disarmed, ...] = ()
+    """Protections that the files take away, with their reasons."""
 
 
 def check_campaign(path: Path) -> CheckReport:
     """Load and check a campaign; opens nothing. Raises ConfigError or PlanError: one sentence with file and key."""
     campaign = load_campaign(path)
     bench = build(campaign.bench)
+    overridden = disarmed(campaign, (stream for _, stream in bench.streams()))
+    require_armed(overridden)
     _require_ports(campaign.bench)
     _require_watchdog(campaign.bench, bench.motor)
     _require_voltages(campaign, bench.motor)
@@ -52,7 +57,7 @@ def check_campaign(path: Path) -> CheckReport:
     plan, runs = campaign.plan.duration(), len(campaign.thrusters)
     run = Duration(plan.expected + proving.expected, plan.worst + proving.worst + campaign.bench.coast_time)
     total = Duration(runs * run.expected, runs * (run.worst + campaign.bench.mount.timeout))
-    return CheckReport(campaign, tuple(campaign.plan), run, total, campaign.plan.peak(), thrust)
+    return CheckReport(campaign, tuple(campaign.plan), run, total, campaign.plan.peak(), thrust, overridden)
 
 
 def _ports(bench: BenchConfig) -> Iterator[tuple[str, str]]:
@@ -65,12 +70,18 @@ def _ports(bench: BenchConfig) -> Iterator[tuple[str, str]]:
 
 
 def _require_ports(bench: BenchConfig) -> None:
-    """A port that is a path must exist; a URL or a plain name (COM3, can0) is left to the opening."""
+    """A port that is a path must exist; a URL or a plain name (COM3, can0) is left to the opening. None serves two."""
+    taken: dict[str, str] = {}
     for key, port in _ports(bench):
-        if "/" in port and "://" not in port and not Path(port).exists():
+        path = "/" in port and "://" not in port
+        if path and not Path(port).exists():
             raise ConfigError(
                 f"{bench.path}: {key} is {port}, but there is no such port: connect it or correct the key"
             )
+        place = str(Path(port).resolve()) if path else port
+        other = taken.setdefault(place, key)
+        if port and other != key:
+            raise ConfigError(f"{bench.path}: {key} is {port}, which {other} has: each device needs a port of its own")
 
 
 def _require_watchdog(bench: BenchConfig, motor: MotorController) -> None:
@@ -176,10 +187,8 @@ def print_report(report: CheckReport, console: Console) -> None:
         console.print("peak thrust    not checked: the campaign gives no expected_C")
     else:
         console.print(f"peak thrust    {report.peak_thrust:.4g} N expected, from expected_C")
-    if not campaign.prove_watchdog:
-        console.print(
-            "watchdog       not proved (prove_watchdog = false): what the motor controller does is not measured"
-        )
+    for each in report.overridden:
+        console.print(f"OVERRIDE       {each.told}", markup=False)
     console.print("The campaign may run. Nothing was opened.")
 
 

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections import deque
 from dataclasses import dataclass, field
 
+from rig.campaign.disarmed import disarmed
 from rig.control.event_log import Level
 from rig.control.readings import Readings
 from rig.errors import DeviceError, LinkError
 from rig.link.front_end_messages import Check
 from rig.recording.ledger import file_facts
-from rig.stages.preflight import all_checks, device_checks, flow_check
+from rig.stages.preflight import all_checks, armed_checks, device_checks, flow_check
 from rig.stages.session import Session, Stopped
 
 SETTLE_ROWS = 5
@@ -56,9 +57,10 @@ def _require_same_devices(session: Session) -> None:
 
 def preflight(session: Session) -> None:
     """Judge the bench until the operator starts it; the checks go on while he looks."""
-    devices = list(session.status.checks)
+    streams = [stream for _, stream in session.bench.streams()]
+    devices, armed = list(session.status.checks), armed_checks(disarmed(session.campaign, streams))
     flow = Flow(session.campaign.flow_speed, session.loop.now + FLOW_PATIENCE)
-    session.turn_for(SETTLE_ROWS * max(stream.period_s for _, stream in session.bench.streams()))
+    session.turn_for(SETTLE_ROWS * max(stream.period_s for stream in streams))
     started, seen = False, session.loop.now
     while not started:
         requests = session.turn()
@@ -66,7 +68,7 @@ def preflight(session: Session) -> None:
         seen = session.loop.now if session.loop.clients.connected else seen
         if session.loop.now - seen > UNSEEN:
             raise Stopped("aborted", f"nobody started the campaign, and no front end was there for {UNSEEN:g} s")
-        checks = all_checks(
+        checks = armed + all_checks(
             session.campaign.bench,
             session.loop.readings,
             session.bench.motor.watchdog,

@@ -8,6 +8,7 @@ from typing import Literal
 
 from drivers.protocols import Stream, Watchdog
 from rig.campaign.config import BenchConfig
+from rig.campaign.disarmed import Disarmed
 from rig.control.readings import Readings
 from rig.link.front_end_messages import Check, Reading
 from rig.safety.pace import FASTEST, SLOWEST
@@ -124,6 +125,16 @@ def _allowed(r: Reading) -> str:
     if r.high is None:
         return f"at least {r.low:g} {r.unit} allowed"
     return f"{r.low:g} to {r.high:g} {r.unit} allowed"
+
+
+def armed_checks(found: Iterable[Disarmed]) -> list[Check]:
+    """Protections that the files take away: owned up to, or a failure."""
+    return [
+        Check("override", "failed", f"{each.key}: {each.cause}; no override owns up to it")
+        if each.reason is None
+        else Check("override", "warning", each.told)
+        for each in found
+    ]
 
 
 def all_checks(

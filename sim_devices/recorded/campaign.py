@@ -85,6 +85,8 @@ def bench_file(bench: Bench, scale: Scale) -> str:
         f"[devices.{MOTOR}]\n{bench.motor}",
         *([f"[devices.{FLOW}]\n{bench.flow}"] if bench.flow else []),
         f'[limits."{CELL}.thrust"]\n{limit}max_frozen = inf\n',
+        f'[limits."{MOTOR}.current"]\nmax = {10.0 * scale.current}\n',
+        f'[overrides]\n"limits.{CELL}.thrust.max_frozen" = "a world without noise may stand still"\n',
     ]
     return "\n".join(parts)
 
@@ -107,5 +109,6 @@ def campaign_file(made: Campaign, thruster: str, scale: Scale, bench: str = "ben
             "[watch]\noff = true\n",
             "[tare]\n" + toml(tare),
             "[plan]\n" + toml(plan) + "[plan.dwell]\n" + dwell,
+            '[overrides]\n"campaign.prove_watchdog" = "a run is what is asked for"\n',
         ]
     )

@@ -92,7 +92,7 @@ def test_encode():
         ({"framing": "9N1"}, "framing must look like"),
         ({"sign": 2}, "sign must be 1 or -1"),
         ({"unit": "stone"}, "unit must be one of"),
-        ({"gain_std": 5.0}, "gain_std is relative"),
+        ({"gain_std": 0.5}, "gain_std is relative"),
         ({"timeout": 0.0}, "timeout must be"),
         ({"port": ""}, "port is empty"),
     ],

@@ -57,6 +57,10 @@ zero_every = 2
 kind = "fixed"
 duration = {dwell}
 """
+NOT_PROVED = """
+[overrides]
+"campaign.prove_watchdog" = "a test of something else"
+"""
 
 
 @dataclass
@@ -87,6 +91,7 @@ class LiveBench:
         )
         for old, new in names.items():
             text = text.replace(old, new)
+        text += "" if prove else NOT_PROVED
         campaign = self.folder / "campaign.toml"
         campaign.write_text(text)
         folder = self.folder / "out" / f"run-{len(self.runs)}"

@@ -21,6 +21,8 @@ output = "out"
 unattended = true
 expected_C = 0.4
 prove_watchdog = false
+[overrides]
+"campaign.prove_watchdog" = "a test of the fit"
 [tare]
 duration = 1.0
 max_std_error = {error}

@@ -121,6 +121,8 @@ def campaign_config(folder: Path, bench: BenchConfig, **changes) -> CampaignConf
         "prove_watchdog": False,
         "tare": PLAN.tare,
     }
+    if not changes.get("prove_watchdog", False):
+        facts["overrides"] = {"campaign.prove_watchdog": "a test of something else"}
     return CampaignConfig(**(facts | changes))
 
 

@@ -117,11 +117,11 @@ def test_ports_relative_and_not(tmp_path):
     text = (WRONG / "right_bench.toml").read_text()
     for port, expected in (
         ("ports/a", str(tmp_path / "ports/a")),
-        ("/dev/null", "/dev/null"),
+        ("/dev/zero", "/dev/zero"),
         ("COM3", "COM3"),
         ("socket://host:4001", "socket://host:4001"),
     ):
-        path.write_text(text.replace('port = "/dev/null"', f'port = "{port}"', 1))
+        path.write_text(text.replace('port = "/dev/zero"', f'port = "{port}"', 1))
         assert load_bench(path).devices["load_cell"].options.port == expected
 
 

@@ -41,7 +41,8 @@ def files(folder: Path, proved: str = "true", limit: float = 300.0) -> Path:
     text = text[: text.index("[devices.thermometer]")] + text[text.index('[limits."load_cell') : text.index("[mount]")]
     folder.mkdir(exist_ok=True)
     (folder / "bench.toml").write_text(text.replace("300.0", f"{limit}"), encoding="utf-8")
-    (folder / "campaign.toml").write_text(CAMPAIGN.format(proved=proved), encoding="utf-8")
+    unproved = "" if proved == "true" else '[overrides]\n"campaign.prove_watchdog" = "measured elsewhere"\n'
+    (folder / "campaign.toml").write_text(CAMPAIGN.format(proved=proved) + unproved, encoding="utf-8")
     return folder / "campaign.toml"
 
 
