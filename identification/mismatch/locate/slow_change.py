@@ -17,6 +17,7 @@ from identification.mismatch.estimate.estimate import Estimate, forces, refresh
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.family_wise import beside, orthogonal_basis
+from identification.mismatch.select.overdispersion import dispersion
 from identification.recording import Floats
 
 SLOW, QUICK = 2, 16
@@ -37,8 +38,9 @@ def slow_changes(estimate: Estimate, data: Data) -> list[tuple[float, Estimate]]
     found = []
     for columns in slow_columns(now, data):
         beside = refresh(now.fit.model, now.fit.theta, data, columns, now, now.noise)
-        gain = now.fit.deviance - beside.fit.deviance + _taken(beside, data, columns)
-        found.append((float(chi2_sf(gain, columns.shape[1])), beside))
+        taken, noisier = _taken(beside, data, columns)
+        gain = now.fit.deviance - beside.fit.deviance + taken
+        found.append((float(chi2_sf(gain / noisier, columns.shape[1])), beside))
     return found
 
 
@@ -65,11 +67,14 @@ def _each_its_own(parts: Sequence[Floats]) -> Floats:
     return out
 
 
-def _taken(estimate: Estimate, data: Data, columns: Floats) -> float:
-    """Of the whitened residual's square by the columns beside the model's own."""
+def _taken(estimate: Estimate, data: Data, columns: Floats) -> tuple[float, float]:
+    """Of the whitened residual's square by the columns beside the model's own; and how much noisier it is there than
+    the noise's model has it."""
     n = data.size
     parts = np.split(columns, np.cumsum([rows.size for rows in data.rows])[:-1])
     whitened = Weights(estimate.weights.thrust).whiten(list(parts), [])
     basis = orthogonal_basis(estimate.fit.jacobian[:n])
-    score = orthogonal_basis(beside(whitened, basis)).T @ estimate.fit.residual[:n]
-    return float(score @ score)
+    span = orthogonal_basis(beside(whitened, basis))
+    residual = estimate.fit.residual[:n]
+    score = span.T @ residual
+    return float(score @ score), dispersion(span, residual)

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.estimation.singular_values import thin_svd
 from identification.estimation.tails import chi2_sf, normal_sf
@@ -97,12 +98,16 @@ def quiet(residual: Floats, columns: Floats) -> Floats:
     return matching_pursuit(columns, residual, policy.select.PLAIN_DIRECTION_SIGMA, MOST_PLAIN)[1]
 
 
+def block_edges(size: int) -> NDArray[np.intp]:
+    """Where the blocks of `size` rows begin."""
+    blocks = min(BLOCKS, max(size // 4, 1))
+    return np.linspace(0, size, blocks + 1).astype(np.intp)[:-1]
+
+
 def surrogate_scores(columns: Floats, residual: Floats, rng: np.random.Generator) -> Floats:
     """(SURROGATES, q) scores after the signs of blocks of the residual were drawn anew."""
-    blocks = min(BLOCKS, max(residual.size // 4, 1))
-    edges = np.linspace(0, residual.size, blocks + 1).astype(int)[:-1]
-    parts = np.add.reduceat(columns * residual[:, None], edges, axis=0)
-    signs = rng.choice((-1.0, 1.0), size=(SURROGATES, blocks))
+    parts = np.add.reduceat(columns * residual[:, None], block_edges(residual.size), axis=0)
+    signs = rng.choice((-1.0, 1.0), size=(SURROGATES, parts.shape[0]))
     out: Floats = signs @ parts
     return out
 

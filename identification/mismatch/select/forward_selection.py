@@ -19,6 +19,7 @@ from identification.mismatch.select.baseline import baseline, every_shape, plain
 from identification.mismatch.select.exchange.nearby_start import best_forms
 from identification.mismatch.select.exchange.rivals import one_for_two, one_less, swaps
 from identification.mismatch.select.limits.clipping import contradiction
+from identification.mismatch.select.overdispersion import dispersion_of
 from identification.mismatch.select.rounds import Candidate, Round, Unhidden
 from identification.mismatch.select.screening import (
     Screening,
@@ -237,7 +238,7 @@ def _hidden(estimate: Estimate, judged: Screening, data: Data) -> tuple[Unhidden
         bigger, theta = estimate.fit.more(term, begin)
         first = fit(bigger, theta, data, estimate.weights)
         new = refresh(bigger, first.theta, data, None, now, now.noise)
-        gain = now.fit.deviance - new.fit.deviance
+        gain = (now.fit.deviance - new.fit.deviance) / dispersion_of(term, new.fit, data.size)
         if gain > (asked := _asked_of_hidden(term, judged, data)):
             found.append((Unhidden(gain, asked), new))
     if not found:
