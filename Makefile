@@ -6,7 +6,7 @@
 PYTHON ?= python3
 VENV := .venv
 # one case each: some effects at each strength, the same taken out of the catalogue, some that are in none, lies, noise
-SHORT := */asymmetry */dead_band */heating */motor_lag */zero_offset outside fault pair/any/0 pair/any/1 bench/nothing/0 bench/plain:dead_band/0 clean/*/0 clean/*/1
+SHORT := */asymmetry */dead_band */heating */motor_lag */zero_offset outside fault pair/any/0 pair/any/1 field/2_effects difference/nothing/0 bench/nothing/0 bench/plain:dead_band/0 clean/*/0 clean/*/1
 BIN := $(VENV)/bin
 
 .PHONY: demo test check lint types imports wheel prove prove-short clean

@@ -1,8 +1,9 @@
 """The process that diagnoses: `python -m rig.blind.answering OPEN ANSWERS`. It sees recordings, never a truth.
 
 One JSON line in, {"token", "tag", "without", "code"}, one line out when the answer is there: ANSWERS/<token>/<tag>.json
-and beside it <tag>.npz, what the model that was found and the baseline predict for the other run. From its start on it
-refuses to read any file of the store but recordings.
+and beside it <tag>.npz, what the model that was found and the baseline predict for the other run. Where the thruster
+was recorded a second time the first recording is diagnosed, and the second against its twin: that is the answer, with
+the first beside it. From its start on it refuses to read any file of the store but recordings.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import Refusal
 from identification.recording import Floats, Recording
-from rig.blind.reading import recording, recordings, times
+from rig.blind.reading import AGAIN, recording, recordings, times
 
 LOOKS = ("open", "os.listdir", "os.scandir")
 """Audit events with a path."""
@@ -56,18 +57,22 @@ def answered(folder: Path, without: Sequence[str] = ()) -> tuple[dict[str, Any],
 
     Whatever is raised becomes the answer's `error`: a crash is a failure of the diagnosis, not of the proof.
     """
-    given = recordings(folder)
+    given, again = recordings(folder), recordings(folder / AGAIN)
     start = perf_counter()
     try:
-        found = diagnose(given, without=tuple(without))
+        first = found = diagnose(given, without=tuple(without))
+        if again and not isinstance(first, Refusal):
+            found = diagnose(again, baseline=first.twin, without=tuple(without))
     except Exception as error:  # noqa: BLE001  # a crash of any kind is an answer, and counts against it
         told = f"{type(error).__name__}: {error}"
         return {"seconds": perf_counter() - start, "error": told, "trace": traceback.format_exc()}, {}
     seconds = perf_counter() - start
     if isinstance(found, Refusal):
         return {"seconds": seconds, "error": f"refused: {found.reason}"}, {}
-    lacking, predicted = predictions(found, folder / "drive.npz")
+    lacking, predicted = predictions(found, (folder / AGAIN if again else folder) / "drive.npz")
     answer = {"seconds": seconds, "error": None, "diagnosis": diagnosis_json(found), "not_predicted": lacking}
+    if again and not isinstance(first, Refusal):
+        answer["first"] = diagnosis_json(first)
     return answer, predicted
 
 

@@ -155,6 +155,8 @@ def _counted(score: Score) -> str:
 
     if score.order.cell in OPEN_CELLS:
         return f"outcome: {score.outcome}" + ("" if score.counted else " (not counted: a neighbour is too near)")
+    if score.order.cell in ("field", "difference"):
+        return f"as it should be: {score.good}, exact: {score.exact}, a name that is not there: {score.extra}"
     return f"right: {score.right}, alone: {score.alone}, wrong: {score.wrong}"
 
 
@@ -167,7 +169,8 @@ def _told(store: Store, job: Job, *, verbose: bool) -> str:
     if truth["error"]:
         return f"{job.id}: {truth['error']}"
     rows = [job.id, f"recordings: {store.opened / job.token} (rig.blind.reading.recordings reads them)"]
-    short = {name: truth[name] for name in ("effects", "fault", "noise_kind", "plan", "rate", "channels")}
+    shown = ("effects", "known", "fault", "noise_kind", "plan", "rate", "channels")
+    short = {name: truth[name] for name in shown if name in truth}
     rows.append(f"truth: {json.dumps(truth if verbose else short)}")
     for order, score in zip(job.orders, collected(store, [job]).scores, strict=True):
         rows += [f"{order.id}: {json.dumps(said(score))}", _counted(score)]

@@ -33,6 +33,12 @@ CLEAN_PER_SEED = 50
 """Clean runs of all kinds of noise together: 20 seeds are 1,000 runs."""
 WIDE_PER_SEED = 25
 """Clean runs of all kinds of wide noise together: 20 seeds are 500 runs."""
+FIELD_EFFECTS: Final = range(2, 7)
+"""Effects of field size in one recording; each number of them is a label: 20 seeds are 100 cases."""
+MORE_PER_SEED, UNCHANGED_PER_SEED = 3.0, 1.5
+"""Second recordings with one effect more and with none: 20 seeds are 60 and 30."""
+FIRST_EFFECTS: Final = range(2, 6)
+"""Effects of field size in the first recording of a difference."""
 
 NOT_REMOVABLE: Final = frozenset({"periodic_disturbance"})
 """Found by a search for lines, which is no term of the catalogue."""
@@ -59,6 +65,10 @@ class Kinds:
     """Of the world with its benches."""
     wide_noise: tuple[str, ...] = ()
     """Noise of laws drawn wide, there when asked for only."""
+    field: tuple[str, ...] = ()
+    """Effects whose amounts can be drawn as the field has them."""
+    added: tuple[str, ...] = ()
+    """Effects that a second recording of the same thruster can have more."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,6 +139,7 @@ def design(world: Kinds, catalogue: Collection[str], seeds: int, only: Sequence[
         _open(world, catalogue, seeds),
         _others(world, catalogue, seeds, draw),
         _recorded(world, catalogue, seeds, draw),
+        _composites(world, catalogue, seeds, draw),
     )
     found = []
     for place, job in rows:
@@ -216,3 +227,30 @@ def _recorded(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -
                 seed = replace(job, draw=draw).seed
                 on["effects"] = np.random.default_rng(seed).choice(known, 2, replace=False).tolist()
             yield place, Job(job.id, {**spec, **on}, job.orders)
+
+
+def _composites(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -> Iterator[tuple[float, Job]]:
+    """Several effects of field size at once; and a thruster with such a composite again, with one more or none."""
+    known = [effect for effect in world.field if effect in catalogue]
+    more = [effect for effect in world.added if effect in catalogue]
+    for count in FIELD_EFFECTS:
+        for place, job in _many("field", f"{count}_effects", seeds if count <= len(known) else 0, {}):
+            yield place, Job(job.id, {"field": _some(known, count, _rng(job, draw))}, job.orders)
+    fewest = FIRST_EFFECTS[0] <= len(known)
+    for label, per_seed in (("one_more", MORE_PER_SEED), ("nothing", UNCHANGED_PER_SEED)):
+        for place, job in _many("difference", label, int(np.ceil(per_seed * seeds)) if fewest else 0, {}):
+            rng = _rng(job, draw)
+            first = _some(known, min(int(rng.choice(FIRST_EFFECTS)), len(known)), rng)
+            spec: dict[str, Any] = {"field": first, "more": "", "strength": STRENGTHS["clear"]}
+            if label == "one_more":
+                spec["more"] = str(rng.choice([effect for effect in more if effect not in first]))
+            yield place, Job(job.id, spec, job.orders)
+
+
+def _rng(job: Job, draw: str) -> np.random.Generator:
+    return np.random.default_rng(replace(job, draw=draw).seed)
+
+
+def _some(names: Sequence[str], count: int, rng: np.random.Generator) -> list[str]:
+    found: list[str] = rng.choice(names, count, replace=False).tolist()
+    return found

@@ -4,11 +4,15 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Final
 
 import numpy as np
 
 from identification.recording import Channel, Floats, Recording, Step
 from rig.hdf5.load import load
+
+AGAIN: Final = "again"
+"""Folder within a case's own: the same thruster a second time, and the drive that is to be predicted then."""
 
 
 def recordings(folder: Path) -> list[Recording]:

@@ -150,6 +150,8 @@ def concealable() -> Kinds:
         tuple(found["recorded_effects"]),
         found["recorded_version"],
         tuple(found["wide_noise"]),
+        tuple(found["field"]),
+        tuple(found["added"]),
     )
 
 

@@ -8,6 +8,8 @@
     pair = concealed.case(rng, ["asymmetry", "heating"], 20.0, plan="interleaved", noise="white", channels=[])
     clean = concealed.case(rng)                                        # tau = C V|V|, noise, one zero per run
     lies = concealed.case(rng, lie="swapped")                          # a channel fault, of LIES
+    field = concealed.composite(rng, ["dead_band", "heating"])         # as much of each as the field has
+    both = concealed.difference(rng, ["asymmetry"], "heating", 15.0)   # .first, and .second with heating beside it
     arrays = concealed.rows(case)                                      # [Rows]: columns of plain arrays, steps
     truth = concealed.truth(case)                                      # dict for a sealed JSON file
 
@@ -29,12 +31,15 @@ from sim_devices.concealed.cases.forms import FORMS, VARIANTS
 from sim_devices.concealed.cases.plans import KINDS as PLAN_KINDS
 from sim_devices.concealed.cases.shapes import SHAPES
 from sim_devices.concealed.cases.wide_noise import WIDE_NOISE_KINDS
+from sim_devices.concealed.composites import ADDED, FIELD, Difference, composite, difference
 from sim_devices.concealed.draw import NOISE_KINDS, case
 from sim_devices.concealed.sealing.records import Rows, rows, truth
 from sim_devices.concealed.visibility.oracle import OutOfReach, scaled_to, strength
 from sim_devices.concealed.visibility.rivals import twins
 
 __all__ = [
+    "ADDED",
+    "FIELD",
     "FORMS",
     "LIES",
     "NOISE_KINDS",
@@ -44,9 +49,12 @@ __all__ = [
     "WIDE_NOISE_KINDS",
     "Case",
     "Column",
+    "Difference",
     "OutOfReach",
     "Rows",
     "case",
+    "composite",
+    "difference",
     "rows",
     "scaled_to",
     "strength",

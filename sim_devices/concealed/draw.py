@@ -54,7 +54,7 @@ def case(
     Raises OutOfReach when no case of TRIES can show the effects so; ValueError for a name that is not known.
     """
     for _ in range(TRIES):
-        drawn = _bare(rng, effects, plan, noise, voltage, thrust, sampling, duration, channels, runs, lie)
+        drawn = bare(rng, effects, plan, noise, voltage, thrust, sampling, duration, channels, runs, lie)
         if channels is None and not lie:
             drawn = with_bystanders(drawn, rng.spawn(1)[0], frozenset(effects))
         wanted = [*forms, *[""] * (len(effects) - len(forms))]
@@ -72,7 +72,7 @@ def case(
     raise OutOfReach(f"no case of {TRIES} shows {', '.join(effects)} at {strength} sigma; expected a lower strength")
 
 
-def _bare(
+def bare(
     rng: Rng,
     effects: Sequence[str],
     plan: str,
@@ -85,7 +85,7 @@ def _bare(
     runs: int,
     lie: str,
 ) -> Case:
-    """Thruster, runs, noise and sensors, nothing concealed yet."""
+    """Thruster, runs, noise and sensors, nothing concealed yet; what `case` draws, it draws here."""
     rate = sampling or _log(rng, 20.0, 500.0)
     long = duration or float(rng.uniform(300.0, 720.0))
     named = frozenset(effects)
@@ -96,7 +96,7 @@ def _bare(
     with_flow = bool(named & NEEDS_FLOW) or rng.random() < 0.3
     drift = float(rng.uniform(4.0, 8.0)) * float(rng.choice((-1.0, 1.0))) if named & NEEDS_DRIFT else 0.0
     kind = plan or str(rng.choice(KINDS))
-    made = [_run(rng, scale, kind, i * long, long, named, with_flow=with_flow) for i in range(runs)]
+    made = [one_run(rng, scale, kind, i * long, long, named, with_flow=with_flow) for i in range(runs)]
     loud = full * _log(rng, 5e-4, 0.01)
     noise_kind = noise or str(rng.choice(NOISE_KINDS))
     forced = {"flow_speed"} if named & NEEDS_FLOW else set()
@@ -118,7 +118,7 @@ def _bare(
     )
 
 
-def _run(
+def one_run(
     rng: Rng, scale: Scale, kind: str, start: float, long: float, named: frozenset[str], *, with_flow: bool
 ) -> Run:
     """One run of the plan, `long` s from `start` on of the campaign's clock."""

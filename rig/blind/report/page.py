@@ -11,6 +11,7 @@ from rig.blind.collecting import Collected
 from rig.blind.design import STRENGTHS
 from rig.blind.report import figures
 from rig.blind.report.beside import peers_section, real_section
+from rig.blind.report.composites import composites_section
 from rig.blind.report.figures import Row
 from rig.blind.report.sections import SIGNS, alarms_section, models_section, open_section, power_section
 from rig.blind.scoring.metrics import besides, by_label, cell, goals
@@ -34,6 +35,7 @@ def proof_page(found: Collected, tables: dict[str, Any], beside: Sequence[Beside
         _alone(scores),
         _taken(scores),
         _other_cells(scores),
+        composites_section(scores, tables),
         open_section(tables),
         alarms_section(scores),
         models_section(scores, tables),

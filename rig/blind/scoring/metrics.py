@@ -8,6 +8,7 @@ from typing import Any, Final
 import numpy as np
 
 from rig.blind.design import LADDER, ORACLE, PAIR_STRENGTH, STRENGTHS, WITHIN
+from rig.blind.scoring.composites import composite_besides, difference_goals, field_goals
 from rig.blind.scoring.on_benches import bench_besides, bench_goals
 from rig.blind.scoring.rates import Goal, Rate, of_groups, of_rate, rate
 from rig.blind.scoring.score import LOCATED, OPEN_CELLS, Score
@@ -53,7 +54,8 @@ def goals(scores: Sequence[Score]) -> list[Goal]:
         of_rate("open world: a wrong name instead", rate(s.outcome == "wrong name" for s in counted), most=0.05),
     ]
     found += [*_alarms(scores), *_errors(scores), *_coverage(scores), *_power(scores)]
-    return [*found, *bench_goals(cell(scores, "bench"))]
+    found += bench_goals(cell(scores, "bench"))
+    return [*found, *field_goals(cell(scores, "field")), *difference_goals(cell(scores, "difference"))]
 
 
 def besides(scores: Sequence[Score]) -> list[Goal]:
@@ -94,6 +96,7 @@ def besides(scores: Sequence[Score]) -> list[Goal]:
         of_rate("models that predict another run", rate(s.held_out is not None for s in cell(scores, *MODELLED))),
         of_rate("crashed, refused or overdue", rate(s.failed for s in scores)),
         *bench_besides(cell(scores, "bench")),
+        *composite_besides(cell(scores, "field"), cell(scores, "difference")),
     ]
 
 

@@ -104,10 +104,10 @@ class Goal:
         ('≥ 92 %', '0.3 to 2 %')
         """
         low, high = (f"{100 * x:.3g}" if self.percent else f"{x:.3g}" for x in (self.least, self.most))
-        unit = " %" if self.percent else ""
-        if self.least > 0.0 and self.most < (1.0 if self.percent else float("inf")):
+        unit, bound = (" %", 1.0) if self.percent else ("", float("inf"))
+        if self.least > 0.0 and self.most < bound:
             return f"{low} to {high}{unit}"
-        if self.least <= 0.0 and self.most >= 1.0 and self.percent:
+        if self.least <= 0.0 and self.most >= bound:
             return ""
         return f"≥ {low}{unit}" if self.least > 0.0 else f"≤ {high}{unit}"
 

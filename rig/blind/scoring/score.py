@@ -4,6 +4,9 @@
     alone      the findings are exactly what was concealed and the verdict is `explained`
     wrong      something is named, and of what was concealed nothing is among findings and rivals
     extra      a finding is not what was concealed, whatever stands beside it
+    exact      the findings are what was concealed and no other, rivals stated or not, and nothing is `unexplained`
+
+Of a second recording of a thruster, asked against the twin of the first, concealed is what came on top.
 
 Where the physics is outside the catalogue, or was taken out of it, the outcome counts: `located` (unexplained, in the
 right place), `located, named` (the same, and a name beside it, wrong as every name is there), `misplaced` (unexplained,
@@ -20,9 +23,10 @@ from typing import Any, Final
 import numpy as np
 
 from identification.recording import Floats
-from rig.blind.design import Order
+from rig.blind.design import STRENGTHS, Order
 from rig.blind.scoring.places import PLACES, UPSTREAM
 from rig.blind.scoring.same_parameters import true_values
+from rig.blind.scoring.sealed import concealed, described, strengths
 
 Table = Mapping[str, Any]
 
@@ -90,6 +94,8 @@ class Score:
     """What the recording was like, in words."""
     constant: Interval | None = None
     """C of the model; None where the answer has none, or what is concealed gives it another meaning."""
+    strengths: tuple[float, ...] = ()
+    """d' of each effect of `truth` beside the others; empty where a lie is among them."""
 
     @property
     def right(self) -> bool:
@@ -109,6 +115,16 @@ class Score:
     @property
     def extra(self) -> bool:
         return bool(set(self.named) - set(self.truth))
+
+    @property
+    def exact(self) -> bool:
+        told = ("explained", "ambiguous") if self.truth else ("adequate",)
+        return not self.failed and self.said in told and set(self.named) == set(self.truth)
+
+    @property
+    def clear(self) -> tuple[str, ...]:
+        """Concealed effects that an oracle sees at the strength called clear, or better."""
+        return tuple(e for e, d in zip(self.truth, self.strengths, strict=False) if d >= STRENGTHS["clear"])
 
     @property
     def rival_only(self) -> bool:
@@ -139,7 +155,10 @@ class Score:
         """As it should be, by the measure of its cell."""
         if self.order.cell in OPEN_CELLS:
             return self.outcome in LOCATED or not (self.counted or self.failed)
-        return self.right
+        if self.order.cell == "field":
+            seen = set(self.clear) <= {*self.named, *self.rivals}
+            return seen and not (self.failed or self.extra or self.said == "unexplained")
+        return self.exact if self.order.cell == "difference" else self.right
 
     @property
     def answer(self) -> str:
@@ -161,8 +180,9 @@ def scored(
     """`thrust`: true and measured of the other run, `predicted`: by model and baseline; None where there is none."""
     hidden, near = concealed(truth), nearest(order, truth)
     if answer["error"]:
-        seconds = answer["seconds"]
-        return Score(order, hidden, answer["error"], failed=True, near=near, seconds=seconds, case=described(truth))
+        seconds, seen = answer["seconds"], strengths(truth)
+        case = described(truth)
+        return Score(order, hidden, answer["error"], failed=True, near=near, seconds=seconds, case=case, strengths=seen)
     found = answer["diagnosis"]
     findings, unexplained = found["findings"], found["unexplained"]
     return Score(
@@ -180,6 +200,7 @@ def scored(
         seconds=answer["seconds"],
         case=described(truth),
         constant=thrust_constant(found, truth),
+        strengths=strengths(truth),
     )
 
 
@@ -192,12 +213,6 @@ def thrust_constant(found: Table, truth: Table) -> Interval | None:
     return Interval("", "C", (told["value"] - value) / std if std > 0.0 else float("inf"), _holds(told, value))
 
 
-def concealed(truth: Table) -> tuple[str, ...]:
-    """Ids of what is hidden in a case."""
-    lie = ("channel_fault",) if truth["fault"] else ()
-    return (*(effect["effect"] for effect in truth["effects"]), *lie)
-
-
 def nearest(order: Order, truth: Table) -> Near | None:
     """As the world measured it.
 
@@ -208,34 +223,6 @@ def nearest(order: Order, truth: Table) -> Near | None:
         return Near("rotation_coupling", 0.0)
     twins = truth.get("twins")
     return Near(twins[0]["rival"], twins[0]["left"]) if twins else None
-
-
-def described(truth: Table) -> str:
-    """Noise, sampling, plan, channels, and the effects with their parameters.
-
-    >>> effect = {"effect": "dead_band", "parameters": {"form": "jump", "half_width": 0.51234}}
-    >>> scale = {"voltage": 10.0, "thrust": 80.0, "duration": 400.2}
-    >>> seal = {"noise_kind": "white", "rate": 25.0, "plan": ["ramp"], "channels": ["current"], "scale": scale}
-    >>> described(seal | {"effects": [effect], "fault": None})
-    'white noise, 25 /s, ramp of 400 s, 10 V, 80 N, with current; dead_band: form jump, half_width 0.5123'
-    """
-    scale = truth["scale"]
-    with_channels = f", with {', '.join(truth['channels'])}" if truth["channels"] else ""
-    plan = f"{' and '.join(truth['plan'])} of {scale['duration']:.0f} s"
-    parts = [
-        f"{truth['noise_kind']} noise, {truth['rate']:.3g} /s, {plan}, "
-        f"{scale['voltage']:.3g} V, {scale['thrust']:.3g} N{with_channels}"
-    ]
-    if "bench" in truth:
-        parts.append(f"bench {truth['bench']['name']}, loop at {truth['bench']['loop_rate']:g} Hz")
-    for effect in truth["effects"]:
-        told = ", ".join(
-            f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in effect["parameters"].items()
-        )
-        parts.append(f"{effect['effect']}: {told}")
-    if truth["fault"]:
-        parts.append(", ".join(f"{k} {v}" for k, v in truth["fault"].items()))
-    return "; ".join(parts)
 
 
 def held_out(true: Floats, measured: Floats, predicted: Mapping[str, Floats]) -> HeldOut:
@@ -258,8 +245,8 @@ def held_out(true: Floats, measured: Floats, predicted: Mapping[str, Floats]) ->
 
 def intervals(findings: list[Table], truth: Table) -> tuple[Interval, ...]:
     """Of the right findings' parameters that mean the same on both sides."""
-    found = []
-    for finding in findings:
+    found, hidden = [], concealed(truth)
+    for finding in (f for f in findings if f["effect"] in hidden):
         chosen = {name: told["value"] for name, told in finding["parameters"].items()}
         for name, value in true_values(finding["effect"], finding["form"], truth, chosen).items():
             told = finding["parameters"].get(name)

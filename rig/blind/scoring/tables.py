@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from rig.blind.design import LADDER, STRENGTHS
+from rig.blind.scoring.composites import composite_rows
 from rig.blind.scoring.metrics import LARGE, besides, cell, goals, half_named, named_by_strength, ratios
 from rig.blind.scoring.rates import Goal, rate
 from rig.blind.scoring.score import OPEN_CELLS, TELLABLE, Score
@@ -42,6 +43,7 @@ def said(s: Score) -> dict[str, Any]:
     return {
         "id": s.order.id,
         "truth": list(s.truth),
+        "strengths": [round(d, 1) for d in s.strengths],
         "verdict": s.said,
         "named": list(s.named),
         "rivals": list(s.rivals),
@@ -163,6 +165,7 @@ def tables(
         "open_world": open_world(scores),
         "twins": twins(scores),
         "coverage": coverage(scores),
+        "composites": composite_rows(scores),
         "held_out": {name: {str(q): float(np.quantile(v, q)) for q in quantiles} for name, v in held.items() if v.size},
         "seconds": {str(q): float(np.quantile(seconds, q)) for q in (0.5, 0.95, 1.0)},
         "worst": worst(scores),

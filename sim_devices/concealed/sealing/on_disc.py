@@ -1,7 +1,9 @@
 """Cases on disc: recordings that anybody may open, and beside them, in a folder of its own, the sealed truth.
 
     OUT/open/<token>/0.npz, 1.npz ...   one recording each: `about` (JSON text), `time0`, `value0`, `time1` ...
-    OUT/open/<token>/drive.npz          another run without its thrust, for a prediction at the times `at`
+    OUT/open/<token>/again/0.npz        the same thruster a second time, where that is asked for
+    OUT/open/<token>/drive.npz          another run without its thrust, for a prediction at the times `at`; in `again`
+                                        where there is a second recording, of whose thruster it is
     OUT/sealed/<token>.json             what was concealed; `error` where no such case could be drawn
     OUT/sealed/<token>.npz              `thrust` and `measured` of that other run at the times `at`
 
@@ -9,6 +11,11 @@ A case is asked for by a table: `token` (its name, which should tell nothing), `
 left to chance: `effects`, `strength`, `forms`, `noise`, `plan`, `lie`, `runs`, `sampling`, `duration` as of
 `concealed.case`; `rivals`: names whose likeness to the first effect goes into the seal (`concealed.twins`);
 `world`: the version that is to make it, where that matters.
+
+With `field`, a list of effects in the place of `effects`, their amounts are drawn as the field has them
+(`composites.composite`); with `more` as well the thruster is recorded a second time, `more` concealed beside them at
+`strength`, or nothing where it is empty. The seal is then that of the second run: `known` are the effects of both,
+`first` is the truth of the first.
 """
 
 from __future__ import annotations
@@ -22,10 +29,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sim_devices.concealed.cases.definition import Case
 from sim_devices.concealed.cases.faults import KINDS as LIES
 from sim_devices.concealed.cases.forms import FORMS, VARIANTS
 from sim_devices.concealed.cases.shapes import SHAPES
 from sim_devices.concealed.cases.wide_noise import WIDE_NOISE_KINDS
+from sim_devices.concealed.composites import ADDED, FIELD, composite, difference
 from sim_devices.concealed.draw import NOISE_KINDS
 from sim_devices.concealed.draw import case as drawn
 from sim_devices.concealed.sealing.another import another
@@ -44,13 +53,18 @@ KINDS: Mapping[str, Any] = {
     "lies": list(LIES),
     "noise": list(NOISE_KINDS),
     "wide_noise": list(WIDE_NOISE_KINDS),
+    "field": list(FIELD),
+    "added": list(ADDED),
     "version": version(),
 }
 """What may be asked for, and of what world."""
 CHOSEN = ("effects", "strength", "forms", "noise", "plan", "lie", "runs", "sampling", "duration")
-KNOWN = frozenset({"token", "seed", "world", "rivals", *CHOSEN})
+CHOSEN_OF_COMPOSITES = ("noise", "plan", "sampling", "duration")
+KNOWN = frozenset({"token", "seed", "world", "rivals", "field", "more", *CHOSEN})
 NEAREST = 5
 """Twins that go into the seal."""
+AGAIN = "again"
+"""Folder of the second recording."""
 
 
 def conceal(asked: Mapping[str, Any], out: Path) -> None:
@@ -63,19 +77,20 @@ def conceal(asked: Mapping[str, Any], out: Path) -> None:
     token, seed = str(asked["token"]), list(asked["seed"])
     sealed = out / "sealed"
     sealed.mkdir(parents=True, exist_ok=True)
-    chosen = {name: asked[name] for name in CHOSEN if name in asked}
     try:
-        case = drawn(np.random.default_rng(seed), **chosen)
+        case, second = _cases(asked, np.random.default_rng(seed))
     except OutOfReach as error:
         write_json(sealed / f"{token}.json", {"asked": dict(asked), "error": str(error)})
         return
     except (TypeError, ValueError) as error:
         raise WorldError(f"case {token}: {error}") from error
     folder = out / "open" / token
-    folder.mkdir(parents=True, exist_ok=True)
-    for i, found in enumerate(rows(case)):
-        write_rows(folder / f"{i}.npz", found)
-    told = truth(case) | {"asked": dict(asked), "thruster": asdict(case.thruster), "error": None}
+    told = _recorded(case, folder)
+    if second is not None:
+        folder = folder / AGAIN
+        known = [c.effect for c in case.effects]
+        told, case = _recorded(second, folder) | {"known": known, "first": told}, second
+    told |= {"asked": dict(asked), "thruster": asdict(case.thruster), "error": None}
     if asked.get("rivals") and case.effects:
         near = twins(case, case.effects[0].effect, list(asked["rivals"]), np.random.default_rng([*seed, 1]))
         told["twins"] = [asdict(twin) for twin in near[:NEAREST]]
@@ -85,6 +100,30 @@ def conceal(asked: Mapping[str, Any], out: Path) -> None:
         exact, seen = other.thrust.astype(np.float32), other.measured.astype(np.float32)
         np.savez_compressed(sealed / f"{token}.npz", thrust=exact, measured=seen)
     write_json(sealed / f"{token}.json", told)  # last: a seal stands for a case that is complete
+
+
+def _cases(asked: Mapping[str, Any], rng: np.random.Generator) -> tuple[Case, Case | None]:
+    """What is recorded first, and a second time. Raises OutOfReach; TypeError and ValueError for what cannot be."""
+    if "field" not in asked:
+        if "more" in asked:
+            raise ValueError("more: expected `field` with it, the effects of the first recording; give both")
+        return drawn(rng, **{name: asked[name] for name in CHOSEN if name in asked}), None
+    if instead := sorted(set(asked) & (set(CHOSEN) | {"rivals"}) - {"strength", *CHOSEN_OF_COMPOSITES}):
+        raise ValueError(f"field: its effects are all there is, got {', '.join(instead)} with it; leave that out")
+    chosen = {name: asked[name] for name in CHOSEN_OF_COMPOSITES if name in asked}
+    if "more" not in asked:
+        return composite(rng, asked["field"], **chosen), None
+    strength = {"strength": asked["strength"]} if "strength" in asked else {}
+    both = difference(rng, asked["field"], asked["more"], **strength, **chosen)
+    return both.first, both.second
+
+
+def _recorded(case: Case, folder: Path) -> dict[str, Any]:
+    """The recordings of a case in `folder`, and what is true of them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for i, found in enumerate(rows(case)):
+        write_rows(folder / f"{i}.npz", found)
+    return truth(case)
 
 
 def write_rows(path: Path, found: Rows, at: Floats | None = None) -> None:

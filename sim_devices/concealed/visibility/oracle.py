@@ -43,7 +43,10 @@ def strength(case: Case, effect: str) -> float:
 
 def measured(case: Case) -> Case:
     """The case with the strength of each of its effects written beside it."""
-    return replace(case, effects=tuple(replace(c, seen=strength(case, c.effect)) for c in case.effects))
+    whole = signals(case)
+    projection = Projection(case, whole)
+    seen = (projection.strength(whole, signals(case, frozenset({c.effect}))) for c in case.effects)
+    return replace(case, effects=tuple(replace(c, seen=d) for c, d in zip(case.effects, seen, strict=True)))
 
 
 def scaled_to(case: Case, effect: str, d_prime: float) -> Case:
@@ -66,17 +69,39 @@ def levelled(case: Case, d_prime: float) -> Case:
     its bounds.
     """
     for effect in [c.effect for c in case.effects]:
-        off = strength(case, effect) / d_prime
-        if abs(off - 1.0) > CLOSE:
-            without = signals(case, frozenset({effect}))
-            screen = Screen(case, without)
-            here = screen.strength(signals(case), without)  # times 1 / off: what it sees where the oracle sees d_prime
-            case = _with_strength(case, effect, screen, without, here / off)
+        case = _relevelled(case, effect, d_prime)
     case = measured(case)
     for found in case.effects:
-        if abs(found.seen / d_prime - 1.0) > LEVEL:
-            raise OutOfReach(f"{found.effect} is seen at {found.seen:.3g} sigma beside the others: draw another case")
+        _require_level(found.effect, found.seen, d_prime)
     return case
+
+
+def added_at(case: Case, effect: str, d_prime: float) -> Case:
+    """The case with as much of one of its effects as is seen at `d_prime`; the others and the noise stay as they are.
+
+    Raises OutOfReach when its amount meets its bounds.
+    """
+    without = signals(case, frozenset({effect}))
+    found = _relevelled(_with_strength(case, effect, Screen(case, without), without, d_prime), effect, d_prime)
+    _require_level(effect, strength(found, effect), d_prime)
+    return found
+
+
+def _relevelled(case: Case, effect: str, d_prime: float) -> Case:
+    """One more search for its amount, where the exact strength is not the one that the screen saw."""
+    off = strength(case, effect) / d_prime
+    if abs(off - 1.0) <= CLOSE or off <= 0.0:
+        return case
+    without = signals(case, frozenset({effect}))
+    screen = Screen(case, without)
+    here = screen.strength(signals(case), without)  # times 1 / off: what it sees where the oracle sees d_prime
+    return _with_strength(case, effect, screen, without, here / off)
+
+
+def _require_level(effect: str, seen: float, d_prime: float) -> None:
+    """Raises OutOfReach."""
+    if abs(seen / d_prime - 1.0) > LEVEL:
+        raise OutOfReach(f"{effect} is seen at {seen:.3g} sigma beside the others: draw another case")
 
 
 def _with_strength(case: Case, effect: str, screen: Screen, without: list[Floats], target: float) -> Case:
