@@ -6,8 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
 from identification.mismatch import policy
-from identification.mismatch.value import Value, Where
+from identification.mismatch.value import Value, Where, told_rows
 from identification.mismatch.verdict_clauses import either, mostly
 from identification.recording import Floats
 from identification.twin import Twin
@@ -55,6 +58,10 @@ class Finding:
     doubts: tuple[str, ...] = ()
     """Why it is not the whole of it: checks of its shape that it failed."""
 
+    def __post_init__(self) -> None:
+        if self.bic_gain <= 0:
+            raise ValueError(f"{self.effect} does not pay for its parameters (BIC worse by {-self.bic_gain:.3g})")
+
     @property
     def grade(self) -> Literal["all", "mostly", "partly"]:
         """How much of what could be explained it is."""
@@ -80,6 +87,17 @@ class Spline:
     """The curve, (n,) each."""
     table: tuple[tuple[float, float, float, float], ...]
     """(covariate, value of the spline, value measured there, its standard error) bin by bin."""
+
+    @property
+    def told(self) -> NDArray[np.bool_]:
+        """Which rows of the table the data determine."""
+        _, _, measured, std = np.array(self.table).reshape(-1, 4).T
+        return told_rows(measured, std)
+
+    @property
+    def drawn(self) -> NDArray[np.bool_]:
+        """Which points of the curve they do."""
+        return told_rows(self.value, self.std)
 
 
 @dataclass(frozen=True, eq=False)
@@ -139,6 +157,12 @@ class Remainder:
     heldout_without: float | None = None
     """RMSE per sample on what was not fitted, without the flexible terms, N."""
     formula: FormulaFound | None = None
+
+    @property
+    def told(self) -> NDArray[np.bool_]:
+        """Which rows of the shape the data determine; one that is 0 by choice has no error."""
+        _, residual, std = np.array(self.shape).reshape(-1, 3).T
+        return np.asarray(told_rows(residual, std) | ((residual == 0) & np.isinf(std)))
 
 
 @dataclass(frozen=True, slots=True)

@@ -37,8 +37,13 @@ def with_error(value: Value) -> str:
 
     >>> with_error(Value(0.41234, 0.00123, "N/V^2")), with_error(Value(3.0, float("nan"), "s"))
     ('0.4123 +- 0.0012 N/V^2', '3 s')
+    >>> with_error(Value(24.0, 5844288569.0, "s", limits=(1.0, 400.0)))
+    'not determined (between 1 and 400 s)'
     """
     unit = "" if value.unit in ("", "1") else f" {value.unit}"
+    if not value.determined:
+        low, high = value.interval
+        return "not determined" + (f" (between {low:.3g} and {high:.3g}{unit})" if value.limits else "")
     if not (isfinite(value.std) and value.std > 0):
         return f"{value.value:.4g}{unit}"
     digits = max(1 - floor(log10(value.std)), 0)
@@ -128,9 +133,13 @@ def _flexible(f: FlexibleShape) -> Iterator[str]:
     unit = "" if f.unit in ("", "1") else f" / {f.unit}"
     for s in f.splines:
         label = s.times if s.unit in ("", "1") else f"{s.times} / {s.unit}"
-        size = max((abs(value) for _, value, _, _ in s.table), default=0.0) or 1.0
+        rows = zip(s.table, s.told, strict=True)
+        size = max((abs(value) for (_, value, _, _), known in rows if known), default=0.0) or 1.0
         yield f"  {f.covariate + unit:>24}{label:>14}{'measured':>12}{'std':>10}"
-        for at, value, measured, std in s.table:
+        for (at, value, measured, std), known in zip(s.table, s.told, strict=True):
+            if not known:
+                yield f"  {at:>24.4g}{'not determined':>26}"
+                continue
             yield f"  {at:>24.4g}{value:>14.3g}{measured:>12.3g}{std:>10.2g}  {_bar(value, size)}".rstrip()
 
 
@@ -147,15 +156,18 @@ def _formula(f: FormulaFound) -> Iterator[str]:
 
 def _shape(u: Remainder, force: str) -> Iterator[str]:
     """The residual over the covariate, bin by bin, as numbers and bars."""
-    rows = [(a, b, c) for a, b, c in u.shape if isfinite(b)]
-    size = max((abs(b) for _, b, _ in rows), default=0.0)
+    rows = [(a, b, c, known) for (a, b, c), known in zip(u.shape, u.told, strict=True) if isfinite(b)]
+    size = max((abs(b) for _, b, _, known in rows if known), default=0.0)
     if not size:
         return
     unit = "" if u.where.unit in ("", "1") else f" / {u.where.unit}"
     yield f"  {u.where.quantity + unit:>24}{f'residual / {force}':>14}{f'std / {force}':>10}"
-    for at, residual, std in rows:
-        known = f"{std:.2g}" if isfinite(std) else "-"
-        yield f"  {at:>24.4g}{residual:>14.3g}{known:>10}  {_bar(residual, size)}".rstrip()
+    for at, residual, std, known in rows:
+        if known:
+            error = f"{std:.2g}" if isfinite(std) else "-"
+            yield f"  {at:>24.4g}{residual:>14.3g}{error:>10}  {_bar(residual, size)}".rstrip()
+        else:
+            yield f"  {at:>24.4g}{'not determined':>24}"
 
 
 def _bar(value: float, size: float) -> str:

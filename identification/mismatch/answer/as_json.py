@@ -65,7 +65,7 @@ def _values(values: Mapping[str, Value]) -> dict[str, object]:
     for name, v in values.items():
         low, high = v.interval
         told = {"value": _number(v.value), "std": _number(v.std), "low": _number(low), "high": _number(high)}
-        out[name] = {**told, "unit": v.unit}
+        out[name] = {**told, "unit": v.unit, "determined": v.determined}
     return out
 
 
@@ -112,7 +112,10 @@ def _unexplained(u: Remainder) -> dict[str, object]:
         "where": _where(u.where),
         "share": _number(u.share),
         "p_value": _number(u.p_value),
-        "shape": [{"at": _number(a), "residual": _number(b), "std": _number(c)} for a, b, c in u.shape],
+        "shape": [
+            {"at": _number(a), "residual": _number(b), "std": _number(c), "determined": bool(known)}
+            for (a, b, c), known in zip(u.shape, u.told, strict=True)
+        ],
         "statement": u.statement,
         "resembles": list(u.resembles),
         "equals": list(u.equals),
@@ -153,9 +156,10 @@ def _flexible_shape(f: FlexibleShape) -> dict[str, object]:
                 "measured": _number(measured),
                 "measured_std": _number(std),
                 "value_unit": s.unit,
+                "determined": bool(known),
             }
             for s in f.splines
-            for at, value, measured, std in s.table
+            for (at, value, measured, std), known in zip(s.table, s.told, strict=True)
         ],
         "statement": f.statement,
     }
@@ -174,4 +178,7 @@ def _formula(f: FormulaFound) -> dict[str, object]:
 
 
 def _plain_values(values: Mapping[str, Value]) -> dict[str, object]:
-    return {k: {"value": _number(v.value), "std": _number(v.std), "unit": v.unit} for k, v in values.items()}
+    return {
+        k: {"value": _number(v.value), "std": _number(v.std), "unit": v.unit, "determined": v.determined}
+        for k, v in values.items()
+    }

@@ -15,7 +15,7 @@ from identification.mismatch.model.whitening import Weights
 from identification.mismatch.unnamed.flexible import Extended
 from identification.mismatch.unnamed.flexible_knots import seen_at
 from identification.mismatch.unnamed.formula import find_formula
-from identification.mismatch.value import Value
+from identification.mismatch.value import Value, of_shape
 from identification.physics.term import Term
 from identification.recording import Floats
 from identification.run_history.history import History
@@ -48,7 +48,7 @@ def shape_of(term: Flexible, fitted: Fit, data: Data, weights: Weights) -> Flexi
         term.degree,
         term.memory,
         term.period,
-        {p.name: Value(v, float(s), p.unit) for p, v, s in zip(known, theta, std, strict=True)},
+        of_shape({p.name: Value(v, float(s), p.unit) for p, v, s in zip(known, theta, std, strict=True)}),
         tuple(_splines(term, theta, covariance, fitted, data, weights)),
         term.statement(theta, data.scale),
     )

@@ -49,8 +49,8 @@ def _check(named: Named, scores: WithoutEach, failed: str) -> Check:
     score = scores.less.get(named.term)
     if score is None:
         told = "not asked: it failed before" if named.failed_checks else "not asked: another run need not repeat it"
-        return Check(asked, told=told, silent=True)
-    return Check(asked, failed, f"chi-square {score.chi2 - scores.whole.chi2:+.4g} without it")
+        return Check("predicts", asked, told=told, silent=True)
+    return Check("predicts", asked, failed, f"chi-square {score.chi2 - scores.whole.chi2:+.4g} without it")
 
 
 def score(

@@ -104,7 +104,8 @@ def _diagnosed(
     if unnamed:
         held, last = better_predicting(before, (held, last), vehicle.less(last, unnamed), data, unseen)
     earned = [_beside(n, last, left) for n in standing if not n.failed_checks]
-    unexplained = unexplained_of(_as_fitted(left, last), unearned, data)
+    doubtful = [n for n in unearned if not n.only_unpaid]
+    unexplained = unexplained_of(_as_fitted(left, last), doubtful, data)
     experiment = propose(after, earned, data) if unexplained is None else None
     findings = tuple(finding_of(n, data.scale, {}) for n in restated(earned, last.fit))
     n, p = last.fit.residual.size, int(np.sum(last.fit.free))
@@ -138,7 +139,7 @@ def _beside(n: Named, last: State, left: Left) -> Named:
     if n.term in last.terms:
         return n
     instead = f"a free force over {left.structures[0].covariate.quantity} takes its place"
-    return n.asked(Check("stands beside a free force", instead))
+    return n.asked(Check("repair", "stands beside a free force", instead))
 
 
 def _as_fitted(left: Left, last: State) -> Left:

@@ -173,10 +173,11 @@ def after_table(d: Diagnosis) -> tuple[Table, Sentences]:
 
 
 def parameter_section(d: Diagnosis) -> Section:
-    """Every number of the model."""
+    """Every number of the model that is a physics'; a shape without a name is drawn."""
     head = ("parameter", "of", "value ± std", "95 % interval", "unit", "baseline had")
     findings = {f.effect for f in d.findings}
-    rows = tuple(_parameter_row(name, value, d.baseline.get(name), findings) for name, value in d.model.items())
+    physics = {name: value for name, value in d.model.items() if not name.startswith("flexible:")}  # these are drawn
+    rows = tuple(_parameter_row(name, value, d.baseline.get(name), findings) for name, value in physics.items())
     table = Table("Model with its standard errors", head, rows, columns(head, "parameter", "of", "unit"))
     terms = " + ".join([d.baseline_model, *map(effect_name, d.model_terms)])
     return Section("Parameters", (table,), words(f"Model: {terms}."))
@@ -184,7 +185,7 @@ def parameter_section(d: Diagnosis) -> Section:
 
 def _parameter_row(name: str, value: Value, before: Value | None, findings: set[str]) -> tuple[str, ...]:
     effect, dot, parameter = name.partition(".")
-    named = not dot or effect.split("#")[0] in findings or effect.startswith("flexible:")
+    named = not dot or effect.split("#")[0] in findings
     doubted = "" if named else " (name not earned)"
     shown = (parameter if dot else name).replace("_", " ")
     of = effect_name(effect) + doubted if dot else "baseline"

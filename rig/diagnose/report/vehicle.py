@@ -19,7 +19,7 @@ from rig.diagnose.report.page import (
     rivals_section,
     short,
 )
-from rig.diagnose.report.words import evidence, rarity, stretch, words
+from rig.diagnose.report.words import evidence, not_drawn, rarity, stretch, words
 from rig.report import page as pages
 from rig.report.mismatch_figures import Panel, before_after
 from rig.report.page import Page, Picture, Remark, Section, sentences
@@ -98,7 +98,7 @@ def unexplained_section(d: Diagnosis) -> tuple[Section, ...]:
 
 
 def _left(u: Remainder, d: Diagnosis) -> Iterator[Picture]:
-    rows = np.array([row for row in u.shape if np.isfinite(row[1])])
+    rows = np.array(u.shape).reshape(-1, 3)[u.told]
     if len(rows) < 2:
         return
     at, force, std = rows.T
@@ -107,6 +107,7 @@ def _left(u: Remainder, d: Diagnosis) -> Iterator[Picture]:
     span = (u.where.low, u.where.high) if u.where.low < u.where.high else None
     plot = shape([Group("force left out", at, force, 1.96 * std)], x, f"force / {unit_text(d.force_unit)}", span)
     caption = f"Shaded: {stretch(u.where)}, where it is clearest. Bars are 95 % intervals; the mean is taken out."
+    caption += not_drawn(len(u.shape) - len(rows))
     yield Picture(f"Force that is left over {u.where.quantity.replace('_', ' ')}", plot, words(caption))
 
 

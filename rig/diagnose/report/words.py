@@ -42,8 +42,6 @@ KINDS: Mapping[Kind, tuple[str, float]] = {
     "step": ("left out / % of the step", 100.0),
 }
 """Label of a signature's ordinate and its factor."""
-LOST = 100.0
-"""Standard errors in units of the value from which a number is not determined."""
 EFFECTS = (*{term.id for term in CATALOGUE}, *WITHOUT_TERM)
 _NAMES = re.compile(r"\b(" + "|".join(sorted((*UNITS, *EFFECTS), key=len, reverse=True)) + r")\b")
 
@@ -125,20 +123,32 @@ def value_cells(value: Value) -> tuple[str, str, str]:
 
     >>> value_cells(Value(0.40123, 0.0012, "N/V^2")), value_cells(Value(3.0, float("nan"), "1"))
     (('0.4012 ± 0.0012', '0.3989 to 0.4036', 'N/V²'), ('3', '–', ''))
-    >>> value_cells(Value(432.0, 376232.0, "s"))
-    ('432', 'not determined', 's')
+    >>> value_cells(Value(432.0, 376232.0, "s")), value_cells(Value(24.0, 5.8e9, "s", limits=(1.0, 400.0)))
+    (('–', 'not determined', 's'), ('–', 'not determined (between 1 and 400)', 's'))
     """
     unit = unit_text(value.unit)
     if not isfinite(value.value):
         return "–", "–", unit
     if not (isfinite(value.std) and value.std > 0):
         return f"{value.value:.4g}".replace("-", "−"), "–", unit
-    if value.std > LOST * abs(value.value) > 0:
-        return f"{value.value:.3g}".replace("-", "−"), "not determined", unit
+    if not value.determined:
+        low, high = (f"{x:.3g}".replace("-", "−") for x in value.interval)
+        return "–", "not determined" + (f" (between {low} and {high})" if value.limits else ""), unit
     shown, error, low, high = (
         digits(x, value.std).replace("-", "−") for x in (value.value, value.std, *value.interval)
     )
     return f"{shown} ± {error}", f"{low} to {high}", unit
+
+
+def not_drawn(rows: int) -> str:
+    """A sentence on bins whose value the data do not determine; empty where there are none.
+
+    >>> not_drawn(1)
+    ' 1 place is not drawn: the data do not determine its value.'
+    """
+    if not rows:
+        return ""
+    return f" {rows} place{'s are' if rows > 1 else ' is'} not drawn: the data do not determine its value."
 
 
 def evidence(finding: Finding) -> str:
