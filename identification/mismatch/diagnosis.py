@@ -6,11 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
-import numpy as np
-from numpy.typing import NDArray
-
 from identification.mismatch import policy
-from identification.mismatch.value import Value, Where, told_rows
+from identification.mismatch.unexplained import Remainder
+from identification.mismatch.value import Value, Where
 from identification.mismatch.verdict_clauses import either, mostly
 from identification.recording import Floats
 from identification.twin import Twin
@@ -72,99 +70,6 @@ class Finding:
         return "mostly" if self.share >= policy.unnamed.MOSTLY_SHARE else "partly"
 
 
-@dataclass(frozen=True, eq=False)
-class Spline:
-    """What a flexible term multiplies by, over its covariate."""
-
-    times: str
-    """`force` (1), `gain` (thrust), `even` (|thrust|), `step` (change of thrust), `rate` (|drive|) or `drive`."""
-    what: str
-    """The same as a clause."""
-    unit: str
-    at: Floats
-    value: Floats
-    std: Floats
-    """The curve, (n,) each."""
-    table: tuple[tuple[float, float, float, float], ...]
-    """(covariate, value of the spline, value measured there, its standard error) bin by bin."""
-
-    @property
-    def told(self) -> NDArray[np.bool_]:
-        """Which rows of the table the data determine."""
-        _, _, measured, std = np.array(self.table).reshape(-1, 4).T
-        return told_rows(measured, std)
-
-    @property
-    def drawn(self) -> NDArray[np.bool_]:
-        """Which points of the curve they do."""
-        return told_rows(self.value, self.std)
-
-
-@dataclass(frozen=True, eq=False)
-class FlexibleShape:
-    """A flexible term of the final model: a spline over a covariate, no physics."""
-
-    covariate: str
-    unit: str
-    knots: tuple[float, ...]
-    degree: int
-    memory: float
-    """s, of load_history; otherwise 0."""
-    period: float
-    """s after which a spline over time begins anew; 0: never."""
-    coefficients: Mapping[str, Value]
-    splines: tuple[Spline, ...]
-    statement: str
-
-
-@dataclass(frozen=True, eq=False)
-class FormulaFound:
-    """A formula that agrees with held-out data and in both halves; a formula, not a physics."""
-
-    text: str
-    """`residual = ...`"""
-    symbols: str
-    """What its symbols stand for: `T_w: water_temperature`."""
-    coefficients: Mapping[str, Value]
-    bic_gain: float
-    heldout_before: float
-    heldout_after: float
-    """RMSE per sample on what was not fitted, without and with the formula alone, N."""
-    halves_p: float
-    """p-value of the same coefficients in both halves."""
-    equals: tuple[str, ...] = ()
-    """Other formulas that do about as well."""
-
-
-@dataclass(frozen=True, eq=False)
-class Remainder:
-    """Structure that no term of the catalogue carries."""
-
-    where: Where
-    share: float
-    p_value: float
-    shape: tuple[tuple[float, float, float], ...]
-    """(covariate, mean residual in N, its standard error) bin by bin."""
-    statement: str
-    resembles: tuple[str, ...] = ()
-    """Effects that fit but whose name was not earned, each with the reason."""
-    flexible: tuple[FlexibleShape, ...] = ()
-    """Of the final model, the clearest first; empty where none predicts better what was not fitted."""
-    equals: tuple[str, ...] = ()
-    """Coordinates over which the first flexible term would have done about as well."""
-    replaces: tuple[str, ...] = ()
-    """Effects whose name was not earned and whose place the flexible terms take."""
-    heldout_without: float | None = None
-    """RMSE per sample on what was not fitted, without the flexible terms, N."""
-    formula: FormulaFound | None = None
-
-    @property
-    def told(self) -> NDArray[np.bool_]:
-        """Which rows of the shape the data determine; one that is 0 by choice has no error."""
-        _, residual, std = np.array(self.shape).reshape(-1, 3).T
-        return np.asarray(told_rows(residual, std) | ((residual == 0) & np.isinf(std)))
-
-
 @dataclass(frozen=True, slots=True)
 class Rmse:
     before: float
@@ -177,6 +82,14 @@ class HeldOutRmse:
     after: float
     noise: float
     what: str
+    growth_p: float = 1.0
+    """How often chance makes an error that did not grow seem to have grown so much."""
+
+    @property
+    def grown(self) -> bool:
+        """Whether the model predicts what was not fitted worse than the baseline, beyond chance."""
+        plainly = self.after > policy.validate.GROWN_RATIO * self.before
+        return plainly or (self.after > self.before and self.growth_p < policy.validate.GROWN_P)
 
 
 @dataclass(frozen=True, slots=True)

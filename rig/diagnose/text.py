@@ -6,7 +6,8 @@ from collections.abc import Iterator, Mapping
 from math import floor, isfinite, log10
 from textwrap import wrap
 
-from identification.mismatch.diagnosis import Diagnosis, Finding, FlexibleShape, FormulaFound, Remainder
+from identification.mismatch.diagnosis import Diagnosis, Finding
+from identification.mismatch.unexplained import FlexibleShape, FormulaFound, Remainder
 from identification.mismatch.value import Value, Where
 from identification.mismatch.verdict_clauses import NOT_WHITE
 
@@ -14,8 +15,6 @@ WIDTH = 100
 MOST_STEPS = 12
 BAR = 24
 """Characters of the longest bar in the table of a shape."""
-WORSE = 1.05
-"""Ratio of errors on what was not fitted from which a reader is warned."""
 
 
 def diagnosis_text(d: Diagnosis) -> str:
@@ -114,7 +113,8 @@ def _finding(f: Finding) -> Iterator[str]:
 
 
 def _unexplained(u: Remainder, force: str) -> Iterator[str]:
-    yield f"Not explained: {100 * u.share:.0f} % of what remains, at {place(u.where)} ({rarity(u.p_value)})"
+    of = "what the baseline leaves" if u.unpredictive else "what remains"
+    yield f"Not explained: {100 * u.share:.0f} % of {of}, at {place(u.where)} ({rarity(u.p_value)})"
     yield from _shape(u, force)
     for text in u.resembles:
         yield from _para(f"- resembles {text}", "  ")
@@ -190,7 +190,7 @@ def _fit(d: Diagnosis) -> Iterator[str]:
     yield f"{f'RMSE per sample / {d.unit}':<24}{'before':>12}{'after':>12}{'noise':>12}"
     yield f"{'  fitted':<24}{d.train.before:>12.4g}{d.train.after:>12.4g}"
     yield f"{'  not fitted':<24}{d.heldout.before:>12.4g}{d.heldout.after:>12.4g}{d.heldout.noise:>12.4g}"
-    if d.heldout.after > WORSE * d.heldout.before:
+    if d.heldout.grown:
         yield "  the error on what was not fitted GROWS: this model describes the runs, it does not predict others"
     yield from _para(f"not fitted: {d.heldout.what}", "  ")
     white = f"white ({rarity(d.whiteness_p)})" if d.white else f"NOT white ({rarity(d.whiteness_p)}): {NOT_WHITE}"

@@ -5,14 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import isfinite
 
-from identification.mismatch.diagnosis import (
-    Diagnosis,
-    Finding,
-    FlexibleShape,
-    FormulaFound,
-    NextExperiment,
-    Remainder,
-)
+from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment
+from identification.mismatch.unexplained import FlexibleShape, FormulaFound, Remainder
 from identification.mismatch.value import Value, Where
 
 
@@ -47,6 +41,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, object]:
                 "rmse_after": _number(d.heldout.after),
                 "noise": _number(d.heldout.noise),
                 "what": d.heldout.what,
+                "growth_p": _number(d.heldout.growth_p),
             },
             "chi2_per_dof": _number(d.chi2_per_dof),
             "whiteness_p": _number(d.whiteness_p),
@@ -121,6 +116,7 @@ def _unexplained(u: Remainder) -> dict[str, object]:
         "equals": list(u.equals),
         "flexible": _flexible(u.flexible, u.replaces, u.heldout_without),
         "formula": None if u.formula is None else _formula(u.formula),
+        "unpredictive": u.unpredictive,
     }
 
 

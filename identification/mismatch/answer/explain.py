@@ -266,6 +266,8 @@ def _why(d: Diagnosis) -> str:
         case Ambiguous():
             return f"a finding has a rival within {equal:g} BIC"
         case Unexplained():
+            if d.heldout.grown:
+                return "the error on what was not fitted grew, by more than chance makes it"
             return "something is left, or a term of the model has no name"
 
 

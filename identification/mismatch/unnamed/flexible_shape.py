@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 
 from identification.flexible_terms.flexible import WORDS, Flexible, Multiplier
-from identification.mismatch.diagnosis import FlexibleShape, HeldOutRmse, Remainder, Spline
+from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
+from identification.mismatch.unexplained import FlexibleShape, Remainder, Spline
 from identification.mismatch.unnamed.flexible import Extended
 from identification.mismatch.unnamed.flexible_knots import seen_at
 from identification.mismatch.unnamed.formula import find_formula

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from identification.mismatch.diagnosis import FlexibleShape, Remainder, Spline
+from identification.mismatch.unexplained import FlexibleShape, Remainder, Spline
 from identification.mismatch.value import Value
 from rig.diagnose.report.figures import spline_over
 from rig.diagnose.report.words import axis, effect_name, not_drawn, rarity, value_cells, words

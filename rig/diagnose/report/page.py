@@ -34,6 +34,7 @@ VERDICTS: Mapping[str, Remark] = {
     "ambiguous": Remark("Ambiguous: several effects explain these recordings about as well; see the rivals.", "doubt"),
     "unexplained": Remark("Unexplained: structure is left that nothing in the catalogue carries.", "bad"),
 }
+UNPREDICTIVE = Remark("Unexplained: what was found does not predict data that were not fitted.", "bad")
 
 
 def write(diagnosis: Diagnosis, path: Path, recordings: Sequence[Recording] = ()) -> None:
@@ -64,7 +65,7 @@ def diagnosis_page(d: Diagnosis, recordings: Sequence[Recording] = ()) -> Page:
 
 def short(d: Diagnosis) -> Iterator[Remark]:
     """Verdict, error on what was not fitted, what next."""
-    yield VERDICTS[d.verdict]
+    yield UNPREDICTIVE if d.unexplained is not None and d.unexplained.unpredictive else VERDICTS[d.verdict]
     held = d.heldout
     if isfinite(held.before) and isfinite(held.after):
         better = "" if held.after >= held.before else f", {_change(held.before, held.after)} less"
@@ -130,7 +131,8 @@ def unexplained_section(d: Diagnosis, runs: Sequence[Run]) -> tuple[Section, ...
     u = d.unexplained
     if u is None:
         return ()
-    left = f"{100 * u.share:.0f} % of what remains is structure, not noise ({rarity(u.p_value)})."
+    of = "what the baseline leaves" if u.unpredictive else "what remains"
+    left = f"{100 * u.share:.0f} % of {of} is structure, not noise ({rarity(u.p_value)})."
     told = [Remark(left, "bad")]
     told += [Remark(words(f"Resembles {text.removesuffix('.')}."), "doubt") for text in u.resembles]
     told += modelled_remarks(u)

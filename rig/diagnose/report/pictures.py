@@ -9,7 +9,13 @@ import numpy as np
 from identification.mismatch.compare.reported_runs import Run
 from identification.mismatch.compare.signature import SPREAD_OUT, Signature, profile, signature
 from identification.mismatch.compare.signature import shape as shape_of
-from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, NextExperiment, Remainder
+from identification.mismatch.diagnosis import (
+    Curves,
+    Diagnosis,
+    Finding,
+    NextExperiment,
+)
+from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Where, told_rows
 from rig.diagnose.report.figures import residual_size, shape, signature_over, steps_plot
 from rig.diagnose.report.words import KINDS, axis, driver_quantity, effect_name, evidence, not_drawn, stretch, words

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from identification.mismatch.diagnosis import Curves, Diagnosis, Remainder
+from identification.mismatch.diagnosis import Curves, Diagnosis
+from identification.mismatch.unexplained import Remainder
 from identification.recording import Recording
 from rig.diagnose.report.figures import shape
 from rig.diagnose.report.page import (
@@ -92,7 +93,8 @@ def unexplained_section(d: Diagnosis) -> tuple[Section, ...]:
     u = d.unexplained
     if u is None:
         return ()
-    told = [Remark(f"{100 * u.share:.2g} % of what remains is structure, not noise ({rarity(u.p_value)}).", "bad")]
+    of = "what the baseline leaves" if u.unpredictive else "what remains"
+    told = [Remark(f"{100 * u.share:.2g} % of {of} is structure, not noise ({rarity(u.p_value)}).", "bad")]
     told += [Remark(words(f"Resembles {text.removesuffix('.')}."), "doubt") for text in u.resembles]
     return (Section("What is not explained", (*sentences(told), *_left(u, d))),)
 
