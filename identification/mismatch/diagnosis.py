@@ -46,8 +46,10 @@ class Finding:
     statement: str
     parameters: Mapping[str, Value]
     p_value: float
+    """Of the best of `searched` alternatives."""
     bic_gain: float
     probability: float
+    """Its weight among the effects that were asked, which that it is none of these is not."""
     rivals: tuple[RivalFinding, ...]
     share: float | None = None
     """Of the squared error on what was not fitted that anything could take off, how much this does, 0 to 1."""
@@ -55,6 +57,10 @@ class Finding:
     """RMSE per sample on what was not fitted, without it and with it."""
     doubts: tuple[str, ...] = ()
     """Why it is not the whole of it: checks of its shape that it failed."""
+    searched: int | None = 1
+    """Alternatives that were looked at; None where its test counts them otherwise."""
+    asked: int = 1
+    """Effects that were fitted in its place, and itself."""
 
     def __post_init__(self) -> None:
         if self.bic_gain <= 0:

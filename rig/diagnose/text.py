@@ -9,7 +9,7 @@ from textwrap import wrap
 from identification.mismatch.diagnosis import Diagnosis, Finding
 from identification.mismatch.unexplained import FlexibleShape, FormulaFound, Remainder
 from identification.mismatch.value import Value, Where
-from identification.mismatch.verdict_clauses import NOT_WHITE
+from identification.mismatch.verdict_clauses import NOT_WHITE, degree, sureness
 
 WIDTH = 100
 MOST_STEPS = 12
@@ -100,14 +100,10 @@ def _finding(f: Finding) -> Iterator[str]:
     yield from _para(f.statement, "  ")
     if f.parameters:
         yield from _para(_values(f.parameters), "  ")
-    yield from _para(
-        f"{rarity(f.p_value)}, BIC better by {f.bic_gain:.4g}, probability among its rivals {f.probability:.2g}", "  "
-    )
-    if f.share is not None and f.heldout is not None and f.grade != "all":
-        without, with_it = f.heldout
-        told = f"{f.grade}: not fitted {without:.4g} without it, {with_it:.4g} with it, "
-        told += f"{100 * f.share:.0f} % of what any shape could take off"
-        yield from _para("; ".join((told, *f.doubts)), "  ")
+    evidence = (rarity(f.p_value), sureness(f), f"BIC better by {f.bic_gain:.4g}")
+    yield from _para(", ".join(part for part in evidence if part), "  ")
+    if f.grade != "all":
+        yield from _para("; ".join((degree(f), *f.doubts)), "  ")
     for rival in f.rivals:
         yield from _para(f"- or {rival.effect} (BIC worse by {rival.bic_loss:.1f}): {rival.statement}", "  ")
 

@@ -80,8 +80,10 @@ def _finding(f: Finding) -> dict[str, object]:
         "statement": f.statement,
         "parameters": _values(f.parameters),
         "p_value": _number(f.p_value),
+        "searched": f.searched,
         "bic_gain": _number(f.bic_gain),
         "probability": _number(f.probability),
+        "asked": f.asked,
         "share": None if f.share is None else _number(f.share),
         "grade": f.grade,
         "heldout": None

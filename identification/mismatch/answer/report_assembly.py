@@ -78,6 +78,8 @@ def finding_of(named: NamedTerm[T, F], scale: Any, known: Mapping[T, tuple[Inter
         None if named.attained is None else named.attained.share,
         None if named.attained is None else (named.attained.without, named.attained.with_it),
         named.failed_checks,
+        named.searched,
+        named.asked_effects,
     )
 
 

@@ -23,6 +23,9 @@ PAYS: CheckKind = "pays"
 GRAVE: frozenset[CheckKind] = frozenset({"possible", "sampled", "clipping", "undone", PAYS, "predicts"})
 """Kinds that no share of what could be explained makes up for: a term that fails one is not that physics."""
 
+LEAST_P = 1e-300
+"""Smallest p-value that is told: 0 has no logarithm for those who draw it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Check:
@@ -61,7 +64,9 @@ class NamedTerm(Generic[T, F]):
     chi2_gain: float
     bic_gain: float
     p_value: float
+    """Of the best of `searched` alternatives."""
     probability: float
+    """Its weight among the effects that were asked: that it is none of these is not among them."""
     rivals: tuple[RivalTerm[T, F], ...]
     """Other effects within RIVAL_STATED_BIC, best first."""
     checks: tuple[Check, ...]
@@ -69,6 +74,10 @@ class NamedTerm(Generic[T, F]):
     forms: tuple[RivalTerm[T, F], ...] = ()
     """The same effect in its other textbook forms, best first, however much worse."""
     attained: Attained | None = None
+    searched: int = 1
+    """Alternatives that were looked at before this one was taken."""
+    asked_effects: int = 1
+    """Effects that were fitted in its place, and itself."""
     chi2_of_all: float = 0.0
     """Of the whole model, beside which the fits of rivals and forms stand."""
 
@@ -97,8 +106,13 @@ def named_term(
     stands: Standing[F, T],
     asked: tuple[Check, ...],
     effect_of: Callable[[T], str] = effect_id,
+    searched: int = 1,
 ) -> NamedTerm[T, F]:
-    """A term of a model beside its rivals: of each other effect the best form; `effect_of`: what counts as one."""
+    """A term of a model beside its rivals: of each other effect the best form; `effect_of`: what counts as one.
+
+    `searched`: alternatives that were looked at. The p-value is that of the best of so many, whatever their
+    correlations (Bonferroni).
+    """
     less, others = stands
     gain, values = less.chi2 - fitted.chi2, fitted.values[term]
     bic_gain = gain - len(values) * float(np.log(max(fitted.residual.size, 2)))
@@ -112,11 +126,13 @@ def named_term(
         tuple(map(float, fitted.std[fitted.layout.of(term)])),
         gain,
         bic_gain,
-        max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
+        min(max(searched * float(chi2_sf(max(gain, 0.0), len(values))), LEAST_P), 1.0),
         probability_beside([r.bic_loss for r in unique.values()]),
         tuple(unique.values()),
         (*asked, _pays(bic_gain)),
         tuple(r for r in others if effect_of(r.term) == effect_of(term)),
+        searched=searched,
+        asked_effects=len({effect_of(r.term) for r in others} | {effect_of(term)}),
         chi2_of_all=fitted.chi2,
     )
 

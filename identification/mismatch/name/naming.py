@@ -20,6 +20,7 @@ from identification.mismatch.name.named_term import Check, NamedTerm, named_term
 from identification.mismatch.prepare.preparing import DRIVERS
 from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.forward_selection import STATIC, SwapTest, Thruster, static_curve
+from identification.mismatch.select.likeliest_trials import alternatives
 from identification.mismatch.select.limits.clipping import contradiction
 from identification.mismatch.select.stepwise import stands
 from identification.physics.term import Term
@@ -152,14 +153,14 @@ def name(
     estimate: Estimate, data: Data, terms: Sequence[Term], standing: Mapping[Term, SwapTest] | None = None
 ) -> tuple[Named, ...]:
     """Every term of the model with its rivals and checks, the largest gain first."""
-    many = max(len(estimate.fit.model.terms), 1)
+    many, searched = max(len(estimate.fit.model.terms), 1), alternatives(terms, data.scale)
     system = Thruster(data, tuple(terms))
     standing = {term: (standing or {}).get(term) or stands(system, estimate, term) for term in estimate.fit.model.terms}
     repaired = _repaired(estimate, data, {term: less for term, (less, _) in standing.items()})
     out = []
     for term, stand in standing.items():
         asked = (*checks(estimate, term, data, many), *_not_repaired(repaired.get(term, ())))
-        out.append(named_term(term, estimate.fit, stand, asked))
+        out.append(named_term(term, estimate.fit, stand, asked, searched=searched))
     return tuple(sorted(out, key=lambda n: -n.chi2_gain))
 
 

@@ -26,8 +26,9 @@ def name(state: State, vehicle: Vehicle) -> tuple[State, tuple[Named, ...]]:
     """Each term against its rivals; another that does better takes the place first."""
     state, known = exchanged(vehicle, state)
     standing = known or {term: stands(vehicle, state, term) for term in state.terms}
+    searched = max(sum(len(term.trials(vehicle.data.scale)) for term in vehicle.terms), 1)
     return state, tuple(
-        named_term(term, state.fit, stand, tuple(checks(state, vehicle.data, term)), effect_of)
+        named_term(term, state.fit, stand, tuple(checks(state, vehicle.data, term)), effect_of, searched)
         for term, stand in standing.items()
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from identification.mismatch.diagnosis import Curves, Diagnosis
 from identification.mismatch.unexplained import Remainder
 from identification.recording import Recording
+from rig.diagnose.recording_names import NO_NAMES, told_by_name
 from rig.diagnose.report.figures import shape
 from rig.diagnose.report.page import (
     after_table,
@@ -30,13 +31,16 @@ from rig.report.style import unit_text
 MOST_RUNS = 4
 
 
-def write(diagnosis: Diagnosis, path: Path, _recordings: Sequence[Recording] = ()) -> None:
-    """One page. Raises OSError."""
-    pages.write(vehicle_page(diagnosis), path)
+def write(
+    diagnosis: Diagnosis, path: Path, _recordings: Sequence[Recording] = (), names: Mapping[str, str] = NO_NAMES
+) -> None:
+    """One page; `names` of the recordings' files, by recording id. Raises OSError."""
+    pages.write(vehicle_page(diagnosis, names), path)
 
 
-def vehicle_page(d: Diagnosis) -> Page:
+def vehicle_page(diagnosis: Diagnosis, names: Mapping[str, str] = NO_NAMES) -> Page:
     """The page of one diagnosis of a vehicle."""
+    d = told_by_name(diagnosis, names)
     before = Section("Before and after", (*after_table(d), *motion_pictures(d)))
     sections = (
         Section("In short", sentences(short(d))),
@@ -48,7 +52,7 @@ def vehicle_page(d: Diagnosis) -> Page:
         *rivals_section(d),
         *next_section(d.next_experiment),
         *notes_section(d),
-        provenance_section(d),
+        provenance_section(diagnosis, names),
     )
     return Page(f"Diagnosis of {d.thruster or 'a vehicle'}: {d.verdict}", words(d.statement), sections, contents=True)
 

@@ -9,6 +9,7 @@ from math import isfinite
 from identification.mismatch.compare.signature import Kind
 from identification.mismatch.diagnosis import Diagnosis, Finding
 from identification.mismatch.value import Value, Where
+from identification.mismatch.verdict_clauses import degree, sureness
 from identification.physics.catalogue import CATALOGUE
 from identification.thruster.thrust_report import digits
 from rig.diagnose.report.rivals import WITHOUT_TERM
@@ -152,7 +153,9 @@ def not_drawn(rows: int) -> str:
 
 
 def evidence(finding: Finding) -> str:
-    """How sure a finding is."""
+    """How sure a finding is, and how much of what could be explained it is."""
     gain = f"{finding.bic_gain:.3g}" if abs(finding.bic_gain) < 100 else f"{finding.bic_gain:.0f}"
-    among = f"probability among its rivals {finding.probability:.2g}" if finding.rivals else "no rival comes near"
-    return f"{rarity(finding.p_value)}, BIC better by {gain}, {among}"
+    near = "" if finding.rivals else "no rival comes near"
+    told = (rarity(finding.p_value), sureness(finding), f"BIC better by {gain}", near)
+    graded = "; ".join(part for part in (degree(finding), *finding.doubts) if part)
+    return ", ".join(part for part in told if part) + (f". {graded[:1].upper()}{graded[1:]}" if graded else "")
