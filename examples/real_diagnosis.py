@@ -24,6 +24,7 @@ from rig.blind import beside
 from rig.blind.beside import RealRecordings, real_case, unanswered
 from rig.blind.store import version_of_diagnosis
 from rig.diagnose.command import diagnose_files
+from rig.diagnose.recording_names import file_names, told_by_name
 from rig.diagnose.report.page import write
 from rig.diagnose.text import diagnosis_text
 from rig.importing.command import import_file
@@ -75,7 +76,8 @@ def diagnosed(root: Path, case: Case, folder: Path) -> Diagnosis:
         files = sorted((root / case.folder).glob(pattern)) if pattern else []
         return [import_file(p, plan, folder / f"{p.stem}.h5", dict(case.parameters)).path for p in files]
 
-    return diagnose_files(imported(case.fitted), imported(case.judged))
+    fitted, judged = imported(case.fitted), imported(case.judged)
+    return told_by_name(diagnose_files(fitted, judged), file_names([*fitted, *judged]))
 
 
 def short(case: Case, found: Diagnosis, took: float) -> str:

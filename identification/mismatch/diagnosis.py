@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from identification.mismatch import policy
+from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Value, Where
 from identification.mismatch.verdict_clauses import either, mostly
 from identification.recording import Floats
@@ -45,8 +46,10 @@ class Finding:
     statement: str
     parameters: Mapping[str, Value]
     p_value: float
+    """Of the best of `searched` alternatives."""
     bic_gain: float
     probability: float
+    """Its weight among the effects that were asked, which that it is none of these is not."""
     rivals: tuple[RivalFinding, ...]
     share: float | None = None
     """Of the squared error on what was not fitted that anything could take off, how much this does, 0 to 1."""
@@ -54,6 +57,14 @@ class Finding:
     """RMSE per sample on what was not fitted, without it and with it."""
     doubts: tuple[str, ...] = ()
     """Why it is not the whole of it: checks of its shape that it failed."""
+    searched: int | None = 1
+    """Alternatives that were looked at; None where its test counts them otherwise."""
+    asked: int = 1
+    """Effects that were fitted in its place, and itself."""
+
+    def __post_init__(self) -> None:
+        if self.bic_gain <= 0:
+            raise ValueError(f"{self.effect} does not pay for its parameters (BIC worse by {-self.bic_gain:.3g})")
 
     @property
     def grade(self) -> Literal["all", "mostly", "partly"]:
@@ -63,82 +74,6 @@ class Finding:
         if self.share >= policy.unnamed.ALL_SHARE and not self.doubts:
             return "all"
         return "mostly" if self.share >= policy.unnamed.MOSTLY_SHARE else "partly"
-
-
-@dataclass(frozen=True, eq=False)
-class Spline:
-    """What a flexible term multiplies by, over its covariate."""
-
-    times: str
-    """`force` (1), `gain` (thrust), `even` (|thrust|), `step` (change of thrust), `rate` (|drive|) or `drive`."""
-    what: str
-    """The same as a clause."""
-    unit: str
-    at: Floats
-    value: Floats
-    std: Floats
-    """The curve, (n,) each."""
-    table: tuple[tuple[float, float, float, float], ...]
-    """(covariate, value of the spline, value measured there, its standard error) bin by bin."""
-
-
-@dataclass(frozen=True, eq=False)
-class FlexibleShape:
-    """A flexible term of the final model: a spline over a covariate, no physics."""
-
-    covariate: str
-    unit: str
-    knots: tuple[float, ...]
-    degree: int
-    memory: float
-    """s, of load_history; otherwise 0."""
-    period: float
-    """s after which a spline over time begins anew; 0: never."""
-    coefficients: Mapping[str, Value]
-    splines: tuple[Spline, ...]
-    statement: str
-
-
-@dataclass(frozen=True, eq=False)
-class FormulaFound:
-    """A formula that agrees with held-out data and in both halves; a formula, not a physics."""
-
-    text: str
-    """`residual = ...`"""
-    symbols: str
-    """What its symbols stand for: `T_w: water_temperature`."""
-    coefficients: Mapping[str, Value]
-    bic_gain: float
-    heldout_before: float
-    heldout_after: float
-    """RMSE per sample on what was not fitted, without and with the formula alone, N."""
-    halves_p: float
-    """p-value of the same coefficients in both halves."""
-    equals: tuple[str, ...] = ()
-    """Other formulas that do about as well."""
-
-
-@dataclass(frozen=True, eq=False)
-class Remainder:
-    """Structure that no term of the catalogue carries."""
-
-    where: Where
-    share: float
-    p_value: float
-    shape: tuple[tuple[float, float, float], ...]
-    """(covariate, mean residual in N, its standard error) bin by bin."""
-    statement: str
-    resembles: tuple[str, ...] = ()
-    """Effects that fit but whose name was not earned, each with the reason."""
-    flexible: tuple[FlexibleShape, ...] = ()
-    """Of the final model, the clearest first; empty where none predicts better what was not fitted."""
-    equals: tuple[str, ...] = ()
-    """Coordinates over which the first flexible term would have done about as well."""
-    replaces: tuple[str, ...] = ()
-    """Effects whose name was not earned and whose place the flexible terms take."""
-    heldout_without: float | None = None
-    """RMSE per sample on what was not fitted, without the flexible terms, N."""
-    formula: FormulaFound | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,6 +88,14 @@ class HeldOutRmse:
     after: float
     noise: float
     what: str
+    growth_p: float = 1.0
+    """How often chance makes an error that did not grow seem to have grown so much."""
+
+    @property
+    def grown(self) -> bool:
+        """Whether the model predicts what was not fitted worse than the baseline, beyond chance."""
+        plainly = self.after > policy.validate.GROWN_RATIO * self.before
+        return plainly or (self.after > self.before and self.growth_p < policy.validate.GROWN_P)
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,6 +13,24 @@ NOT_WHITE = (
 )
 
 
+def sureness(f: Finding) -> str:
+    """How many alternatives were looked at before it was taken, and its weight among those fitted in its place."""
+    says = f"the best of {f.searched} alternatives looked at" if f.searched is not None and f.searched > 1 else ""
+    weight = f"weight {f.probability:.2g} among the {f.asked} effects asked (none of these is not asked)"
+    return ", ".join(part for part in (says, weight if f.asked > 1 else "") if part)
+
+
+def degree(f: Finding) -> str:
+    """Its grade with its share; empty where that was not judged."""
+    if f.share is None or f.heldout is None:
+        return ""
+    without, with_it = f.heldout
+    return (
+        f"{f.grade}: not fitted {without:.4g} without it, {with_it:.4g} with it, {100 * f.share:.0f} % of what any "
+        "shape could take off"
+    )
+
+
 def mostly(f: Finding) -> str:
     """With what it does on what was not fitted."""
     says = f"Mostly {f.statement[:1].lower()}{f.statement[1:]}"

@@ -141,7 +141,7 @@ def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = (),
     """Twin, page, JSON and plan where they are wanted; text for a person unless the JSON goes to standard output.
 
     `recordings`: those diagnosed; with them the page draws each effect by itself. `files`: those of all recordings,
-    whose names the text has in the place of ids. Raises OSError, ConfigError.
+    whose names text and page have in the place of ids. Raises OSError, ConfigError.
     """
     from identification.mismatch.answer.as_json import diagnosis_json
     from rig.diagnose.text import diagnosis_text
@@ -152,7 +152,7 @@ def tell(found: Diagnosis, wanted: Wanted, recordings: Sequence[Recording] = (),
         write_twin(found.twin, wanted.save_twin)
     if wanted.report is not None:
         page = "rig.diagnose.report.page" if found.response == "thrust" else "rig.diagnose.report.vehicle"
-        import_module(page).write(found, wanted.report, recordings)  # matplotlib: only for a page
+        import_module(page).write(found, wanted.report, recordings, _names(files))  # matplotlib: only for a page
     if wanted.json_path is not None:
         text = json.dumps(diagnosis_json(found), indent=1, allow_nan=False)
         if wanted.alone:

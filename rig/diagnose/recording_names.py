@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 T = TypeVar("T")
+NO_NAMES: Mapping[str, str] = MappingProxyType({})
 
 
 def file_names(paths: Iterable[Path]) -> dict[str, str]:

@@ -6,16 +6,15 @@ from collections.abc import Iterator, Mapping
 from math import floor, isfinite, log10
 from textwrap import wrap
 
-from identification.mismatch.diagnosis import Diagnosis, Finding, FlexibleShape, FormulaFound, Remainder
+from identification.mismatch.diagnosis import Diagnosis, Finding
+from identification.mismatch.unexplained import FlexibleShape, FormulaFound, Remainder
 from identification.mismatch.value import Value, Where
-from identification.mismatch.verdict_clauses import NOT_WHITE
+from identification.mismatch.verdict_clauses import NOT_WHITE, degree, sureness
 
 WIDTH = 100
 MOST_STEPS = 12
 BAR = 24
 """Characters of the longest bar in the table of a shape."""
-WORSE = 1.05
-"""Ratio of errors on what was not fitted from which a reader is warned."""
 
 
 def diagnosis_text(d: Diagnosis) -> str:
@@ -37,8 +36,13 @@ def with_error(value: Value) -> str:
 
     >>> with_error(Value(0.41234, 0.00123, "N/V^2")), with_error(Value(3.0, float("nan"), "s"))
     ('0.4123 +- 0.0012 N/V^2', '3 s')
+    >>> with_error(Value(24.0, 5844288569.0, "s", limits=(1.0, 400.0)))
+    'not determined (between 1 and 400 s)'
     """
     unit = "" if value.unit in ("", "1") else f" {value.unit}"
+    if not value.determined:
+        low, high = value.interval
+        return "not determined" + (f" (between {low:.3g} and {high:.3g}{unit})" if value.limits else "")
     if not (isfinite(value.std) and value.std > 0):
         return f"{value.value:.4g}{unit}"
     digits = max(1 - floor(log10(value.std)), 0)
@@ -96,20 +100,17 @@ def _finding(f: Finding) -> Iterator[str]:
     yield from _para(f.statement, "  ")
     if f.parameters:
         yield from _para(_values(f.parameters), "  ")
-    yield from _para(
-        f"{rarity(f.p_value)}, BIC better by {f.bic_gain:.4g}, probability among its rivals {f.probability:.2g}", "  "
-    )
-    if f.share is not None and f.heldout is not None and f.grade != "all":
-        without, with_it = f.heldout
-        told = f"{f.grade}: not fitted {without:.4g} without it, {with_it:.4g} with it, "
-        told += f"{100 * f.share:.0f} % of what any shape could take off"
-        yield from _para("; ".join((told, *f.doubts)), "  ")
+    evidence = (rarity(f.p_value), sureness(f), f"BIC better by {f.bic_gain:.4g}")
+    yield from _para(", ".join(part for part in evidence if part), "  ")
+    if f.grade != "all":
+        yield from _para("; ".join((degree(f), *f.doubts)), "  ")
     for rival in f.rivals:
         yield from _para(f"- or {rival.effect} (BIC worse by {rival.bic_loss:.1f}): {rival.statement}", "  ")
 
 
 def _unexplained(u: Remainder, force: str) -> Iterator[str]:
-    yield f"Not explained: {100 * u.share:.0f} % of what remains, at {place(u.where)} ({rarity(u.p_value)})"
+    of = "what the baseline leaves" if u.unpredictive else "what remains"
+    yield f"Not explained: {100 * u.share:.0f} % of {of}, at {place(u.where)} ({rarity(u.p_value)})"
     yield from _shape(u, force)
     for text in u.resembles:
         yield from _para(f"- resembles {text}", "  ")
@@ -128,9 +129,13 @@ def _flexible(f: FlexibleShape) -> Iterator[str]:
     unit = "" if f.unit in ("", "1") else f" / {f.unit}"
     for s in f.splines:
         label = s.times if s.unit in ("", "1") else f"{s.times} / {s.unit}"
-        size = max((abs(value) for _, value, _, _ in s.table), default=0.0) or 1.0
+        rows = zip(s.table, s.told, strict=True)
+        size = max((abs(value) for (_, value, _, _), known in rows if known), default=0.0) or 1.0
         yield f"  {f.covariate + unit:>24}{label:>14}{'measured':>12}{'std':>10}"
-        for at, value, measured, std in s.table:
+        for (at, value, measured, std), known in zip(s.table, s.told, strict=True):
+            if not known:
+                yield f"  {at:>24.4g}{'not determined':>26}"
+                continue
             yield f"  {at:>24.4g}{value:>14.3g}{measured:>12.3g}{std:>10.2g}  {_bar(value, size)}".rstrip()
 
 
@@ -147,15 +152,18 @@ def _formula(f: FormulaFound) -> Iterator[str]:
 
 def _shape(u: Remainder, force: str) -> Iterator[str]:
     """The residual over the covariate, bin by bin, as numbers and bars."""
-    rows = [(a, b, c) for a, b, c in u.shape if isfinite(b)]
-    size = max((abs(b) for _, b, _ in rows), default=0.0)
+    rows = [(a, b, c, known) for (a, b, c), known in zip(u.shape, u.told, strict=True) if isfinite(b)]
+    size = max((abs(b) for _, b, _, known in rows if known), default=0.0)
     if not size:
         return
     unit = "" if u.where.unit in ("", "1") else f" / {u.where.unit}"
     yield f"  {u.where.quantity + unit:>24}{f'residual / {force}':>14}{f'std / {force}':>10}"
-    for at, residual, std in rows:
-        known = f"{std:.2g}" if isfinite(std) else "-"
-        yield f"  {at:>24.4g}{residual:>14.3g}{known:>10}  {_bar(residual, size)}".rstrip()
+    for at, residual, std, known in rows:
+        if known:
+            error = f"{std:.2g}" if isfinite(std) else "-"
+            yield f"  {at:>24.4g}{residual:>14.3g}{error:>10}  {_bar(residual, size)}".rstrip()
+        else:
+            yield f"  {at:>24.4g}{'not determined':>24}"
 
 
 def _bar(value: float, size: float) -> str:
@@ -178,7 +186,7 @@ def _fit(d: Diagnosis) -> Iterator[str]:
     yield f"{f'RMSE per sample / {d.unit}':<24}{'before':>12}{'after':>12}{'noise':>12}"
     yield f"{'  fitted':<24}{d.train.before:>12.4g}{d.train.after:>12.4g}"
     yield f"{'  not fitted':<24}{d.heldout.before:>12.4g}{d.heldout.after:>12.4g}{d.heldout.noise:>12.4g}"
-    if d.heldout.after > WORSE * d.heldout.before:
+    if d.heldout.grown:
         yield "  the error on what was not fitted GROWS: this model describes the runs, it does not predict others"
     yield from _para(f"not fitted: {d.heldout.what}", "  ")
     white = f"white ({rarity(d.whiteness_p)})" if d.white else f"NOT white ({rarity(d.whiteness_p)}): {NOT_WHITE}"

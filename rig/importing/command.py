@@ -13,18 +13,15 @@ from typing import Literal
 import click
 import numpy as np
 
-from rig.errors import ConfigError, RecordingError, RigError
+from rig.errors import RecordingError, RigError
 from rig.importing.convert import Imported, convert, parameters_known
 from rig.importing.json_recording import read_plain
+from rig.importing.map_options import LEVELS, Levels, assignments_of, plan_of, refuse_without_map
 from rig.importing.mapping import ImportMap, read_map, shipped
 from rig.importing.reading.foreign_formats import foreign
-from rig.importing.reading.row_filter import parse
 from rig.importing.thruster_name import thruster_of
 from rig.importing.timing.two_clocks import ESTIMATED, merged, offset_asked, offset_between
 from rig.link.recorder_messages import Attribute, EventRow, Rows
-
-Levels = Literal["start", "middle", "end", "no"]
-"""What of its level the time of a row is; `no`: rows are no levels."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -182,44 +179,6 @@ def _version() -> str:
         return "(not installed)"
 
 
-def _assignments(texts: tuple[str, ...]) -> dict[str, float]:
-    """`name=value` of --set.
-
-    >>> _assignments(("nominal_voltage=48",))
-    {'nominal_voltage': 48.0}
-    """
-    found = {}
-    for text in texts:
-        name, _, value = text.partition("=")
-        try:
-            found[name.strip()] = float(value)
-        except ValueError as error:
-            raise ConfigError(f"--set {text}: expected name=number, for example nominal_voltage=48") from error
-    return found
-
-
-def _plan_of(name: str, levels: Levels | None, where: str) -> ImportMap:
-    """The map, with what the command line says of its rows."""
-    plan = read_map(name)
-    if where:
-        parse(where)
-        plan = replace(plan, file=replace(plan.file, where=where))
-    if levels is None:
-        return plan
-    if plan.time.level_duration is not None:
-        raise ConfigError(f"--levels is for files with times; {name} has level_duration: each row is a level already")
-    if levels == "no":
-        return replace(plan, time=replace(plan.time, levels=False))
-    return replace(plan, time=replace(plan.time, levels=True, level_time=levels))
-
-
-def _refuse_without_map(file: Path, options: Mapping[str, object]) -> None:
-    """Raises ConfigError where an option was given that changes a map."""
-    given = [name for name, value in options.items() if value]
-    if given:
-        raise ConfigError(f"{file}: {', '.join(given)} is for a map: give --map, or write it into the JSON itself")
-
-
 def _list_maps(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
     if wanted and not context.resilient_parsing:
         for name in shipped():
@@ -238,14 +197,16 @@ def _list_maps(context: click.Context, _parameter: click.Parameter, wanted: bool
 @click.option("--set", "assignments", multiple=True, metavar="NAME=NUMBER", help="override a parameter of the map")
 @click.option("--thruster", help="id of the thruster; default: the map's, else what the file's name tells")
 @click.option("--kind", type=click.Choice(["tunnel", "bollard", "vehicle"]), help="override the map's kind")
-@click.option("--where", default="", metavar="FILTER", help="rows that are wanted: \"mode == 'run' and c3 > 0\"")
+@click.option("--where", default="", metavar="FILTER", help="rows wanted of all files: \"mode == 'run' and c3 > 0\"")
 @click.option(
     "--levels",
-    type=click.Choice(["start", "middle", "end", "no"]),
-    help="each row is a level, its time the level's start, middle or end; no: each row is a sample of a log",
+    type=click.Choice(LEVELS),
+    help="of all files: each row is a level, its time its start, middle or end; no: each row is a sample of a log",
 )
 @click.option("--with", "beside", type=click.Path(path_type=Path), help="a second file, with a clock of its own")
 @click.option("--with-map", help="the map of the second file; default: that of the first")
+@click.option("--with-where", metavar="FILTER", help="its rows that are wanted; default: --where; '': all of them")
+@click.option("--with-levels", type=click.Choice(LEVELS), help="what its rows are; default: --levels")
 @click.option(
     "--offset",
     default=ESTIMATED,
@@ -266,25 +227,37 @@ def import_command(
     levels: Levels | None,
     beside: Path | None,
     with_map: str | None,
+    with_where: str | None,
+    with_levels: Levels | None,
     offset: str,
     notes: str,
 ) -> None:
     """Exit status 0; RigError is for the caller (rig.cli) to print."""
     out = output or file.with_suffix(".h5")
     if map_name is None:
-        given = {"--set": assignments, "--thruster": thruster, "--kind": kind, "--where": where, "--levels": levels}
-        _refuse_without_map(file, given | {"--with": beside, "--with-map": with_map})
+        given: dict[str, object] = {
+            "--set": assignments,
+            "--thruster": thruster,
+            "--kind": kind,
+            "--where": where,
+            "--levels": levels,
+        }
+        given |= {"--with": beside, "--with-map": with_map, "--with-where": with_where, "--with-levels": with_levels}
+        refuse_without_map(file, given)
         summary = import_plain(file, out, notes)
         for sentence in summary.sentences:
             click.echo(sentence)
         click.echo(f"{summary.path}: {summary.rows} rows")
         return
-    plan = _plan_of(map_name, levels, where)
+    plan = plan_of(map_name, levels, where)
     _read(file, plan.file.encoding)  # what it is comes before whose it is
     whose, known_by = thruster_of(thruster, plan, file)
     plan = replace(plan, thruster=whose, kind=kind or plan.kind)
-    second = None if beside is None else Beside(beside, read_map(with_map or map_name), offset_asked(offset))
-    _tell(import_file(file, plan, out, _assignments(assignments), notes, second), whose, known_by)
+    second = None
+    if beside is not None:
+        its_rows = with_levels or levels, where if with_where is None else with_where
+        second = Beside(beside, plan_of(with_map or map_name, *its_rows), offset_asked(offset))
+    _tell(import_file(file, plan, out, assignments_of(assignments), notes, second), whose, known_by)
 
 
 def _tell(summary: Summary, whose: str, known_by: str) -> None:

@@ -86,7 +86,7 @@ def given_values(twin: Twin) -> dict[str, Value]:
 
 
 def changed_constant(twin: Twin, estimate: Estimate, known: str, unit: str) -> Finding | None:
-    """The thrust constant is no longer the twin's, at CHANGED_CONSTANT_FALSE_ALARM."""
+    """The thrust constant is no longer the twin's, at CHANGED_CONSTANT_FALSE_ALARM, and the change pays for itself."""
     value, std = estimate.fit.theta.C, float(estimate.fit.std[0])
     was, was_std = twin.C, float(np.sqrt(twin.covariance[0][0]))
     both = float(np.hypot(std, was_std))
@@ -94,13 +94,13 @@ def changed_constant(twin: Twin, estimate: Estimate, known: str, unit: str) -> F
         return None
     z = (value - was) / both
     p = max(2 * float(normal_sf(abs(z))), 1e-300)
-    if p >= policy.answer.CHANGED_CONSTANT_FALSE_ALARM:
+    bic_gain = z**2 - float(np.log(max(estimate.fit.residual.size, 2)))
+    if p >= policy.answer.CHANGED_CONSTANT_FALSE_ALARM or bic_gain <= 0:
         return None
     share = 100 * (value - was) / abs(was)
     says = f"Thrust constant: {value:.4g} {unit} where {known} has {was:.4g} ({share:+.2g} %, {abs(z):.0f} sigma)."
-    logn = float(np.log(max(estimate.fit.residual.size, 2)))
     parameters = {"C": Value(value, std, unit), "before": Value(was, was_std, unit)}
-    return Finding("thrust_constant", "", says, parameters, p, z**2 - logn, 1.0, ())
+    return Finding("thrust_constant", "", says, parameters, p, bic_gain, 1.0, ())
 
 
 def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], before: Twin | None) -> Twin:

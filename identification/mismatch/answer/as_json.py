@@ -5,14 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from math import isfinite
 
-from identification.mismatch.diagnosis import (
-    Diagnosis,
-    Finding,
-    FlexibleShape,
-    FormulaFound,
-    NextExperiment,
-    Remainder,
-)
+from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment
+from identification.mismatch.unexplained import FlexibleShape, FormulaFound, Remainder
 from identification.mismatch.value import Value, Where
 
 
@@ -47,6 +41,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, object]:
                 "rmse_after": _number(d.heldout.after),
                 "noise": _number(d.heldout.noise),
                 "what": d.heldout.what,
+                "growth_p": _number(d.heldout.growth_p),
             },
             "chi2_per_dof": _number(d.chi2_per_dof),
             "whiteness_p": _number(d.whiteness_p),
@@ -65,7 +60,7 @@ def _values(values: Mapping[str, Value]) -> dict[str, object]:
     for name, v in values.items():
         low, high = v.interval
         told = {"value": _number(v.value), "std": _number(v.std), "low": _number(low), "high": _number(high)}
-        out[name] = {**told, "unit": v.unit}
+        out[name] = {**told, "unit": v.unit, "determined": v.determined}
     return out
 
 
@@ -85,8 +80,10 @@ def _finding(f: Finding) -> dict[str, object]:
         "statement": f.statement,
         "parameters": _values(f.parameters),
         "p_value": _number(f.p_value),
+        "searched": f.searched,
         "bic_gain": _number(f.bic_gain),
         "probability": _number(f.probability),
+        "asked": f.asked,
         "share": None if f.share is None else _number(f.share),
         "grade": f.grade,
         "heldout": None
@@ -112,12 +109,16 @@ def _unexplained(u: Remainder) -> dict[str, object]:
         "where": _where(u.where),
         "share": _number(u.share),
         "p_value": _number(u.p_value),
-        "shape": [{"at": _number(a), "residual": _number(b), "std": _number(c)} for a, b, c in u.shape],
+        "shape": [
+            {"at": _number(a), "residual": _number(b), "std": _number(c), "determined": bool(known)}
+            for (a, b, c), known in zip(u.shape, u.told, strict=True)
+        ],
         "statement": u.statement,
         "resembles": list(u.resembles),
         "equals": list(u.equals),
         "flexible": _flexible(u.flexible, u.replaces, u.heldout_without),
         "formula": None if u.formula is None else _formula(u.formula),
+        "unpredictive": u.unpredictive,
     }
 
 
@@ -153,9 +154,10 @@ def _flexible_shape(f: FlexibleShape) -> dict[str, object]:
                 "measured": _number(measured),
                 "measured_std": _number(std),
                 "value_unit": s.unit,
+                "determined": bool(known),
             }
             for s in f.splines
-            for at, value, measured, std in s.table
+            for (at, value, measured, std), known in zip(s.table, s.told, strict=True)
         ],
         "statement": f.statement,
     }
@@ -174,4 +176,7 @@ def _formula(f: FormulaFound) -> dict[str, object]:
 
 
 def _plain_values(values: Mapping[str, Value]) -> dict[str, object]:
-    return {k: {"value": _number(v.value), "std": _number(v.std), "unit": v.unit} for k, v in values.items()}
+    return {
+        k: {"value": _number(v.value), "std": _number(v.std), "unit": v.unit, "determined": v.determined}
+        for k, v in values.items()
+    }

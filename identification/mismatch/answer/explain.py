@@ -204,8 +204,8 @@ def _name(named: Named, selected: Selected) -> Iterator[str]:
     says = "NOT earned" if named.failed_checks else "earned"
     yield f"{label(named.term)} {values_text(named.term, named.theta, selected.data, named.std)}: {says}"
     yield (
-        f"  chi-square {named.chi2_gain:.4g}, BIC {named.bic_gain:.4g}, {p_text(named.p_value)}, probability among "
-        f"rivals {named.probability:.3g}"
+        f"  chi-square {named.chi2_gain:.4g}, BIC {named.bic_gain:.4g}, {p_text(named.p_value)} of the best of "
+        f"{named.searched}, weight among {named.asked_effects} asked {named.probability:.3g}"
     )
     for check in named.checks:
         if check.failed:
@@ -266,6 +266,8 @@ def _why(d: Diagnosis) -> str:
         case Ambiguous():
             return f"a finding has a rival within {equal:g} BIC"
         case Unexplained():
+            if d.heldout.grown:
+                return "the error on what was not fitted grew, by more than chance makes it"
             return "something is left, or a term of the model has no name"
 
 

@@ -19,7 +19,7 @@ LEAST_P = 1e-300
 def fault_finding(fault: Fault) -> Finding:
     values = {k: Value(v.value, v.std, v.unit) for k, v in fault.parameters.items()}
     p = max(fault.p_value, LEAST_P)
-    return Finding(EFFECT, fault.kind, fault.statement, values, p, -2 * float(np.log(p)), 1.0, ())
+    return Finding(EFFECT, fault.kind, fault.statement, values, p, -2 * float(np.log(p)), 1.0, (), searched=None)
 
 
 def with_channels(draft: Draft, faults: Sequence[Fault], recordings: Sequence[str]) -> Draft:

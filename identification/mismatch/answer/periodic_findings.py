@@ -54,7 +54,12 @@ def line_finding(line: Line) -> Finding:
     p = max(line.p_value, LEAST_P)
     rivals = tuple(_rivals(line))
     probability = probability_beside([r.bic_loss for r in rivals])
-    return Finding(EFFECT, line.kind, line.statement, line_values(twin_line(line)), p, line.gain, probability, rivals)
+    values, asked = line_values(twin_line(line)), 1 + len(rivals)
+    return Finding(
+        *(EFFECT, line.kind, line.statement, values, p, line.gain, probability, rivals),
+        searched=line.searched,
+        asked=asked,
+    )
 
 
 def _rivals(line: Line) -> Iterable[RivalFinding]:

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from identification.mismatch import policy
-from identification.mismatch.diagnosis import Remainder
 from identification.mismatch.locate.places import says, where_of
 from identification.mismatch.model.data import Data
+from identification.mismatch.unexplained import Remainder
 from identification.mismatch.unnamed.flexible import foremost
 from identification.mismatch.unnamed.flexible_shape import with_flexible
 from identification.mismatch.unnamed.stage import Completed, foremost_covariate

@@ -3,8 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import Any
 
+import numpy as np
+
+from identification.flexible_terms.flexible import Flexible
 from identification.mismatch.diagnosis import Curves, Finding, RivalFinding
 from identification.mismatch.estimate.confidence_intervals import Interval
 from identification.mismatch.estimate.estimate import Estimate
@@ -13,24 +17,29 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.name.named_term import NamedTerm
 from identification.mismatch.select.rounds import T
 from identification.mismatch.select.stepwise import F, RivalTerm
-from identification.mismatch.value import QUANTILE, Value
+from identification.mismatch.value import QUANTILE, Value, of_shape
 from identification.physics.term import Term
 
 Intervals = Mapping[Term, tuple[Interval, ...]]
 
 
 def values_of(fitted: Fit, data: Data, known: Intervals | None = None) -> dict[str, Value]:
-    """C, tares and all parameters of the terms with their standard errors, or their intervals where they are known."""
+    """C, tares and all parameters of the terms with their standard errors, or their intervals where they are known.
+
+    A tare could be anything within the reach of its run's readings.
+    """
     std = fitted.std
     unit = data.scale.driver_unit
     out = {"C": Value(fitted.theta.C, float(std[0]), f"N/{unit}^2" if unit == "V" else "N s^2/rev^2")}
     at = fitted.layout
     for term, values in fitted.values.items():
         told = values_told(term, values, std[at.of(term)].tolist(), data.scale, (known or {}).get(term))
+        told = of_shape(told) if isinstance(term, Flexible) else told
         out |= {f"{term.id}.{name}": value for name, value in told.items()}
     for run, (history, tare) in enumerate(zip(data.histories, fitted.theta.tares, strict=True)):
+        reach = float(np.max(np.abs(data.thrust[run]), initial=0.0))
         key = "tare" if len(data.histories) == 1 else f"tare[{history.recording_id}]"
-        out[key] = Value(tare, float(std[at.tare(run)]), "N")
+        out[key] = Value(tare, float(std[at.tare(run)]), "N", limits=(-reach, reach))
     return out
 
 
@@ -39,22 +48,29 @@ def values_told(
 ) -> dict[str, Value]:
     told = term.parameters(scale)
     if known is None:
-        return {p.name: Value(v, s, p.unit) for p, v, s in zip(told, theta, std, strict=True)}
-    return {p.name: _within(v, p.unit, i) for p, v, i in zip(told, theta, known, strict=True)}
+        return {p.name: Value(v, s, p.unit, limits=_limits(p)) for p, v, s in zip(told, theta, std, strict=True)}
+    return {p.name: _within(v, p, i) for p, v, i in zip(told, theta, known, strict=True)}
 
 
-def _within(value: float, unit: str, interval: Interval) -> Value:
+def _within(value: float, known: Any, interval: Interval) -> Value:
     far = max(interval.high - value, value - interval.low)
-    return Value(value, far / QUANTILE, unit, (interval.low, interval.high))
+    return Value(value, far / QUANTILE, known.unit, (interval.low, interval.high), _limits(known))
+
+
+def _limits(known: Any) -> tuple[float, float] | None:
+    """Of a parameter, a thruster's or a vehicle's; None where it may be any."""
+    return (known.low, known.high) if isfinite(known.low) and isfinite(known.high) else None
 
 
 def finding_of(named: NamedTerm[T, F], scale: Any, known: Mapping[T, tuple[Interval, ...]]) -> Finding:
     """Of any term, a thruster's or a vehicle's; `scale`: what its parameters refer to; `known`: intervals, if any."""
+    values = values_told(named.term, named.theta, named.std, scale, known.get(named.term))
+    lost = " and ".join(name.replace("_", " ") for name, value in values.items() if not value.determined)
     return Finding(
         named.term.id,
         named.term.form,
-        named.term.statement(named.theta, scale),
-        values_told(named.term, named.theta, named.std, scale, known.get(named.term)),
+        named.term.statement(named.theta, scale) + (f" The data do not determine its {lost}." if lost else ""),
+        values,
         named.p_value,
         named.bic_gain,
         named.probability,
@@ -62,6 +78,8 @@ def finding_of(named: NamedTerm[T, F], scale: Any, known: Mapping[T, tuple[Inter
         None if named.attained is None else named.attained.share,
         None if named.attained is None else (named.attained.without, named.attained.with_it),
         named.failed_checks,
+        named.searched,
+        named.asked_effects,
     )
 
 

@@ -64,7 +64,7 @@ def run(
     remainder = remainder_of(completed, data, case.unseen)
     flexible = completed.flexible
     quiet = located.estimate.noise
-    held = score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None)
+    held = with_held(score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None), flexible)
     draft = Draft(
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
@@ -82,14 +82,14 @@ def run(
     return Diagnosis(
         recordings=ids,
         thruster=case.recordings[0].thruster,
-        answer=decided(draft.findings, remainder, experiment),
+        answer=decided(draft.findings, remainder, experiment, held, draft.mismatch),
         baseline_model=draft.baseline_model,
         baseline=draft.baseline,
         mismatch=draft.mismatch,
         model_terms=draft.model_terms,
         model=draft.model,
         train=train,
-        heldout=with_held(held, flexible),
+        heldout=held,
         chi2_per_dof=after.fit.chi2 / max(n - p, 1),
         whiteness_p=whiteness(after.fit.residual, [r.size for r in data.rows]),
         notes=(*draft.notes, *case.notes, *stands_in),

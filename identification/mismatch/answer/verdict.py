@@ -2,25 +2,65 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from identification.mismatch import policy
 from identification.mismatch.diagnosis import (
     Adequate,
     Ambiguous,
     Explained,
     Finding,
+    HeldOutRmse,
+    Mismatch,
     NextExperiment,
-    Remainder,
     Unexplained,
     Verdict,
 )
+from identification.mismatch.faults.channel_faults import EFFECT as FAULT
+from identification.mismatch.periodic.periodic_disturbances import EFFECT as LINE
+from identification.mismatch.unexplained import Remainder
+from identification.mismatch.value import Where
+
+NOT_OF_THE_MODEL = frozenset({FAULT, LINE})
+"""Findings that are put right, or taken out, before anything is predicted."""
+NOWHERE = Where("time", float("nan"), float("nan"), "s")
 
 
-def decided(findings: tuple[Finding, ...], remainder: Remainder | None, experiment: NextExperiment | None) -> Verdict:
-    """Unexplained where something is left; ambiguous where a finding has a rival that does as well; else explained."""
+def decided(
+    findings: tuple[Finding, ...],
+    remainder: Remainder | None,
+    experiment: NextExperiment | None,
+    held: HeldOutRmse,
+    mismatch: Sequence[Mismatch] = (),
+    unit: str = "N",
+) -> Verdict:
+    """Unexplained where something is left, or where what was found predicts unfitted data worse than the baseline;
+    ambiguous where a finding has a rival that does as well; else explained.
+
+    `mismatch`: where the baseline fails, the clearest place first; `unit`: of the errors.
+    """
     if remainder is not None:
         return Unexplained(findings, remainder, experiment)
+    refuted = tuple(f for f in findings if f.effect not in NOT_OF_THE_MODEL) if held.grown else ()
+    if refuted:
+        known = tuple(f for f in findings if f not in refuted)
+        return Unexplained(known, unpredictive(refuted, held, mismatch, unit), experiment)
     if not findings:
         return Adequate()
     if any(rival.bic_loss < policy.select.RIVALS_EQUAL_BIC for finding in findings for rival in finding.rivals):
         return Ambiguous(findings, experiment)
     return Explained(findings)
+
+
+def unpredictive(
+    refuted: Sequence[Finding], held: HeldOutRmse, mismatch: Sequence[Mismatch], unit: str = "N"
+) -> Remainder:
+    """What the baseline lacks, and a model of it that describes the runs fitted and predicts no others."""
+    place = mismatch[0] if mismatch else Mismatch("thrust", NOWHERE, 1.0, 1.0, "")
+    names = " and ".join(dict.fromkeys(f.effect for f in refuted))
+    says = (
+        f"What was found describes the data that were fitted and predicts no others: with {names} the error on data "
+        f"that were not fitted grows from {held.before:.4g} to {held.after:.4g} {unit}."
+    )
+    resembles = tuple(f"{f.effect}: the error on data that were not fitted grows with it" for f in refuted)
+    return Remainder(place.where, place.share, place.p_value, (), says, resembles, unpredictive=True)

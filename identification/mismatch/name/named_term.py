@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Generic
+from typing import Generic, Literal
 
 import numpy as np
 
@@ -14,11 +14,24 @@ from identification.mismatch.select.rounds import T
 from identification.mismatch.select.stepwise import F, RivalTerm, Standing
 from identification.recording import Floats
 
+CheckKind = Literal[
+    "possible", "sampled", "clipping", "undone", "pays", "constant", "repair", "own_covariate", "any_curve", "predicts"
+]
+"""What a check is about: `possible` values, what the samples can show (`sampled`), what else clips, another term that
+undoes it, BIC, a parameter that is the same everywhere, the shape (three kinds), and what was not fitted."""
+PAYS: CheckKind = "pays"
+GRAVE: frozenset[CheckKind] = frozenset({"possible", "sampled", "clipping", "undone", PAYS, "predicts"})
+"""Kinds that no share of what could be explained makes up for: a term that fails one is not that physics."""
+
+LEAST_P = 1e-300
+"""Smallest p-value that is told: 0 has no logarithm for those who draw it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Check:
     """One thing that a name is asked."""
 
+    kind: CheckKind
     asked: str
     failed: str = ""
     """Why the name is not earned; empty where it passes."""
@@ -51,7 +64,9 @@ class NamedTerm(Generic[T, F]):
     chi2_gain: float
     bic_gain: float
     p_value: float
+    """Of the best of `searched` alternatives."""
     probability: float
+    """Its weight among the effects that were asked: that it is none of these is not among them."""
     rivals: tuple[RivalTerm[T, F], ...]
     """Other effects within RIVAL_STATED_BIC, best first."""
     checks: tuple[Check, ...]
@@ -59,8 +74,17 @@ class NamedTerm(Generic[T, F]):
     forms: tuple[RivalTerm[T, F], ...] = ()
     """The same effect in its other textbook forms, best first, however much worse."""
     attained: Attained | None = None
+    searched: int = 1
+    """Alternatives that were looked at before this one was taken."""
+    asked_effects: int = 1
+    """Effects that were fitted in its place, and itself."""
     chi2_of_all: float = 0.0
     """Of the whole model, beside which the fits of rivals and forms stand."""
+
+    @property
+    def only_unpaid(self) -> bool:
+        """Whether all that speaks against it is that it does not pay for its parameters: it follows noise."""
+        return [check.kind for check in self.checks if check.failed] == [PAYS]
 
     @property
     def failed_checks(self) -> tuple[str, ...]:
@@ -82,10 +106,16 @@ def named_term(
     stands: Standing[F, T],
     asked: tuple[Check, ...],
     effect_of: Callable[[T], str] = effect_id,
+    searched: int = 1,
 ) -> NamedTerm[T, F]:
-    """A term of a model beside its rivals: of each other effect the best form; `effect_of`: what counts as one."""
+    """A term of a model beside its rivals: of each other effect the best form; `effect_of`: what counts as one.
+
+    `searched`: alternatives that were looked at. The p-value is that of the best of so many, whatever their
+    correlations (Bonferroni).
+    """
     less, others = stands
     gain, values = less.chi2 - fitted.chi2, fitted.values[term]
+    bic_gain = gain - len(values) * float(np.log(max(fitted.residual.size, 2)))
     unique: dict[str, RivalTerm[T, F]] = {}
     for r in others:
         if min(r.bic_loss, r.aic_loss) < policy.select.RIVAL_STATED_BIC and effect_of(r.term) != effect_of(term):
@@ -95,14 +125,22 @@ def named_term(
         values,
         tuple(map(float, fitted.std[fitted.layout.of(term)])),
         gain,
-        gain - len(values) * float(np.log(max(fitted.residual.size, 2))),
-        max(float(chi2_sf(max(gain, 0.0), len(values))), 1e-300),
+        bic_gain,
+        min(max(searched * float(chi2_sf(max(gain, 0.0), len(values))), LEAST_P), 1.0),
         probability_beside([r.bic_loss for r in unique.values()]),
         tuple(unique.values()),
-        asked,
+        (*asked, _pays(bic_gain)),
         tuple(r for r in others if effect_of(r.term) == effect_of(term)),
+        searched=searched,
+        asked_effects=len({effect_of(r.term) for r in others} | {effect_of(term)}),
         chi2_of_all=fitted.chi2,
     )
+
+
+def _pays(bic_gain: float) -> Check:
+    """What does not pay for its parameters has no name, whatever else speaks for it."""
+    failed = "" if bic_gain > 0 else f"it does not pay for its parameters (BIC worse by {-bic_gain:.1f})"
+    return Check(PAYS, "it pays for its parameters", failed, f"BIC better by {bic_gain:.4g}" if bic_gain > 0 else "")
 
 
 def restated(named: Sequence[NamedTerm[T, F]], final: F) -> list[NamedTerm[T, F]]:
@@ -150,8 +188,10 @@ def part_check(what: str, column: Floats, basis: Floats, residual: Floats, spare
     asked = f"the same {what}"
     apart = part_difference(column, basis, residual, spared)
     if apart is None:
-        return Check(asked, told="the parts tell too little", silent=True)
+        return Check("constant", asked, told="the parts tell too little", silent=True)
     p = apart.p_value * tests
     says = f"{100 * apart.share:.0f} % apart"
     failed = f"its parameter is not the same {what} ({says})" if p < policy.name.INCONSTANT_P else ""
-    return Check(asked, failed, f"{says}, +- {100 * apart.error:.0f} %; p {min(p, 1.0):.2g}", apart=apart.share)
+    return Check(
+        "constant", asked, failed, f"{says}, +- {100 * apart.error:.0f} %; p {min(p, 1.0):.2g}", apart=apart.share
+    )

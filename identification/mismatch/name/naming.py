@@ -20,12 +20,14 @@ from identification.mismatch.name.named_term import Check, NamedTerm, named_term
 from identification.mismatch.prepare.preparing import DRIVERS
 from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.forward_selection import STATIC, SwapTest, Thruster, static_curve
+from identification.mismatch.select.likeliest_trials import alternatives
 from identification.mismatch.select.limits.clipping import contradiction
 from identification.mismatch.select.stepwise import stands
 from identification.physics.term import Term
 from identification.recording import Floats
 
 Named = NamedTerm[Term, Fit]
+CLIPPING = "what else was recorded clips with it, or does not"
 AT_LEAST = 0.01
 """Of the least time that samples can show: what is no longer ends there."""
 
@@ -40,11 +42,13 @@ def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check
     change = _raw_effect(estimate.fit, (term,), data)
     cancelled = _cancelled(estimate.fit, term, change, data)
     return (
-        Check("its values are possible", "its parameters end at what is physically possible" if ended else ""),
-        Check("the samples can show it", "it is faster than the samples can show" if unseen else ""),
-        *((Check("what else was recorded clips with it, or does not", elsewhere),) if term.traits.limits else ()),
-        *(Check("no other term undoes it", f"it and {other.id} nearly cancel") for other in cancelled),
-        *(() if cancelled else (Check("no other term undoes it"),)),
+        Check(
+            "possible", "its values are possible", "its parameters end at what is physically possible" if ended else ""
+        ),
+        Check("sampled", "the samples can show it", "it is faster than the samples can show" if unseen else ""),
+        *((Check("clipping", CLIPPING, elsewhere),) if term.traits.limits else ()),
+        *(Check("undone", "no other term undoes it", f"it and {other.id} nearly cancel") for other in cancelled),
+        *(() if cancelled else (Check("undone", "no other term undoes it"),)),
         *_constancy(estimate, change, data, many),
     )
 
@@ -74,7 +78,7 @@ def _constancy(estimate: Estimate, change: list[Floats], data: Data, many: int) 
             < float(np.linalg.norm(column)) / max(whole, 1e-300)
             < 1 - policy.name.PART_SIZE**2
         ):
-            yield Check(f"the same {what}", told="nearly all of it is in one part", silent=True)
+            yield Check("constant", f"the same {what}", told="nearly all of it is in one part", silent=True)
             continue
         residual, tests = estimate.fit.residual[:n], len(splits) * many
         yield part_check(what, column, basis, residual, policy.name.PART_DIFFERENCE, tests)
@@ -142,21 +146,21 @@ def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[
 
 def _not_repaired(told: tuple[str, ...]) -> tuple[Check, ...]:
     asked = "no repair of another shape"
-    return tuple(Check(asked, each) for each in told) or (Check(asked),)
+    return tuple(Check("repair", asked, each) for each in told) or (Check("repair", asked),)
 
 
 def name(
     estimate: Estimate, data: Data, terms: Sequence[Term], standing: Mapping[Term, SwapTest] | None = None
 ) -> tuple[Named, ...]:
     """Every term of the model with its rivals and checks, the largest gain first."""
-    many = max(len(estimate.fit.model.terms), 1)
+    many, searched = max(len(estimate.fit.model.terms), 1), alternatives(terms, data.scale)
     system = Thruster(data, tuple(terms))
     standing = {term: (standing or {}).get(term) or stands(system, estimate, term) for term in estimate.fit.model.terms}
     repaired = _repaired(estimate, data, {term: less for term, (less, _) in standing.items()})
     out = []
     for term, stand in standing.items():
         asked = (*checks(estimate, term, data, many), *_not_repaired(repaired.get(term, ())))
-        out.append(named_term(term, estimate.fit, stand, asked))
+        out.append(named_term(term, estimate.fit, stand, asked, searched=searched))
     return tuple(sorted(out, key=lambda n: -n.chi2_gain))
 
 
@@ -184,5 +188,6 @@ def with_joint_checks(named: Sequence[Named], left: ResidualStructure | None, *,
         curve = static_curve(n.term, measured=measured)
         any_curve = bool(curve) and shapes[curve] >= policy.name.CURVE_OF_ANY_SHAPE_TERMS
         many = f"{shapes[curve]} shapes on one static curve make any curve" if any_curve else ""
-        out.append(n.asked(Check("nothing is left over its own covariate", over), Check("few shapes on a curve", many)))
+        own_shape = Check("own_covariate", "nothing is left over its own covariate", over)
+        out.append(n.asked(own_shape, Check("any_curve", "few shapes on a curve", many)))
     return tuple(out)

@@ -81,6 +81,8 @@ class Line:
     """Highest speed of the rotor, turns per s."""
     power: float = 0.0
     """N^2, mean square over all samples."""
+    searched: int | None = None
+    """Frequencies that were looked at; None of one locked to the rotor: its p-value counts them otherwise."""
 
     def at(self, time: Floats, turns: Floats | None = None, run: int = 0) -> Floats:
         """(n,) N, the line at these times (and turns) of that run."""
@@ -211,7 +213,9 @@ def _fitted(
     phase = float(np.arctan2(parts[0].a, parts[0].b))
     says = _fixed_says(f, amplitude, spacing)
     return Line(
-        "fixed", f, f_std, None, None, amplitude, std, phase, phase_std, p, 2 * power(f), says, parts=tuple(parts)
+        *("fixed", f, f_std, None, None, amplitude, std, phase, phase_std, p, 2 * power(f), says),
+        parts=tuple(parts),
+        searched=int(np.ceil(trials)),
     )
 
 

@@ -12,6 +12,30 @@ WHITE_P = Threshold(
         "model that does not describe all of it."
     ),
 )
+UNIFORM_ERROR = Threshold(
+    0.2887,
+    unit="share of what a value could be at all",
+    reason=(
+        "A number of which only its ends a and b are known has standard error (b - a)/sqrt(12): with a larger one "
+        "nothing was learnt of it, and it is called not determined."
+    ),
+)
+LOST_ERRORS = Threshold(
+    10.0,
+    unit="standard errors in units of the value",
+    reason=(
+        "Of a value that cannot change its sign, or of which no bounds are known, an error of ten times itself leaves "
+        "not even the order of magnitude: it is called not determined."
+    ),
+)
+SURE_SIGMA = Threshold(
+    3.0,
+    unit="standard errors",
+    reason=(
+        "What a row of a shape's table is sure of: the largest such value is the size of the shape, and rows that are "
+        "less sure than that tell nothing of it."
+    ),
+)
 LINE_KNOWN_SIGMA = Threshold(
     4.0,
     unit="sigma",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from identification.mismatch.policy.record.threshold import Threshold
+from identification.mismatch.policy.record.threshold import Count, Threshold
 
 HELD_OUT_WORTH = Threshold(
     6.0,
@@ -28,6 +28,27 @@ PREDICTED_WORSE_CHI2 = Threshold(
         "A name is doubted where the model predicts what was not fitted better without it, by three sigma of "
         "one parameter."
     ),
+)
+GROWN_P = Threshold(
+    0.01,
+    unit="probability",
+    reason=(
+        "A model whose error on what was not fitted is larger than the baseline's, as chance would make it once in a "
+        "hundred recordings, explains nothing: it describes the runs that it was fitted to."
+    ),
+)
+GROWN_RATIO = Threshold(
+    1.05,
+    unit="ratio of RMSE on what was not fitted",
+    reason=(
+        "An error that grew by a twentieth is no chance, however few and uneven the blocks are over which it is "
+        "compared: a parameter too many costs some thousandths."
+    ),
+)
+LEAST_BLOCKS = Count(
+    4,
+    unit="blocks of time",
+    reason="Over fewer blocks the scatter of a difference of errors is not known, and none is called a growth.",
 )
 RUNS_ALIKE = Threshold(
     0.5,

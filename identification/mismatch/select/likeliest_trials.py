@@ -16,7 +16,7 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.model.step_response import told
 from identification.mismatch.model.whitening import Weights
-from identification.physics.term import Term
+from identification.physics.term import Scale, Term
 from identification.recording import Floats
 
 TRIED = 600
@@ -29,6 +29,14 @@ SHARP, DULL = 0.05, 0.3
 """Damping."""
 LOWEST = 5.0
 """Hz: what rings more slowly is among the term's own trials."""
+
+
+def alternatives(terms: Sequence[Term], scale: Scale) -> int:
+    """How many trials a search looks at: those of all terms and forms, and every instant at which one may jump.
+
+    More of a delay or of a ring, where a recording asks for them, are near to one of these.
+    """
+    return max(sum(len(t.trials(scale)) + (TRIED if t.traits.instant else 0) for t in terms), 1)
 
 
 def likeliest_jumps(

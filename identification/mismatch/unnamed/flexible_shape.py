@@ -8,14 +8,15 @@ from dataclasses import replace
 import numpy as np
 
 from identification.flexible_terms.flexible import WORDS, Flexible, Multiplier
-from identification.mismatch.diagnosis import FlexibleShape, HeldOutRmse, Remainder, Spline
+from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
+from identification.mismatch.unexplained import FlexibleShape, Remainder, Spline
 from identification.mismatch.unnamed.flexible import Extended
 from identification.mismatch.unnamed.flexible_knots import seen_at
 from identification.mismatch.unnamed.formula import find_formula
-from identification.mismatch.value import Value
+from identification.mismatch.value import Value, of_shape
 from identification.physics.term import Term
 from identification.recording import Floats
 from identification.run_history.history import History
@@ -48,7 +49,7 @@ def shape_of(term: Flexible, fitted: Fit, data: Data, weights: Weights) -> Flexi
         term.degree,
         term.memory,
         term.period,
-        {p.name: Value(v, float(s), p.unit) for p, v, s in zip(known, theta, std, strict=True)},
+        of_shape({p.name: Value(v, float(s), p.unit) for p, v, s in zip(known, theta, std, strict=True)}),
         tuple(_splines(term, theta, covariance, fitted, data, weights)),
         term.statement(theta, data.scale),
     )

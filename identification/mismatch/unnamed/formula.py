@@ -28,13 +28,13 @@ from identification.flexible_terms.formula import (
 )
 from identification.flexible_terms.formula import times as multiplied
 from identification.mismatch import policy
-from identification.mismatch.diagnosis import FormulaFound
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.family_wise import orthogonal_basis
+from identification.mismatch.unexplained import FormulaFound
 from identification.mismatch.unnamed.flexible import Extended
 from identification.mismatch.unnamed.flexible_knots import best_over
 from identification.mismatch.unnamed.formula_words import legend, told

@@ -12,22 +12,11 @@ from dataclasses import dataclass, replace
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, at_bound, fit
-from identification.mismatch.name.named_term import Attained
+from identification.mismatch.name.named_term import GRAVE, Attained
 from identification.mismatch.name.naming import Named
 from identification.mismatch.validate.held_out import Score
 from identification.mismatch.validate.train_test_split import TrainTestSplit, better
 from identification.physics.term import Term
-
-IMPOSSIBLE = frozenset(
-    {
-        "its values are possible",
-        "the samples can show it",
-        "what else was recorded clips with it, or does not",
-        "no other term undoes it",
-        "predicts what was not fitted",
-    }
-)
-"""What a name is asked that no share makes up for."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -95,7 +84,7 @@ def share(without: Score, with_it: Score, least: float) -> float:
 def _possible(named: Named) -> bool:
     """Whether it failed no more than its shape: values that it can have, and parts that are not too far apart."""
     failed = [check for check in named.checks if check.failed]
-    return all(c.asked not in IMPOSSIBLE and c.apart <= policy.unnamed.MOSTLY_APART for c in failed)
+    return all(c.kind not in GRAVE and c.apart <= policy.unnamed.MOSTLY_APART for c in failed)
 
 
 def _fitted(split: TrainTestSplit, now: Fit, without: Sequence[Term]) -> Fit:

@@ -78,7 +78,7 @@ def run(
         return Completed(flexible.estimate, valued, known, unearned, flexible, open_ended, bare, left)
     after = predicting(now, split, data, selected.terms, [n.term for n in unearned], unseen)
     if earned and unearned and not predicts(after, before, data, unseen):
-        refuted = Check("predicts better than the baseline", ALONE)
+        refuted = Check("predicts", "predicts better than the baseline", ALONE)
         after, unearned, earned = before, (*unearned, *(n.asked(refuted) for n in earned)), ()
         bare, left = _without(now, data, unearned, rng)
         if left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM:

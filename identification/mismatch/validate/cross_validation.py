@@ -14,7 +14,16 @@ from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
-from identification.mismatch.validate.held_out import by_blocks, least_noise, rmse, with_tares
+from identification.mismatch.validate.held_out import (
+    Squares,
+    by_blocks,
+    compared,
+    least_noise,
+    squares,
+    together,
+    with_tares,
+)
+from identification.physics.term import Term
 
 FOLDS = 4
 """Runs are left out one by one, or in as many groups: each costs two fits."""
@@ -29,22 +38,25 @@ def folds(runs: int) -> list[list[int]]:
     return [fold.tolist() for fold in np.array_split(np.arange(runs), min(runs, FOLDS))]
 
 
-def by_folds(before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise) -> HeldOutRmse:
+def by_folds(
+    before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise, leaving: Sequence[Term] = ()
+) -> HeldOutRmse:
     """Both models fitted without a run and judged on it, every run in turn; of the run itself only its tare is fitted.
 
-    By blocks of time where there is one run, or one that is no match for the others. Arguments as of `by_blocks`.
+    By blocks of time where there is one run, or one that is no match for the others. Arguments as of `by_blocks`;
+    `leaving`: terms of `after` that are left out on another run than those fitted.
     """
     R = len(data.histories)
     if R < 2 or not _alike(data):
         return by_blocks(before, after, data, measured, quiet)
     left_out = folds(R)
     old = [_judged(before, measured, fold) for fold in left_out]
-    new = [_judged(after, data, fold) for fold in left_out]
+    new = [_judged(after, data, fold, leaving) for fold in left_out]
     keep = [np.ones(r.size, dtype=bool) for r in data.rows]
     noise = least_noise(after.fit, (after.noise, quiet), data, keep)
     each = "each run" if len(left_out) == R else f"each of {len(left_out)} groups of runs"
     what = f"{each} by a model fitted to the others, its own tare fitted; terms were chosen on all of them"
-    return HeldOutRmse(_together(old), _together(new), noise, what)
+    return compared(together(old), together(new), noise, what)
 
 
 def _alike(data: Data) -> bool:
@@ -56,15 +68,13 @@ def _alike(data: Data) -> bool:
     )
 
 
-def _judged(estimate: Estimate, data: Data, fold: Sequence[int]) -> tuple[float, float]:
-    """RMSE in N and samples of the runs of a fold, by the model fitted to the others."""
+def _judged(estimate: Estimate, data: Data, fold: Sequence[int], leaving: Sequence[Term] = ()) -> Squares:
+    """Errors in the runs of a fold, by the model fitted to the others."""
     others = [i for i in range(len(data.histories)) if i not in fold]
-    model = _fitted(estimate, _of(data, others), others)
+    model, theta = _fitted(estimate, _of(data, others), others).less(*leaving)
     unseen = replace(_of(data, fold), with_rate=False)
-    theta = with_tares(model.model, model.theta, unseen)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
-    samples = sum(float(h.count[r].sum()) for h, r in zip(unseen.histories, unseen.rows, strict=True))
-    return rmse(model.model, theta, unseen, every), samples
+    return squares(model, with_tares(model, theta, unseen), unseen, every)
 
 
 def _of(data: Data, runs: Sequence[int]) -> Data:
@@ -75,8 +85,3 @@ def _fitted(estimate: Estimate, part: Data, runs: Sequence[int]) -> Fit:
     theta = replace(estimate.fit.theta, tares=tuple(estimate.fit.theta.tares[i] for i in runs))
     w = weights(part, estimate.noise, forces(estimate.fit.model, theta, part), estimate.rate_noise)
     return fit(estimate.fit.model, theta, part, w)
-
-
-def _together(parts: Sequence[tuple[float, float]]) -> float:
-    """RMSE over all samples."""
-    return float(np.sqrt(sum(n * e**2 for e, n in parts) / sum(n for _, n in parts)))

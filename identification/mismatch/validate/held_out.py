@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.estimation.tails import student_sf
+from identification.mismatch import policy
 from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit, raw
@@ -16,6 +18,7 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
+from identification.physics.term import Term
 from identification.recording import Floats
 from identification.run_history.history import History
 
@@ -23,16 +26,10 @@ KEPT_BACK = 4
 """One block of so many is not fitted: a quarter judges, and three quarters still determine the model."""
 BLOCKS_PER_RUN = 24
 """Blocks of time of a long run: enough that every part of a plan is in both shares."""
+TABLE_PIECES = 8
+"""Pieces of a table of levels by which the growth of an error is judged."""
 LEAST_BLOCK = 8.0
 """s: a shorter block would be known from its neighbours, whose slow noise it shares."""
-
-
-@dataclass(frozen=True, slots=True)
-class Error:
-    """Root mean square per sample, N, before (C V|V| and tare) and after."""
-
-    before: float
-    after: float
 
 
 def blocks(history: History) -> NDArray[np.bool_]:
@@ -45,21 +42,71 @@ def blocks(history: History) -> NDArray[np.bool_]:
 
 def fitted_blocks(t: Floats) -> NDArray[np.bool_]:
     """(n,) of bool at times in s: all but every fourth of the blocks of time."""
+    return np.asarray(_block_of(t) % KEPT_BACK != KEPT_BACK - 2)
+
+
+def _block_of(t: Floats) -> NDArray[np.intp]:
     span = float(t[-1] - t[0])
-    length = max(span / BLOCKS_PER_RUN, min(LEAST_BLOCK, span / 8))
-    index = np.floor((t - t[0]) / length).astype(int)
-    return np.asarray(index % KEPT_BACK != KEPT_BACK - 2)
+    length = max(span / BLOCKS_PER_RUN, min(LEAST_BLOCK, span / 8), np.finfo(float).tiny)
+    return np.asarray(np.floor((t - t[0]) / length), dtype=np.intp)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class Squares:
+    """Squared errors of a model in pieces of time, (p,) each."""
+
+    error: Floats
+    """N^2, summed over samples."""
+    samples: Floats
+
+    @property
+    def rmse(self) -> float:
+        """Per sample, N."""
+        samples = float(self.samples.sum())
+        return float(np.sqrt(self.error.sum() / samples)) if samples else float("nan")
+
+
+def together(parts: Sequence[Squares]) -> Squares:
+    """Of all runs."""
+    return Squares(np.concatenate([p.error for p in parts]), np.concatenate([p.samples for p in parts]))
+
+
+def squares(model: Model, theta: Theta, data: Data, which: Sequence[NDArray[np.bool_]]) -> Squares:
+    """Over the rows in `which`, by blocks of time (of a table an eighth of its levels): scatter within a row is in
+    it."""
+    thrust, _ = raw(model, theta, data, with_rate=False)
+    found = []
+    for h, rows, f, w in zip(data.histories, data.rows, thrust, which, strict=True):
+        r = rows[w]
+        each = h.count[r] * (h.thrust[r] - f[w]) ** 2 + h.within[r]
+        piece = _pieces(h)[w]
+        error, count = (np.asarray(np.bincount(piece, weights=x), dtype=np.float64) for x in (each, h.count[r]))
+        found.append(Squares(error[count > 0], count[count > 0]))
+    return together(found)
+
+
+def _pieces(history: History) -> NDArray[np.intp]:
+    """(n,) at the thrust rows: which block of time each is in."""
+    t = history.sampled[history.rows]
+    return np.arange(t.size) * TABLE_PIECES // max(t.size, 1) if history.static else _block_of(t)
 
 
 def rmse(model: Model, theta: Theta, data: Data, which: Sequence[NDArray[np.bool_]]) -> float:
     """Per sample, N, over the rows in `which`: scatter within a row is in it."""
-    thrust, _ = raw(model, theta, data, with_rate=False)
-    total = samples = 0.0
-    for h, rows, f, w in zip(data.histories, data.rows, thrust, which, strict=True):
-        r = rows[w]
-        total += float(h.count[r] @ (h.thrust[r] - f[w]) ** 2) + float(np.sum(h.within[r]))
-        samples += float(h.count[r].sum())
-    return float(np.sqrt(total / samples)) if samples else float("nan")
+    return squares(model, theta, data, which).rmse
+
+
+def growth_p(before: Squares, after: Squares) -> float:
+    """p-value that the error is no larger after than before: Student's t over the blocks, one-sided; 1 where they are
+    too few to tell."""
+    K = after.error.size
+    if K < policy.validate.LEAST_BLOCKS or before.error.size != K:
+        return 1.0
+    growth = after.error - before.error
+    error = float(np.std(growth, ddof=1)) / np.sqrt(K)
+    if error == 0:
+        return 0.0 if growth[0] > 0 else 1.0
+    return float(student_sf(float(np.mean(growth)) / error, K - 1))
 
 
 def least_noise(fitted: Fit, noises: Sequence[Noise], data: Data, which: Sequence[NDArray[np.bool_]]) -> float:
@@ -104,20 +151,35 @@ def by_blocks(before: Estimate, after: Estimate, data: Data, measured: Data, qui
     noise = least_noise(new, (after.noise, quiet), data, keep)
     held = "levels" if data.histories[0].static else "blocks of time"
     what = f"every fourth of the {held}, {sum(int(b.sum()) for b in back)} rows; terms were chosen on all of them"
-    return HeldOutRmse(rmse(old.model, old.theta, measured, back), rmse(new.model, new.theta, data, back), noise, what)
+    errors = squares(old.model, old.theta, measured, back), squares(new.model, new.theta, data, back)
+    return compared(*errors, noise, what)
 
 
-def by_runs(before: Estimate, after: Estimate, data: Data, others: Sequence[History], quiet: Noise) -> HeldOutRmse:
-    """Both models on whole runs that were not fitted; of these only the tare is. `quiet` as in `by_blocks`."""
+def compared(before: Squares, after: Squares, noise: float, what: str) -> HeldOutRmse:
+    """The error before and after, N per sample, and whether it grew beyond chance."""
+    return HeldOutRmse(before.rmse, after.rmse, noise, what, growth_p(before, after))
+
+
+def by_runs(
+    before: Estimate,
+    after: Estimate,
+    data: Data,
+    others: Sequence[History],
+    quiet: Noise,
+    leaving: Sequence[Term] = (),
+) -> HeldOutRmse:
+    """Both models on whole runs that were not fitted; of these only the tare is. `quiet` as in `by_blocks`.
+
+    `leaving`: terms of `after` that are left out there.
+    """
     unseen = Data(tuple(others), data.scale, with_rate=False, most_shift=data.most_shift)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
     errors = []
-    for estimate in (before, after):
-        theta = with_tares(estimate.fit.model, estimate.fit.theta, unseen)
-        errors.append(rmse(estimate.fit.model, theta, unseen, every))
+    for model, theta in ((before.fit.model, before.fit.theta), after.fit.less(*leaving)):
+        errors.append(squares(model, with_tares(model, theta, unseen), unseen, every))
     noise = least_noise(after.fit, (after.noise, quiet), data, [np.ones(r.size, dtype=bool) for r in data.rows])
     names = ", ".join(h.recording_id for h in others)
-    return HeldOutRmse(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
+    return compared(errors[0], errors[1], noise, f"whole runs not fitted ({names}); only their tare is fitted")
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.estimate.estimate import Estimate
@@ -15,6 +15,7 @@ from identification.mismatch.validate.cross_validation import by_folds
 from identification.mismatch.validate.held_out import by_blocks, by_runs
 from identification.mismatch.validate.prediction import WithoutEach, without_each, worse_predicted
 from identification.mismatch.validate.train_test_split import TrainTestSplit, train_test_split
+from identification.physics.term import Term
 from identification.run_history.history import History
 
 
@@ -49,8 +50,8 @@ def _check(named: Named, scores: WithoutEach, failed: str) -> Check:
     score = scores.less.get(named.term)
     if score is None:
         told = "not asked: it failed before" if named.failed_checks else "not asked: another run need not repeat it"
-        return Check(asked, told=told, silent=True)
-    return Check(asked, failed, f"chi-square {score.chi2 - scores.whole.chi2:+.4g} without it")
+        return Check("predicts", asked, told=told, silent=True)
+    return Check("predicts", asked, failed, f"chi-square {score.chi2 - scores.whole.chi2:+.4g} without it")
 
 
 def score(
@@ -67,8 +68,20 @@ def score(
     and where flexible terms were chosen on the rest of these.
 
     `measured`: the runs with periodic disturbances still in them. `quiet`: noise of another model of these runs.
+    Where the error grows on other runs it is that without what is of one run's own time, if that is smaller.
     """
-    if unseen:
-        return by_runs(before, after, data, unseen, quiet)
-    judge = by_blocks if flexible else by_folds
-    return judge(before, after, data, measured, quiet)
+
+    def judged(leaving: Sequence[Term] = ()) -> HeldOutRmse:
+        if unseen:
+            return by_runs(before, after, data, unseen, quiet, leaving)
+        return by_folds(before, after, data, measured, quiet, leaving)
+
+    if flexible and not unseen:
+        return by_blocks(before, after, data, measured, quiet)
+    found = judged()
+    own = [t for t in after.fit.model.terms if t.traits.own_clock and not t.traits.delay]
+    if found.after <= found.before or not own:
+        return found
+    without = judged(own)
+    told = f"{without.what}; of one run's own time, and left out there: {', '.join(t.id for t in own)}"
+    return replace(without, what=told) if without.after < found.after else found

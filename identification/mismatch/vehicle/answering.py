@@ -9,8 +9,9 @@ import numpy as np
 from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.answer.report_assembly import values_told
-from identification.mismatch.diagnosis import Curves, Mismatch, Remainder
+from identification.mismatch.diagnosis import Curves, Mismatch
 from identification.mismatch.noise.whiteness import whiteness
+from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Value, Where
 from identification.mismatch.vehicle.fitting import Fit
 from identification.mismatch.vehicle.free_force import BACK, Left, Structure, place_of

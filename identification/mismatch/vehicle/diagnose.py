@@ -104,18 +104,19 @@ def _diagnosed(
     if unnamed:
         held, last = better_predicting(before, (held, last), vehicle.less(last, unnamed), data, unseen)
     earned = [_beside(n, last, left) for n in standing if not n.failed_checks]
-    unexplained = unexplained_of(_as_fitted(left, last), unearned, data)
+    doubtful = [n for n in unearned if not n.only_unpaid]
+    unexplained = unexplained_of(_as_fitted(left, last), doubtful, data)
     experiment = propose(after, earned, data) if unexplained is None else None
     findings = tuple(finding_of(n, data.scale, {}) for n in restated(earned, last.fit))
     n, p = last.fit.residual.size, int(np.sum(last.fit.free))
-    channel = _channel(data)
+    channel, places = _channel(data), _places(before, after, data, left, rng)
     return Diagnosis(
         recordings=tuple(r.recording_id for r in recordings),
         thruster=recordings[0].thruster,
-        answer=decided(findings, unexplained, experiment),
+        answer=decided(findings, unexplained, experiment, held, places, _unit(data)),
         baseline_model=baseline_words(data),
         baseline=values_of(before.fit, data),
-        mismatch=_places(before, after, data, left, rng),
+        mismatch=places,
         model_terms=tuple(term.id for term in last.terms),
         model=values_of(last.fit, data),
         train=Rmse(
@@ -128,7 +129,7 @@ def _diagnosed(
         notes=(*ties(data, last.fit, unseen_effects), *_noise_note(last, data)),
         curves=curves_of(before.fit, last.fit, data),
         response=channel,
-        unit=data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit,
+        unit=_unit(data),
         force_unit=data.scale.force_unit,
     )
 
@@ -138,7 +139,7 @@ def _beside(n: Named, last: State, left: Left) -> Named:
     if n.term in last.terms:
         return n
     instead = f"a free force over {left.structures[0].covariate.quantity} takes its place"
-    return n.asked(Check("stands beside a free force", instead))
+    return n.asked(Check("repair", "stands beside a free force", instead))
 
 
 def _as_fitted(left: Left, last: State) -> Left:
@@ -153,6 +154,10 @@ def _as_fitted(left: Left, last: State) -> Left:
     if not np.all(std > 0):  # a steady force of another term and this one's mean are one
         return left
     return replace(left, structures=(replace(left.structures[0], force=force, std=std), *left.structures[1:]))
+
+
+def _unit(data: Prepared) -> str:
+    return data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit
 
 
 def _channel(data: Prepared) -> str:
@@ -182,7 +187,7 @@ def _noise_note(after: State, data: Prepared) -> tuple[str, ...]:
     white = float(np.sqrt(after.noise.white))
     if slow < policy.vehicle.SLOW_DISTURBANCE * white:
         return tuple(out)
-    unit = data.scale.speed_unit if data.runs[0].quantity == "speed" else data.scale.length_unit
+    unit = _unit(data)
     out.append(
         f"what remains is {slow:.3g} {unit} of slow disturbance beside {white:.3g} {unit} of white noise: errors and "
         "p-values allow for it, and what is weaker than it cannot be seen"

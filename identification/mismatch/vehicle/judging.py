@@ -11,13 +11,16 @@ from identification.mismatch import policy
 from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.validate.cross_validation import folds
-from identification.mismatch.validate.held_out import fitted_blocks
+from identification.mismatch.validate.held_out import Squares, compared, fitted_blocks
 from identification.mismatch.vehicle.fitting import Fit, fit, weights
 from identification.mismatch.vehicle.free_force import carried, free_force_of
 from identification.mismatch.vehicle.model import Layout, on_other_runs, without_term
 from identification.mismatch.vehicle.runs import Prepared, Run
 from identification.mismatch.vehicle.search import State
 from identification.recording import Floats
+
+PIECES = 8
+"""Of each run, by which the growth of an error is judged: motion that drifts off errs alike for long."""
 
 
 def rms(parts: Sequence[Floats]) -> float:
@@ -44,9 +47,7 @@ def held_out(before: State, after: State, data: Prepared, unseen: Prepared | Non
     if unseen is not None:
         old, new = _elsewhere(before.fit, data, unseen, noise), _elsewhere(after.fit, data, unseen, noise)
         names = ", ".join(run.recording_id for run in unseen.runs)
-        return HeldOutRmse(
-            rms(old), rms(new), noise, f"whole runs not fitted ({names}); only {_starts(after, data)} fitted"
-        )
+        return _compared(old, new, noise, f"whole runs not fitted ({names}); only {_starts(after, data)} fitted")
     if len(data.runs) < policy.vehicle.VEHICLE_RUNS:
         return _by_blocks(before, after, data)
     left_out = folds(len(data.runs))
@@ -61,7 +62,7 @@ def held_out(before: State, after: State, data: Prepared, unseen: Prepared | Non
     what = (
         f"{share} in turn simulated by a model fitted to the others; only {_starts(after, data)} fitted; terms: on all"
     )
-    return HeldOutRmse(rms(olds), rms(news), noise, what)
+    return _compared(olds, news, noise, what)
 
 
 def better_predicting(
@@ -126,7 +127,17 @@ def _by_blocks(before: State, after: State, data: Prepared) -> HeldOutRmse:
     out = []
     for state in (before, after):
         found = fit(state.fit.layout, state.fit.theta, data, white, state.fit.motions, keep)
-        out.append(rms([r[~k] for r, k in zip(residuals(found, data), keep, strict=True)]))
+        out.append([r[~k] for r, k in zip(residuals(found, data), keep, strict=True)])
     rows = sum(int(np.sum(~k)) for k in keep)
     what = f"every fourth block of time, {rows} rows, simulated through from the commands; terms were chosen on all"
-    return HeldOutRmse(out[0], out[1], noise_rms(after.noise), what)
+    return _compared(out[0], out[1], noise_rms(after.noise), what)
+
+
+def _compared(old: Sequence[Floats], new: Sequence[Floats], noise: float, what: str) -> HeldOutRmse:
+    return compared(_squares(old), _squares(new), noise, what)
+
+
+def _squares(parts: Sequence[Floats]) -> Squares:
+    """Of residuals of runs, each in pieces of time of equal length."""
+    pieces = [piece for part in parts for piece in np.array_split(part, min(PIECES, part.size))]
+    return Squares(np.array([float(p @ p) for p in pieces]), np.array([float(p.size) for p in pieces]))

@@ -26,8 +26,9 @@ def name(state: State, vehicle: Vehicle) -> tuple[State, tuple[Named, ...]]:
     """Each term against its rivals; another that does better takes the place first."""
     state, known = exchanged(vehicle, state)
     standing = known or {term: stands(vehicle, state, term) for term in state.terms}
+    searched = max(sum(len(term.trials(vehicle.data.scale)) for term in vehicle.terms), 1)
     return state, tuple(
-        named_term(term, state.fit, stand, tuple(checks(state, vehicle.data, term)), effect_of)
+        named_term(term, state.fit, stand, tuple(checks(state, vehicle.data, term)), effect_of, searched)
         for term, stand in standing.items()
     )
 
@@ -35,7 +36,9 @@ def name(state: State, vehicle: Vehicle) -> tuple[State, tuple[Named, ...]]:
 def checks(state: State, data: Prepared, term: VehicleTerm) -> Iterator[Check]:
     """Whether its values are possible, and a parameter the same in parts of the recordings."""
     fitted, ended = state.fit, at_bound(state.fit, term)
-    yield Check("its values are possible", "its parameters end at what is physically possible" if ended else "")
+    yield Check(
+        "possible", "its values are possible", "its parameters end at what is physically possible" if ended else ""
+    )
     layout, i = fitted.layout, fitted.layout.of(term).start
     amount = fitted.theta[i] - (layout.parts[term][0].neutral or 0.0)
     if len(layout.parts[term]) > 1 or amount == 0 or not fitted.free[i]:

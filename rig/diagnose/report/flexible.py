@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from identification.mismatch.diagnosis import FlexibleShape, Remainder, Spline
+from identification.mismatch.unexplained import FlexibleShape, Remainder, Spline
 from identification.mismatch.value import Value
 from rig.diagnose.report.figures import spline_over
-from rig.diagnose.report.words import axis, effect_name, rarity, value_cells, words
+from rig.diagnose.report.words import axis, effect_name, not_drawn, rarity, value_cells, words
 from rig.report.page import Picture, Remark
 from rig.report.regression_figures import Curve, Group
 
@@ -62,10 +62,10 @@ def flexible_pictures(u: Remainder, driver: str) -> Iterator[Picture]:
 
 def _picture(f: FlexibleShape, s: Spline, driver: str) -> Picture:
     y, factor = ORDINATES[s.times]
-    at, _, measured, std = np.array(s.table).T
+    at, _, measured, std = np.array(s.table)[s.told].T
     points = Group("measured", at, factor * measured, 1.96 * factor * std)
-    half = 1.96 * s.std
-    curve = Curve("flexible term", s.at, factor * s.value, factor * (s.value - half), factor * (s.value + half))
+    over, value, half = s.at[s.drawn], s.value[s.drawn], 1.96 * s.std[s.drawn]
+    curve = Curve("flexible term", over, factor * value, factor * (value - half), factor * (value + half))
     x = axis(f.covariate, driver)
     x = f"{x} (low-pass of {f.memory:g} s)" if f.memory else x
     x = f"{x} (within each {f.period:.4g} s)" if f.period else x
@@ -75,5 +75,6 @@ def _picture(f: FlexibleShape, s: Spline, driver: str) -> Picture:
     caption = (
         f"A {kind} with {len(f.knots)} knots that {s.what}, with its 95 % band; points: what the model without it "
         "lacks, in bins, with 95 % intervals. No physics is claimed; beyond the range it is constant."
+        + not_drawn(len(s.table) - at.size)
     )
     return Picture(f"Flexible term over {name}: {s.times}", plot, caption)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from math import isfinite, sqrt
 from pathlib import Path
 
@@ -11,6 +12,7 @@ from identification.mismatch.diagnosis import Diagnosis, NextExperiment
 from identification.mismatch.value import Value
 from identification.mismatch.verdict_clauses import NOT_WHITE
 from identification.recording import Recording
+from rig.diagnose.recording_names import NO_NAMES, told_by_name
 from rig.diagnose.report.flexible import flexible_pictures, modelled_remarks
 from rig.diagnose.report.pictures import (
     before_after_pictures,
@@ -21,7 +23,7 @@ from rig.diagnose.report.pictures import (
     where_pictures,
 )
 from rig.diagnose.report.rivals import told_apart
-from rig.diagnose.report.words import driver_quantity, effect_name, rarity, value_cells, words
+from rig.diagnose.report.words import driver_quantity, effect_name, evidence, rarity, value_cells, words
 from rig.report import page as pages
 from rig.report import provenance
 from rig.report.page import Page, Remark, Section, Sentences, Table, columns, sentences
@@ -34,19 +36,25 @@ VERDICTS: Mapping[str, Remark] = {
     "ambiguous": Remark("Ambiguous: several effects explain these recordings about as well; see the rivals.", "doubt"),
     "unexplained": Remark("Unexplained: structure is left that nothing in the catalogue carries.", "bad"),
 }
+UNPREDICTIVE = Remark("Unexplained: what was found does not predict data that were not fitted.", "bad")
 
 
-def write(diagnosis: Diagnosis, path: Path, recordings: Sequence[Recording] = ()) -> None:
+def write(
+    diagnosis: Diagnosis, path: Path, recordings: Sequence[Recording] = (), names: Mapping[str, str] = NO_NAMES
+) -> None:
     """One page. `recordings`: those diagnosed; with them each effect is drawn by itself, over all that was recorded.
 
-    Raises OSError.
+    `names`: of the recordings' files, by recording id: they stand in the place of the ids. Raises OSError.
     """
-    pages.write(diagnosis_page(diagnosis, recordings), path)
+    pages.write(diagnosis_page(diagnosis, recordings, names), path)
 
 
-def diagnosis_page(d: Diagnosis, recordings: Sequence[Recording] = ()) -> Page:
+def diagnosis_page(
+    diagnosis: Diagnosis, recordings: Sequence[Recording] = (), names: Mapping[str, str] = NO_NAMES
+) -> Page:
     """The page of one diagnosis."""
-    runs = runs_of(d, recordings)
+    d = told_by_name(diagnosis, names)
+    runs = runs_of(d, [replace(r, recording_id=names.get(r.recording_id, r.recording_id)) for r in recordings])
     sections = (
         Section("In short", sentences(short(d))),
         where_section(d, runs),
@@ -57,14 +65,14 @@ def diagnosis_page(d: Diagnosis, recordings: Sequence[Recording] = ()) -> Page:
         *rivals_section(d),
         *next_section(d.next_experiment),
         *notes_section(d),
-        provenance_section(d),
+        provenance_section(diagnosis, names),
     )
     return Page(f"Diagnosis of {d.thruster or 'a thruster'}: {d.verdict}", words(d.statement), sections, contents=True)
 
 
 def short(d: Diagnosis) -> Iterator[Remark]:
     """Verdict, error on what was not fitted, what next."""
-    yield VERDICTS[d.verdict]
+    yield UNPREDICTIVE if d.unexplained is not None and d.unexplained.unpredictive else VERDICTS[d.verdict]
     held = d.heldout
     if isfinite(held.before) and isfinite(held.after):
         better = "" if held.after >= held.before else f", {_change(held.before, held.after)} less"
@@ -121,7 +129,7 @@ def what_section(d: Diagnosis, runs: Sequence[Run]) -> tuple[Section, ...]:
     lead = "Measured signature against the signature of the named physics, over the coordinate that shows it best."
     drawn = tuple(finding_pictures(d, runs))
     titles = {picture.title.lower() for picture in drawn}
-    told = [words(f.statement) for f in d.findings if effect_name(f.effect).lower() not in titles]
+    told = [words(f"{f.statement} {evidence(f)}.") for f in d.findings if effect_name(f.effect).lower() not in titles]
     return (Section("What was left out", (*sentences(told), *drawn), lead),)
 
 
@@ -130,7 +138,8 @@ def unexplained_section(d: Diagnosis, runs: Sequence[Run]) -> tuple[Section, ...
     u = d.unexplained
     if u is None:
         return ()
-    left = f"{100 * u.share:.0f} % of what remains is structure, not noise ({rarity(u.p_value)})."
+    of = "what the baseline leaves" if u.unpredictive else "what remains"
+    left = f"{100 * u.share:.0f} % of {of} is structure, not noise ({rarity(u.p_value)})."
     told = [Remark(left, "bad")]
     told += [Remark(words(f"Resembles {text.removesuffix('.')}."), "doubt") for text in u.resembles]
     told += modelled_remarks(u)
@@ -173,18 +182,19 @@ def after_table(d: Diagnosis) -> tuple[Table, Sentences]:
 
 
 def parameter_section(d: Diagnosis) -> Section:
-    """Every number of the model."""
+    """Every number of the model that is a physics'; a shape without a name is drawn."""
     head = ("parameter", "of", "value ± std", "95 % interval", "unit", "baseline had")
     findings = {f.effect for f in d.findings}
-    rows = tuple(_parameter_row(name, value, d.baseline.get(name), findings) for name, value in d.model.items())
+    physics = {name: value for name, value in d.model.items() if not name.startswith("flexible:")}  # these are drawn
+    rows = tuple(_parameter_row(name, value, d.baseline.get(name), findings) for name, value in physics.items())
     table = Table("Model with its standard errors", head, rows, columns(head, "parameter", "of", "unit"))
     terms = " + ".join([d.baseline_model, *map(effect_name, d.model_terms)])
     return Section("Parameters", (table,), words(f"Model: {terms}."))
 
 
 def _parameter_row(name: str, value: Value, before: Value | None, findings: set[str]) -> tuple[str, ...]:
-    effect, dot, parameter = name.partition(".")
-    named = not dot or effect.split("#")[0] in findings or effect.startswith("flexible:")
+    effect, dot, parameter = (name, "", "") if "[" in name else name.partition(".")  # tare[T1.h5] has a dot of its own
+    named = not dot or effect.split("#")[0] in findings
     doubted = "" if named else " (name not earned)"
     shown = (parameter if dot else name).replace("_", " ")
     of = effect_name(effect) + doubted if dot else "baseline"
@@ -249,16 +259,15 @@ def notes_section(d: Diagnosis) -> tuple[Section, ...]:
     return (Section("Notes", sentences(map(words, d.notes))),) if d.notes else ()
 
 
-def provenance_section(d: Diagnosis) -> Section:
-    """Recordings, with the hashes of their files where they are known."""
+def provenance_section(d: Diagnosis, names: Mapping[str, str] = NO_NAMES) -> Section:
+    """Recordings by id, with the names and the hashes of their files where they are known."""
     known = {s.recording_id: s.sha256 for s in d.twin.sources} if d.twin is not None else {}
-    if not any(known.get(name) for name in d.recordings):
+    if not names and not any(known.get(name) for name in d.recordings):
         return provenance.section((), d.recordings)
-    head = ("recording id", "SHA-256 of the file")
-    table = Table(
-        "Recordings behind this page",
-        head,
-        tuple((name, known.get(name, "") or "–") for name in d.recordings),
-        columns(head, *head),
-    )
+    told = [("recording id", {name: name for name in d.recordings}), ("SHA-256 of the file", known)]
+    if names:
+        told.insert(0, ("file", dict(names)))
+    head = tuple(title for title, _ in told)
+    rows = tuple(tuple(cells.get(name, "") or "–" for _, cells in told) for name in d.recordings)
+    table = Table("Recordings behind this page", head, rows, columns(head, *head))
     return Section("Provenance", (table,), f"Computed by {pages.program()}.")

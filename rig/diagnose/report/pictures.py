@@ -9,10 +9,16 @@ import numpy as np
 from identification.mismatch.compare.reported_runs import Run
 from identification.mismatch.compare.signature import SPREAD_OUT, Signature, profile, signature
 from identification.mismatch.compare.signature import shape as shape_of
-from identification.mismatch.diagnosis import Curves, Diagnosis, Finding, NextExperiment, Remainder
-from identification.mismatch.value import Where
+from identification.mismatch.diagnosis import (
+    Curves,
+    Diagnosis,
+    Finding,
+    NextExperiment,
+)
+from identification.mismatch.unexplained import Remainder
+from identification.mismatch.value import Where, told_rows
 from rig.diagnose.report.figures import residual_size, shape, signature_over, steps_plot
-from rig.diagnose.report.words import KINDS, axis, driver_quantity, effect_name, evidence, stretch, words
+from rig.diagnose.report.words import KINDS, axis, driver_quantity, effect_name, evidence, not_drawn, stretch, words
 from rig.report.mismatch_figures import Panel, Region, before_after, grid_of, residual_map
 from rig.report.page import Picture
 from rig.report.regression_figures import Curve, Group
@@ -139,13 +145,16 @@ def _signature(finding: Finding, runs: Sequence[Run], driver: str, *, several: b
     what = "what the model lacks without it" if several and found.alone else "what the baseline lacks"
     caption = f"{words(finding.statement)} Points: {what}, with 95 % intervals; line: the model in the same bins."
     plot = _signature_plot(found, label, driver)
-    return Picture(f"{name[0].upper()}{name[1:]}", plot, f"{caption} {evidence(finding)}.")
+    sure = words(evidence(finding))
+    return Picture(f"{name[0].upper()}{name[1:]}", plot, f"{caption} {sure[:1].upper()}{sure[1:]}.")
 
 
 def _signature_plot(found: Signature, label: str, driver: str) -> Plot:
     y, factor = KINDS[found.kind]
-    measured = Group("measured", found.at, factor * found.measured, 1.96 * factor * found.std)
-    model = Curve(label, found.at, factor * found.modelled)
+    told = told_rows(found.measured, found.std)
+    at = found.at[told]
+    measured = Group("measured", at, factor * found.measured[told], 1.96 * factor * found.std[told])
+    model = Curve(label, at, factor * found.modelled[told])
     spread_out = found.quantity in SPREAD_OUT
     return signature_over(measured, model, axis(found.quantity, driver), y, spread_out=spread_out)
 
@@ -168,7 +177,7 @@ def shape_pictures(d: Diagnosis, runs: Sequence[Run]) -> Iterator[Picture]:
 
 def unexplained_picture(u: Remainder, driver: str) -> Picture | None:
     """Shape of what is left."""
-    rows = np.array([row for row in u.shape if np.isfinite(row[1])])
+    rows = np.array(u.shape).reshape(-1, 3)[u.told]
     if len(rows) < 2:
         return None
     at, mean, std = rows.T
@@ -176,6 +185,7 @@ def unexplained_picture(u: Remainder, driver: str) -> Picture | None:
     span = (u.where.low, u.where.high) if u.where.low < u.where.high else None
     plot = shape([Group("left by the model", at, mean, 1.96 * std)], x, "residual / N", span)
     caption = f"Shaded: {stretch(u.where)}, where most of it lies. Bars are 95 % intervals of the mean."
+    caption += not_drawn(len(u.shape) - len(rows))
     return Picture(f"What is left over {x.split(' / ')[0]}", plot, caption)
 
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
-from identification.mismatch.diagnosis import Curves, Diagnosis, Remainder
+from identification.mismatch.diagnosis import Curves, Diagnosis
+from identification.mismatch.unexplained import Remainder
 from identification.recording import Recording
+from rig.diagnose.recording_names import NO_NAMES, told_by_name
 from rig.diagnose.report.figures import shape
 from rig.diagnose.report.page import (
     after_table,
@@ -19,7 +21,7 @@ from rig.diagnose.report.page import (
     rivals_section,
     short,
 )
-from rig.diagnose.report.words import evidence, rarity, stretch, words
+from rig.diagnose.report.words import evidence, not_drawn, rarity, stretch, words
 from rig.report import page as pages
 from rig.report.mismatch_figures import Panel, before_after
 from rig.report.page import Page, Picture, Remark, Section, sentences
@@ -29,13 +31,16 @@ from rig.report.style import unit_text
 MOST_RUNS = 4
 
 
-def write(diagnosis: Diagnosis, path: Path, _recordings: Sequence[Recording] = ()) -> None:
-    """One page. Raises OSError."""
-    pages.write(vehicle_page(diagnosis), path)
+def write(
+    diagnosis: Diagnosis, path: Path, _recordings: Sequence[Recording] = (), names: Mapping[str, str] = NO_NAMES
+) -> None:
+    """One page; `names` of the recordings' files, by recording id. Raises OSError."""
+    pages.write(vehicle_page(diagnosis, names), path)
 
 
-def vehicle_page(d: Diagnosis) -> Page:
+def vehicle_page(diagnosis: Diagnosis, names: Mapping[str, str] = NO_NAMES) -> Page:
     """The page of one diagnosis of a vehicle."""
+    d = told_by_name(diagnosis, names)
     before = Section("Before and after", (*after_table(d), *motion_pictures(d)))
     sections = (
         Section("In short", sentences(short(d))),
@@ -47,7 +52,7 @@ def vehicle_page(d: Diagnosis) -> Page:
         *rivals_section(d),
         *next_section(d.next_experiment),
         *notes_section(d),
-        provenance_section(d),
+        provenance_section(diagnosis, names),
     )
     return Page(f"Diagnosis of {d.thruster or 'a vehicle'}: {d.verdict}", words(d.statement), sections, contents=True)
 
@@ -92,13 +97,14 @@ def unexplained_section(d: Diagnosis) -> tuple[Section, ...]:
     u = d.unexplained
     if u is None:
         return ()
-    told = [Remark(f"{100 * u.share:.2g} % of what remains is structure, not noise ({rarity(u.p_value)}).", "bad")]
+    of = "what the baseline leaves" if u.unpredictive else "what remains"
+    told = [Remark(f"{100 * u.share:.2g} % of {of} is structure, not noise ({rarity(u.p_value)}).", "bad")]
     told += [Remark(words(f"Resembles {text.removesuffix('.')}."), "doubt") for text in u.resembles]
     return (Section("What is not explained", (*sentences(told), *_left(u, d))),)
 
 
 def _left(u: Remainder, d: Diagnosis) -> Iterator[Picture]:
-    rows = np.array([row for row in u.shape if np.isfinite(row[1])])
+    rows = np.array(u.shape).reshape(-1, 3)[u.told]
     if len(rows) < 2:
         return
     at, force, std = rows.T
@@ -107,6 +113,7 @@ def _left(u: Remainder, d: Diagnosis) -> Iterator[Picture]:
     span = (u.where.low, u.where.high) if u.where.low < u.where.high else None
     plot = shape([Group("force left out", at, force, 1.96 * std)], x, f"force / {unit_text(d.force_unit)}", span)
     caption = f"Shaded: {stretch(u.where)}, where it is clearest. Bars are 95 % intervals; the mean is taken out."
+    caption += not_drawn(len(u.shape) - len(rows))
     yield Picture(f"Force that is left over {u.where.quantity.replace('_', ' ')}", plot, words(caption))
 
 

@@ -9,6 +9,7 @@ from math import isfinite
 from identification.mismatch.compare.signature import Kind
 from identification.mismatch.diagnosis import Diagnosis, Finding
 from identification.mismatch.value import Value, Where
+from identification.mismatch.verdict_clauses import degree, sureness
 from identification.physics.catalogue import CATALOGUE
 from identification.thruster.thrust_report import digits
 from rig.diagnose.report.rivals import WITHOUT_TERM
@@ -42,8 +43,6 @@ KINDS: Mapping[Kind, tuple[str, float]] = {
     "step": ("left out / % of the step", 100.0),
 }
 """Label of a signature's ordinate and its factor."""
-LOST = 100.0
-"""Standard errors in units of the value from which a number is not determined."""
 EFFECTS = (*{term.id for term in CATALOGUE}, *WITHOUT_TERM)
 _NAMES = re.compile(r"\b(" + "|".join(sorted((*UNITS, *EFFECTS), key=len, reverse=True)) + r")\b")
 
@@ -125,24 +124,38 @@ def value_cells(value: Value) -> tuple[str, str, str]:
 
     >>> value_cells(Value(0.40123, 0.0012, "N/V^2")), value_cells(Value(3.0, float("nan"), "1"))
     (('0.4012 ± 0.0012', '0.3989 to 0.4036', 'N/V²'), ('3', '–', ''))
-    >>> value_cells(Value(432.0, 376232.0, "s"))
-    ('432', 'not determined', 's')
+    >>> value_cells(Value(432.0, 376232.0, "s")), value_cells(Value(24.0, 5.8e9, "s", limits=(1.0, 400.0)))
+    (('–', 'not determined', 's'), ('–', 'not determined (between 1 and 400)', 's'))
     """
     unit = unit_text(value.unit)
     if not isfinite(value.value):
         return "–", "–", unit
     if not (isfinite(value.std) and value.std > 0):
         return f"{value.value:.4g}".replace("-", "−"), "–", unit
-    if value.std > LOST * abs(value.value) > 0:
-        return f"{value.value:.3g}".replace("-", "−"), "not determined", unit
+    if not value.determined:
+        low, high = (f"{x:.3g}".replace("-", "−") for x in value.interval)
+        return "–", "not determined" + (f" (between {low} and {high})" if value.limits else ""), unit
     shown, error, low, high = (
         digits(x, value.std).replace("-", "−") for x in (value.value, value.std, *value.interval)
     )
     return f"{shown} ± {error}", f"{low} to {high}", unit
 
 
+def not_drawn(rows: int) -> str:
+    """A sentence on bins whose value the data do not determine; empty where there are none.
+
+    >>> not_drawn(1)
+    ' 1 place is not drawn: the data do not determine its value.'
+    """
+    if not rows:
+        return ""
+    return f" {rows} place{'s are' if rows > 1 else ' is'} not drawn: the data do not determine its value."
+
+
 def evidence(finding: Finding) -> str:
-    """How sure a finding is."""
+    """How sure a finding is, and how much of what could be explained it is."""
     gain = f"{finding.bic_gain:.3g}" if abs(finding.bic_gain) < 100 else f"{finding.bic_gain:.0f}"
-    among = f"probability among its rivals {finding.probability:.2g}" if finding.rivals else "no rival comes near"
-    return f"{rarity(finding.p_value)}, BIC better by {gain}, {among}"
+    near = "" if finding.rivals else "no rival comes near"
+    told = (rarity(finding.p_value), sureness(finding), f"BIC better by {gain}", near)
+    graded = "; ".join(part for part in (degree(finding), *finding.doubts) if part)
+    return ", ".join(part for part in told if part) + (f". {graded[:1].upper()}{graded[1:]}" if graded else "")

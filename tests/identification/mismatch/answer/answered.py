@@ -10,12 +10,12 @@ from identification.mismatch.diagnosis import (
     Finding,
     NextExperiment,
     PlanStep,
-    Remainder,
     RivalFinding,
 )
 from identification.mismatch.faults.stage import Sound
 from identification.mismatch.locate.stage import run as located_by
 from identification.mismatch.name.stage import run as named_by
+from identification.mismatch.unexplained import Remainder
 from identification.mismatch.unnamed.stage import run as completed_by
 from identification.mismatch.validate.stage import run as validated_by
 from identification.mismatch.value import Value, Where

@@ -31,7 +31,9 @@ def test_whatever_the_numbers_the_json_is_one(explained, x, y):
         baseline={"C": Value(x, y, "N/V^2")},
         mismatch=(Mismatch("thrust", Where("time", x, y, "s"), x, y, "there"),),
         answer=Unexplained(
-            (replace(finding(), p_value=x, bic_gain=y),), replace(LEFT, share=x, p_value=y, shape=((x, y, x),)), SWEEP
+            (replace(finding(), p_value=x, bic_gain=abs(y) or 1.0),),
+            replace(LEFT, share=x, p_value=y, shape=((x, y, x),)),
+            SWEEP,
         ),
         whiteness_p=x,
         chi2_per_dof=y,
@@ -62,7 +64,7 @@ def test_every_verdict_has_its_keys(explained, answer):
         assert found["findings"][0]["rival_details"][0]["bic_loss"] == 0.5
     if answer.name == "unexplained":
         assert found["unexplained"]["where"] == {"quantity": "time", "from": 1.0, "to": 2.0, "unit": "s"}
-        assert found["unexplained"]["shape"] == [{"at": 1.5, "residual": 0.2, "std": 0.1}]
+        assert found["unexplained"]["shape"] == [{"at": 1.5, "residual": 0.2, "std": 0.1, "determined": True}]
         assert found["unexplained"]["flexible"] is None
 
 
@@ -73,4 +75,21 @@ def test_intervals_of_values_are_told_as_they_are():
     assert isinstance(data, Diagnosis)
     found = diagnosis_json(data)["baseline"]["parameters"]
     assert (found["C"]["low"], found["C"]["high"]) == (0.7, 1.9)
+    assert found["C"]["determined"] is True
     assert (found["D"]["low"], found["D"]["high"]) == pytest.approx((1.0 - 0.98, 1.98), abs=1e-3)
+
+
+def test_what_is_not_determined_keeps_its_numbers_and_says_so():
+    lost = Value(24.0, 5844288569.0, "s", limits=(1.0, 400.0))
+    data = replace(told(short(), {})[0], baseline={"time_constant": lost})
+    assert diagnosis_json(data)["baseline"]["parameters"]["time_constant"] == {
+        "value": 24.0,
+        "std": 5844288569.0,
+        "low": 1.0,
+        "high": 400.0,
+        "unit": "s",
+        "determined": False,
+    }
+    left = replace(LEFT, shape=((1.0, 2.0, 0.1), (2.0, -44.7, 55.0)))
+    rows = diagnosis_json(replace(data, answer=Unexplained((), left, None)))["unexplained"]["shape"]
+    assert [row["determined"] for row in rows] == [True, False]

@@ -17,6 +17,7 @@ from identification.mismatch.diagnosis import (
     Adequate,
     Ambiguous,
     Explained,
+    HeldOutRmse,
     Unexplained,
 )
 from identification.mismatch.estimate.confidence_intervals import Interval
@@ -28,6 +29,7 @@ from tests.identification.diagnosed_runs import NOISE, C, dead_band
 from tests.identification.mismatch.answer.answered import BAND, LEFT, SWEEP, draft, finding, told
 from tests.identification.mismatch.small import known_noise, rng, selected, short
 
+HELD = HeldOutRmse(1.0, 0.2, 0.2, "blocks of time")
 EQUAL = policy.select.RIVALS_EQUAL_BIC
 
 
@@ -39,7 +41,7 @@ ROWS = list(
 @pytest.mark.parametrize(("remainder", "findings", "experiment"), ROWS)
 def test_the_verdict_by_table(remainder, findings, experiment):
     """Something left before all else; then rivals that do as well; then findings; else nothing is missing."""
-    verdict = decided(findings, remainder, experiment)
+    verdict = decided(findings, remainder, experiment, HELD)
     rivals = any(r.bic_loss < EQUAL for f in findings for r in f.rivals)
     if remainder is not None:
         assert isinstance(verdict, Unexplained)

@@ -93,7 +93,7 @@ def test_names_have_every_check(trace):
     (named,) = trace.completed.earned
     assert "dead_band (shrink) half_width" in said
     assert said.count("passed") + said.count("  -  ") == len(named.checks)
-    doubted = replace(named, checks=(*named.checks, Check("it is so", "it is not so")))
+    doubted = replace(named, checks=(*named.checks, Check("own_covariate", "it is so", "it is not so")))
     other = replace(trace, completed=replace(trace.completed, earned=(), unearned=(doubted,)))
     assert "FAILED  it is not so" in section(other, "name:")
     assert "NOT earned" in section(other, "name:")

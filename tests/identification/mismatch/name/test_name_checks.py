@@ -124,7 +124,7 @@ def test_a_name_has_the_gain_of_a_refit_without_it():
         gain = alone[term].chi2 - estimate.fit.chi2
         assert n.chi2_gain == pytest.approx(gain, rel=0.02)
         assert n.bic_gain == pytest.approx(n.chi2_gain - len(n.theta) * np.log(estimate.fit.residual.size))
-        assert n.p_value == pytest.approx(max(chi2.sf(n.chi2_gain, len(n.theta)), 1e-300), rel=1e-3)
+        assert n.p_value == pytest.approx(max(n.searched * chi2.sf(n.chi2_gain, len(n.theta)), 1e-300), rel=1e-3)
         assert n.theta == estimate.fit.values[term]
         assert n.rivals == ()
         assert n.probability == 1.0

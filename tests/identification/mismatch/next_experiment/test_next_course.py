@@ -16,7 +16,6 @@ from identification.mismatch.diagnosis import (
     HeldOutRmse,
     NextExperiment,
     PlanStep,
-    Remainder,
     RivalFinding,
     Rmse,
     Unexplained,
@@ -30,6 +29,7 @@ from identification.mismatch.next_experiment.sequential_experiment import (
     next_step,
 )
 from identification.mismatch.next_experiment.sweeps import BUDGET
+from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Where
 
 

@@ -12,7 +12,6 @@ from identification.mismatch.diagnosis import (
     HeldOutRmse,
     NextExperiment,
     PlanStep,
-    Remainder,
     RivalFinding,
     Rmse,
 )
@@ -26,8 +25,10 @@ from identification.mismatch.next_experiment.sequential_experiment import (
     opening_line,
     round_line,
 )
+from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Where
 
+HELD = HeldOutRmse(1.0, 0.1, 0.1, "blocks")
 SWEEP = NextExperiment("separates exponent from dead_band", (PlanStep(0.0, 3.0), PlanStep(9.0, 4.0)), 0.9)
 
 
@@ -40,8 +41,8 @@ def diagnosis(verdict, *findings, experiment=None, place=""):
     where = Where(place, 0.0, 1.0, "V")
     left = Remainder(where, 0.5, 1e-9, (), "Something is left.") if place else None
     found = Diagnosis(
-        *(("a",), "T1", decided(findings, left, experiment), "C V|V|", {}, (), (), {}),
-        *(Rmse(1.0, 0.1), HeldOutRmse(1.0, 0.1, 0.1, "blocks"), 1.0, 0.5),
+        *(("a",), "T1", decided(findings, left, experiment, HELD), "C V|V|", {}, (), (), {}),
+        *(Rmse(1.0, 0.1), HELD, 1.0, 0.5),
     )
     assert found.verdict == verdict
     return found

@@ -18,6 +18,8 @@ from identification.physics.dead_band import DeadBand
 from identification.physics.zero_offset import ZeroOffset
 from tests.identification.diagnosed_runs import TOP, dead_band, run
 
+PARAMETER = {"value", "std", "low", "high", "unit", "determined"}
+
 
 def no_nan(node):
     if isinstance(node, dict):
@@ -38,7 +40,7 @@ def test_the_json_holds_what_the_contract_promises(which, request):
     }
     assert told["verdict"] in ("adequate", "explained", "ambiguous", "unexplained")
     assert told["baseline"]["model"] == "C V|V|"
-    assert told["baseline"]["parameters"]["C"].keys() == {"value", "std", "low", "high", "unit"}
+    assert told["baseline"]["parameters"]["C"].keys() == PARAMETER
     for place in told["mismatch"]:
         assert place.keys() >= {"channel", "where", "share", "p_value", "statement"}
         assert place["where"].keys() >= {"quantity", "from", "to"}
@@ -46,7 +48,7 @@ def test_the_json_holds_what_the_contract_promises(which, request):
     assert finding.keys() >= {
         *("effect", "statement", "parameters", "p_value", "bic_gain", "probability", "rivals"),
     }
-    assert all(p.keys() == {"value", "std", "low", "high", "unit"} for p in finding["parameters"].values())
+    assert all(p.keys() == PARAMETER for p in finding["parameters"].values())
     assert all(p["low"] <= p["value"] <= p["high"] for p in finding["parameters"].values())
     assert all(isinstance(rival, str) for rival in finding["rivals"])
     assert [r["effect"] for r in finding["rival_details"]] == finding["rivals"]
@@ -78,7 +80,7 @@ def test_unexplained_is_told_with_its_table(bump):
     told = json.loads(json.dumps(diagnosis_json(bump), allow_nan=False))
     left = told["unexplained"]
     assert left.keys() >= {"where", "share", "p_value", "shape", "statement", "resembles"}
-    assert all(row.keys() == {"at", "residual", "std"} for row in left["shape"])
+    assert all(row.keys() == {"at", "residual", "std", "determined"} for row in left["shape"])
     assert 0 < left["share"] <= 1
 
 

@@ -190,7 +190,12 @@ def test_a_name_has_one_rival_of_each_effect_and_its_values_in_the_last_model():
     other, form = Column("b", "steep"), Column("a", "steep")
     system = Columns(9 * wave(0), {A: wave(0), B: alike(0.999), other: alike(0.998), form: alike(0.999), C: wave(3)})
     state = system.state(A)
-    found = named_term(A, state.fit, (system.fit(), system.rivals(state, A, system.fit())), (Check("asked", "failed"),))
+    found = named_term(
+        A,
+        state.fit,
+        (system.fit(), system.rivals(state, A, system.fit())),
+        (Check("own_covariate", "asked", "failed"),),
+    )
     assert [r.term for r in found.rivals] == [B], "neither another form of its own, nor one twice, nor what is far off"
     assert found.chi2_gain == 81.0
     assert np.isclose(found.bic_gain, 81 - LOGN)

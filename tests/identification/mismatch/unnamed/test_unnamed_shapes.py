@@ -65,7 +65,7 @@ def test_a_flexible_term_may_take_the_place_of_a_name_that_was_not_earned():
     band = DeadBand()
     data, before = known_noise({}, [short(change=bumped)])
     _, after = known_noise({band: (0.3,)}, [short(change=bumped)])
-    named = [n.asked(Check("it is one", "it is none")) for n in name(after, data, [])]
+    named = [n.asked(Check("own_covariate", "it is one", "it is none")) for n in name(after, data, [])]
     found = extend(after, before, data, "command_voltage", named, train_test_split(after, data, ()), rng(0))
     assert found.dropped == (band,)
     assert found.terms[0].quantity == "command_voltage"

@@ -27,7 +27,7 @@ def completed(values, recording, unseen=(), unearn=()):
     chosen = selected(values, [recording], list(values))
     located = located_by(chosen, rng(0))
     named = named_by(chosen, located)
-    named = tuple(n.asked(Check("it is one", "it is none")) if n.term in unearn else n for n in named)
+    named = tuple(n.asked(Check("own_covariate", "it is one", "it is none")) if n.term in unearn else n for n in named)
     validated = validated_by(located.estimate, named, chosen.data, unseen)
     return stage.run(chosen, located, validated, unseen, rng(1)), chosen
 

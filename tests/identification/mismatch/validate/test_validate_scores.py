@@ -284,7 +284,7 @@ def test_the_stage_parts_names_into_those_that_predict_and_those_that_do_not(fit
     bad = stage.run(after, named, data, [history(short(seed=5))])
     assert bad.earned == ()
     assert bad.unearned[0].failed_checks == ("what was not fitted is predicted better without it",)
-    doubted = [n.asked(Check("so", "odd")) for n in named]
+    doubted = [n.asked(Check("own_covariate", "so", "odd")) for n in named]
     assert stage.run(after, doubted, data, [history(short(seed=5))]).unearned[0].failed_checks == ("odd",)
 
 
