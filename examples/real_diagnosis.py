@@ -67,16 +67,17 @@ CASES = (
 )
 
 
-def diagnosed(root: Path, case: Case, folder: Path) -> Diagnosis:
-    """Imported into `folder` and diagnosed."""
+def imported(root: Path, case: Case, pattern: str, folder: Path) -> list[Path]:
+    """The recordings of that pattern, made in `folder`."""
     plan = read_map(case.map)
     plan = replace(plan, thruster=case.thruster or plan.thruster)
+    files = sorted((root / case.folder).glob(pattern)) if pattern else []
+    return [import_file(p, plan, folder / f"{p.stem}.h5", dict(case.parameters)).path for p in files]
 
-    def imported(pattern: str) -> list[Path]:
-        files = sorted((root / case.folder).glob(pattern)) if pattern else []
-        return [import_file(p, plan, folder / f"{p.stem}.h5", dict(case.parameters)).path for p in files]
 
-    fitted, judged = imported(case.fitted), imported(case.judged)
+def diagnosed(root: Path, case: Case, folder: Path) -> Diagnosis:
+    """Imported into `folder` and diagnosed."""
+    fitted, judged = (imported(root, case, pattern, folder) for pattern in (case.fitted, case.judged))
     return told_by_name(diagnose_files(fitted, judged), file_names([*fitted, *judged]))
 
 

@@ -82,7 +82,7 @@ def traced(
     prepared = prepare.run(recordings, holdout, baseline)
     if isinstance(prepared, Refusal):
         return prepared
-    sound = faults.run(prepared)
+    sound = faults.run(prepared, None if baseline is None else baseline.rate_per_driver)
     if isinstance(sound, Refusal):
         return sound
     first = found = search(sound.histories, draws.select, given=given, without=without)

@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.hot_motor import cold_motor, copper_at_full, hot_rate, weaker_at_full
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import KELVIN, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
@@ -25,6 +25,11 @@ MOST_FLUX_PER_KELVIN = 0.1
 def _slowest(scale: Scale) -> float:
     """s; what is slower is a trend that any cause may have."""
     return max(60.0, 0.7 * scale.duration)
+
+
+def _full_current(now: TermContext) -> float:
+    """A, one for all runs."""
+    return now.scale.current or float(np.nanmax(np.abs(now.history.others["current"])))
 
 
 POWER = Proxy(
@@ -86,7 +91,7 @@ class Heating:
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         history, current = now.history, now.history.others.get("current")
         winding, full = cold_motor(self._winding(now), now.scale.driver)
-        load = (value / full) ** 4 if current is None else (current / np.nanmax(np.abs(current))) ** 2
+        load = (value / full) ** 4 if current is None else (current / _full_current(now)) ** 2
         copper, flux, later = self._amounts(theta)
         warm = lowpass(load, history.dt, theta[1])[1]
         magnets = lowpass(warm, history.dt, later)[1] if later is not None else warm
@@ -120,8 +125,8 @@ class Heating:
 
 @dataclass(frozen=True, slots=True)
 class MeasuredHeating:
-    """By the recorded temperature, from where it began: `loss_per_kelvin` of the thrust at the largest driver by
-    copper, `flux_loss_per_kelvin` of k_e by magnets, which follow the thermometer later."""
+    """By the recorded temperature, from the lowest that a run began with: `loss_per_kelvin` of the thrust at the
+    largest driver by copper, `flux_loss_per_kelvin` of k_e by magnets, which follow the thermometer later."""
 
     id: ClassVar[str] = "heating"
     stage: ClassVar[Stage] = "command"
@@ -161,8 +166,8 @@ class MeasuredHeating:
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         copper, flux, later = self._amounts(theta)
         measured = now.history.others[THERMOMETER]
-        rise = measured - measured[0]
-        magnets = lowpass(rise, now.history.dt, later)[1] if later is not None else rise
+        rise = measured + KELVIN - now.scale.cold if now.scale.cold > 0 else measured - measured[0]
+        magnets = lowpass(rise, now.history.dt, later, float(rise[0]))[1] if later is not None else rise
         alone = self.form == "measured_magnet"  # as Heating
         winding, full = cold_motor(now.winding or 0.0 if alone else now.winding, now.scale.driver)
         weaker = np.minimum(flux * magnets, MOST_FLUX)

@@ -1,4 +1,4 @@
-"""The command is a fraction of a supply that moves: V_eff = V (V_bus / V_ref)^k, V_ref the highest of the run."""
+"""The command is a fraction of a supply that moves: V_eff = V (V_bus / V_ref)^k, V_ref the highest of all runs."""
 
 from __future__ import annotations
 
@@ -16,9 +16,18 @@ UNKNOWN = "no bus voltage was recorded"
 OTHER_SUPPLY = (("", "another supply voltage at the same levels"),)
 
 
+def _reference(now: TermContext) -> float:
+    """V, one for all runs that are fitted and all that these numbers are for: supplies differ between runs, too."""
+    return now.scale.bus or float(np.nanmax(now.history.others["bus_voltage"]))
+
+
+def _highest(scale: Scale) -> str:
+    return f"{scale.bus:.3g} V" if scale.bus > 0 else "its highest"
+
+
 @dataclass(frozen=True, slots=True)
 class SupplySag:
-    """The command is a fraction of a supply that moves: V_eff = V (V_bus / V_ref)^k, V_ref the highest of the run."""
+    """The command is a fraction of a supply that moves: V_eff = V (V_bus / V_ref)^k, V_ref the highest of all runs."""
 
     id: ClassVar[str] = "supply_sag"
     stage: ClassVar[Stage] = "command"
@@ -45,14 +54,14 @@ class SupplySag:
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         bus = now.history.others["bus_voltage"]
-        ratio = np.maximum(bus / np.nanmax(bus), 1e-3)
+        ratio = np.maximum(bus / _reference(now), 1e-3)
         out: Floats = value * ratio ** theta[0]
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
-            "Supply sag: the thruster sees the command times (bus voltage / its "
-            f"highest)^{theta[0]:.2f}; keep the supply up, or correct by the recorded bus voltage."
+            f"Supply sag: the thruster sees the command times (bus voltage / {_highest(scale)})^{theta[0]:.2f}; "
+            "keep the supply up, or correct by the recorded bus voltage."
         )
 
 
@@ -86,13 +95,13 @@ class Buffered:
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         bus = now.history.others["bus_voltage"]
         felt = lowpass(bus, now.history.dt, theta[1], float(bus[0]))[1]
-        out: Floats = value * np.maximum(felt / np.nanmax(bus), 1e-3) ** theta[0]
+        out: Floats = value * np.maximum(felt / _reference(now), 1e-3) ** theta[0]
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
-            "Supply sag: the thruster sees the command times (bus voltage / its "
-            f"highest)^{theta[0]:.2f}, {1000 * theta[1]:.3g} ms later than the load draws on it; keep the supply up."
+            f"Supply sag: the thruster sees the command times (bus voltage / {_highest(scale)})^{theta[0]:.2f}, "
+            f"{1000 * theta[1]:.3g} ms later than the load draws on it; keep the supply up."
         )
 
 

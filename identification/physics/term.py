@@ -16,6 +16,8 @@ from identification.run_history.history import History
 from identification.run_history.remembered import RememberedRun
 
 Stage = Literal["command", "rotor", "hydro", "stand", "cell"]
+KELVIN = 273.15
+"""At 0 degC."""
 STAGES: tuple[Stage, ...] = ("command", "rotor", "hydro", "stand", "cell")
 
 
@@ -42,6 +44,15 @@ class Scale:
     """N m: |torque| at the largest driver, by a square law through all of it; 0 where none was recorded."""
     spacing: float = 0.0
     """s between thrust samples, the shortest of all runs: what is over within one of them has no time of its own."""
+    bus: float = 0.0
+    """V, the highest bus_voltage of all runs: what every run's supply is referred to. 0, here and below: not known
+    (none was recorded, or a twin of an earlier version), and each run is referred to its own."""
+    current: float = 0.0
+    """A, the largest |current| of all runs."""
+    neighbour: float = 0.0
+    """N, the largest |neighbour_thrust| of all runs."""
+    cold: float = 0.0
+    """K, the lowest motor_temperature that a run began with."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -46,7 +46,7 @@ class ThrusterInteraction:
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         neighbour = np.abs(now.history.others["neighbour_thrust"])
-        jet = np.sqrt(neighbour / max(float(np.max(neighbour)), 1e-12))
+        jet = np.sqrt(neighbour / max(now.scale.neighbour or float(np.max(neighbour)), 1e-12))
         out: Floats = value - theta[0] * now.C * now.scale.driver * np.abs(now.x) * jet
         return out
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from identification.mismatch.faults.channel_faults import Fault, find_faults, repaired
 from identification.mismatch.prepare.channel_availability import held_by_all
 from identification.mismatch.prepare.preparing import Refusal
+from identification.mismatch.prepare.scales import of_one_rate
 from identification.mismatch.prepare.stage import Prepared, histories_of
 from identification.recording import Recording
 from identification.run_history.history import History
@@ -29,8 +30,8 @@ class Sound:
     """What was left aside, as not every run holds it."""
 
 
-def run(prepared: Prepared) -> Sound | Refusal:
-    """Refused where a recording that was put right cannot be diagnosed."""
+def run(prepared: Prepared, rate_per_driver: float | None = None) -> Sound | Refusal:
+    """Refused where a recording that was put right cannot be diagnosed. `rate_per_driver`: of a twin, for all runs."""
     faults, histories = _put_right(prepared.recordings, prepared.histories)
     faults_of_unseen, unseen = _put_right(prepared.held_out, prepared.unseen)
     if isinstance(histories, Refusal):
@@ -38,6 +39,9 @@ def run(prepared: Prepared) -> Sound | Refusal:
     if isinstance(unseen, Refusal):
         return unseen
     histories, notes = held_by_all(prepared.recordings, histories)
+    histories = of_one_rate(histories, rate_per_driver)
+    turning = next((h.rate_per_driver for h in histories if h.rate is not None), None)
+    unseen = of_one_rate(unseen, turning)
     return Sound(histories, unseen, faults + faults_of_unseen, notes)
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
-from identification.physics.term import Scale
+from identification.physics.term import KELVIN, Scale
 from identification.run_history.history import History
 from identification.run_history.remembered import RememberedRun
 
 MANY_SAMPLES = 100
 """Samples, above which scatter is told by second differences: fewer are compared level by level."""
+
+THERMOMETER = "motor_temperature"
 
 
 def scale_of(runs: Sequence[RememberedRun], C: float) -> Scale:
@@ -31,7 +34,32 @@ def scale_of(runs: Sequence[RememberedRun], C: float) -> Scale:
         noise=float(np.median([_scatter(h) for h in histories])),
         torque=_full_torque(histories) * driver**2,
         spacing=min(h.spacing for h in histories),
+        bus=_largest(histories, "bus_voltage"),
+        current=_largest(histories, "current"),
+        neighbour=_largest(histories, "neighbour_thrust"),
+        cold=min((_begun(h) for h in histories if THERMOMETER in h.others), default=0.0),
     )
+
+
+def _largest(histories: Sequence[History], quantity: str) -> float:
+    """In the unit of the quantity, over all runs that hold it; 0 where none does."""
+    sizes = (float(np.nanmax(np.abs(h.others[quantity]))) for h in histories if quantity in h.others)
+    return max(sizes, default=0.0)
+
+
+def _begun(history: History) -> float:
+    """K, the motor temperature at the beginning."""
+    return max(float(history.others[THERMOMETER][0]) + KELVIN, 0.0)
+
+
+def of_one_rate(histories: Sequence[History], known: float | None = None) -> tuple[History, ...]:
+    """The same with one rate per driver: with one of its own each, a rotor that is faster in one run than in another at
+    the same command would not be seen. `known`: that of a twin or of other runs; None: the mean of these."""
+    turning = [h.rate_per_driver for h in histories if h.rate is not None]
+    if known is None and not turning:
+        return tuple(histories)
+    one = float(np.mean(turning)) if known is None else known
+    return tuple(h if h.rate is None else replace(h, rate_per_driver=one) for h in histories)
 
 
 def _full_torque(histories: Sequence[History]) -> float:

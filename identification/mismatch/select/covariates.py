@@ -117,7 +117,7 @@ def covariates(fit: Fit, data: Data) -> tuple[Covariate, ...]:
         whole,
     )
     if any(h.static for h in data.histories):
-        return tuple(_levels(view))
+        return (*_levels(view), *_recorded(view))
     return (*_levels(view), *_times(view), *_memories(view), *_channels(view))
 
 
@@ -212,7 +212,8 @@ def _loads(view: _View, run: int) -> Floats:
     return np.column_stack(columns) if columns else np.empty((rows.size, 0))
 
 
-def _channels(view: _View) -> Iterator[Covariate]:
+def _recorded(view: _View) -> Iterator[Covariate]:
+    """What was recorded beside the driver and is no answer to it."""
     data = view.data
     size = tuple(np.abs(x) for x in view.rate)
     for quantity, unit in FOLLOWED:
@@ -222,6 +223,11 @@ def _channels(view: _View) -> Iterator[Covariate]:
             if float(np.ptp(every)) > 1e-9 * max(float(np.max(np.abs(every))), 1e-12):
                 gains = (view.force, size)
                 yield _splines(quantity, unit, value, _knots(value, 6), gains, f"it follows {quantity}")
+
+
+def _channels(view: _View) -> Iterator[Covariate]:
+    yield from _recorded(view)
+    data, size = view.data, tuple(np.abs(x) for x in view.rate)
     if data.scale.torque > 0 and all("torque" in h.others for h in data.histories):
         yield _torque(view)
     if all(h.rate is not None for h in data.histories):
