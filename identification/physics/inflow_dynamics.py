@@ -10,7 +10,6 @@ import numpy as np
 from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
-from identification.run_history.filters import lag, lowpass
 
 QUICKEST = 0.004
 """s, half of the least that a small thruster has."""
@@ -57,10 +56,8 @@ class InflowDynamics:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        if not self.form:
-            u = lowpass(now.x, now.history.dt, theta[1])[1]
-        else:
-            u = lag(now.x, now.history.dt, 0.5 / (theta[1] * now.scale.driver), 0.0)[1]
+        rotor = (0.5 / (theta[1] * now.scale.driver), 0.0) if self.form else (0.0, 1 / theta[1])
+        u = now.run.follower(now.settled, rotor)
         out: Floats = value + now.C * np.abs(now.x) * theta[0] * (now.x - u)
         return out
 

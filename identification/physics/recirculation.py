@@ -13,7 +13,6 @@ import numpy as np
 from identification.physics.term import Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
-from identification.run_history.filters import lowpass
 
 JET = "the rotor's rate as the model has it, low-passed"
 INSTEAD = {"rate": JET, "thrust": "the root of the thrust, low-passed", "circuit": f"{JET} twice"}
@@ -57,10 +56,11 @@ class Recirculation:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        jet = np.sign(value) * np.sqrt(np.abs(value / now.C)) if self.form == "thrust" else now.x
-        u = lowpass(jet, now.history.dt, theta[1])[1]
+        jet = np.sign(value) * np.sqrt(np.abs(value / now.C)) if self.form == "thrust" else now.settled
+        follows = (0.0, 1 / theta[1])
+        u = now.run.follower(jet, follows)
         if self.form == "circuit":
-            u = lowpass(u, now.history.dt, theta[1])[1]
+            u = now.run.follower(u, follows)
         out: Floats = value - theta[0] * np.abs(now.x) * u
         return out
 

@@ -87,9 +87,17 @@ class TermContext:
     """Voltage that the model loses in the cold winding, by the square of the rate, 1/(unit of the driver); None where
     it says nothing of it."""
 
+    before: Floats | None = None
+    """Rate before a fast change that was made to `x`: what has a memory has not followed that; None: none was made."""
+
     @property
     def history(self) -> History:
         return self.run.history
+
+    @property
+    def settled(self) -> Floats:
+        """Rate that what has a memory follows."""
+        return self.x if self.before is None else self.before
 
 
 class Term(Protocol):

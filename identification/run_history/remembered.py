@@ -27,6 +27,8 @@ MOST_LEADS = 160
 """What dynamics make of the ticks: those of all trials of a screening, twice."""
 MOST_LATELY = 24
 """What the rates of the last few models make at the samples: most terms change none."""
+MOST_FOLLOWERS = 48
+"""What follows the rates of the last few models late: most parameters change neither the rates nor its time."""
 MOST_REFERENCES = 24
 """Rotors from whose rates those of similar ones are sought."""
 MOST_DELAYS = 8
@@ -43,6 +45,7 @@ class RememberedRun:
         self.predictions = LeastRecentlyUsed[Floats](MOST_PREDICTIONS)
         self.leads = LeastRecentlyUsed[Floats](MOST_LEADS)
         self.lately = LeastRecentlyUsed[Floats](MOST_LATELY)
+        self._followers = LeastRecentlyUsed[Floats](MOST_FOLLOWERS)
         self._references = LeastRecentlyUsed[Floats](MOST_REFERENCES)
         self._delays = LeastRecentlyUsed[tuple[NDArray[np.intp], Floats]](MOST_DELAYS)
         self._since: dict[Channel, tuple[float, tuple[NDArray[np.intp], Floats]]] = {}
@@ -63,6 +66,16 @@ class RememberedRun:
         near = self._reference("intervals", h.driver, h.dt, rotor)
         return lag(value, h.dt, *rotor, float(value[0]), near)[1]
 
+    def follower(self, value: Floats, rotor: tuple[float, float]) -> Floats:
+        """(M,) means of what follows a `value` (M,) as `filters.lag` says, from rest; worked out once of the same."""
+
+        def made() -> Floats:
+            h = self.history
+            near = self._reference("from rest", h.driver, h.dt, rotor, from_rest=True)
+            return lag(value, h.dt, *rotor, 0.0, near)[1]
+
+        return self._followers(rotor, made, value)
+
     def rates_at_ticks(self, rotor: tuple[float, float] | None) -> Floats:
         """(T,) rate of the rotor at each tick of the command; it was settled before the first."""
         assert self.history.ticks is not None
@@ -73,13 +86,16 @@ class RememberedRun:
         end = lag_ends(held, dt, *rotor, float(value[0]), self._reference("ticks", held, dt, rotor))
         return np.concatenate([value[:1], end])
 
-    def _reference(self, of: str, value: Floats, dt: Floats, rotor: tuple[float, float]) -> Floats | None:
+    def _reference(
+        self, of: str, value: Floats, dt: Floats, rotor: tuple[float, float], *, from_rest: bool = False
+    ) -> Floats | None:
         """Ends of a similar rotor, from which those of `rotor` are a few steps; None where it is linear."""
         if rotor[0] == 0 or not value.size:
             return None
         quadratic, linear = (exp(round(REFERENCES * log(c)) / REFERENCES) if c > 0 else 0.0 for c in rotor)
         key = (of, quadratic, linear)
-        return self._references(key, lambda: lag_ends(value, dt, quadratic, linear, float(value[0])))
+        begin = 0.0 if from_rest else float(value[0])
+        return self._references(key, lambda: lag_ends(value, dt, quadratic, linear, begin))
 
     def delayed(self, value: Floats, delay: float) -> Floats:
         """(M,) means over each interval of `value` (M,) `delay` s before."""

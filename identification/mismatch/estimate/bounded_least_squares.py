@@ -22,6 +22,10 @@ HARDER = 8.0
 """By how much the damping grows where a step is no better."""
 LEAST_HARDER = 1e-2
 """Damping of a second try at least: beside slopes of size 1 a smaller one changes no step."""
+NEARLY = 1e-2
+"""Of that fall: where slopes that were followed by secants are asked for at last, a step is tried that promises it."""
+AS_FORETOLD = 0.25
+"""Of the fall that slopes foretold: where it was met as closely, they are not asked for anew before the next step."""
 CLOSE = 1e-2
 """Fall of chi-square at which a fit has ended, or of which the slopes promise less; a difference of 1 is one sigma."""
 
@@ -50,27 +54,48 @@ def least_squares(
     """The least sum of squares of a whitened residual from one start (p,), within the bounds.
 
     `residual_of`: parameters (p,) to the residual (n,), measured less predicted; `slopes_of`: to the slopes (n, p) of
-    the prediction, asked for only where the last step ended. A parameter whose bounds are one stays where it is.
+    the prediction, asked for `most_steps` times at most, only where the last step ended, and where that was not what
+    they foretold; between they follow by secants. A parameter whose bounds are one stays where it is.
     Ends early once the sum is above `hopeless` and falls too slowly to get there.
     """
     at = np.clip(start, low, high)
     residual, J = residual_of(at), slopes_of(at)
-    damping = 1e-3
-    for _ in range(most_steps):
+    damping, fresh, asked = 1e-3, True, 1
+    while asked <= most_steps:
         chi2 = float(residual @ residual)
         close = CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1))
         found = _step(residual_of, at, residual, J, low, high, damping, close)
-        if found is None:
+        if found is None and fresh:
             break
-        at, residual, damping = found
-        fall = chi2 - float(residual @ residual)
+        if found is None:  # by secants the end is only nearly met
+            J, fresh, asked = slopes_of(at), True, asked + 1
+            found = _step(residual_of, at, residual, J, low, high, damping, NEARLY * close)
+            if found is None:
+                break
+        fall = chi2 - float(found.residual @ found.residual)
+        step, change = found.at - at, residual - found.residual
+        at, residual = found.at, found.residual
         if chi2 - (1 + SLOW_FALLS) * fall > hopeless:
+            return Minimum(at, residual, J)
+        damping = max(found.damping / 10, 1e-9)
+        if fall < close and fresh:
             break
-        damping = max(damping / 10, 1e-9)
-        J = slopes_of(at)
-        if fall < close:
-            break
-    return Minimum(at, residual, J)
+        if fall >= close and abs(fall - found.foretold) <= AS_FORETOLD * found.foretold:
+            J, fresh = _secant(J, step, change), False
+        else:
+            J, fresh, asked = slopes_of(at), True, asked + 1
+    return Minimum(at, residual, J if fresh else slopes_of(at))
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Step:
+    """Where the sum of squares is less, and how it was found."""
+
+    at: Floats
+    residual: Floats
+    damping: float
+    foretold: float
+    """Fall that the slopes promised of it."""
 
 
 def _step(
@@ -82,11 +107,8 @@ def _step(
     high: Floats,
     damping: float,
     close: float,
-) -> tuple[Floats, Floats, float] | None:
-    """Where the sum of squares is less, the residual there, and the damping that found it; None where there is nothing.
-
-    No step is tried of which the slopes themselves promise less than `close`.
-    """
+) -> _Step | None:
+    """None where there is nothing: no step is tried of which the slopes themselves promise less than `close`."""
     go = _movable(at, J, residual, low, high)
     size = np.linalg.norm(J[:, go], axis=0)
     A = J[:, go] / size
@@ -94,7 +116,8 @@ def _step(
     chi2 = float(residual @ residual)
     for _ in range(MOST_TRIES):
         step = np.linalg.solve(gram + damping * np.eye(gram.shape[0]), right)
-        if float(step @ (2 * right - gram @ step)) < close:
+        foretold = float(step @ (2 * right - gram @ step))
+        if foretold < close:
             return None
         moved = at.copy()
         moved[go] += step / size
@@ -102,9 +125,16 @@ def _step(
         new = residual_of(trial)
         fall = chi2 - float(new @ new)
         if np.isfinite(fall) and fall > 0:
-            return trial, new, damping
+            return _Step(trial, new, damping, foretold)
         damping = max(HARDER * damping, LEAST_HARDER)
     return None
+
+
+def _secant(J: Floats, moved: Floats, change: Floats) -> Floats:
+    """(n, p) slopes that foretell the `change` (n,) of the prediction by what `moved` (p,), else as they were (Broyden,
+    Math. Comp. 19, 577, 1965), each parameter in units of what it changes."""
+    weight = moved * np.einsum("ij,ij->j", J, J)
+    return J + np.outer(change - J @ moved, weight / float(moved @ weight))
 
 
 def _movable(at: Floats, J: Floats, residual: Floats, low: Floats, high: Floats) -> NDArray[np.bool_]:

@@ -1,6 +1,6 @@
 """How much of a fast change a model's static terms pass on: what ticks do within an interval goes through them too.
 
-Asked by a small change that alternates from interval to interval: what has a memory answers it as it answers a tick.
+Asked by a small change that alternates from interval to interval: what has a memory has not followed it yet.
 Dynamics of a few ticks (a lag, a ring, a delay) and limits have answers of their own (sub_interval.py).
 """
 
@@ -67,7 +67,7 @@ def _thrust_gain(terms: Acting, theta: Theta, run: RememberedRun, x: Floats, tar
     change = new - old
     for term, values, sizes in terms:
         old, new = (
-            term.apply(force, TermContext(run, sizes, theta.C, tare, rate), values)
+            term.apply(force, TermContext(run, sizes, theta.C, tare, rate, before=x), values)
             for force, rate in ((old, x), (new, moved))
         )
     return _ratio(new - old, change)

@@ -95,18 +95,33 @@ def test_a_step_into_what_has_no_value_is_shortened() -> None:
 
 
 def test_what_is_hopeless_ends_early() -> None:
-    steps = []
-
-    def slopes(p: Floats) -> Floats:
-        steps.append(p)
-        return np.exp(-p)[None, :]
+    looks: list[float] = []
 
     def residual(p: Floats) -> Floats:
-        return 1.0 + np.exp(-p)
+        looks.append(float(p[0]))
+        return 10 + 10 / (1 + p)
 
-    free = np.array([-np.inf]), np.array([np.inf])
+    def slopes(p: Floats) -> Floats:
+        return np.asarray(10 / (1 + p)[None, :] ** 2)
+
+    free = np.array([0.0]), np.array([np.inf])
     least_squares(residual, slopes, np.zeros(1), *free)
-    whole = len(steps)
-    steps.clear()
-    least_squares(residual, slopes, np.zeros(1), *free, hopeless=0.5)
-    assert len(steps) < whole
+    whole = len(looks)
+    looks.clear()
+    least_squares(residual, slopes, np.zeros(1), *free, hopeless=50.0)
+    assert len(looks) < whole
+
+
+def test_slopes_are_asked_for_where_they_foretold_too_little_or_too_much() -> None:
+    """A curve that hardly bends: what it did on the way tells its slopes well enough, until the end."""
+    asked: list[Floats] = []
+    rng = np.random.default_rng(2)
+    y = lagged(np.array([3.0, 1.3, 0.2])) + 0.05 * rng.standard_normal(TIME.size)
+
+    def slopes(p: Floats) -> Floats:
+        asked.append(p.copy())
+        return lagged_slopes(p) / 0.05
+
+    found = least_squares(lambda p: np.asarray((y - lagged(p)) / 0.05), slopes, np.array([2.9, 1.2, 0.1]), *FREE)
+    assert len(asked) <= 2
+    assert found.slopes == pytest.approx(lagged_slopes(found.at) / 0.05, rel=1e-2, abs=1e-2)
