@@ -21,6 +21,7 @@ from drivers.ports.lines import (
     LineCutter,
     check_acquisition,
     check_line_rate,
+    check_low_pass,
     line_time,
     printable,
 )
@@ -104,6 +105,8 @@ class Options:
     """s, 1 sigma, of this delay and the computer's."""
     window: float | None = None
     """s that a value is the mean of."""
+    low_pass: float | None = None
+    """s, time constant of a first-order low pass that a value went through; its group delay is in delay."""
     filter: str = ""
     """What the instrument does to a value, in words."""
     gain_std: float | None = None
@@ -128,6 +131,7 @@ class Options:
                 f"line_stream pattern needs a group (?P<value>...) or (?P<raw>...) and knows only {sorted(GROUPS)}"
             )
         check_acquisition("line_stream", delay=self.delay, delay_std=self.delay_std, window=self.window)
+        check_low_pass("line_stream", self.low_pass, self.delay)
         if not math.isfinite(self.scale) or self.scale == 0.0 or not math.isfinite(self.offset):
             raise ValueError(f"line_stream scale must be finite and not 0, offset finite: {self.scale}, {self.offset}")
 
@@ -158,7 +162,8 @@ class LineStream:
             Channel(
                 options.quantity or "value", options.quantity, options.unit, noise_std=options.noise_std,
                 quantum=quantum, delay=options.delay + on_the_line, delay_std=options.delay_std,
-                window=options.window, filter=options.filter, calibration=json.dumps(calibration),
+                window=options.window, low_pass=options.low_pass, filter=options.filter,
+                calibration=json.dumps(calibration),
             )
         ]  # fmt: skip
         if "raw" in self._groups:
