@@ -22,6 +22,7 @@ from drivers.ports.lines import (
     check_acquisition,
     check_gain_std,
     check_line_rate,
+    check_low_pass,
     line_time,
     printable,
 )
@@ -105,6 +106,8 @@ class Options:
     """s, 1 sigma, of this delay and the computer's."""
     window: float | None = None
     """s that a value is the mean of."""
+    low_pass: float | None = None
+    """s, time constant of a first-order low pass that a value went through; its group delay is in delay."""
     filter: str = ""
     """What the instrument does to a value, in words."""
     gain_std: float | None = None
@@ -130,6 +133,7 @@ class Options:
             )
         check_acquisition("line_stream", delay=self.delay, delay_std=self.delay_std, window=self.window)
         check_gain_std("line_stream", self.gain_std)
+        check_low_pass("line_stream", self.low_pass, self.delay)
         if not math.isfinite(self.scale) or self.scale == 0.0 or not math.isfinite(self.offset):
             raise ValueError(f"line_stream scale must be finite and not 0, offset finite: {self.scale}, {self.offset}")
 
@@ -160,7 +164,8 @@ class LineStream:
             Channel(
                 options.quantity or "value", options.quantity, options.unit, noise_std=options.noise_std,
                 quantum=quantum, delay=options.delay + on_the_line, delay_std=options.delay_std,
-                window=options.window, filter=options.filter, calibration=json.dumps(calibration),
+                window=options.window, low_pass=options.low_pass, filter=options.filter,
+                calibration=json.dumps(calibration),
             )
         ]  # fmt: skip
         if "raw" in self._groups:

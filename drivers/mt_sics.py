@@ -28,7 +28,15 @@ from drivers.mt_sics_lines import (
     number,
 )
 from drivers.ports.inbox import BadRecords
-from drivers.ports.lines import HOST_DELAY_STD, check_acquisition, check_gain_std, check_line_rate, line_time, printable
+from drivers.ports.lines import (
+    HOST_DELAY_STD,
+    check_acquisition,
+    check_gain_std,
+    check_line_rate,
+    check_low_pass,
+    line_time,
+    printable,
+)
 from drivers.ports.serial_port import SerialPort, SerialSettings
 from drivers.ports.wire import Wire
 from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream
@@ -66,6 +74,8 @@ class Options:
     """s, 1 sigma, of this delay and the computer's."""
     window: float | None = None
     """s that a reading is the mean of."""
+    low_pass: float | None = None
+    """s, time constant of a first-order low pass that a reading went through; its group delay is in delay."""
     filter: str = ""
     """What the module does to a reading, in words."""
     range_min: float | None = None
@@ -86,6 +96,7 @@ class Options:
             raise ValueError(f"mt_sics unit must be one of {', '.join(NEWTONS_PER_UNIT)}, not {self.unit!r}")
         check_gain_std("mt_sics", self.gain_std)
         check_acquisition("mt_sics", delay=self.delay, delay_std=self.delay_std, window=self.window)
+        check_low_pass("mt_sics", self.low_pass, self.delay)
         if not 0.0 < self.timeout <= 60.0:
             raise ValueError(f"mt_sics timeout must be between 0 and 60 s, not {self.timeout}")
 
@@ -113,7 +124,7 @@ class MtSics:
         thrust = Channel(
             "thrust", "thrust", "N", noise_std=options.noise_std, quantum=options.resolution,
             delay=options.delay + on_the_line, delay_std=options.delay_std, window=options.window,
-            filter=options.filter, range_min=options.range_min, range_max=options.range_max,
+            low_pass=options.low_pass, filter=options.filter, range_min=options.range_min, range_max=options.range_max,
             calibration=json.dumps(calibration),
         )  # fmt: skip
         stable = Channel("stable", None, "1", description="1: the balance calls the reading stable")

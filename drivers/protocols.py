@@ -29,6 +29,8 @@ class Channel:
     """s, 1 sigma: what is not known of `delay`, the same for all rows."""
     window: float | None = None
     """s that the device averages a value over, ending `delay` before its arrival."""
+    low_pass: float | None = None
+    """s, time constant of a first-order low pass before the window; its group delay is in `delay`."""
     filter: str = ""
     """Kind, order and corner of what else the device does to a value, in words."""
     range_min: float | None = None

@@ -53,6 +53,9 @@ class Acquisition:
     """s."""
     window: float | None = None
     """s that a value is averaged over, ending `delay` before its stamp."""
+    low_pass: float | None = None
+    """s, time constant of a first-order low pass that the value went through before the window; its group delay, the
+    same at low frequencies, is in `delay`."""
     quantum: float | None = None
     """Step of the values, in the channel's unit."""
     rounding: str = ""

@@ -72,6 +72,15 @@ def check_gain_std(who: str, gain_std: float | None) -> None:
         )
 
 
+def check_low_pass(who: str, time_constant: float | None, delay: float) -> None:
+    """Raise ValueError for a low pass whose group delay, which is its time constant, is not in `delay` (s)."""
+    if time_constant is not None and not 0.0 <= time_constant <= delay:
+        raise ValueError(
+            f"{who} low_pass must be between 0 and its delay ({delay} s), in which its group delay is, "
+            f"not {time_constant}: add it to delay"
+        )
+
+
 def printable(line: bytes) -> str:
     """A line as it can be shown to a person, shortened to 80 characters."""
     return line[:80].decode("ascii", errors="backslashreplace")

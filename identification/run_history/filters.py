@@ -114,6 +114,12 @@ def lagged(w: Floats, before: Floats, since: Floats, quadratic: float, linear: f
     return end
 
 
+def follow_rate(w: Floats, n: Floats, quadratic: float, linear: float) -> Floats:
+    """lambda(n) of the same equation, 1/s."""
+    out: Floats = quadratic * _secant(w, np.abs(w), n) + linear
+    return out
+
+
 def _secant(w: Floats, much: Floats, n: Floats) -> Floats:
     """(w|w| - n|n|)/(w - n) without a difference of likes; `much` is |w|.
 

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
+from identification.run_history.converter import Converter
 
 TURNING = 0.02
 """Share of the largest driver above which it counts as driving."""
@@ -105,8 +106,8 @@ class History:
     """s by which the time stamps of the thrust may be off."""
     delay_std: float = 0.0
     """s by which all of them may be, against the driver, as the recording itself says."""
-    window: float = 0.0
-    """s that each thrust sample is the mean over, around its time; 0: of an instant."""
+    converter: Converter = field(default_factory=Converter)
+    """Between the thrust and a sample of it."""
     rate_spacing: float = 1.0
     excess: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     """(M,) or (1,): mean of driver |driver| over the interval less that of the mean driver."""

@@ -14,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
-from identification.run_history.filters import delayed, integral_at, lag, lag_ends, places_of
+from identification.run_history.converter import Places
+from identification.run_history.filters import delayed, lag, lag_ends, places_of
 from identification.run_history.history import History, Samples
 from identification.run_history.least_recently_used import LeastRecentlyUsed
 from identification.run_history.rate_gap import RateGap, rate_gap
@@ -52,8 +53,9 @@ class RememberedRun:
 
     @cached_property
     def step_responses(self) -> TickRows | None:
-        """What the ticks of the command tell within the intervals; None where they tell nothing, or are averaged."""
-        return None if self.history.window > 0 else tick_rows(self.history)
+        """What the ticks of the command tell within the intervals; None where they tell nothing, or no sample is of
+        an instant."""
+        return tick_rows(self.history) if self.history.converter.instant else None
 
     @cached_property
     def rate_gap(self) -> RateGap | None:
@@ -102,18 +104,21 @@ class RememberedRun:
         edges = self.history.edges
         return delayed(value, edges, delay, self._delays(delay, lambda: places_of(edges, edges - delay)))
 
-    def averaged(self, value: Floats) -> Floats:
-        """(M,) means of `value` (M,) over the window round the samples of each interval."""
-        dt, window = self.history.dt, self.history.window
-        begin, end = self._window_places
-        out: Floats = (integral_at(value, dt, end) - integral_at(value, dt, begin)) / window
-        return out
+    def converted(self, value: Floats) -> Floats:
+        """(M,) what the converter makes of `value` (M,) at the samples of each interval."""
+        return self.history.converter.shown(value, self.history.dt, self._sampled_places)
+
+    def converted_amid(self, value: Floats) -> Floats:
+        """(M,) the same in the middle of each interval."""
+        return self.history.converter.shown(value, self.history.dt, self._middle_places)
 
     @cached_property
-    def _window_places(self) -> tuple[tuple[NDArray[np.intp], Floats], tuple[NDArray[np.intp], Floats]]:
-        h = self.history
-        half = 0.5 * h.window
-        return places_of(h.edges, h.sampled - half), places_of(h.edges, h.sampled + half)
+    def _sampled_places(self) -> tuple[Places, ...]:
+        return self.history.converter.places(self.history.edges, self.history.sampled)
+
+    @cached_property
+    def _middle_places(self) -> tuple[Places, ...]:
+        return self.history.converter.places(self.history.edges, self.history.middle)
 
     def samples(self, channel: Channel) -> Samples:
         """Every sample of a channel that is in an interval."""

@@ -13,7 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recording import Floats
-from identification.run_history.filters import complex_recursion, lagged, recursion, resonant
+from identification.run_history.converter import Mode
+from identification.run_history.filters import complex_recursion, follow_rate, lag_ends, lagged, recursion, resonant
 from identification.run_history.remembered import RememberedRun
 
 SETTLED = 25.0
@@ -65,8 +66,18 @@ class Passed:
         return out
 
     def ringing(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
-        """What the stand adds to rate |rate|, (N,): modes of the linear response, the rotor taken as linear about each
-        tick."""
+        """What the stand adds to rate |rate|, (N,)."""
+        assert self.ring is not None
+        _, f, z = self.ring
+        *follows, rings = self.ring_modes(when, value)
+        out = sum((mode.at(since, last) for mode in follows), np.zeros(since.size))
+        near = np.flatnonzero(2 * np.pi * f * z * since < SETTLED)
+        out[near] += rings.at(since[near], last[near])
+        return out
+
+    def ring_modes(self, when: Floats, value: Floats) -> tuple[Mode, ...]:
+        """The same after each tick: modes of the linear response, the rotor taken as linear about each tick; what rings
+        is the last."""
         assert self.ring is not None
         c, f, z = self.ring
         w = 2 * np.pi * f
@@ -74,7 +85,7 @@ class Passed:
         force = value * np.abs(value)
         change, gap = np.diff(force, prepend=force[0]), np.diff(when, prepend=when[0])
         share: NDArray[np.complex128] = np.full(value.size, c * w**2 / (2j * pole.imag * pole))
-        out = np.zeros(since.size)
+        modes = []
         if self.rotor is not None:
             quadratic, linear = self.rotor
             follow = 2 * quadratic * np.abs(value) + linear
@@ -82,8 +93,34 @@ class Passed:
             share *= follow / (pole + follow)
             lagging = recursion(np.exp(-follow * gap), change, 0.0)
             lagging *= c * (1 - w**2 / (follow**2 - 2 * z * w * follow + w**2))
-            out += lagging[last] * np.exp(-follow[last] * since)
-        rings = np.flatnonzero(z * w * since < SETTLED)
+            modes.append(Mode(lagging, follow))
         left = share * complex_recursion(np.exp(pole * gap), change.astype(np.complex128))
-        out[rings] += 2 * np.real(left[last[rings]] * np.exp(pole * since[rings]))
+        return (*modes, Mode(2 * left, np.full(left.size, -pole)))
+
+    def rotor_modes(self, when: Floats, value: Floats) -> tuple[Floats, tuple[Mode, Mode]]:
+        """Rate |rate| after the ticks `when` (T,), from which on `value` (T,) is held: where it goes, and two modes.
+
+        n = w + (n0 - w) e^(-l s) has the square w^2 + 2 w (n0 - w) e^(-l s) + (n0 - w)^2 e^(-2 l s). Where it turns
+        round between two ticks (`turning_points` are among them otherwise) its sign is that of its beginning.
+        """
+        assert self.rotor is not None
+        quadratic, linear = self.rotor
+        ends = lag_ends(value[:-1], np.diff(when), quadratic, linear, float(value[0]))
+        begin = np.concatenate([value[:1], ends])
+        rate = follow_rate(value, 0.5 * (begin + np.append(ends, value[-1])), quadratic, linear)
+        rate = np.maximum(rate, SLOWEST * float(np.max(rate)))
+        sign = np.where(begin != 0, np.sign(begin), np.sign(value))
+        gap = begin - value
+        return sign * value**2, (Mode(sign * 2 * value * gap, rate), Mode(sign * gap**2, 2 * rate))
+
+    def turning_points(self, when: Floats, value: Floats) -> Floats:
+        """s: where the rotor passes through rest between two of the ticks."""
+        assert self.rotor is not None
+        ends = lag_ends(value[:-1], np.diff(when), *self.rotor, float(value[0]))
+        begin = np.concatenate([value[:1], ends[:-1]])
+        at = np.flatnonzero(begin * value[:-1] < 0)
+        w, n = value[at], begin[at]
+        rate = follow_rate(w, 0.5 * (n + ends[at]), *self.rotor)
+        found = when[at] + np.log1p(np.abs(n / w)) / np.maximum(rate, 1e-300)
+        out: Floats = found[found < when[at + 1]]
         return out

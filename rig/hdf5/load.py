@@ -216,7 +216,7 @@ def _channel(
 
 def _acquisition(channel: Mapping[str, Any], stream: Mapping[str, Any]) -> Acquisition:
     """What is said of it; a time or a step that is negative or not finite says nothing."""
-    said = {key: _number(channel.get(key)) for key in ("delay", "delay_std", "window", "quantum", "hold")}
+    said = {key: _number(channel.get(key)) for key in ("delay", "delay_std", "window", "low_pass", "quantum", "hold")}
     said |= {key: _number(stream.get(key)) for key in ("period", "clock_drift_std")}
     said["period"] = said["period"] or None  # a clock that does not tick is none
     said["quantum"] = said["quantum"] or _number(channel.get("resolution"))  # as it was called at first

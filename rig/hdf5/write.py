@@ -220,7 +220,8 @@ def _channel(group: h5py.Group, spec: ChannelSpec) -> h5py.Dataset:
     facts: dict[str, Attribute | None] = {
         name: getattr(spec, name) for name in ("quantity", "unit", "noise_std", "range_min", "range_max")
     }
-    facts |= {name: getattr(spec, name) for name in ("quantum", "rounding", "delay", "delay_std", "window", "filter")}
+    facts |= {name: getattr(spec, name) for name in ("quantum", "rounding", "delay", "delay_std")}
+    facts |= {name: getattr(spec, name) for name in ("window", "low_pass", "filter")}
     facts |= {name: getattr(spec, name) for name in ("calibration", "thruster", "axis", "description")}
     if spec.integer:
         facts["missing_value"] = MISSING

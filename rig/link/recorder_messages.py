@@ -31,9 +31,10 @@ class ChannelSpec:
     quantum: float | None = None
     rounding: str = ""
     delay: float | None = None
-    """s, as `delay_std` and `window`."""
+    """s, as `delay_std`, `window` and `low_pass`."""
     delay_std: float | None = None
     window: float | None = None
+    low_pass: float | None = None
     filter: str = ""
     range_min: float | None = None
     range_max: float | None = None

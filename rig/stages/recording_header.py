@@ -85,6 +85,7 @@ def _channel_spec(channel: Channel, primary: bool) -> ChannelSpec:
         delay=channel.delay,
         delay_std=channel.delay_std,
         window=channel.window,
+        low_pass=channel.low_pass,
         filter=channel.filter,
         range_min=channel.range_min,
         range_max=channel.range_max,

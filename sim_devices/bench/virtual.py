@@ -5,7 +5,7 @@ What the desk-top bench is in the machine's time. The host is whoever sleeps on 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
 from math import inf
 
@@ -27,6 +27,8 @@ from sim_devices.world import World
 BEGIN_NS = 10**12
 """Of the host's clock when the bench begins."""
 EPOCH = datetime(2026, 1, 1, tzinfo=UTC)
+FILTERED = 0.0005
+"""s, the longest step of a world whose force goes through a low pass: to it the force stands still in a step."""
 SAME = 1e-9
 """s: two times that are no closer than this are two."""
 
@@ -46,6 +48,7 @@ class VirtualBench:
         """(s, V) of every voltage that the drive took up."""
         self._t, self._told = 0.0, False
         self._wire_rng = wire_rng
+        self._low_passes: list[LowPass] = []
         self._adapter, self._bus = Adapter(), self._wired(bus, None)
         self.serial: dict[str, tuple[SerialDevice, VirtualWire, float]] = {}
         motors = [options for options in settings.devices.values() if isinstance(options, VescOptions)]
@@ -57,12 +60,20 @@ class VirtualBench:
         for name, options in settings.devices.items():
             if isinstance(options, VescOptions):
                 continue
-            force = LowPass(lambda: self.world.sample("thrust"), (filters or {}).get(name, 0.0), self.now)
-            device = serial_device(options, self.world, cross_rng, EPOCH, force)
+            device = serial_device(options, self.world, cross_rng, EPOCH, self._cell((filters or {}).get(name, 0.0)))
             self.serial[name] = (device, self._wired(name, options.baud), turnaround(options))
         self._ends = [self._bus, *(wire for _, wire, _ in self.serial.values())]
         self.wires: Mapping[str, VirtualWire] = {wire.name: wire for wire in self._ends}
         self._next_stall = self._until_stall()
+
+    def _cell(self, time_constant: float) -> Callable[[], float] | None:
+        """What a converter behind a low pass reads; None without one."""
+        if not time_constant:
+            return None
+        low_pass = LowPass(time_constant)
+        low_pass.follow(self.world.exact("thrust"), 0.0)
+        self._low_passes.append(low_pass)
+        return lambda: self.world.converted("thrust", low_pass.value)
 
     def _wired(self, name: str, baud: int | None) -> VirtualWire:
         return VirtualWire(name, self, Wire(baud, self._wire_rng), self.host, self._host_rng)
@@ -119,13 +130,16 @@ class VirtualBench:
         self._move_world(t)
 
     def _move_world(self, t: float) -> None:
-        step, world, vesc, tap = self.settings.step, self.world, self.vesc, self._tap
+        world, vesc, tap = self.world, self.vesc, self._tap
+        step = min(self.settings.step, FILTERED) if self._low_passes else self.settings.step
         state = world.state
         while (left := t - state.t) > SAME:
             dt = min(step, left)
             volts, amps = vesc.drive(state.n, dt)
             world.step(dt, volts, amps)
             tap.after_step(dt)
+            for low_pass in self._low_passes:
+                low_pass.follow(world.exact("thrust"), dt)
         self._t = max(t, self._t)
 
     def _happen(self, t: float) -> None:

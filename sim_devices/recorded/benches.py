@@ -142,7 +142,8 @@ def _acquired(rate: float, average: int, low_pass: float) -> dict[str, float | s
     """What the bench file says of a converter: its window, its filter's group delay at low frequencies."""
     told: dict[str, float | str] = {"window": 1.0 / rate} if average > 1 else {}
     if low_pass:
-        told |= {"delay": low_pass, "filter": f"low pass, first order, {1.0 / (2.0 * np.pi * low_pass):.3g} Hz"}
+        told |= {"delay": low_pass, "low_pass": low_pass}
+        told |= {"filter": f"low pass, first order, {1.0 / (2.0 * np.pi * low_pass):.3g} Hz"}
     return told
 
 

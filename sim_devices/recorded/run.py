@@ -59,7 +59,7 @@ def virtual_bench(drawn: Drawn) -> VirtualBench:
 def noises(drawn: Drawn) -> dict[str, Noise]:
     """Of each conversion: so loud that a reading, which may be the mean of several, has the noise of the case.
 
-    A low pass passes over noise and force alike: at the frequencies that it takes away nothing is seen better or worse.
+    It is the converter's: behind a low pass of the amplifier.
     """
     law = drawn.case.noise
     found = {sensor.quantity: Noise(white=sensor.law.white) for sensor in drawn.case.sensors}

@@ -118,8 +118,11 @@ class World:
 
     def sample(self, channel: str) -> float:
         """What the sensor of `channel` gives now, with noise, clipping and fault. SI; NaN: no number."""
+        return self.converted(channel, self.exact(channel))
+
+    def converted(self, channel: str, value: float) -> float:
+        """What the converter of `channel` makes of the value before it, now: noise, clipping and fault."""
         s = self.state
-        value = self.exact(channel)
         value += self._noise[channel].sample(value, s.t)
         for e in self._outputs[channel]:
             value = e.apply(value, s, 0.0)

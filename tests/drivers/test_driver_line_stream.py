@@ -96,3 +96,10 @@ def test_counts_round_trip(counts):
 def test_impossible_stream_options(options, sentence):
     with pytest.raises(ValueError, match=sentence):
         stream_options(**options)
+
+
+def test_a_low_pass_whose_delay_is_not_told_is_refused():
+    told = {"port": "p", "pattern": r"(?P<raw>-?\d+)", "rate": 80.0, "line_characters": 11}
+    assert line_stream.Options(**told, delay=0.004, low_pass=0.003).low_pass == 0.003
+    with pytest.raises(ValueError, match=r"low_pass must be between 0 and its delay \(0.001 s\).*add it to delay"):
+        line_stream.Options(**told, delay=0.001, low_pass=0.003)

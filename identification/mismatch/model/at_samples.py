@@ -1,7 +1,8 @@
-"""What a model says of the thrust at the samples: of an instant, or of the window that each is a mean over."""
+"""What a model says of the thrust at the samples: of an instant, or what the converter makes of it."""
 
 from __future__ import annotations
 
+from identification.mismatch.model.converted import beside_means
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.predictor import predict
@@ -20,11 +21,12 @@ def at_samples(
     history = run.history
     F, x = predict(model, theta, run, scale, tare)
     share = theta.C * shown(model, theta, history, F, x, tare)
-    if history.window > 0:
+    if not history.converter.instant and history.ticks is None:
         F = F + share * history.excess
     if theta.shift:
         F = run.delayed(F, theta.shift)
-    if history.window > 0:
-        return run.averaged(F), x
+    if not history.converter.instant:
+        more = share * beside_means(model, theta, run, x, scale, late, tare) if history.ticks is not None else 0.0
+        return run.converted(F) + more, x
     more = share * ahead(model, theta, run, x, scale, late, tare)
     return reconstructed(F, history.middle, history.sampled) + more, x

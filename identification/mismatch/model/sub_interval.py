@@ -24,6 +24,13 @@ from identification.run_history.sub_interval_dynamics import Passed
 from identification.run_history.sub_interval_leads import curvature, each_lead, lead
 
 
+def dynamics_between(model: Model, theta: Theta, history: History, largest: float, late: float) -> Passed:
+    """What a model has between the driver and a force that comes `late` s after, as far as its ticks show it."""
+    delay = late if _is_late(late, history) else 0.0
+    passed = Passed(_rotor(model, theta, largest), _ring(model, theta), delay)
+    return passed if _changes(passed, history) else Passed(delay=delay)
+
+
 def delay_of(model: Model, theta: Theta) -> float:
     """Time in s by which the force comes after the driver."""
     return sum(each.delay for each in _dynamics(model, theta, 1.0))

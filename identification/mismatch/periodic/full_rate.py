@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, raw
+from identification.mismatch.model.converted import converted_samples
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.sub_interval import sample_lead
@@ -32,9 +33,12 @@ def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
         F, x = predict(fitted.model, fitted.theta, run, data.scale, tare)
         if fitted.theta.shift:
             F = delayed(F, h.edges, fitted.theta.shift)
-        at = within_intervals(F, h.edges, h.sample_time)
-        rate = within_intervals(x, h.edges, h.sample_time)
-        at += fitted.theta.C * sample_lead(fitted.model, fitted.theta, run, rate, data.scale.driver)
+        if h.converter.instant:
+            at = within_intervals(F, h.edges, h.sample_time)
+            rate = within_intervals(x, h.edges, h.sample_time)
+            at += fitted.theta.C * sample_lead(fitted.model, fitted.theta, run, rate, data.scale.driver)
+        else:
+            at = converted_samples(fitted.model, fitted.theta, run, F, data.scale.driver)
         residual = h.sample_thrust - at - tare
         speed = fitted.theta.k * x if follows else h.others.get("rotation_rate", x)
         out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time)))

@@ -19,7 +19,8 @@ def as_sampled(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     """The recording with each sample at the time that its value is of, and a sentence for each stream changed so.
 
     Rows of a device with an even clock of its own (`period` and `clock_drift_std`) are put on that clock; then
-    `delay` and half of `window` are taken off. Values that were cut toward zero get half a `quantum` back.
+    `delay` and half of `window` are taken off, but for what a low pass delays thrust: a model predicts that. Values
+    that were cut toward zero get half a `quantum` back.
     """
     clocks: dict[str, Floats] = {}
     told: dict[str, str] = {}
@@ -51,9 +52,10 @@ def _clock(channel: Channel) -> tuple[Floats, str]:
 
 
 def _late(channel: Channel) -> float:
-    """S by which a stamp is after the middle of what the value is of."""
+    """S by which a stamp is after the middle of what the value is of, or of what a low pass made of it."""
     how = channel.acquisition
-    return (how.delay or 0.0) + 0.5 * (how.window or 0.0)
+    modelled = (how.low_pass or 0.0) if channel.quantity == "thrust" else 0.0
+    return (how.delay or 0.0) - modelled + 0.5 * (how.window or 0.0)
 
 
 def _uncut(channel: Channel) -> Channel:

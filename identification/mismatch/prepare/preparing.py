@@ -11,6 +11,7 @@ from identification.mismatch import policy
 from identification.mismatch.prepare.channels import followed, jumps, neighbour_at, supply, torque
 from identification.mismatch.prepare.grid import Held, distinct, edges_of
 from identification.recording import Channel, Floats, Recording
+from identification.run_history.converter import Converter
 from identification.run_history.history import CHANGED, History
 from identification.run_history.sub_interval_leads import with_leads
 
@@ -172,11 +173,11 @@ def _delay_std(recording: Recording, driver: Channel) -> float:
     return float(np.hypot(thrust.acquisition.delay_std or 0.0, driver.acquisition.delay_std or 0.0))
 
 
-def _window(recording: Recording) -> float:
-    """S that a thrust sample is the mean over, where the recording says so."""
+def _converter(recording: Recording) -> Converter:
+    """Of the thrust, as far as the recording says."""
     thrust = recording.first_of("thrust")
     assert thrust is not None
-    return thrust.acquisition.window or 0.0
+    return Converter(thrust.acquisition.window or 0.0, thrust.acquisition.low_pass or 0.0)
 
 
 def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, time: Floats, force: Floats) -> History:
@@ -223,7 +224,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         spacing=float(np.median(np.diff(time))),
         jitter=jitter_of(time),
         delay_std=_delay_std(recording, driver),
-        window=_window(recording),
+        converter=_converter(recording),
         rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
         static=_is_table(held, time.size),
     )

@@ -7,7 +7,7 @@ from identification.recording import Acquisition
 from rig.hdf5 import RecordingFile, load
 from rig.link.recorder_messages import ChannelSpec, StreamSpec
 
-HOW = {"delay": 0.0047, "delay_std": 0.0005, "window": 0.01, "quantum": 0.001, "filter": "Bessel, 4th order, 20 Hz"}
+HOW = {"delay": 0.0047, "delay_std": 0.0005, "window": 0.01, "quantum": 0.001, "filter": "RC, 50 Hz", "low_pass": 0.003}
 CLOCK = {"period": 0.01, "clock_drift_std": 1e-4}
 
 

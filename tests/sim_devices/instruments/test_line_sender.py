@@ -59,11 +59,12 @@ def test_options_that_cannot_be(wrong):
 
 
 def test_the_low_pass_follows_a_step_as_an_rc_does():
-    now, value = [0.0], [0.0]
-    filtered = LowPass(lambda: value[0], 0.02, lambda: now[0])
-    assert filtered() == 0.0
-    value[0] = 1.0
-    for now[0] in (0.005, 0.011, 0.04):
-        last = filtered()
-    assert last == pytest.approx(1.0 - exp(-0.04 / 0.02))
-    assert LowPass(lambda: 3.0, 0.0, lambda: 0.0)() == 3.0
+    filtered = LowPass(0.02)
+    filtered.follow(0.0, 0.0)
+    assert filtered.value == 0.0
+    for dt in (0.005, 0.006, 0.029):
+        filtered.follow(1.0, dt)
+    assert filtered.value == pytest.approx(1.0 - exp(-0.04 / 0.02))
+    without = LowPass(0.0)
+    without.follow(3.0, 0.001)
+    assert without.value == 3.0

@@ -9,6 +9,7 @@ from identification.mismatch.estimate.fitting import raw
 from identification.mismatch.prepare.acquisition import as_sampled
 from identification.physics.motor_lag import MotorLag
 from identification.recording import Acquisition, Recording
+from identification.run_history.converter import Converter
 from tests.identification.diagnosed_runs import C
 from tests.identification.mismatch.small import data_of, placed, short
 
@@ -40,11 +41,11 @@ def averaged(window):
 def test_the_mean_over_the_window_is_predicted(window):
     seen, _ = as_sampled(averaged(window))
     data, theta = data_of([seen])
-    assert data.histories[0].window == window
+    assert data.histories[0].converter.window == window
     model, theta = placed({LAG: (0.08,)}, replace(theta, C=C, tares=(0.0,)))
     (told,), _ = raw(model, theta, data, with_rate=False)
     error = np.sqrt(np.mean((told - data.thrust[0]) ** 2))
-    moment = replace(data, histories=(replace(data.histories[0], window=0.0),))
+    moment = replace(data, histories=(replace(data.histories[0], converter=Converter()),))
     (instant,), _ = raw(model, theta, moment, with_rate=False)
     assert error < 0.05
     assert error < 0.5 * np.sqrt(np.mean((instant - data.thrust[0]) ** 2))

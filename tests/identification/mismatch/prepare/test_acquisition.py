@@ -89,6 +89,12 @@ def test_a_stated_delay_and_half_a_window_are_taken_off():
     assert told == ("cell: thrust 70 ms before its stamp, as stated",)
 
 
+def test_a_low_pass_stays_in_the_thrust_for_a_model_to_predict():
+    time = np.arange(10.0)
+    (moved, _) = as_sampled(Recording("r", "T", (channel(time, delay=0.02, low_pass=0.008, window=0.1),)))
+    assert moved.channels[0].time == pytest.approx(time - 0.062)
+
+
 def test_nothing_is_moved_where_nothing_is_said():
     _, came = arrivals()
     recording = Recording("r", "T", (channel(came),))

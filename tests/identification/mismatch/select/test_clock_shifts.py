@@ -1,0 +1,64 @@
+"""A telemetry whose rows keep step with the command's ticks, and is late: its clock is found past the next tick."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.model.model import Model
+from identification.mismatch.select.baseline import baseline
+from identification.mismatch.select.clock_shifts import with_clock_shifts
+from identification.physics.motor_lag import MotorLag
+from identification.recording import Acquisition, Channel, Recording
+from tests.identification.diagnosed_runs import TOP, C
+from tests.identification.mismatch.small import data_of
+
+LATE = 0.002
+"""s"""
+
+
+def in_step(late=LATE):
+    """Ramps written and rates told a hundred times a second, the rate 2 ms late, rows scattered about the ticks."""
+    rng = np.random.default_rng(3)
+    when = 0.01 * np.arange(4000) + 0.003
+    volts = TOP * np.interp(when, np.arange(0.0, 41.0, 2.0), rng.uniform(-1.0, 1.0, 21))
+    volts = np.round(volts / 0.05) * 0.05
+    told = when + 0.0015 + rng.normal(0.0, 0.0006, when.size)
+    thrust = np.arange(0.5, 39.5, 0.05)
+
+    def held(t):
+        return volts[np.maximum(np.searchsorted(when, t, side="right") - 1, 0)]
+
+    F = C * held(thrust - late) * np.abs(held(thrust - late)) + 0.05 * rng.standard_normal(thrust.size)
+    rate = 2.0 * held(told - late) + 0.003 * rng.standard_normal(told.size)
+    unsure = Acquisition(delay_std=0.002)
+    channels = (
+        Channel("command_voltage", "command", "command_voltage", "V", when, volts, acquisition=unsure),
+        Channel("thrust", "cell", "thrust", "N", thrust, F),
+        Channel("rotation_rate", "motor", "rotation_rate", "rev/s", told, rate),
+    )
+    return Recording("in-step", "T1", channels, source="in-step.h5")
+
+
+def test_the_lateness_of_a_rate_in_step_is_found_past_a_tick():
+    data, theta = data_of([in_step()], clocks=True)
+    assert data.with_rate
+    assert with_clock_shifts(Model(), theta, data).rate_shift == pytest.approx(LATE, abs=2e-4)
+
+
+def test_nothing_that_smooths_ticks_is_wanted_beside_it():
+    """A lag of microseconds once took two thirds of the misfit away: it alone had found the hollow."""
+    data, theta = data_of([in_step()], clocks=True)
+    before = baseline(data, theta, (MotorLag("first_order"),), Model())
+    model, begin = before.fit.more(MotorLag("first_order"), (1e-5,))
+    lagging = fit(model, begin, data, before.weights)
+    assert before.fit.chi2 - lagging.chi2 < 10.0
+    assert before.fit.theta.rate_shift == pytest.approx(LATE, abs=2e-4)
+
+
+def test_clocks_that_agree_stay():
+    data, theta = data_of([in_step(0.0)], clocks=False)
+    assert with_clock_shifts(Model(), theta, data) == theta
+    doubted = replace(data, most_shift=0.006)
+    assert abs(with_clock_shifts(Model(), theta, doubted).rate_shift) < 2e-4
