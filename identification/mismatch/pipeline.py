@@ -40,6 +40,7 @@ class Draws(NamedTuple):
     locate: np.random.Generator
     unnamed: np.random.Generator
     answer: np.random.Generator
+    calm: np.random.Generator
 
     @classmethod
     def of(cls, seed: int) -> Draws:
@@ -90,6 +91,7 @@ def traced(
     if cleaned.changed:  # back: a line hides small terms, and is taken for some; a peak of the noise makes it louder
         found = search(cleaned.histories, draws.select_again, given=given, bands=cleaned.bands, without=without)
     selected = exchange_rivals(found, draws.exchange)  # goes back by itself where the exchange made another model
+    selected = locate.calmed(selected, draws.calm)  # back to the baseline: noise after steps looks like many effects
     located = locate.run(selected, draws.locate)
     now, data = located.estimate, selected.data
     unseen, unpredicted = predictable(prepared.held_out, sound.unseen, now)

@@ -11,10 +11,11 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.locate.residual_structure_test import ResidualStructure, residual_structure
 from identification.mismatch.locate.slow_change import beside_slow_change
+from identification.mismatch.locate.unrest import beside_unrest
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.whiteness import whiteness
-from identification.mismatch.select.forward_selection import Selected
+from identification.mismatch.select.forward_selection import Selected, Thruster
 from identification.mismatch.select.shape_error import corrections
 
 
@@ -32,10 +33,28 @@ class Located:
         return self.left.p_value < policy.locate.RESIDUAL_FALSE_ALARM
 
 
+def calmed(selected: Selected, rng: np.random.Generator) -> Selected:
+    """Without what was added to the baseline, where beside noise after steps that leaves nothing at all, nor any term
+    of the catalogue anything to take."""
+    data, before = selected.data, selected.before
+    if len(selected.after.fit.model.terms) == len(before.fit.model.terms):
+        return selected
+    unquiet = beside_unrest(before, data)
+    if unquiet is None:
+        return selected
+    judged = Thruster(data, selected.terms).judged(unquiet, rng)
+    left = residual_structure(unquiet.fit, data, unquiet.weights, rng)
+    if judged.largest > judged.threshold or left.p_value < policy.locate.RESIDUAL_FALSE_ALARM:
+        return selected
+    return replace(selected, after=before, last=judged, standing=None)
+
+
 def run(selected: Selected, rng: np.random.Generator) -> Located:
     """Structure over any covariate; else what the last screening could not carry; else a slow change."""
     data, after = selected.data, selected.after
     left = _with_colour(residual_structure(after.fit, data, after.weights, rng), after, data)
+    if left.p_value < policy.locate.RESIDUAL_FALSE_ALARM and (calm := _unrest(after, data, rng)):
+        return calm
     if left.p_value < policy.locate.RESIDUAL_FALSE_ALARM or not left.groups:
         return Located(after, left)
     last = selected.last
@@ -47,6 +66,15 @@ def run(selected: Selected, rng: np.random.Generator) -> Located:
     if beside is None:
         return Located(after, left)
     return Located(beside, _foremost_over(residual_structure(beside.fit, data, beside.weights, rng), ("time",)))
+
+
+def _unrest(after: Estimate, data: Data, rng: np.random.Generator) -> Located | None:
+    """The same with nothing left, where all that seemed to be is noise after steps."""
+    unquiet = beside_unrest(after, data)
+    if unquiet is None:
+        return None
+    calm = Located(after, residual_structure(unquiet.fit, data, unquiet.weights, rng))
+    return None if calm.structured else calm
 
 
 def _foremost_over(left: ResidualStructure, quantities: Collection[str]) -> ResidualStructure:

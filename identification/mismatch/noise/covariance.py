@@ -37,6 +37,8 @@ class Rows:
     """(n,) variance factor of the white part, above 1 for rows that are trusted less."""
     width: Floats
     """(n,) s over which the samples of a row are spread."""
+    unsettled: Floats | None = None
+    """(n,) N, by how much the thrust differs from its mean of late: what noise after steps goes with."""
 
 
 def rows_of(time: Floats, count: Floats, spacing: float) -> Rows:
@@ -81,6 +83,8 @@ class Noise:
     bands: tuple[tuple[float, float], ...] = ()
     """(frequency in Hz, quality) of each damped oscillator."""
     band: tuple[float, ...] = ()
+    after_steps: int = 0
+    """So many of the last scales are of noise that goes with what has not settled: their `slow` are relative."""
 
     @property
     def variances(self) -> Floats:
@@ -114,10 +118,10 @@ class Noise:
         none = np.empty((n, 0))
         c: list[float] = []
         gain2, U, V = [none], [none], [none]
-        for T in self.scales:
-            relaxed = _mean_wave(-spacing / T + 0j, rows.count).real[:, None]
+        for T, size in zip(self.scales, self._sizes(rows), strict=True):
+            relaxed = (size * _mean_wave(-spacing / T + 0j, rows.count).real)[:, None]
             c.append(1 / T)
-            gain2.append(_mean_variance(np.exp(-spacing / T + 0j), rows.count, 1.0))
+            gain2.append(size**2 * _mean_variance(np.exp(-spacing / T + 0j), rows.count, 1.0))
             U.append(relaxed)
             V.append(relaxed)
         for A, p in self._waves():
@@ -129,6 +133,14 @@ class Noise:
             V.append(np.column_stack([earlier.real, -earlier.imag]))
         left, right = np.column_stack(U), np.column_stack(V)
         return Shape(np.array(c), np.column_stack(gain2), np.ascontiguousarray(left), np.ascontiguousarray(right))
+
+    def _sizes(self, rows: Rows) -> list[Floats | float]:
+        """What each slow part is a multiple of: 1, or (n,) what has not settled."""
+        if not self.after_steps:
+            return [1.0] * len(self.scales)
+        if rows.unsettled is None:
+            raise ValueError("noise after steps needs rows that say how much the thrust has not settled")
+        return [1.0] * (len(self.scales) - self.after_steps) + [rows.unsettled] * self.after_steps
 
     def _waves(self) -> list[tuple[complex, complex]]:
         """A and p of each band: a damped oscillator whose kernel Re(A e^(p |dt|)) is 1 at 0."""
@@ -165,7 +177,7 @@ class Shapes:
         self._known = LeastRecentlyUsed[Shape](MOST_SHAPES)
 
     def __call__(self, noise: Noise, rows: Rows) -> Shape:
-        return self._known((noise.scales, noise.bands), lambda: noise.shape(rows), rows)
+        return self._known((noise.scales, noise.after_steps, noise.bands), lambda: noise.shape(rows), rows)
 
 
 MOSTLY = 0.8
@@ -189,6 +201,11 @@ class Whitener:
     @property
     def log_det(self) -> float:
         return float(np.sum(np.log(self._d)))
+
+    @property
+    def innovation(self) -> Floats:
+        """(n,) variance of each row, given those before it."""
+        return self._d
 
     def whiten(self, columns: Floats) -> Floats:
         """L^-1 columns for K = L L'; (n,) or (n, p)."""

@@ -43,6 +43,15 @@ SLOW_CHANGE_FALSE_ALARM = Threshold(
     ),
     evidence="benchmarks/diagnosis/hidden_gains.py prints the smallest p-values on clean recordings.",
 )
+UNREST_FALSE_ALARM = Threshold(
+    1e-4,
+    unit="probability",
+    reason=(
+        "Noise after steps is told from stationary noise only where it plainly describes more: it raises the bar of "
+        "what is left, and is looked for only where something seems to be."
+    ),
+    evidence="docs/proof.md, the lane `wide`: alarms of wide_near_steps and wide_mixture with it and without.",
+)
 PULSES = Count(
     4,
     unit="pulses",
