@@ -85,7 +85,7 @@ def _known(row: dict[str, Any]) -> Known:
     row["held_out"] = None if row["held_out"] is None else HeldOut(**row["held_out"])
     row["constant"] = Interval(**row["constant"]) if row.get("constant") else None
     row["intervals"] = tuple(Interval(**each) for each in row["intervals"])
-    row["strengths"] = tuple(row.get("strengths", ()))
+    row |= {name: tuple(row.get(name, ())) for name in ("strengths", "known")}
     return Known(Score(**row), version, asked)
 
 

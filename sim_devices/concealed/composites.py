@@ -60,13 +60,16 @@ def composite(
 ) -> Case:
     """A case with `effects` of FIELD, the amount of each drawn log-uniformly, its strength written beside.
 
-    What is not given is drawn as by `draw.case`. Raises ValueError for an effect that is not in FIELD.
+    What is not given is drawn as by `draw.case`. Magnets warm alone in a motor whose winding takes no voltage: beside a
+    winding loss it is the copper. Raises ValueError for an effect that is not in FIELD.
     """
     if unknown := set(effects) - set(FIELD):
         raise ValueError(f"field: expected some of {', '.join(FIELD)}, got {', '.join(sorted(unknown))}")
     drawn = bare(rng, (), plan, noise, 0.0, 0.0, sampling, duration, None, 1, "")
     drawn = with_bystanders(drawn, rng.spawn(1)[0], frozenset(effects))
-    return measured(replace(drawn, effects=tuple(_of_field_size(effect, drawn, rng) for effect in effects)))
+    forms = {"heating": "winding"} if "winding_resistance" in effects else {}
+    added = tuple(_of_field_size(effect, drawn, rng, forms.get(effect, "")) for effect in effects)
+    return measured(replace(drawn, effects=added))
 
 
 def difference(
@@ -109,9 +112,9 @@ def _again(first: Case, rng: Rng, more: str, strength: float) -> Case:
     return measured(second)
 
 
-def _of_field_size(effect: str, case: Case, rng: Rng) -> Concealed:
+def _of_field_size(effect: str, case: Case, rng: Rng, form: str) -> Concealed:
     low, high = FIELD[effect]
-    drawn = shape(effect, case.scale, rng)
+    drawn = shape(effect, case.scale, rng, form)
     if effect != "heating":
         return Concealed(drawn, _log(rng, low, high))
     share = _log(rng, low, min(high, warm_change(case, drawn, drawn.highest)))

@@ -14,7 +14,7 @@ from identification.mismatch import policy
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.static_gain import rotor_gain, thrust_gain
-from identification.physics.term import Scale
+from identification.physics.term import Scale, Term
 from identification.physics.traits import Dynamics, LimitsCommand, LimitsReading
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed
@@ -97,18 +97,20 @@ def sample_lead(model: Model, theta: Theta, run: RememberedRun, rate: Floats, la
 
 def passed_on(model: Model, theta: Theta, history: History) -> Floats | float:
     """(M,) or 1: the share of what the command does within an interval that the drive gives the rotor."""
-    for term, values in zip(model.terms, theta.terms, strict=True):
+    share: Floats | float = 1.0
+    for term, values, _ in _every(model, theta, 1.0):
         if term.traits.limits == "command":
-            return cast(LimitsCommand, term).passed(history, values)
-    return 1.0
+            share = share * cast(LimitsCommand, term).passed(history, values)
+    return share
 
 
 def shown(model: Model, theta: Theta, history: History, F: Floats, x: Floats, tare: float) -> Floats | float:
     """(M,) or 1: the share of what the force F (without tare) does within an interval that the cell shows."""
-    for term, values in zip(model.terms, theta.terms, strict=True):
+    share: Floats | float = 1.0
+    for term, values, _ in _every(model, theta, 1.0):
         if term.traits.limits == "reading":
-            return cast(LimitsReading, term).shown(history, theta.C, x, F + tare, values)
-    return 1.0
+            share = share * cast(LimitsReading, term).shown(history, theta.C, x, F + tare, values)
+    return share
 
 
 def _is_late(late: float, history: History) -> bool:
@@ -168,8 +170,15 @@ def _size(history: History, passed: Passed) -> float:
 
 
 def _rotor(model: Model, theta: Theta, largest: float) -> tuple[float, float] | None:
-    """Coefficients of a rotor that does not follow at once."""
-    return next((each.rotor for each in _dynamics(model, theta, largest) if each.rotor is not None), None)
+    """Coefficients of a rotor that does not follow at once; two lags one behind the other as one of both times."""
+    rotors = [each.rotor for each in _dynamics(model, theta, largest) if each.rotor is not None]
+    if len(rotors) < 2:
+        return rotors[0] if rotors else None
+    rates = [2 * quadratic * largest + linear for quadratic, linear in rotors]
+    slowest = int(np.argmin(rates))
+    share = 1 / (rates[slowest] * sum(1 / rate for rate in rates))
+    quadratic, linear = rotors[slowest]
+    return share * quadratic, share * linear
 
 
 def _ring(model: Model, theta: Theta) -> tuple[float, float, float] | None:
@@ -179,5 +188,12 @@ def _ring(model: Model, theta: Theta) -> tuple[float, float, float] | None:
 
 def _dynamics(model: Model, theta: Theta, largest: float) -> list[Dynamics]:
     """Of the terms that have such."""
-    every = zip(model.terms, theta.terms, strict=True)
-    return [term.traits.dynamics(term, values, largest) for term, values in every if term.traits.dynamics is not None]
+    every = _every(model, theta, largest)
+    return [term.traits.dynamics(term, values, at) for term, values, at in every if term.traits.dynamics is not None]
+
+
+def _every(model: Model, theta: Theta, largest: float) -> list[tuple[Term, tuple[float, ...], float]]:
+    """Terms given and found, with the driver that their values refer to."""
+    given = [(each.term, each.values, each.scale.driver) for each in model.given]
+    found = zip(model.terms, theta.terms, strict=True)
+    return [*given, *((term, values, largest) for term, values in found)]

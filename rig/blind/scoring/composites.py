@@ -53,6 +53,10 @@ def composite_besides(field: Sequence[Score], difference: Sequence[Score]) -> li
         of_rate("difference, one more: exactly it, and no rival stated", rate(s.alone for s in more)),
         of_rate("difference, one more: a name that is not there", rate(s.extra for s in more)),
         of_rate(
+            "difference: a name that is not new, for the first recording has it as well",
+            rate(bool(set(s.named) & set(s.known)) for s in difference),
+        ),
+        of_rate(
             "difference: a thrust constant that is said to have changed",
             rate(CHANGED_CONSTANT in s.named for s in difference),
         ),

@@ -96,6 +96,8 @@ class Score:
     """C of the model; None where the answer has none, or what is concealed gives it another meaning."""
     strengths: tuple[float, ...] = ()
     """d' of each effect of `truth` beside the others; empty where a lie is among them."""
+    known: tuple[str, ...] = ()
+    """Effects that an earlier recording of the same thruster had as well."""
 
     @property
     def right(self) -> bool:
@@ -201,6 +203,7 @@ def scored(
         case=described(truth),
         constant=thrust_constant(found, truth),
         strengths=strengths(truth),
+        known=tuple(truth.get("known", ())),
     )
 
 

@@ -44,6 +44,7 @@ def said(s: Score) -> dict[str, Any]:
         "id": s.order.id,
         "truth": list(s.truth),
         "strengths": [round(d, 1) for d in s.strengths],
+        "known": list(s.known),
         "verdict": s.said,
         "named": list(s.named),
         "rivals": list(s.rivals),

@@ -118,6 +118,9 @@ def test_only_what_came_on_top_is_hidden_in_a_second_recording(tmp_path):
     found = scored(Order("difference/one_more/0"), sealed, told)
     assert (found.truth, found.strengths) == (("heating",), (40.0,))
     assert (found.right, found.exact, found.extra) == (True, False, True)
+    assert found.known == ("asymmetry",)
+    not_new = {g.what: g.value for g in composite_besides((), [found])}
+    assert not_new["difference: a name that is not new, for the first recording has it as well"] == 1.0
     assert found.intervals == ()  # what comes on top of a known effect is not that effect's own value
     write(tmp_path / "scores.jsonl", [Known(found, "abc", "def")])
     assert read(tmp_path / "scores.jsonl") == [Known(found, "abc", "def")]

@@ -46,6 +46,11 @@ def test_heating_of_field_size_changes_the_warm_thrust_by_its_amount(form):
     assert warm_change(case, doubled, 2.0 * heating.amount) > 1.5 * heating.amount
 
 
+def test_beside_a_winding_loss_the_copper_warms():
+    found = [concealed.composite(rng(seed), ["heating", "winding_resistance"], **SHORT) for seed in range(6)]
+    assert {case.effects[0].parameters["form"] for case in found} == {"winding"}
+
+
 def test_the_same_generator_gives_the_same_composite():
     one, other = (concealed.composite(rng(4), TWO, **SHORT) for _ in range(2))
     assert [e.amount for e in one.effects] == [e.amount for e in other.effects]

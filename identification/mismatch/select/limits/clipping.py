@@ -21,7 +21,7 @@ from identification.physics.term import Term, TermContext
 from identification.recording import Floats
 
 POWERS = {"current": 2.0, "rotation_rate": 1.0, "motor_voltage": 1.0}
-"""Quantities that tell, and about how each goes with the driver."""
+"""Quantities that tell, and how each goes with the rate; the voltage about so."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,34 +59,36 @@ def beyond(fitted: Fit, term: Term, data: Data) -> tuple[GoesOn, ...]:
         if data.histories[0].driver_quantity == quantity or any(quantity not in h.others for h in data.histories):
             continue
         parts = []
-        for h, (rows, over, kept) in zip(data.histories, sides, strict=True):
-            of_kept = power if term.traits.limits == "command" else 0.5 * power  # force goes with the driver squared
-            f, was = np.abs(h.driver[rows]) ** power, kept[rows] ** of_kept
+        for h, (rows, over, kept, rate) in zip(data.histories, sides, strict=True):
+            of_kept = power if term.traits.limits == "command" else 0.5 * power  # force goes with the rate squared
+            f, was = rate[rows] ** power, kept[rows] ** of_kept
             parts.append((f, np.abs(h.others[quantity][rows]), over[rows], was))
         told = _goes_on(quantity, *(np.concatenate(column) for column in zip(*parts, strict=True)))
         out += [told] if told is not None else []
     return tuple(out)
 
 
-def _sides(fitted: Fit, term: Term, data: Data, run: int) -> tuple[NDArray[np.intp], NDArray[np.bool_], Floats]:
-    """Settled rows of a run; (M,) whether the limit is passed; (M,) what of it comes through, in its own unit.
+def _sides(fitted: Fit, term: Term, data: Data, run: int) -> tuple[NDArray[np.intp], NDArray[np.bool_], Floats, Floats]:
+    """Settled rows of a run; (M,) whether the limit is passed; (M,) what of it comes through, in its own unit; (M,) the
+    size of the rate if nothing clipped, in units of the driver: with a loss in the winding, say, it bends by itself.
 
-    The unit is that of the driver or of the reading, its largest 1.
+    The unit is that of the driver or of the reading.
     """
     h, values, tare = data.histories[run], fitted.values[term], fitted.theta.tares[run]
+    free, rate = predict(*fitted.less(term), data.runs[run], data.scale, tare)
     if term.traits.limits == "command":
         whole = np.abs(h.driver)
         now = TermContext(data.runs[run], data.scale, fitted.theta.C, tare, h.driver)
         kept = np.abs(term.apply(h.driver, now, values))
     else:
-        whole = np.abs(predict(*fitted.less(term), data.runs[run], data.scale, tare)[0] + tare)
+        whole = np.abs(free + tare)
         kept = np.abs(predict(fitted.model, fitted.theta, data.runs[run], data.scale, tare)[0] + tare)
     rows = np.flatnonzero(h.since_step > policy.select.GOES_ON_SETTLED)
-    return rows, kept < (1 - policy.select.GOES_ON_DEPTH) * whole, kept
+    return rows, kept < (1 - policy.select.GOES_ON_DEPTH) * whole, kept, np.abs(rate)
 
 
 def _goes_on(quantity: str, f: Floats, value: Floats, over: NDArray[np.bool_], kept: Floats) -> GoesOn | None:
-    """By a straight line over f (n,), the driver to the quantity's power, through rows below the limit."""
+    """By a straight line over f (n,), the rate to the quantity's power, through rows below the limit."""
     good = np.isfinite(value)
     f, value, over, kept = f[good], value[good], over[good], kept[good]
     least = policy.select.GOES_ON_ROWS

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from identification.mismatch.estimate.fitting import raw
-from identification.mismatch.model.model import Model
+from identification.mismatch.model.model import Given, Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.sub_interval import delay_of, passed_on, sample_lead, shown
@@ -93,6 +93,41 @@ def test_a_delay_passes_ticks_on_late(moving, tau):
     assert np.std(off) < 0.003
     smooth, _ = predict(Model(model), Theta(C, values, (0.0,)), data.runs[0], data.scale)
     assert np.std(smooth[h.rows] - true) > 0.008
+
+
+def test_what_a_twin_gives_is_passed_on_as_what_is_found(moving):
+    """A given lag was left out of the ticks: each run with a moving command got a second lag, or up and down apart."""
+    data, start, volts = moving
+    h = data.histories[0]
+    model, values = (LAG, SKEW), ((0.05,), (0.03,))
+    given = Model((), tuple(Given(t, v, data.scale) for t, v in zip(model, values, strict=True)))
+    theta = Theta(C, (), (0.0,))
+    found, _ = raw(Model(model), replace(theta, terms=values), data, with_rate=False)
+    told_by_twin, _ = raw(given, theta, data, with_rate=False)
+    assert told_by_twin[0] == pytest.approx(found[0], abs=1e-12)
+    true = means(h, at_samples(start, volts, h.sample_time, 0.05, 0.03))[h.rows]
+    assert np.std((told_by_twin[0] - true)[h.middle[h.rows] > 1.0]) < 0.003
+    assert delay_of(given, theta) == pytest.approx(0.03)
+    limit = Given(LoadCellSaturation("hard"), (20.0,), data.scale)
+    F = C * h.driver * np.abs(h.driver)
+    share = np.broadcast_to(shown(Model((), (limit,)), theta, h, F, h.driver, 0.0), F.shape)
+    assert np.all(share[F > 21.0] == 0.0)
+
+
+def test_a_lag_on_top_of_a_given_one_passes_ticks_on_as_one_of_both_times(moving):
+    data = moving[0]
+    theta = Theta(C, ((0.02,),), (0.0,))
+    both = Model((LAG,), (Given(LAG, (0.08,), data.scale),))
+    one, _ = raw(Model((LAG,)), Theta(C, ((0.1,),), (0.0,)), data, with_rate=False)
+    two, _ = raw(both, theta, data, with_rate=False)
+    smooth = [
+        predict(m, t, data.runs[0], data.scale)[0]
+        for m, t in ((both, theta), (Model((LAG,)), Theta(C, ((0.1,),), (0.0,))))
+    ]
+    h = data.histories[0]
+    later = h.middle[h.rows] > 1.0
+    ticks_of = [seen[0] - line[h.rows] for seen, line in zip((two, one), smooth, strict=True)]
+    assert np.std((ticks_of[0] - ticks_of[1])[later]) < 0.1 * np.std(ticks_of[1][later])
 
 
 def test_at_every_sample_a_lag_is_seen_too(moving):

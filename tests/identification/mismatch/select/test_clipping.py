@@ -10,6 +10,7 @@ from identification.mismatch.select.limits.clipping import beyond, contradiction
 from identification.physics.cavitation import Cavitation
 from identification.physics.command_saturation import CommandSaturation
 from identification.physics.load_cell_saturation import LoadCellSaturation
+from identification.physics.winding_resistance import WindingResistance
 from identification.recording import Channel
 from tests.identification.diagnosed_runs import NOISE, C, run
 from tests.identification.mismatch.pipeline.whole_diagnoses import diagnosed
@@ -64,6 +65,30 @@ def test_what_else_does_beyond_a_limit_is_measured(quantity, what, term):
     if said:
         assert quantity.replace("_", " ") in said
         assert said in {check.failed for check in checks(estimate, term, data, 1)}
+
+
+def test_a_rate_that_bends_by_itself_does_not_stop_with_the_thrust():
+    """A third of the voltage is lost in the winding: over the command the rate bends, and seemed to stop at the cell's
+    limit. Over the rate that the model has it goes on."""
+    loss, limit = 0.05, 26.0
+
+    def back_emf(V):
+        return 2.0 * V / (1.0 + np.sqrt(1.0 + 4.0 * loss * np.abs(V)))
+
+    def cell(_t, V, _F):
+        return np.clip(C * back_emf(V) * np.abs(back_emf(V)), -limit, limit)
+
+    made = run(cell, seconds=120.0, rate=20.0)
+    command, thrust = made.channels
+    V = command.value[np.maximum(np.searchsorted(command.time, thrust.time, side="right") - 1, 0)]
+    turning = 3 * back_emf(V) + 0.02 * rng(5).standard_normal(V.size)
+    rate = Channel("rate", "tacho", "rotation_rate", "rev/s", thrust.time, turning)
+    winding = WindingResistance()
+    values = {winding: (loss,), CELL: (limit,)}
+    data, estimate = known_noise(values, [replace(made, channels=(command, thrust, rate))], NOISE)
+    (told,) = beyond(estimate.fit, CELL, data)
+    assert told.share == pytest.approx(1.0, abs=max(4 * told.std, 0.05))
+    assert contradiction(estimate.fit, CELL, estimate.noise, data) == ""
 
 
 def test_nothing_is_said_where_nothing_was_recorded_or_nothing_clips():
