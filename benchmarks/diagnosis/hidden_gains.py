@@ -2,7 +2,7 @@
 
     python benchmarks/diagnosis/hidden_gains.py [N [EFFECT [SIGMA]]]  # 8 of each kind of noise, zero_drift, 8
 
-The search tries a term that no screening finds by estimating term and noise together (`forward_selection._hidden`), and
+The search tries a term that no screening finds by estimating term and noise together (`select.hidden`), and
 believes it from a gain in deviance on; those prices (STEADY_TERM_FALSE_ALARM, HIDDEN_OFFSET_PRICE and HIDDEN_TERM_PRICE
 of policy.select) were set by this table. On clean recordings every term that would be tried is told by the largest
 gains it reached; then the gains of EFFECT where an oracle sees it at SIGMA. `asked` is the median of what the search
@@ -37,6 +37,7 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.prepare.stage import histories_of
 from identification.mismatch.select import forward_selection as search
+from identification.mismatch.select import hidden as unhiding
 from identification.mismatch.select.baseline import baseline, start
 from identification.mismatch.select.screening import Screening, directions, refined, screen
 from identification.mismatch.select.shape_error import allowed, corrections
@@ -90,14 +91,14 @@ def seen(case: concealed.Case, *without: str) -> Seen:
 
 def _tried(estimate: Estimate, judged: Screening, data: Data) -> Iterator[Gain]:
     now = refresh(estimate.fit.model, estimate.fit.theta, data, None, None)
-    for term, values, screened in judged.best(2 * search.MOST_HIDDEN):
+    for term, values, screened in judged.best(2 * unhiding.MOST_HIDDEN):
         if screened < LEAST:
             continue
         begin = refined(estimate.fit, data, estimate.weights, term, values)
         bigger, theta = estimate.fit.more(term, begin)
         first = fit(bigger, theta, data, estimate.weights)
         new = refresh(bigger, first.theta, data, None, now, now.noise)
-        asked = search._asked_of_hidden(term, judged, data)
+        asked = unhiding.asked_of(term, judged, data)
         yield Gain(term.id, screened, now.fit.deviance - new.fit.deviance, asked)
 
 

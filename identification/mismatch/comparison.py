@@ -19,7 +19,8 @@ from identification.mismatch import policy
 from identification.mismatch.compare.simulation import Drive, held, others_of, simulate
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.next_experiment.sweeps import Limits
-from identification.mismatch.pipeline import diagnose
+from identification.mismatch.observer import UNWATCHED, Observer
+from identification.mismatch.pipeline import INTERRUPTED, diagnose
 from identification.mismatch.prepare.preparing import DRIVERS, Refusal
 from identification.recording import Channel, Floats, Recording
 from identification.twin import Twin
@@ -45,11 +46,13 @@ def compare(
     seed: int = 0,
     holdout: Sequence[Recording] = (),
     limits: Limits | None = None,
+    watch: Observer = UNWATCHED,
 ) -> Compared | Refusal:
     """What the simulation leaves out relative to the real recording.
 
     `holdout`: real runs that are only predicted, by the description of the simulation, for nobody simulated them.
-    `limits`: of the next experiment, as for diagnose().
+    `limits`: of the next experiment, as for diagnose(). `watch`: of both diagnoses; one that ends the search of the
+    simulation ends that of the recording too.
     """
     drives = _driver(simulation), _driver(real)
     sim_driver, real_driver = drives
@@ -63,7 +66,7 @@ def compare(
     wrong = _disagreement(simulation, real)
     if wrong is not None:
         return wrong
-    known = _described(simulation, real, seed)
+    known = _described(simulation, real, seed, watch)
     if isinstance(known, Refusal):
         return known
     twin = known.twin
@@ -77,7 +80,7 @@ def compare(
     lines = twin.lines if np.all(left == 0) else ()  # else they were subtracted as they are
     twin = replace(twin, thruster=real.thruster, origin=origin, sources=sources, covariance=exact, lines=lines)
     recording = _less(real, left)
-    found = diagnose([recording], holdout, seed, twin, limits)
+    found = diagnose([recording], holdout, seed, twin, limits, watch=watch)
     if isinstance(found, Refusal):
         return found
     rms = float(np.sqrt(np.nanmean(left**2)))
@@ -174,7 +177,7 @@ def sample_noise(channel: Channel) -> float:
     return float(np.median(np.abs(second)) / 0.6745 / np.sqrt(6)) if second.size else 0.0
 
 
-def _described(simulation: Recording, real: Recording, seed: int) -> Diagnosis | Refusal:
+def _described(simulation: Recording, real: Recording, seed: int, watch: Observer) -> Diagnosis | Refusal:
     """The diagnosis of the simulation, made as noisy as needed."""
     thrust, measured = simulation.first_of("thrust"), real.first_of("thrust")
     assert thrust is not None
@@ -183,7 +186,7 @@ def _described(simulation: Recording, real: Recording, seed: int) -> Diagnosis |
     wanted = max(sample_noise(measured), 1e-5 * size)
     added = float(np.sqrt(max(wanted**2 - sample_noise(thrust) ** 2, 0.0)))
     noisy = thrust.value + added * np.random.default_rng([seed, 1]).standard_normal(thrust.value.size)
-    return diagnose([_with_thrust(simulation, thrust, noisy)], seed=seed)
+    return diagnose([_with_thrust(simulation, thrust, noisy)], seed=seed, watch=watch)
 
 
 def _with_thrust(recording: Recording, thrust: Channel, value: Floats) -> Recording:
@@ -220,7 +223,8 @@ def _less(real: Recording, left: Floats) -> Recording:
 def _told(found: Diagnosis, known: Diagnosis, offset: float, rms: float, held_out: int) -> Diagnosis:
     """With what was done to the simulation."""
     terms = ", ".join(known.model_terms) or "nothing else"
-    notes = [f"The simulation was found to be {known.baseline_model} with {terms}; these are part of the baseline."]
+    notes = [note for note in known.notes if note.startswith(INTERRUPTED)]
+    notes += [f"The simulation was found to be {known.baseline_model} with {terms}; these are part of the baseline."]
     if rms > 0:
         notes.append(
             f"What it has beyond that ({rms:.3g} N rms) was subtracted as it is; a twin that is saved does not hold it."

@@ -15,7 +15,9 @@ from identification.mismatch.faults import stage as faults
 from identification.mismatch.locate import stage as locate
 from identification.mismatch.name import stage as name
 from identification.mismatch.next_experiment import stage as next_experiment
+from identification.mismatch.observer import UNWATCHED, Observer
 from identification.mismatch.periodic import stage as periodic
+from identification.mismatch.periodic.stage import untouched
 from identification.mismatch.prepare import stage as prepare
 from identification.mismatch.prepare.channel_availability import predictable
 from identification.mismatch.prepare.preparing import Refusal
@@ -29,6 +31,11 @@ if TYPE_CHECKING:
     from identification.mismatch.next_experiment.sweeps import Limits
     from identification.recording import Recording
     from identification.twin import Twin
+
+
+INTERRUPTED = "Interrupted"
+NO_LINES = "which periodic disturbances there are"
+NO_SHAPE = "which shape what is left has"
 
 
 class Draws(NamedTuple):
@@ -54,18 +61,20 @@ def diagnose(
     baseline: Twin | None = None,
     limits: Limits | None = None,
     without: Collection[str] = (),
+    watch: Observer = UNWATCHED,
 ) -> Diagnosis | Refusal:
     """Everything that `rig diagnose` says, for recordings of one thruster. A Refusal says what is wrong with them.
 
     `baseline`: a twin in the place of C V|V|; its terms keep their values, findings are what lies beyond them.
     `limits`: of the next experiment; None: what was recorded may be run again, for BUDGET s.
     `without`: ids of effects taken out of the catalogue (what does the tool say of a physics that it does not know?).
+    `watch`: is told how far it is, and may end the search; then a note says what was not asked.
     """
     if any(r.kind == "vehicle" for r in recordings):
         from identification.mismatch.vehicle.diagnose import diagnose_vehicle  # as much again to start, for a few
 
         return diagnose_vehicle(recordings, holdout, seed, without=without)
-    found = traced(recordings, holdout, seed, baseline, limits, without)
+    found = traced(recordings, holdout, seed, baseline, limits, without, watch)
     return found if isinstance(found, Refusal) else found.diagnosis
 
 
@@ -76,22 +85,31 @@ def traced(
     baseline: Twin | None = None,
     limits: Limits | None = None,
     without: Collection[str] = (),
+    watch: Observer = UNWATCHED,
 ) -> Trace | Refusal:
     """The same of a thruster, with what each stage handed on."""
     baseline = None if baseline is None else lasting(baseline, recordings)
     draws, given = Draws.of(seed), None if baseline is None else starting(baseline)
+    watch.stage("reading the runs")
     prepared = prepare.run(recordings, holdout, baseline)
     if isinstance(prepared, Refusal):
         return prepared
     sound = faults.run(prepared, None if baseline is None else baseline.rate_per_driver)
     if isinstance(sound, Refusal):
         return sound
-    first = found = search(sound.histories, draws.select, given=given, without=without)
-    cleaned = periodic.run(first.after.fit, first.data, sound.histories)
+    watch.stage("looking for effects")
+    first = found = search(sound.histories, draws.select, given=given, without=without, watch=watch)
+    original = sound.histories
+    cleaned = untouched(original) if found.undone else periodic.run(first.after.fit, first.data, original)
     if cleaned.changed:  # back: a line hides small terms, and is taken for some; a peak of the noise makes it louder
-        found = search(cleaned.histories, draws.select_again, given=given, bands=cleaned.bands, without=without)
-    selected = exchange_rivals(found, draws.exchange)  # goes back by itself where the exchange made another model
+        watch.stage("looking again, without lines")
+        found = search(
+            cleaned.histories, draws.select_again, given=given, bands=cleaned.bands, without=without, watch=watch
+        )
+    watch.stage("asking for rivals")
+    selected = exchange_rivals(found, draws.exchange, watch)  # goes back where the exchange made another model
     selected = locate.calmed(selected, draws.calm)  # back to the baseline: noise after steps looks like many effects
+    watch.stage("judging by what was not fitted")
     located = locate.run(selected, draws.locate)
     now, data = located.estimate, selected.data
     unseen, unpredicted = predictable(prepared.held_out, sound.unseen, now)
@@ -99,7 +117,16 @@ def traced(
     validated = validate.run(now, named, data, unseen)
     completed = unnamed.run(selected, located, validated, unseen, draws.unnamed)
     news = told_lines(cleaned.lines, baseline)
-    experiment = next_experiment.run(now, data, completed.earned, news, limits)
-    case = answer.Case(prepared.recordings, sound, unseen, cleaned.lines, baseline, (*sound.notes, *unpredicted))
+    experiment = None if selected.undone else next_experiment.run(now, data, completed.earned, news, limits)
+    undone = (*selected.undone, *((NO_LINES,) if first.undone else ()))
+    notes = (*interrupted(undone), *sound.notes, *unpredicted)
+    case = answer.Case(prepared.recordings, sound, unseen, cleaned.lines, baseline, notes)
     diagnosis = answer.run(case, selected, located, completed, experiment, draws.answer)
     return Trace(prepared, sound, first, cleaned, selected, located, named, validated, completed, diagnosis)
+
+
+def interrupted(undone: Sequence[str]) -> tuple[str, ...]:
+    """What is said of a search that was: what was not asked."""
+    if not undone:
+        return ()
+    return (f"{INTERRUPTED} before it was asked {'; '.join((*undone, NO_SHAPE))}. Begin again for a whole answer.",)

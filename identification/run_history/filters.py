@@ -179,9 +179,10 @@ def places_of(edges: Floats, at: Floats) -> tuple[NDArray[np.intp], Floats]:
 def integral_at(value: Floats, dt: Floats, places: tuple[NDArray[np.intp], Floats]) -> Floats:
     """As `integral`, at places that are known."""
     index, since = places
-    total = np.cumsum(value * dt)
-    before: Floats = np.where(index > 0, total[index - 1], 0.0)
-    before += since * value[index]
+    total = np.zeros(value.size + 1)
+    np.cumsum(value * dt, out=total[1:])
+    before: Floats = total.take(index)
+    before += since * value.take(index)
     return before
 
 

@@ -14,6 +14,7 @@ import click
 
 from rig.diagnose.next_plan import write_next
 from rig.diagnose.outputs import PATH, Wanted, answer_options, holdout_option, seed_option, wanted_of
+from rig.diagnose.progress import observed
 from rig.diagnose.recording_names import file_names, told_by_name, with_names
 from rig.diagnose.vehicle import VehicleFiles, diagnose_vehicle_files, is_vehicle, refuse_for_tunnel
 from rig.errors import RecordingError, RigError
@@ -23,6 +24,7 @@ if TYPE_CHECKING:  # numpy and scipy come up when a diagnosis is made, not for `
     from identification.mismatch.answer.trace import Trace
     from identification.mismatch.diagnosis import Diagnosis
     from identification.mismatch.next_experiment.sweeps import Limits
+    from identification.mismatch.observer import Observer
     from identification.recording import Recording
     from identification.twin import Twin
     from rig.campaign.config import CampaignConfig
@@ -75,12 +77,14 @@ def diagnose_files(
     vehicle: VehicleFiles = NO_VEHICLE,
     wanted: Wanted = NOTHING,
     watched: Callable[[Trace], object] | None = None,
+    observer: Observer | None = None,
 ) -> Diagnosis:
     """The diagnosis of recordings of one thruster, against C V|V| or a twin; its own twin knows the files' hashes.
 
     Of recordings of a vehicle, against its drag and its thrusters' models; `vehicle` says what is known of it.
     `limits`: of the next experiment. `wanted`: what is to be written of the answer; what cannot be is refused before
-    anything is computed. `watched` is given what each stage of a thruster's diagnosis handed on.
+    anything is computed. `watched` is given what each stage of a thruster's diagnosis handed on, `observer` is told how
+    far it is and may end its search.
     Raises RecordingError or ConfigError for what cannot be used, TwinError for such a twin.
     """
     from rig.twin.reading import read_twin
@@ -98,7 +102,7 @@ def diagnose_files(
     refuse_for_tunnel(vehicle)
     if baseline is not None and any_thruster:
         baseline = replace(baseline, thruster=recordings[0].thruster)
-    trace = traced(recordings, read(held), seed, baseline, limits)
+    trace = traced(recordings, read(held), seed, baseline, limits, observer)
     if watched is not None:
         watched(trace)
     found = trace.diagnosis
@@ -126,12 +130,14 @@ def traced(
     seed: int = 0,
     baseline: Twin | None = None,
     limits: Limits | None = None,
+    observer: Observer | None = None,
 ) -> Trace:
     """As identification has it for a thruster, a refusal raised as RecordingError."""
+    from identification.mismatch.observer import UNWATCHED
     from identification.mismatch.pipeline import traced as trace_of
     from identification.mismatch.prepare.preparing import Refusal
 
-    found = trace_of(recordings, holdout, seed, baseline, limits)
+    found = trace_of(recordings, holdout, seed, baseline, limits, watch=observer or UNWATCHED)
     if isinstance(found, Refusal):
         raise RecordingError(found.reason)
     return found
@@ -220,23 +226,27 @@ def diagnose_command(
 
     Of recordings of a vehicle: what its drag and the models of its thrusters leave out.
 
-    Exit status 0 for every honest verdict, 2 for input that cannot be used (one sentence why).
+    Ctrl+C ends the search with what it has, and the answer says what was not asked; a second time ends at once.
+
+    Exit status 0 for every honest verdict, 2 for input that cannot be used (one sentence why), 130 if ended at once.
     """
     try:
         wanted = wanted_of(**outputs)
         vehicle = VehicleFiles(thrusters, installation, mass, mass_std, axis or "")
         traces: list[Trace] = []
-        found = diagnose_files(
-            files,
-            holdout,
-            seed,
-            twin,
-            any_thruster=any_thruster,
-            limits=wanted.limits,
-            vehicle=vehicle,
-            wanted=wanted,
-            watched=traces.append if wants_stages else None,
-        )
+        with observed(shown=not wanted.alone) as observer:
+            found = diagnose_files(
+                files,
+                holdout,
+                seed,
+                twin,
+                any_thruster=any_thruster,
+                limits=wanted.limits,
+                vehicle=vehicle,
+                wanted=wanted,
+                watched=traces.append if wants_stages else None,
+                observer=observer,
+            )
         tell(found, wanted, read(recordings_in(files)) if wanted.report is not None else (), (*files, *holdout))
         for trace in traces:
             explain(trace, wanted, (*files, *holdout))

@@ -11,22 +11,30 @@ import click
 
 from rig.diagnose.command import NOTHING, read, recordings_in, refuse_both, tell
 from rig.diagnose.outputs import PATH, Wanted, answer_options, holdout_option, seed_option, wanted_of
+from rig.diagnose.progress import observed
 from rig.errors import RecordingError, RigError
 from rig.list_option import ListCommand
 
 if TYPE_CHECKING:
     from identification.mismatch.comparison import Compared
+    from identification.mismatch.observer import Observer
 
 
 def compare_files(
-    sim: Path, real: Path, holdout: Iterable[Path] = (), seed: int = 0, wanted: Wanted = NOTHING
+    sim: Path,
+    real: Path,
+    holdout: Iterable[Path] = (),
+    seed: int = 0,
+    wanted: Wanted = NOTHING,
+    observer: Observer | None = None,
 ) -> Compared:
     """The real recording diagnosed against the simulated one; its twin knows the hashes of both files.
 
-    `holdout`: further real runs, which are only predicted. Raises RecordingError or ConfigError for what cannot be
-    used.
+    `holdout`: further real runs, which are only predicted. `observer` as for diagnose_files(). Raises RecordingError or
+    ConfigError for what cannot be used.
     """
     from identification.mismatch.comparison import compare
+    from identification.mismatch.observer import UNWATCHED
     from identification.mismatch.prepare.preparing import Refusal
     from rig.twin.writing import stamped
 
@@ -34,7 +42,7 @@ def compare_files(
     refuse_both([sim, real], held)
     simulation, measured = read([sim, real])
     wanted.refuse([measured])
-    found = compare(simulation, measured, seed, read(held), wanted.limits)
+    found = compare(simulation, measured, seed, read(held), wanted.limits, observer or UNWATCHED)
     if isinstance(found, Refusal):
         raise RecordingError(found.reason)
     if found.real.twin is None:
@@ -52,11 +60,14 @@ def compare_files(
 def compare_command(sim: Path, real: Path, holdout: tuple[Path, ...], seed: int, **outputs: Any) -> None:
     """Diagnose the recording REAL against the recording SIM that any program simulated with the same command.
 
-    Exit status 0 for every honest verdict, 2 for input that cannot be used (one sentence why).
+    Ctrl+C ends the search with what it has, and the answer says what was not asked; a second time ends at once.
+
+    Exit status 0 for every honest verdict, 2 for input that cannot be used (one sentence why), 130 if ended at once.
     """
     try:
         wanted = wanted_of(**outputs)
-        found = compare_files(sim, real, holdout, seed, wanted)
+        with observed(shown=not wanted.alone) as observer:
+            found = compare_files(sim, real, holdout, seed, wanted, observer)
         tell(found.real, wanted, [found.recording], (sim, real, *holdout))
     except (RigError, OSError) as error:
         click.echo(f"rig compare: {error}", err=True)

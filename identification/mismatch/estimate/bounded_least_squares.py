@@ -14,6 +14,8 @@ MOST_STEPS = 25
 """Steps of Levenberg and Marquardt: what needs more goes along a valley that tells nothing."""
 MOST_TRIES = 8
 """Dampings tried for one step."""
+FEW_TRIES = 2
+"""The same where the slopes are not those of the place itself."""
 LEAST_REACH = 0.05
 """sigma: a parameter that changes less within its bounds is left where it is."""
 SLOW_FALLS = 3.0
@@ -39,7 +41,7 @@ class Minimum:
     residual: Floats
     """(n,) whitened: measured less predicted."""
     slopes: Floats
-    """(n, p) of the prediction."""
+    """(n, p) of the prediction, there or so near that the sum of squares is within CLOSE of the same."""
 
 
 def least_squares(
@@ -50,21 +52,23 @@ def least_squares(
     high: Floats,
     most_steps: int = MOST_STEPS,
     hopeless: float = np.inf,
+    slopes: Floats | None = None,
 ) -> Minimum:
     """The least sum of squares of a whitened residual from one start (p,), within the bounds.
 
     `residual_of`: parameters (p,) to the residual (n,), measured less predicted; `slopes_of`: to the slopes (n, p) of
     the prediction, asked for `most_steps` times at most, only where the last step ended, and where that was not what
     they foretold; between they follow by secants. A parameter whose bounds are one stays where it is.
+    `slopes`: (n, p) to begin with, which need not be quite those of the start.
     Ends early once the sum is above `hopeless` and falls too slowly to get there.
     """
     at = np.clip(start, low, high)
-    residual, J = residual_of(at), slopes_of(at)
-    damping, fresh, asked = 1e-3, True, 1
+    residual, J = residual_of(at), slopes_of(at) if slopes is None else slopes
+    damping, fresh, asked = 1e-3, slopes is None, 1
     while asked <= most_steps:
         chi2 = float(residual @ residual)
         close = CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1))
-        found = _step(residual_of, at, residual, J, low, high, damping, close)
+        found = _step(residual_of, at, residual, J, low, high, damping, close, MOST_TRIES if fresh else FEW_TRIES)
         if found is None and fresh:
             break
         if found is None:  # by secants the end is only nearly met
@@ -107,6 +111,7 @@ def _step(
     high: Floats,
     damping: float,
     close: float,
+    tries: int = MOST_TRIES,
 ) -> _Step | None:
     """None where there is nothing: no step is tried of which the slopes themselves promise less than `close`."""
     go = _movable(at, J, residual, low, high)
@@ -114,7 +119,7 @@ def _step(
     A = J[:, go] / size
     gram, right = A.T @ A, A.T @ residual
     chi2 = float(residual @ residual)
-    for _ in range(MOST_TRIES):
+    for _ in range(tries):
         step = np.linalg.solve(gram + damping * np.eye(gram.shape[0]), right)
         foretold = float(step @ (2 * right - gram @ step))
         if foretold < close:

@@ -38,13 +38,16 @@ class Estimate:
         return self.fit.deviance + int(self.fit.free.sum()) * float(np.log(max(self.fit.residual.size, 2)))
 
 
-def fit_without(estimate: Estimate, term: Term, data: Data) -> Fit:
-    """The model without one of its terms, refitted with the same noise; once for all who ask."""
+def fit_without(estimate: Estimate, term: Term, data: Data, hopeless: float = np.inf) -> Fit:
+    """The model without one of its terms, refitted with the same noise; once for all who ask as closely.
+
+    `hopeless`: chi-square of which it is enough to know that it is more.
+    """
 
     def made() -> Fit:
-        return fit(*estimate.fit.less(term), data, estimate.weights)
+        return fit(*estimate.fit.less(term), data, estimate.weights, hopeless=hopeless, near=estimate.fit)
 
-    found: Fit = data.predictor.once(("without", term), made, estimate, data)
+    found: Fit = data.predictor.once(("without", term, hopeless), made, estimate, data)
     return found
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,7 +86,7 @@ def bounds_of(model: Model, data: Data, theta: Theta) -> tuple[Floats, Floats, F
     scale, at = data.scale, model.layout(theta)
     known = [p for group in parameters(model, scale) for p in group]
     most = 0.0 if any(term.traits.delay for term in model.terms) else data.most_shift
-    low, high, step = np.full(at.size, -np.inf), np.full(at.size, np.inf), np.empty(at.size)
+    low, high, step = (np.full(at.size, value) for value in (-np.inf, np.inf, 0.0))
     low[at.of_terms], high[at.of_terms] = [p.low for p in known], [p.high for p in known]
     low[at.shift], high[at.shift] = -most, most
     low[at.rate_shift], high[at.rate_shift] = -data.most_shift, data.most_shift
@@ -112,9 +113,8 @@ def raw(
     would hide the slope.
     """
     key = (model, theta.vector.tobytes(), with_rate, None if near is None else near.vector.tobytes())
-    found: tuple[list[Floats], list[Floats]] = data.predictor.lately(
-        key, lambda: _raw(model, theta, data, near or theta, with_rate=with_rate), data
-    )
+    made = partial(_raw, model, theta, data, near or theta, with_rate=with_rate)
+    found: tuple[list[Floats], list[Floats]] = data.predictor.lately(key, made, data)
     return found
 
 
@@ -154,40 +154,32 @@ def ticks_told(model: Model, theta: Theta, data: Data, weights: Weights) -> list
 
 def columns_of(model: Model, theta: Theta, data: Data, weights: Weights, which: NDArray[np.bool_]) -> Floats:
     """(n, p) whitened slopes of the prediction over the parameters in `which`."""
-    low, high, step = bounds_of(model, data, theta)
-    del low
-    base_thrust, base_rate = raw(model, theta, data, with_rate=bool(weights.rate))
+    _, high, step = bounds_of(model, data, theta)
+    vector, columns = theta.vector, []
+    for j in np.flatnonzero(which).tolist():
+        h = float(step[j] if vector[j] + step[j] <= high[j] else -step[j])
+        made = partial(_column, model, theta, data, j, h)
+        columns.append(data.predictor.column((model, vector.tobytes(), j), made, data))
+    if not columns:
+        return np.empty((residual_of(model, theta, data, weights).size, 0))
+    thrust, rate, ticks = ([np.column_stack(c) for c in zip(*each, strict=True)] for each in zip(*columns, strict=True))
+    return weights.whiten(thrust, rate if weights.rate else [], ticks if weights.ticks else [])
+
+
+def _column(model: Model, theta: Theta, data: Data, j: int, h: float) -> list[list[Floats]]:
+    """Of thrust, rate and what ticks tell, run by run, by a difference of `h` of parameter `j`; not whitened."""
+    thrust, rate = raw(model, theta, data, with_rate=data.with_rate)
+    ticks = ticked(model, theta, data)
+    run = model.layout(theta).run_of(j)
+    if run is not None:  # a tare moves its own run by one
+        own = [np.full(f.size, float(i == run)) for i, f in enumerate(thrust)]
+        return [own, *([np.zeros(f.size) for f in each] for each in (rate, ticks))]
     vector = theta.vector
-    R, layout = len(theta.tares), model.layout(theta)
-    base_ticks = ticks_told(model, theta, data, weights)
-    thrust: list[list[Floats]] = [[] for _ in data.histories]
-    rate: list[list[Floats]] = [[] for _ in data.histories]
-    ticks: list[list[Floats]] = [[] for _ in base_ticks]
-    for j in np.flatnonzero(which):
-        run = layout.run_of(int(j))
-        if run is not None:  # a tare moves its own run by one
-            for i in range(R):
-                thrust[i].append(np.full(base_thrust[i].size, float(i == run)))
-                if weights.rate:
-                    rate[i].append(np.zeros(base_rate[i].size))
-            for column, base in zip(ticks, base_ticks, strict=True):
-                column.append(np.zeros(base.size))
-            continue
-        h = step[j] if vector[j] + step[j] <= high[j] else -step[j]
-        moved = vector.copy()
-        moved[j] += h
-        moved_theta = theta.with_vector(moved)
-        new_thrust, new_rate = raw(model, moved_theta, data, with_rate=bool(weights.rate), near=theta)
-        for i in range(R):
-            thrust[i].append((new_thrust[i] - base_thrust[i]) / h)
-            if weights.rate:
-                rate[i].append((new_rate[i] - base_rate[i]) / h)
-        for column, base, new in zip(ticks, base_ticks, ticks_told(model, moved_theta, data, weights), strict=True):
-            column.append((new - base) / h)
-    stacked = [np.column_stack(c) if c else np.empty((y.size, 0)) for c, y in zip(thrust, base_thrust, strict=True)]
-    stacked_rate = [np.column_stack(c) for c in rate] if weights.rate and which.any() else []
-    stacked_ticks = [np.column_stack(c) if c else np.empty((y.size, 0)) for c, y in zip(ticks, base_ticks, strict=True)]
-    return weights.whiten(stacked, stacked_rate, stacked_ticks)
+    vector[j] += h
+    moved = theta.with_vector(vector)
+    now = (*raw(model, moved, data, with_rate=data.with_rate, near=theta), ticked(model, moved, data))
+    pairs = (zip(after, before, strict=True) for after, before in zip(now, (thrust, rate, ticks), strict=True))
+    return [[(after - before) / h for after, before in each] for each in pairs]
 
 
 def fit(
@@ -197,15 +189,17 @@ def fit(
     weights: Weights,
     most_steps: int = MOST_STEPS,
     hopeless: float = np.inf,
+    near: Fit | None = None,
 ) -> Fit:
     """Least squares of the whitened residual within the bounds.
 
     What comes late and clocks that differ look alike, and small steps of the command at few phases of the samples leave
     valleys between: where a shift of the clocks was found beside such a term, it is also looked for without one. So it
     is where none at all is better: chi-square has an edge where a step passes from one sample into the next.
-    Ends early once chi-square is above `hopeless` and falls too slowly to get there.
+    Ends early once chi-square is above `hopeless` and falls too slowly to get there. `near`: a fit with the same
+    weights, with whose slopes it begins.
     """
-    found = _descended(model, start, data, weights, most_steps, hopeless)
+    found = _descended(model, start, data, weights, most_steps, hopeless, near)
     shift = max(abs(found.theta.shift), abs(found.theta.rate_shift))
     if shift == 0:
         return found
@@ -217,11 +211,13 @@ def fit(
         left = residual_of(model, alike, data, weights)
         if not float(left @ left) < found.chi2:
             return found
-    other = _descended(model, alike, data, weights, most_steps, hopeless)
+    other = _descended(model, alike, data, weights, most_steps, hopeless, found)
     return min(found, other, key=lambda each: each.chi2)
 
 
-def _descended(model: Model, start: Theta, data: Data, weights: Weights, most_steps: int, hopeless: float) -> Fit:
+def _descended(
+    model: Model, start: Theta, data: Data, weights: Weights, most_steps: int, hopeless: float, near: Fit | None
+) -> Fit:
     """Levenberg-Marquardt from one start."""
     low, high, _ = bounds_of(model, data, start)
     theta = start.with_vector(np.clip(start.vector, low, high))
@@ -239,16 +235,27 @@ def _descended(model: Model, start: Theta, data: Data, weights: Weights, most_st
     found = least_squares(
         lambda part: residual_of(model, whole(part), data, weights),
         lambda part: columns_of(model, whole(part), data, weights, may),
-        theta.vector[may],
-        low[may],
-        high[may],
-        most_steps,
-        hopeless,
+        *(theta.vector[may], low[may], high[may]),
+        most_steps=most_steps,
+        hopeless=hopeless,
+        slopes=None if near is None else _begun(near, model, theta, data, weights, may),
     )
     best = whole(found.at)
-    ended = (best.vector <= low) | (best.vector >= high)
-    free = may & ~ended
+    free = may & (best.vector > low) & (best.vector < high)
     return Fit(model, best, found.residual, found.slopes[:, free[may]], free, weights.log_det)
+
+
+def _begun(near: Fit, model: Model, theta: Theta, data: Data, weights: Weights, may: NDArray[np.bool_]) -> Floats:
+    """(n, p) slopes to begin with: those that `near` has of the same parameters, and of the others at `theta`."""
+    at = np.cumsum(near.free) - 1
+    every = model.layout(theta).shared(near.layout).items()
+    known = {mine: int(at[other]) for mine, other in every if near.free[other] and may[mine]}
+    rest = may.copy()
+    rest[list(known)] = False
+    out = np.empty((near.residual.size, may.size))
+    out[:, list(known)] = near.jacobian[:, list(known.values())]
+    out[:, rest] = columns_of(model, theta, data, weights, rest)
+    return out[:, may]
 
 
 def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:

@@ -101,3 +101,11 @@ class Layout:
     @property
     def size(self) -> int:
         return self.shift + 3
+
+    def shared(self, other: Layout) -> dict[int, int]:
+        """Index here to index there, of every value that both have; of models of the same runs."""
+        out = {self.C: other.C, self.shift: other.shift, self.rate_shift: other.rate_shift, self.k: other.k}
+        both = [(self.of(term), other.of(term)) for term in self.terms if term in other.terms]
+        for here, there in [(self.tares, other.tares), *both]:
+            out |= dict(zip(range(here.start, here.stop), range(there.start, there.stop), strict=True))
+        return out

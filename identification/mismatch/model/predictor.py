@@ -22,6 +22,8 @@ MOST_RUNS = 64
 """Histories of which something is remembered: a diagnosis has some tens at most, with their parts."""
 MOST_LATELY = 4
 """Whole predictions: a fit asks for the residual and then for the slopes at the same values."""
+MOST_COLUMNS = 64
+"""Slopes over one parameter: those at one set of values are asked for with the noise before and after, and singly."""
 MOST_ANSWERS = 64
 """Fits without a term, and what else is asked for more than once of the very same estimate."""
 
@@ -35,6 +37,7 @@ class Predictor:
     def __init__(self) -> None:
         self._runs = LeastRecentlyUsed[RememberedRun](MOST_RUNS)
         self._answers = LeastRecentlyUsed[Any](MOST_ANSWERS)
+        self._columns = LeastRecentlyUsed[Any](MOST_COLUMNS)
         self._lately = LeastRecentlyUsed[Any](MOST_LATELY)
         self.shapes = Shapes()
 
@@ -48,6 +51,10 @@ class Predictor:
     def lately(self, key: Hashable, make: Callable[[], Any], *of: object) -> Any:
         """The same of what is asked for again at once or never."""
         return self._lately(key, make, *of)
+
+    def column(self, key: Hashable, make: Callable[[], Any], *of: object) -> Any:
+        """The same of slopes over one parameter, which many models do not ask for."""
+        return self._columns(key, make, *of)
 
 
 def predict(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: float = 0.0) -> tuple[Floats, Floats]:

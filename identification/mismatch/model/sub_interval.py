@@ -65,16 +65,15 @@ def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Sc
     passed = Passed(_rotor(model, theta, scale.driver), delay=late if _is_late(late, history) else 0.0)
     known = _remembered(run, "rate", passed) if _changes(passed, history) else history.rate_lead
     share, shift = passed_on(model, theta, history), theta.rate_shift
-    if history.ticks is not None:
-        share = share * rotor_gain(model, theta, run, scale)
+    gain = 1.0 if history.ticks is None else rotor_gain(model, theta, run, scale)
 
     def made() -> Floats:
         assert history.rate_sampled is not None
         moved = run.delayed(x, shift) if shift else x
         line = reconstructed(moved, history.middle, history.rate_sampled)
-        return np.asarray(line + share * np.atleast_2d(known)[0], dtype=np.float64)
+        return np.asarray(line + share * gain * np.atleast_2d(known)[0], dtype=np.float64)
 
-    return run.lately(("turning", shift), made, x, known, share)
+    return run.lately(("turning", shift), made, x, known, share, gain)
 
 
 def sample_lead(model: Model, theta: Theta, run: RememberedRun, rate: Floats, largest: float) -> Floats:

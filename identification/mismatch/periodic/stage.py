@@ -41,11 +41,16 @@ class Cleaned:
         return bool(self.lines or self.bands)
 
 
+def untouched(histories: Sequence[History]) -> Cleaned:
+    """The runs as they are, where nobody looked."""
+    return Cleaned((), (), tuple(histories))
+
+
 def run(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned:
     """Lines and bands of what this fit leaves; `originals`: the runs from which lines are taken."""
     series = series_of(fitted, data)
     if all(s.time.size < policy.periodic.FULL_RATE_SAMPLES for s in series):
-        return Cleaned((), (), tuple(originals))
+        return untouched(originals)
     lines = _lines(fitted, data, series)
     bands = find_bands(_still(series, lines, data))
     histories = tuple(

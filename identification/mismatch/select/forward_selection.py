@@ -8,18 +8,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from identification.estimation.tails import chi2_isf
 from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
 from identification.mismatch.estimate.fitting import Fit, at_bound, fit
 from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
+from identification.mismatch.observer import UNWATCHED, Observer
 from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
 from identification.mismatch.select.exchange.nearby_start import best_forms
 from identification.mismatch.select.exchange.rivals import one_for_two, one_less, swaps
+from identification.mismatch.select.hidden import hidden
 from identification.mismatch.select.limits.clipping import contradiction
-from identification.mismatch.select.overdispersion import dispersion_of
 from identification.mismatch.select.rounds import Candidate, Round, Unhidden
 from identification.mismatch.select.screening import (
     Screening,
@@ -37,14 +37,7 @@ CANDIDATES = 5
 """Terms of a round that are fitted: a fit costs as much as the screening of all."""
 MOST_MORE = 3
 """Terms of a round that are fitted beside CANDIDATES: those whose trials say little of what a fit would find."""
-SLOW_COVARIATES = frozenset({"time", "flow_speed"})
-"""Coordinates along which nothing changes quickly: slow noise takes for its own what an effect does over them."""
-MOST_HIDDEN = 3
-"""Terms of a round that are estimated together with the noise: each costs a search for variances."""
-MOST_INSTANTS = 5
-"""Trials of a jump that is hidden: which is the best depends on the noise, and each costs a search for variances."""
-INSTANTS_APART = 0.05
-"""Of the run: trials of a jump that is hidden."""
+NOT_ALL = "whether more is left out"
 STATIC = ("command_voltage", "thrust")
 """Coordinates of the static curve."""
 
@@ -89,6 +82,8 @@ class Selected:
     """Of the model `after`; None once it was exchanged for another."""
     standing: Mapping[Term, SwapTest] | None = None
     """How each term stands against its rivals, where that is known."""
+    undone: tuple[str, ...] = ()
+    """What was not asked, as clauses, because the search was interrupted."""
 
 
 def static_curve(term: Term, *, measured: bool) -> str:
@@ -104,6 +99,7 @@ def search(
     given: Callable[[Data, Theta], tuple[Data, Theta, Model]] | None = None,
     bands: tuple[tuple[float, float], ...] = (),
     without: Collection[str] = (),
+    watch: Observer = UNWATCHED,
 ) -> Selected:
     """Forward: screen, fit the best few, keep the best, refresh the noise; until nothing passes. Then prune.
 
@@ -114,13 +110,13 @@ def search(
     data = replace(data, bands=bands)
     terms = available(data, without)
     before = baseline(data, theta, terms, first)
-    return _forward(data, terms, before, before, rng)
+    return _forward(data, terms, before, before, rng, watch)
 
 
-def resumed(found: Selected, estimate: Estimate, rng: np.random.Generator) -> Selected:
+def resumed(found: Selected, estimate: Estimate, rng: np.random.Generator, watch: Observer = UNWATCHED) -> Selected:
     """The search gone on with from `estimate`, a model of the same recordings that is not the one that was `found`."""
     known = frozenset(found.after.fit.model.terms)
-    again = _forward(found.data, found.terms, found.before, estimate, rng, known)
+    again = _forward(found.data, found.terms, found.before, estimate, rng, watch, known)
     return replace(again, rounds=(*found.rounds, *again.rounds))
 
 
@@ -130,11 +126,14 @@ def _forward(
     before: Estimate,
     estimate: Estimate,
     rng: np.random.Generator,
+    watch: Observer,
     *known: frozenset[Term],
 ) -> Selected:
     """Larger models from `estimate` on while something passes, none of those that are `known`."""
-    after, rounds = forward(Thruster(data, terms), estimate, policy.select.MODEL_TERMS, rng, known)
-    return Selected(data, terms, before, after, rounds, rounds[-1].screening)
+    system = Thruster(data, terms, watch)
+    after, rounds, whole = forward(system, estimate, policy.select.MODEL_TERMS, rng, known)
+    undone = () if whole else (NOT_ALL,)
+    return Selected(data, terms, before, after, rounds, rounds[-1].screening if whole else None, undone=undone)
 
 
 def prune(estimate: Estimate, data: Data) -> Estimate:
@@ -148,9 +147,11 @@ class Thruster:
 
     data: Data
     terms: tuple[Term, ...]
+    watch: Observer = UNWATCHED
 
     def judged(self, estimate: Estimate, rng: np.random.Generator) -> Screening:
         """What may still be added to the model, judged."""
+        self.watch.trying(f"all of the catalogue beside {_told(estimate.fit.model.terms)}")
         data, inside = self.data, estimate.fit.model.terms
         ids = {t.id for t in inside}
         shapes = Counter(static_curve(t, measured=data.with_rate) for t in inside)
@@ -172,8 +173,9 @@ class Thruster:
         data, weights = self.data, estimate.weights
         found = []
         for term, values in _candidates(judged, data) if judged.largest > judged.threshold else []:
+            self.watch.trying(f"{term.id} beside {_told(estimate.fit.model.terms)}")
             bigger, theta = estimate.fit.more(term, refined(estimate.fit, data, weights, term, values))
-            new = fit(bigger, theta, data, weights)
+            new = fit(bigger, theta, data, weights, near=estimate.fit)
             gain = estimate.fit.chi2 - new.chi2
             logn = float(np.log(new.residual.size))
             cost = price(term, data) * logn
@@ -192,15 +194,21 @@ class Thruster:
         return estimate if better is estimate.fit else self.enlarged(estimate, better)
 
     def unhidden(self, estimate: Estimate, judged: Screening) -> tuple[Unhidden, Estimate] | None:
-        return _hidden(estimate, judged, self.data)
+        return hidden(estimate, judged, self.data)
 
     def without(self, estimate: Estimate, term: Term) -> Fit:
+        self.watch.trying(f"the model without {term.id}")
         return fit_without(estimate, term, self.data)
+
+    def nearly_without(self, estimate: Estimate, term: Term, hopeless: float) -> Fit:
+        self.watch.trying(f"the model without {term.id}")
+        return fit_without(estimate, term, self.data, hopeless)
 
     def replaced(self, estimate: Estimate, other: Fit) -> Estimate:
         return refresh(other.model, other.theta, self.data, None, estimate)
 
     def rivals(self, estimate: Estimate, term: Term, less: Fit) -> list[Rival]:
+        self.watch.trying(f"rivals of {term.id}")
         return swaps(estimate, term, less, self.data, self.terms)
 
     def impossible(self, estimate: Estimate, term: Term) -> bool:
@@ -213,67 +221,13 @@ class Thruster:
         return term.traits.rare and not other.traits.rare
 
     def merged(self, estimate: Estimate, best: tuple[float, Fit] | None) -> tuple[float, Fit] | None:
+        self.watch.trying("one term in the place of two")
         best = one_less(estimate, self.data, self.terms, best)
         return one_for_two(estimate, self.data, self.terms, best)
 
 
-def _hidden(estimate: Estimate, judged: Screening, data: Data) -> tuple[Unhidden, Estimate] | None:
-    """The model with a term that the noise had taken for its own: they are told apart when estimated together."""
-    least = (
-        policy.select.HIDDEN_FIRST_TERM_SIGMA if not estimate.fit.model.terms else np.inf
-    )  # shape error would be taken for what is hidden
-    likely = [
-        (t, v)
-        for rank, (t, v, z) in enumerate(judged.best(2 * MOST_HIDDEN))
-        if (rank < MOST_HIDDEN or t.traits.one_shape)
-        and z > (policy.select.HIDDEN_SIGMA if SLOW_COVARIATES & set(t.covariates) else least)
-    ]
-    likely = [each for t, v in likely for each in ((t, at) for at in _instants(judged, t, data) or (v,))]
-    if not likely:
-        return None
-    now = refresh(estimate.fit.model, estimate.fit.theta, data, None, None)
-    found = []
-    for term, values in likely:
-        begin = refined(estimate.fit, data, estimate.weights, term, values)
-        bigger, theta = estimate.fit.more(term, begin)
-        first = fit(bigger, theta, data, estimate.weights)
-        new = refresh(bigger, first.theta, data, None, now, now.noise)
-        gain = (now.fit.deviance - new.fit.deviance) / dispersion_of(term, new.fit, data.size)
-        if gain > (asked := _asked_of_hidden(term, judged, data)):
-            found.append((Unhidden(gain, asked), new))
-    if not found:
-        return None
-    told, best = max(found, key=lambda each: each[0].gain)
-    return told, refresh(best.fit.model, best.fit.theta, data, None, None)
-
-
-def _instants(judged: Screening, term: Term, data: Data) -> list[tuple[float, ...]]:
-    """Of a jump in time the likeliest trials: which is the best depends on the noise, and that takes it for its own."""
-    if not term.traits.instant:
-        return []
-    place = [p.name for p in term.parameters(data.scale)].index(term.traits.instant)
-    out: list[tuple[float, ...]] = []
-    for j in np.argsort(-judged.plain):
-        at = judged.directions.values[j]
-        if judged.directions.terms[j] == term and all(
-            abs(at[place] - v[place]) > INSTANTS_APART * data.scale.duration for v in out
-        ):
-            out.append(at)
-        if len(out) == MOST_INSTANTS:
-            break
-    return out
-
-
-def _asked_of_hidden(term: Term, judged: Screening, data: Data) -> float:
-    """Gain in deviance from which a term that is told from noise by estimating both is believed."""
-    if term.traits.one_shape:
-        return chi2_isf(policy.select.STEADY_TERM_FALSE_ALARM, price(term, data))
-    share = 1.0 if term.traits.from_data else _share_of_hidden(term)
-    return float(judged.threshold**2 + share * price(term, data) * np.log(data.size))
-
-
-def _share_of_hidden(term: Term) -> float:
-    return float(policy.select.HIDDEN_OFFSET_PRICE if term.traits.instant else policy.select.HIDDEN_TERM_PRICE)
+def _told(terms: Collection[Term]) -> str:
+    return ", ".join(term.id for term in terms) or "the baseline"
 
 
 def _candidates(judged: Screening, data: Data) -> list[tuple[Term, tuple[float, ...]]]:

@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.estimation.tails import chi2_isf
 from identification.mismatch import policy
+from identification.mismatch.observer import Interrupted
 from identification.mismatch.select.rounds import Candidate, Judged, Round, T, Unhidden
 from identification.recording import Floats
 
@@ -88,6 +89,9 @@ class System(Protocol[T, F, S, Judged]):
     def without(self, state: S, term: T, /) -> F:
         """The rest of the model, refitted."""
 
+    def nearly_without(self, state: S, term: T, hopeless: float, /) -> F:
+        """The same, as far as it takes to see whether chi-square falls below `hopeless`."""
+
     def replaced(self, state: S, other: F, /) -> S:
         """A smaller model, or one with a rival, in the place of the model."""
 
@@ -110,26 +114,43 @@ def forward(
     most: int,
     rng: np.random.Generator,
     known: Collection[frozenset[T]] = (),
-) -> tuple[S, tuple[Round[T, Judged], ...]]:
-    """Larger models, of `most` terms, while something passes, none of those that are `known`; and how it went."""
+) -> tuple[S, tuple[Round[T, Judged], ...], bool]:
+    """Larger models, of `most` terms, while something passes, none of those that are `known`; how it went, and whether
+    it came to its end: one that is interrupted has the model of its last round."""
     rounds: list[Round[T, Judged]] = []
     seen = {frozenset(state.fit.values), *known}
     while True:
-        inside = tuple(state.fit.values)
-        judged = system.judged(state, rng)
-        full = len(inside) >= most
-        found = [] if full else system.additions(state, judged)
-        told, larger = None, _reformed(system, _lasting(system, state, found, seen), seen)
-        if larger is None and not full and (hidden := system.unhidden(state, judged)) is not None:
-            beside = pruned(system, hidden[1])
-            if frozenset(beside.fit.values) not in seen:
-                told, larger = hidden[0], beside
-        fitted = tuple(candidate for candidate, _ in found)
-        rounds.append(Round(inside, judged, fitted, told, None if larger is None else tuple(larger.fit.values)))
+        try:
+            larger = _round(system, state, most, rng, seen, rounds)
+        except Interrupted:
+            return state, tuple(rounds), False
         if larger is None:
-            return state, tuple(rounds)
+            return state, tuple(rounds), True
         state = larger
         seen.add(frozenset(state.fit.values))
+
+
+def _round(
+    system: System[T, F, S, Judged],
+    state: S,
+    most: int,
+    rng: np.random.Generator,
+    seen: Collection[frozenset[T]],
+    rounds: list[Round[T, Judged]],
+) -> S | None:
+    """A larger model that lasts, none of those `seen`; what was done is put to the `rounds`."""
+    inside = tuple(state.fit.values)
+    judged = system.judged(state, rng)
+    full = len(inside) >= most
+    found = [] if full else system.additions(state, judged)
+    told, larger = None, _reformed(system, _lasting(system, state, found, seen), seen)
+    if larger is None and not full and (hidden := system.unhidden(state, judged)) is not None:
+        beside = pruned(system, hidden[1])
+        if frozenset(beside.fit.values) not in seen:
+            told, larger = hidden[0], beside
+    fitted = tuple(candidate for candidate, _ in found)
+    rounds.append(Round(inside, judged, fitted, told, None if larger is None else tuple(larger.fit.values)))
+    return larger
 
 
 def _reformed(system: System[T, F, S, Judged], larger: S | None, seen: Collection[frozenset[T]]) -> S | None:
@@ -173,9 +194,9 @@ def _best(found: Sequence[tuple[Candidate[T], F]]) -> F:
 def pruned(system: System[T, F, S, Judged], state: S) -> S:
     """Without terms that give less than their price, worst first."""
     while state.fit.values:
-        less = [system.without(state, term) for term in state.fit.values]
-        sizes = map(len, state.fit.values.values())
-        short = [each.chi2 - state.fit.chi2 - accept_threshold(size) for each, size in zip(less, sizes, strict=True)]
+        worth = {term: state.fit.chi2 + accept_threshold(len(values)) for term, values in state.fit.values.items()}
+        less = [system.nearly_without(state, term, least) for term, least in worth.items()]
+        short = [each.chi2 - least for each, least in zip(less, worth.values(), strict=True)]
         if min(short) > 0:
             break
         state = system.replaced(state, less[short.index(min(short))])

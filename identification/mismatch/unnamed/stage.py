@@ -51,7 +51,10 @@ class Completed:
 def run(
     selected: Selected, located: Located, validated: Validated, unseen: Sequence[History], rng: np.random.Generator
 ) -> Completed:
-    """Flexible terms where they predict better; else the named model, without unnamed terms that predict no better."""
+    """Flexible terms where they predict better; else the named model, without unnamed terms that predict no better.
+
+    After a search that was interrupted no flexible term is looked for.
+    """
     data, before, now = selected.data, selected.before, located.estimate
     earned, unearned, split = validated.earned, validated.unearned, validated.split
     open_ended = (located.structured or bool(unearned)) and bool(located.left.groups)
@@ -64,7 +67,7 @@ def run(
             return Completed(after, *_with_values(earned, now, after, data, None), (), None, False, after, left)
         if nothing:
             bare, left = now, located.left
-    if open_ended:
+    if open_ended and not selected.undone:
         over = foremost_covariate(left, unearned, data)
         flexible = extend(now, before, data, over, unearned, split, rng)
         best = min(split.judge(split.estimate.fit).rmse, np.inf if flexible is None else flexible.held)

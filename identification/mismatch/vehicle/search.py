@@ -94,6 +94,11 @@ class Vehicle:
         layout, theta = without_term(state.fit.layout, self.data, state.fit.theta, term)
         return fit(layout, theta, self.data, state.white, state.fit.motions, steps=QUICK)
 
+    def nearly_without(self, state: State, term: VehicleTerm, hopeless: float) -> Fit:
+        """As quick as it is, whatever is hoped for."""
+        del hopeless
+        return self.without(state, term)
+
     def less(self, state: State, terms: Sequence[VehicleTerm]) -> State:
         """The model without these."""
         for term in terms:
@@ -134,7 +139,7 @@ class Vehicle:
 def search(vehicle: Vehicle, rng: np.random.Generator) -> tuple[State, State]:
     """The baseline, and the model that nothing in the catalogue improves any more."""
     first = _baseline(vehicle.data, vehicle.terms)
-    last, _ = forward(vehicle, first, policy.vehicle.VEHICLE_MODEL_TERMS, rng)
+    last, _, _ = forward(vehicle, first, policy.vehicle.VEHICLE_MODEL_TERMS, rng)
     return _under(first, last, vehicle.data), last
 
 

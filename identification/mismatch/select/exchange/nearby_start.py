@@ -70,7 +70,7 @@ def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights
     if not possible:
         return now
     begin = min(possible, key=lambda start: _left(start, data, weights))
-    new = fit(*begin, data, weights, FORM_STEPS, wanted)
+    new = fit(*begin, data, weights, FORM_STEPS, wanted, near=now)
     if new.chi2 >= wanted or at_bound(other, new, data, weights) or contradiction(new, other, noise, data):
         return now
     return new

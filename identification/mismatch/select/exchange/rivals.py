@@ -60,7 +60,7 @@ def one_for_two(
             values = mirrored(other, found.values[j], data) if score[j] < 0 else found.values[j]
             begin = refined(less, data, estimate.weights, other, values)
             bigger, theta = less.more(other, begin)
-            new = fit(bigger, theta, data, estimate.weights, RIVAL_STEPS, wanted)
+            new = fit(bigger, theta, data, estimate.weights, RIVAL_STEPS, wanted, near=less)
             loss = new.chi2 - now.chi2 + more
             if (
                 loss < -policy.select.RIVAL_BETTER_BIC
@@ -124,7 +124,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
         extra = more * logn
         bigger, begun = nearer(less, now, term, other, begin, data, estimate.weights)
         if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
-            new = fit(bigger, begun, data, estimate.weights)
+            new = fit(bigger, begun, data, estimate.weights, near=now)
         else:
             new = fit(
                 bigger,
@@ -133,6 +133,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
                 estimate.weights,
                 RIVAL_STEPS,
                 now.chi2 + policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more),
+                near=now,
             )
         if new.chi2 - now.chi2 + extra < FORMS_BEYOND * policy.select.RIVAL_STATED_BIC:
             new = best_forms(new, [t for t in terms if t.id != other.id], data, estimate.weights, estimate.noise)
