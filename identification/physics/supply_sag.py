@@ -107,7 +107,12 @@ class Buffered:
 
 @dataclass(frozen=True, slots=True)
 class Discharge:
-    """The proxy where no bus voltage was recorded: V_eff = V (1 - d q), q the energy drawn so far, |V|^3 over time."""
+    """The proxy where no bus voltage was recorded, or in steps that hide how it falls: V_eff = V / (1 + d Q), Q the
+    integral of |V|^3 over time.
+
+    The drive switches, so it draws V_eff^3 / V_b of current: with r = V_b / V_0 = V_eff / V that is |V|^3 r^2 / V_0. A
+    supply that falls by what was drawn has dr/dt = -d |V|^3 r^2, of which 1 / r = 1 + d Q is the solution.
+    """
 
     id: ClassVar[str] = "supply_sag"
     stage: ClassVar[Stage] = "command"
@@ -135,14 +140,14 @@ class Discharge:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        drawn = np.cumsum(np.abs(now.history.driver / now.scale.driver) ** 3 * now.history.dt) / now.scale.duration
-        out: Floats = value * np.maximum(1 - theta[0] * drawn, 1e-3)
+        drawn = np.abs(now.history.driver / now.scale.driver) ** 3 * now.history.dt / now.scale.duration
+        out: Floats = value / (1 + theta[0] * (np.cumsum(drawn) - 0.5 * drawn))
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
-            f"Supply sag: the voltage falls as the supply is drawn on, by {100 * theta[0]:.2g} % for "
-            f"{scale.duration:.3g} s at full power; energy drawn stands for the bus voltage: record it."
+            f"Supply sag: the voltage falls as the supply is drawn on, by {100 * theta[0] / (1 + theta[0]):.2g} % for "
+            f"{scale.duration:.3g} s at full power; energy drawn stands for the bus voltage: record it in fine steps."
         )
 
 
@@ -189,7 +194,7 @@ class Loaded:
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
             f"Supply sag: at {scale.driver:.3g} {scale.driver_unit} the supply gives way by {100 * theta[0]:.2g} %; "
-            "power drawn stands for the bus voltage: record it."
+            "power drawn stands for the bus voltage: record it in fine steps."
         )
 
 

@@ -98,6 +98,8 @@ class History:
     others: Mapping[str, Floats] = None  # type: ignore[assignment]  # replaced in __post_init__
     """quantity -> (M,) interpolated: bus_voltage, flow_speed, current, torque, motor_temperature, water_temperature,
     rotation_rate, neighbour_thrust."""
+    coarse: frozenset[str] = frozenset()
+    """Of these what was read in so few steps that the steps hide how it moves."""
     rate_per_driver: float = 1.0
     """rev/s per unit of the driver, where both are steady; of no use without a rate."""
     spacing: float = 1.0

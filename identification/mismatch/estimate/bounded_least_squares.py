@@ -102,6 +102,14 @@ class _Step:
     """Fall that the slopes promised of it."""
 
 
+def promised(found: Minimum, low: Floats, high: Floats, which: NDArray[np.bool_]) -> float:
+    """By how much the slopes say that the sum of squares would fall, if the parameters `which` (p,) alone moved."""
+    go = which & _movable(found.at, found.slopes, found.residual, low, high)
+    J = found.slopes[:, go] / np.linalg.norm(found.slopes[:, go], axis=0)
+    right = J.T @ found.residual
+    return float(right @ np.linalg.lstsq(J.T @ J, right, rcond=1e-12)[0])
+
+
 def _step(
     residual_of: Callable[[Floats], Floats],
     at: Floats,

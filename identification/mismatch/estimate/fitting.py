@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from identification.estimation.singular_values import thin_svd
 from identification.mismatch import policy
-from identification.mismatch.estimate.bounded_least_squares import MOST_STEPS, least_squares
+from identification.mismatch.estimate.bounded_least_squares import CLOSE, MOST_STEPS, Minimum, least_squares, promised
 from identification.mismatch.model.at_samples import at_samples
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model, extended, parameters, reduced
@@ -227,21 +227,29 @@ def _descended(
     may[at.shift] = high[at.shift] > low[at.shift]
     may[at.rate_shift] = bool(weights.rate) and high[at.rate_shift] > low[at.rate_shift]
 
-    def whole(part: Floats) -> Theta:
-        vector = theta.vector
-        vector[may] = part
-        return theta.with_vector(vector)
+    def descended(begin: Theta, moving: NDArray[np.bool_], slopes: Floats | None = None) -> Minimum:
+        return least_squares(
+            lambda part: residual_of(model, begin.with_part(moving, part), data, weights),
+            lambda part: columns_of(model, begin.with_part(moving, part), data, weights, moving),
+            begin.vector[moving],
+            low[moving],
+            high[moving],
+            most_steps=most_steps,
+            hopeless=hopeless,
+            slopes=slopes,
+        )
 
-    found = least_squares(
-        lambda part: residual_of(model, whole(part), data, weights),
-        lambda part: columns_of(model, whole(part), data, weights, may),
-        *(theta.vector[may], low[may], high[may]),
-        most_steps=most_steps,
-        hopeless=hopeless,
-        slopes=None if near is None else _begun(near, model, theta, data, weights, may),
-    )
-    best = whole(found.at)
-    free = may & (best.vector > low) & (best.vector < high)
+    found = descended(theta, may, None if near is None else _begun(near, model, theta, data, weights, may))
+    best = theta.with_part(may, found.at)
+    still = may.copy()
+    still[[at.shift, at.rate_shift]] = False
+    if (may & ~still).any() and promised(found, low[may], high[may], still[may]) > CLOSE:
+        # a tick at the edge of a sample stopped the clocks, and all others with them
+        best = best.with_part(still, descended(best, still).at)
+        left, slopes = residual_of(model, best, data, weights), columns_of(model, best, data, weights, may)
+        found = Minimum(best.vector[may], left, slopes)
+    ended = (best.vector <= low) | (best.vector >= high)
+    free = may & ~ended
     return Fit(model, best, found.residual, found.slopes[:, free[may]], free, weights.log_det)
 
 

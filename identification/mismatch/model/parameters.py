@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.physics.term import Scale, Term
 from identification.recording import Floats
@@ -28,6 +29,12 @@ class Theta:
     def vector(self) -> Floats:
         known = (v for theta in self.terms for v in theta)
         return np.array([self.C, *known, *self.tares, self.shift, self.rate_shift, self.k])
+
+    def with_part(self, which: NDArray[np.bool_], part: Floats) -> Theta:
+        """The same with `part` (p,) in the place of those `which` (q,) of the vector."""
+        vector = self.vector.copy()
+        vector[which] = part
+        return self.with_vector(vector)
 
     def with_vector(self, values: Floats) -> Theta:
         """The same lay-out with other numbers."""

@@ -65,6 +65,15 @@ SUPPLY_REST_TOLD = Threshold(
         "effects look smaller."
     ),
 )
+COARSE_STEPS = Threshold(
+    20.0,
+    unit="steps of its readings",
+    reason=(
+        "A step's own error is 1/sqrt(12) of it, so that a supply known by 20 of them is known to 1.5 % of its way at "
+        "best, which a rate read to a part in ten thousand shows; what stands for it then may stand beside it."
+    ),
+    evidence="bench/plain:supply_sag of draw 2026-12-01: falls of 0.1 to 7 steps of a VESC's 0.1 V, none told rightly.",
+)
 COMMAND_STEP = Threshold(
     0.02,
     unit="share of the largest driver",

@@ -26,27 +26,31 @@ def followed(channel: Channel, at: Floats) -> Floats | None:
         return None
     time, value = channel.time[good], channel.value[good]
     if channel.quantity in CALMED:
-        value = _calmest(value, (1, *REACHES))[0]
+        value = _calmest(value, (1, *REACHES), channel.acquisition.quantum or 0.0)[0]
     out: Floats = np.interp(at, time, value)
     return out
 
 
-def jumps(value: Floats) -> NDArray[np.bool_]:
-    """(n-1,) where neighbouring samples differ by far more than their noise."""
+def jumps(value: Floats, quantum: float = 0.0) -> NDArray[np.bool_]:
+    """(n-1,) where neighbouring samples differ by far more than their noise, and by more than two steps of the
+    readings, which a value between two of them takes when it likes."""
     step = np.abs(np.diff(value))
     noise = float(np.median(step)) / 0.6745
-    return step > max(policy.prepare.CHANNEL_JUMP_SIGMA * noise, 1e-9 * float(np.max(np.abs(value), initial=0.0)))
+    least = max(2.5 * quantum, 1e-9 * float(np.max(np.abs(value), initial=0.0)))
+    return step > max(policy.prepare.CHANNEL_JUMP_SIGMA * noise, least)
 
 
-def _calmest(value: Floats, reaches: Sequence[int], apart: NDArray[np.bool_] | None = None) -> tuple[Floats, float]:
+def _calmest(
+    value: Floats, reaches: Sequence[int], quantum: float, apart: NDArray[np.bool_] | None = None
+) -> tuple[Floats, float]:
     """`_calm` with the reach whose windows miss their samples least."""
-    return min((_calm(value, reach, apart) for reach in reaches), key=lambda each: each[1])
+    return min((_calm(value, reach, quantum, apart) for reach in reaches), key=lambda each: each[1])
 
 
-def _calm(value: Floats, reach: int, apart: NDArray[np.bool_] | None) -> tuple[Floats, float]:
+def _calm(value: Floats, reach: int, quantum: float, apart: NDArray[np.bool_] | None) -> tuple[Floats, float]:
     """Running mean over up to `reach` samples on either side, never across a jump or where `apart` (n-1,); and the
     mean square by which the others in the window miss each sample."""
-    cut = jumps(value) if apart is None else jumps(value) | apart
+    cut = jumps(value, quantum) if apart is None else jumps(value, quantum) | apart
     starts = np.concatenate([[0], np.flatnonzero(cut) + 1, [value.size]])
     index = np.arange(value.size)
     which = np.searchsorted(starts, index, side="right") - 1
@@ -76,7 +80,8 @@ def _calm_where_it_rests(value: Floats, apart: NDArray[np.bool_]) -> Floats:
 
 
 def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats) -> Floats | None:
-    """Supply voltage: what the load makes of it, and the slow rest, so that it is known between its samples."""
+    """Supply voltage: what the load makes of it, and the slow rest, so that it is known between its samples; a rest
+    that is no larger than what the steps of the readings make is none of the supply's."""
     good = np.isfinite(channel.value)
     if np.count_nonzero(good) < 2 * LOADS:
         return followed(channel, at)
@@ -96,10 +101,19 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     rest = value - H[:, kept] @ theta
     by_load: Floats = columns(driven, charge)[:, kept] @ theta
     apart = np.abs(np.diff(then)) > policy.prepare.COMMAND_STEP * size
-    smooth, missed = _calmest(rest, REACHES, apart)
+    step = channel.acquisition.quantum or 0.0
+    smooth, missed = _calmest(rest, REACHES, step, apart)
+    if float(np.mean(smooth**2)) <= step**2 / 12:  # a staircase that a meter makes of what the load does
+        return by_load
     if missed > (1 - policy.prepare.SUPPLY_REST_TOLD) * float(np.mean(rest**2)):
         return by_load
     return by_load + np.interp(at, time, smooth)
+
+
+def is_coarse(channel: Channel | None, moved: Floats) -> bool:
+    """Whether it `moved` (M,) over so few steps of its readings that these hide how."""
+    step = 0.0 if channel is None else channel.acquisition.quantum or 0.0
+    return step > 0 and float(np.ptp(moved)) < policy.prepare.COARSE_STEPS * step
 
 
 def torque(channel: Channel, held: Held, edges: Floats, driven: Floats) -> Floats | None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch import policy
-from identification.mismatch.prepare.channels import followed, jumps, neighbour_at, supply, torque
+from identification.mismatch.prepare.channels import followed, is_coarse, jumps, neighbour_at, supply, torque
 from identification.mismatch.prepare.grid import Held, distinct, edges_of
 from identification.recording import Channel, Floats, Recording
 from identification.run_history.converter import Converter
@@ -220,6 +220,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         rate_count=rate_count,
         rate_sampled=rate_sampled,
         others=others,
+        coarse=frozenset(q for q in others if is_coarse(recording.first_of(q), others[q])),
         rate_per_driver=per_driver,
         spacing=float(np.median(np.diff(time))),
         jitter=jitter_of(time),

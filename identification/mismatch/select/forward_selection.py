@@ -43,8 +43,12 @@ STATIC = ("command_voltage", "thrust")
 
 
 def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
-    """Terms of the catalogue whose channels were recorded in every run, but for the effects `without`."""
+    """Terms of the catalogue whose channels were recorded in every run, but for the effects `without`.
+
+    What stands for a channel is among them where that was not recorded, or in a few steps only.
+    """
     have = set.intersection(*(set(h.others) for h in data.histories))
+    fine = have.difference(*(h.coarse for h in data.histories))
     if data.scale.torque <= 0:
         have.discard("torque")  # a channel of zeros
     static = any(h.static for h in data.histories)
@@ -56,7 +60,7 @@ def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
             continue
         if term.traits.flow and data.scale.flow <= 0:
             continue
-        if term.traits.seen_by in have - set(term.needs):
+        if term.traits.seen_by in fine - set(term.needs):
             continue
         out.append(term)
     return tuple(out)

@@ -7,6 +7,8 @@ import pytest
 
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.model import Model
+from identification.mismatch.model.whitening import weights
+from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.select.baseline import baseline
 from identification.mismatch.select.clock_shifts import with_clock_shifts
 from identification.physics.motor_lag import MotorLag
@@ -18,13 +20,13 @@ LATE = 0.002
 """s"""
 
 
-def in_step(late=LATE):
+def in_step(late=LATE, after=0.0015, scatter=0.0006):
     """Ramps written and rates told a hundred times a second, the rate 2 ms late, rows scattered about the ticks."""
     rng = np.random.default_rng(3)
     when = 0.01 * np.arange(4000) + 0.003
     volts = TOP * np.interp(when, np.arange(0.0, 41.0, 2.0), rng.uniform(-1.0, 1.0, 21))
     volts = np.round(volts / 0.05) * 0.05
-    told = when + 0.0015 + rng.normal(0.0, 0.0006, when.size)
+    told = when + after + rng.normal(0.0, scatter, when.size)
     thrust = np.arange(0.5, 39.5, 0.05)
 
     def held(t):
@@ -62,3 +64,18 @@ def test_clocks_that_agree_stay():
     assert with_clock_shifts(Model(), theta, data) == theta
     doubted = replace(data, most_shift=0.006)
     assert abs(with_clock_shifts(Model(), theta, doubted).rate_shift) < 2e-4
+
+
+@pytest.mark.parametrize("off", [-3e-4, 3e-4])
+def test_clocks_that_a_tick_stops_stop_nothing_else(off):
+    """C by least squares with the clocks where they ended: where each row stands at the edge of a tick, no step of all
+    parameters together was better, and C stayed where it began, two standard errors away."""
+    recording = in_step(after=0.0023, scatter=0.0003)
+    data, theta = data_of([recording], clocks=True)
+    begin = replace(with_clock_shifts(Model(), theta, data), C=C * (1 + off))
+    sizes = [np.zeros(rows.size) for rows in data.rows]
+    w = weights(data, Noise(0.05**2, 0.0), sizes, Noise(0.003**2, 0.0), unit=True)
+    found = fit(Model(), begin, data, w)
+    held, _ = data_of([recording], clocks=False)
+    alone = fit(Model(), found.theta, replace(held, with_rate=False), replace(w, rate=()))
+    assert pytest.approx(alone.theta.C, abs=0.2 * found.std[0]) == found.theta.C
