@@ -243,8 +243,8 @@ def _descended(
     best = theta.with_part(may, found.at)
     still = may.copy()
     still[[at.shift, at.rate_shift]] = False
-    if (may & ~still).any() and promised(found, low[may], high[may], still[may]) > CLOSE:
-        # a tick at the edge of a sample stopped the clocks, and all others with them
+    if may[at.rate_shift] and promised(found, low[may], high[may], still[may]) > CLOSE:
+        # rows at the edge of a tick stopped the rate's clock, and all others with it
         best = best.with_part(still, descended(best, still).at)
         left, slopes = residual_of(model, best, data, weights), columns_of(model, best, data, weights, may)
         found = Minimum(best.vector[may], left, slopes)
