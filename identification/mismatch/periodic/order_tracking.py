@@ -16,6 +16,7 @@ from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.periodic.order_law import FORCE, PICK_UP, OrderLaw, Ring, laws
 from identification.mismatch.periodic.order_search import LASTING, OrderCandidate, candidates
+from identification.mismatch.periodic.recurrence import Recurrence, of_stretches
 from identification.mismatch.periodic.spectrum import Series
 from identification.mismatch.periodic.steady_segments import SteadySegment, speed_of, stretches
 from identification.recording import Floats
@@ -67,6 +68,8 @@ class RotorOrder:
     """Highest speed, turns per s."""
     law_gain: float = 0.0
     """Chi-square of waves of the size that the law gives them."""
+    seen: Recurrence | None = None
+    """Whether it comes again in other runs, or in other parts of the only one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -171,7 +174,10 @@ def _fitted(parts: Sequence[SteadySegment], noise: _LocalNoise, candidate: Order
         ):
             waves = fewer
             break
-    return _told(parts, waves, candidate.p_value)
+    span = [(p.run, float(p.time[0]), float(p.time[-1])) for p in parts]
+    each = np.arange(len(parts))
+    seen = of_stretches(span, waves.piece, _sums(parts, noise, waves.ratio), _weights(parts, noise, each))
+    return replace(_told(parts, waves, candidate.p_value), seen=seen)
 
 
 def _noise_at(parts: Sequence[SteadySegment], ratio: float) -> _LocalNoise:
