@@ -20,8 +20,9 @@ from identification.mismatch import policy
 from identification.mismatch.periodic.line_or_order import as_turning
 from identification.mismatch.periodic.line_width import peak_p_value
 from identification.mismatch.periodic.order_law import PICK_UP, OrderLaw, Ring
-from identification.mismatch.periodic.order_tracking import Part, RotorOrder, find_locked, wave_of
+from identification.mismatch.periodic.order_tracking import RotorOrder, find_locked
 from identification.mismatch.periodic.recurrence import Recurrence, of_frequency, power
+from identification.mismatch.periodic.rotor_angle import Part, wave_of
 from identification.mismatch.periodic.spectrum import (
     FAR,
     Series,

@@ -24,7 +24,7 @@ MOST_OFFSETS = 41
 
 
 @dataclass(frozen=True, slots=True)
-class Part:
+class Sighting:
     """What a line is in one run, or in a quarter of the only one."""
 
     run: int
@@ -47,7 +47,7 @@ class Recurrence:
 
     p_value: float
     """That the other parts hold noise alone."""
-    clearest: Part
+    clearest: Sighting
     others: int
 
     @property
@@ -55,7 +55,7 @@ class Recurrence:
         return self.p_value < policy.periodic.COMES_AGAIN_P
 
 
-def recurrence(parts: Sequence[Part]) -> Recurrence:
+def recurrence(parts: Sequence[Sighting]) -> Recurrence:
     """All parts but the clearest together, or the clearest of these: the smaller p-value counts twice."""
     first = max(range(len(parts)), key=lambda i: parts[i].gain)
     rest = [part for i, part in enumerate(parts) if i != first]
@@ -83,11 +83,11 @@ def power(time: Floats, value: Floats, f: float) -> float:
     return float((value @ np.cos(angle)) ** 2 + (value @ np.sin(angle)) ** 2) / time.size
 
 
-def _at(run: int, time: Floats, value: Floats, f: float, noise: float) -> Part:
-    return Part(run, float(time[0]), float(time[-1]), 2 * power(time, value, f) / noise, 2)
+def _at(run: int, time: Floats, value: Floats, f: float, noise: float) -> Sighting:
+    return Sighting(run, float(time[0]), float(time[-1]), 2 * power(time, value, f) / noise, 2)
 
 
-def _near(run: int, series: Series, f: float, noise: float) -> Part:
+def _near(run: int, series: Series, f: float, noise: float) -> Sighting:
     """At f, and round it as far as the mains wander."""
     values = clipped(series.residual)
     found = _at(run, series.time, values, f, noise)
@@ -95,7 +95,7 @@ def _near(run: int, series: Series, f: float, noise: float) -> Part:
     offsets = np.linspace(-wander, wander, int(np.clip(2 * wander / step + 1, 1, MOST_OFFSETS)))
     most = max(2 * power(series.time, values, f + d) / noise for d in offsets)
     nearby = min(offsets.size * float(chi2_sf(most, 2)), 1.0)
-    return Part(run, found.start, found.end, found.gain, 2, nearby)
+    return Sighting(run, found.start, found.end, found.gain, 2, nearby)
 
 
 def of_stretches(
@@ -121,11 +121,11 @@ def _of_part(
     sums: NDArray[np.complex128],
     weights: Floats,
     mine: NDArray[np.bool_],
-) -> Part:
+) -> Sighting:
     gain = 0.0
     there = np.unique(piece[mine])
     for p in there:
         these = mine & (piece == p)
         gain += float(2 * np.abs(np.sum(sums[these])) ** 2 / np.sum(weights[these]))
     first, last = np.flatnonzero(mine)[[0, -1]]
-    return Part(span[first][0], span[first][1], span[last][2], gain, 2 * there.size)
+    return Sighting(span[first][0], span[first][1], span[last][2], gain, 2 * there.size)

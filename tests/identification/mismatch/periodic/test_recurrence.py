@@ -10,7 +10,7 @@ import pytest
 from identification.mismatch import policy
 from identification.mismatch.answer.periodic_findings import seen_once, told_lines, twin_line, with_lines
 from identification.mismatch.periodic.periodic_disturbances import find_lines
-from identification.mismatch.periodic.recurrence import Part, of_frequency, recurrence
+from identification.mismatch.periodic.recurrence import Sighting, of_frequency, recurrence
 from identification.mismatch.periodic.rotor_angle import turned
 from identification.mismatch.periodic.spectrum import Series
 from tests.identification.mismatch.answer.answered import draft
@@ -99,8 +99,8 @@ def test_noise_alone_seldom_looks_like_a_second_time():
 
 
 def test_what_has_no_second_part_was_seen_once():
-    assert not recurrence([Part(0, 0.0, 9.0, 1000.0, 2)]).again
-    assert recurrence([Part(0, 0.0, 9.0, 1000.0, 2), Part(1, 0.0, 9.0, 30.0, 2)]).again
+    assert not recurrence([Sighting(0, 0.0, 9.0, 1000.0, 2)]).again
+    assert recurrence([Sighting(0, 0.0, 9.0, 1000.0, 2), Sighting(1, 0.0, 9.0, 30.0, 2)]).again
 
 
 def locked(seed, amplitude):
