@@ -98,9 +98,9 @@ def _once(line: Line, recordings: Sequence[str]) -> str:
     there = f"from {seen.clearest.start:.4g} to {seen.clearest.end:.4g} s"
     if len(recordings) > 1:
         there = f"in {recordings[seen.clearest.run]}"
-    s = "s" if seen.others != 1 else ""
-    parts = f"run{s}" if len(recordings) > 1 else f"part{s} of the run"
-    also = f", not in the other {seen.others} {parts}" if seen.others else ""
+    one, more = ("run", "runs") if len(recordings) > 1 else ("quarter of the run", "quarters of the run")
+    others = one if seen.others == 1 else f"{seen.others} {more}"
+    also = f", not in the other {others}" if seen.others else ""
     return (
         f"A line seen once, and no finding: {line.amplitude:.3g} N at {line.frequency:.4g} Hz (p = {line.p_value:.2g}) "
         f"stands out {there}{also}. It was taken out of the thrust; record again, and look whether it comes again."

@@ -74,7 +74,7 @@ def test_of_one_run_the_quarters_are_asked(start, end, again):
     if not again:
         once = replace(only(sweeps([0.9])), seen=found)
         (note,) = with_lines(draft(), (once,), 2.0, None, IDS[:1]).notes
-        assert "stands out from 30 to 44.98 s, not in the other 3 parts of the run" in note
+        assert "stands out from 30 to 44.98 s, not in the other 3 quarters of the run" in note
 
 
 def test_a_line_just_clear_enough_is_nearly_always_there_again():
