@@ -114,13 +114,11 @@ def find_locked(
     # a law that has nearly all at one speed: orders of other ratios look alike by their powers, not by their waves
     tried = [(_of_best_law(parts, each, top, ring), each) for each in likely]
     found, candidate = max(tried, key=lambda each: each[0].law_gain)
-    rate = 1.0 / min(spacing_of(r.time)[0] for _, r in runs)
-    others = [
-        each
-        for each in aliases(parts, replace(candidate, ratio=found.ratio), rate, top)
-        if _passes(each, alarm, in_turns)
-    ]
-    for each in _likeliest(parts, others, found.law, top):
+    alike: list[OrderCandidate] = []
+    if found.law.growth and not in_turns:  # nearly all at one speed, and no whole number of times a turn to go by
+        rate = 1.0 / min(spacing_of(r.time)[0] for _, r in runs)
+        alike = aliases(parts, replace(candidate, ratio=found.ratio), rate, top)
+    for each in _likeliest(parts, alike, found.law, top):
         other = _of_best_law(parts, each, top, ring)
         if other.law_gain > found.law_gain + policy.periodic.LINE_KINDS_CHI2:
             found, candidate = other, replace(each, reach=candidate.reach)
