@@ -126,7 +126,8 @@ def find_locked(
         return None
     # a loud line was part of its own noise
     loud = [wave_of(found.parts, i, r.time, 2 * np.pi * found.ratio * r.turns) for i, r in runs if r.turns is not None]
-    return _of_best_law(list(stretches(runs, top, loud)), candidate, top, ring)
+    told = _of_best_law(list(stretches(runs, top, loud)), candidate, top, ring)
+    return told if told.gain > 0 else None
 
 
 def _likeliest(
