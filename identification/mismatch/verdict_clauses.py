@@ -16,7 +16,7 @@ NOT_WHITE = (
 def sureness(f: Finding) -> str:
     """How many alternatives were looked at before it was taken, and its weight among those fitted in its place."""
     says = f"the best of {f.searched} alternatives looked at" if f.searched is not None and f.searched > 1 else ""
-    weight = f"weight {f.probability:.2g} among the {f.asked} effects asked (none of these is not asked)"
+    weight = f"weight {f.probability:.2g} among the {f.asked} effects asked ('none of these' was not)"
     return ", ".join(part for part in (says, weight if f.asked > 1 else "") if part)
 
 

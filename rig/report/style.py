@@ -213,8 +213,10 @@ def prose(text: str) -> str:
 
     >>> prose("C_plus = 0.4 N/V^2, C_t_minus is lost")
     'C+ = 0.4 N/V², C_t− is lost'
+    >>> prose("thrust grows as |V|^2.19, not as V^2.")
+    'thrust grows as |V|^2.19, not as V².'
     """
-    return text.replace("^2", "²").replace("_plus", "+").replace("_minus", "−")
+    return re.sub(r"\^2(?!\.?\d)", "²", text).replace("_plus", "+").replace("_minus", "−")
 
 
 def power_of_ten(value: float) -> str:

@@ -131,9 +131,10 @@ def _search(title: str, selected: Selected) -> Iterator[Section]:
 
 def _periodic(trace: Trace) -> Iterator[str]:
     for line in trace.cleaned.lines:
+        once = "" if line.again else ", seen once: it has no name"
         yield (
             f"{line.kind}: {line.frequency:.4g} +- {line.frequency_std:.2g} Hz, {line.amplitude:.3g} +- "
-            f"{line.amplitude_std:.2g} N, chi-square {line.gain:.4g}, {p_text(line.p_value)}: taken out"
+            f"{line.amplitude_std:.2g} N, chi-square {line.gain:.4g}, {p_text(line.p_value)}: taken out{once}"
         )
     for f, quality in trace.cleaned.bands:
         yield f"broad peak of the noise at {f:.4g} Hz, quality {quality:.3g}: told to the noise model"

@@ -81,14 +81,42 @@ def line_place(line: Line, residual: float) -> Mismatch:
 def told_lines(lines: Sequence[Line], before: Twin | None) -> tuple[Line, ...]:
     """Those that are news: one that the twin `before` has is only where it changed."""
     known = () if before is None else before.lines
-    return tuple(line for line in lines if (j := _known_as(line, known)) is None or _changed(line, known[j]))
+    named = (line for line in lines if not seen_once(line, before))
+    return tuple(line for line in named if (j := _known_as(line, known)) is None or _changed(line, known[j]))
 
 
-def with_lines(draft: Draft, lines: Sequence[Line], residual: float, before: Twin | None) -> Draft:
+def seen_once(line: Line, before: Twin | None) -> bool:
+    """Whether it is in one run, or one part of the only run, alone; one that a twin has has come again."""
+    return not line.again and _known_as(line, () if before is None else before.lines) is None
+
+
+def _once(line: Line, recordings: Sequence[str]) -> str:
+    """What is said of a line that has no name."""
+    seen = line.seen
+    if seen is None:
+        raise ValueError("only a line of which it was asked whether it comes again was seen once")
+    there = f"from {seen.clearest.start:.4g} to {seen.clearest.end:.4g} s"
+    if len(recordings) > 1:
+        there = f"in {recordings[seen.clearest.run]}"
+    one, more = ("run", "runs") if len(recordings) > 1 else ("quarter of the run", "quarters of the run")
+    others = one if seen.others == 1 else f"{seen.others} {more}"
+    also = f", not in the other {others}" if seen.others else ""
+    return (
+        f"A line seen once, and no finding: {line.amplitude:.3g} N at {line.frequency:.4g} Hz (p = {line.p_value:.2g}) "
+        f"stands out {there}{also}. It was taken out of the thrust; record again, and look whether it comes again."
+    )
+
+
+def with_lines(
+    draft: Draft, lines: Sequence[Line], residual: float, before: Twin | None, recordings: Sequence[str] = ()
+) -> Draft:
     """The draft with periodic disturbances: a place, a finding, parameters of the model, a part of the twin.
 
-    `residual`: rms of what the baseline leaves, N per sample. A line of the twin that is gone is noted.
+    `residual`: rms of what the baseline leaves, N per sample; `recordings`: ids of the runs, as lines count them. A
+    line of the twin that is gone is noted, and one that was seen once.
     """
+    once = tuple(_once(line, recordings) for line in lines if seen_once(line, before))
+    lines = tuple(line for line in lines if not seen_once(line, before))
     known = () if before is None else before.lines
     same = {i: j for i, line in enumerate(lines) if (j := _known_as(line, known)) is not None}
     told = told_lines(lines, before)
@@ -104,7 +132,7 @@ def with_lines(draft: Draft, lines: Sequence[Line], residual: float, before: Twi
         findings=(*draft.findings, *(_beside_known(line, known, origin) for line in told)),
         model_terms=(*draft.model_terms, *(EFFECT for _ in lines)),
         model={**draft.model, **_named(found)},
-        notes=(*draft.notes, *missing),
+        notes=(*draft.notes, *missing, *once),
         twin=None if draft.twin is None else replace(draft.twin, lines=(*found.values(), *gone.values())),
     )
 

@@ -76,7 +76,7 @@ def run(
     ids = tuple(r.recording_id for r in case.recordings)
     draft = with_channels(draft, case.sound.faults, ids)
     draft = with_twin(draft, after, data, case.recordings, case.baseline, completed.earned)
-    draft = with_lines(draft, case.lines, train.before, case.baseline)
+    draft = with_lines(draft, case.lines, train.before, case.baseline, ids)
     stands_in = proxies(after.fit.model, draft.findings, case.recordings, case.sound.histories)
     n, p = after.fit.residual.size, int(after.fit.free.sum())
     return Diagnosis(

@@ -30,6 +30,10 @@ AROUND = 5
 """Ratios round the best one over which it may have its best without one group of speed."""
 
 
+ALIAS_REACH = 4.0
+"""Widths of a peak of the longest stretch round an alias: the speeds at which it is loudest are several."""
+
+
 @dataclass(frozen=True, slots=True)
 class OrderCandidate:
     ratio: float
@@ -62,6 +66,20 @@ def candidates(parts: Sequence[SteadySegment], top: float) -> list[OrderCandidat
     """The best by each way to look, its p-value that of all ways; `top`: highest speed, turns per s."""
     found = [_of_powers(parts, top), *(_of_waves(parts, top, seconds) for seconds in LASTING)]
     return [replace(each, p_value=min(len(found) * each.p_value, 1.0)) for each in found]
+
+
+def aliases(parts: Sequence[SteadySegment], found: OrderCandidate, rate: float, top: float) -> list[OrderCandidate]:
+    """Ratios that samples at `rate` (1/s) show as this one at the speed `top`: there their waves are the same.
+
+    A force of the rotor is nearly all at the highest speeds, so that a wrong one of these may look clear; at the other
+    speeds they part.
+    """
+    low, high = policy.periodic.LOWEST_ORDER / top, policy.periodic.HIGHEST_ORDER / top
+    reach = ALIAS_REACH / max(float(np.ptp(p.turns)) for p in parts)
+    whole = np.arange(int(2 * policy.periodic.HIGHEST_ORDER / rate) + 2) * rate / top
+    ratios = np.unique(np.abs(np.concatenate([whole + found.ratio, whole - found.ratio])))
+    apart = ratios[(ratios > low) & (ratios < high) & (np.abs(ratios - found.ratio) > reach)]
+    return [replace(found, ratio=z, reach=reach) for z in apart.tolist()]
 
 
 def _grid(longest: float, top: float) -> _Grid:

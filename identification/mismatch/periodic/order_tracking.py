@@ -15,36 +15,19 @@ from numpy.typing import NDArray
 from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.periodic.order_law import FORCE, PICK_UP, OrderLaw, Ring, laws
-from identification.mismatch.periodic.order_search import LASTING, OrderCandidate, candidates
-from identification.mismatch.periodic.spectrum import Series
+from identification.mismatch.periodic.order_search import ALIAS_REACH, LASTING, OrderCandidate, aliases, candidates
+from identification.mismatch.periodic.recurrence import Recurrence, of_stretches
+from identification.mismatch.periodic.rotor_angle import Part, wave_of
+from identification.mismatch.periodic.spectrum import Series, spacing_of
 from identification.mismatch.periodic.steady_segments import SteadySegment, speed_of, stretches
 from identification.recording import Floats
 
 TRIED = np.linspace(-1.0, 1.0, 41)
 """Ratios near a candidate, in its reach."""
+ALIASES = 3
+"""Ratios that look alike at one speed of which the whole fit is made."""
 BESIDE = (-7, -6, -5, -4, 4, 5, 6, 7)
 """Independent ratios of a stretch beside a line."""
-
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """a cos(phi) + b sin(phi) from `start` to `end` (s) of one run."""
-
-    run: int
-    start: float
-    end: float
-    a: float
-    b: float
-
-
-def wave_of(parts: Sequence[Part], run: int, time: Floats, angle: Floats) -> Floats:
-    """(n,) N at these times of a run, from phi = angle (n,) rad; 0 where no part is."""
-    out = np.zeros_like(time)
-    for part in parts:
-        if part.run == run:
-            inside = (time >= part.start) & (time < part.end)
-            out[inside] += part.a * np.cos(angle[inside]) + part.b * np.sin(angle[inside])
-    return out
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +50,8 @@ class RotorOrder:
     """Highest speed, turns per s."""
     law_gain: float = 0.0
     """Chi-square of waves of the size that the law gives them."""
+    seen: Recurrence | None = None
+    """Whether it comes again in other runs, or in other parts of the only one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,11 +114,31 @@ def find_locked(
     # a law that has nearly all at one speed: orders of other ratios look alike by their powers, not by their waves
     tried = [(_of_best_law(parts, each, top, ring), each) for each in likely]
     found, candidate = max(tried, key=lambda each: each[0].law_gain)
+    alike: list[OrderCandidate] = []
+    if found.law.growth and not in_turns:  # nearly all at one speed, and no whole number of times a turn to go by
+        rate = 1.0 / min(spacing_of(r.time)[0] for _, r in runs)
+        alike = aliases(parts, replace(candidate, ratio=found.ratio), rate, top)
+    for each in _likeliest(parts, alike, found.law, top):
+        other = _of_best_law(parts, each, top, ring)
+        if other.law_gain > found.law_gain + policy.periodic.LINE_KINDS_CHI2:
+            found, candidate = other, replace(each, reach=candidate.reach)
     if not found.gain > policy.periodic.LOCKED_LINE_GAIN:
         return None
     # a loud line was part of its own noise
     loud = [wave_of(found.parts, i, r.time, 2 * np.pi * found.ratio * r.turns) for i, r in runs if r.turns is not None]
-    return _of_best_law(list(stretches(runs, top, loud)), candidate, top, ring)
+    told = _of_best_law(list(stretches(runs, top, loud)), candidate, top, ring)
+    return told if told.gain > 0 else None
+
+
+def _likeliest(
+    parts: Sequence[SteadySegment], every: Sequence[OrderCandidate], law: OrderLaw, top: float
+) -> list[OrderCandidate]:
+    """Those of most power, a phase for each stretch, at the ratio within reach where they have it."""
+    tried = []
+    for each in every:
+        waves = _apart(law.on(parts, each.ratio, top), _noise_at(parts, each.ratio), each)
+        tried.append((waves.gain, replace(each, ratio=waves.ratio, reach=each.reach / ALIAS_REACH)))
+    return [each for _, each in sorted(tried, key=lambda one: -one[0])[:ALIASES]]
 
 
 def _passes(candidate: OrderCandidate, alarm: float, in_turns: bool) -> bool:
@@ -171,7 +176,10 @@ def _fitted(parts: Sequence[SteadySegment], noise: _LocalNoise, candidate: Order
         ):
             waves = fewer
             break
-    return _told(parts, waves, candidate.p_value)
+    span = [(p.run, float(p.time[0]), float(p.time[-1])) for p in parts]
+    each = np.arange(len(parts))
+    seen = of_stretches(span, waves.piece, _sums(parts, noise, waves.ratio), _weights(parts, noise, each))
+    return replace(_told(parts, waves, candidate.p_value), seen=seen)
 
 
 def _noise_at(parts: Sequence[SteadySegment], ratio: float) -> _LocalNoise:

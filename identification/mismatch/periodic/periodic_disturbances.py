@@ -20,7 +20,9 @@ from identification.mismatch import policy
 from identification.mismatch.periodic.line_or_order import as_turning
 from identification.mismatch.periodic.line_width import peak_p_value
 from identification.mismatch.periodic.order_law import PICK_UP, OrderLaw, Ring
-from identification.mismatch.periodic.order_tracking import Part, RotorOrder, find_locked, wave_of
+from identification.mismatch.periodic.order_tracking import RotorOrder, find_locked
+from identification.mismatch.periodic.recurrence import Recurrence, of_frequency, power
+from identification.mismatch.periodic.rotor_angle import Part, wave_of
 from identification.mismatch.periodic.spectrum import (
     FAR,
     Series,
@@ -83,6 +85,13 @@ class Line:
     """N^2, mean square over all samples."""
     searched: int | None = None
     """Frequencies that were looked at; None of one locked to the rotor: its p-value counts them otherwise."""
+    seen: Recurrence | None = None
+    """Whether it comes again in other runs, or in other parts of the only one; None where it was not asked."""
+
+    @property
+    def again(self) -> bool:
+        """Whether it may be told by name."""
+        return self.seen is None or self.seen.again
 
     def at(self, time: Floats, turns: Floats | None = None, run: int = 0) -> Floats:
         """(n,) N, the line at these times (and turns) of that run."""
@@ -143,7 +152,7 @@ def _best(runs: Sequence[Series], unit: Literal["rev", "V s"], ring: Ring | None
         locked = (
             None
             if turning is None or fixed.gain - turning.gain > policy.periodic.LINE_KINDS_CHI2
-            else _locked(turning, unit)
+            else _locked(replace(turning, seen=fixed.seen), unit)
         )
     if fixed is None or locked is None:
         return fixed or locked
@@ -188,15 +197,15 @@ def _fitted(
     noise = [float(s.noise[at]) for s in spectra]
     values = [clipped(r.residual) for _, r in runs]
 
-    def power(f: float) -> float:
-        return sum(_power(r.time, v, f) / s for (_, r), v, s in zip(runs, values, noise, strict=True))
+    def ratio(f: float) -> float:
+        return sum(power(r.time, v, f) / s for (_, r), v, s in zip(runs, values, noise, strict=True))
 
     found = minimize_scalar(
-        lambda f: -power(f), bounds=((at - 1) * step, (at + 1) * step), method="bounded", options={"xatol": 1e-3 * step}
+        lambda f: -ratio(f), bounds=((at - 1) * step, (at + 1) * step), method="bounded", options={"xatol": 1e-3 * step}
     )
     f = float(found.x)
-    p = _p_value(power(f) / len(runs), len(runs), trials)
-    loudest = int(np.argmax([_power(r.time, v, f) / s for (_, r), v, s in zip(runs, values, noise, strict=True)]))
+    p = _p_value(ratio(f) / len(runs), len(runs), trials)
+    loudest = int(np.argmax([power(r.time, v, f) / s for (_, r), v, s in zip(runs, values, noise, strict=True)]))
     p = max(p, peak_p_value(runs[loudest][1].time, values[loudest], f))
     parts, precision = [], []
     for (i, r), s in zip(runs, noise, strict=True):
@@ -213,16 +222,11 @@ def _fitted(
     phase = float(np.arctan2(parts[0].a, parts[0].b))
     says = _fixed_says(f, amplitude, spacing)
     return Line(
-        *("fixed", f, f_std, None, None, amplitude, std, phase, phase_std, p, 2 * power(f), says),
+        *("fixed", f, f_std, None, None, amplitude, std, phase, phase_std, p, 2 * ratio(f), says),
         parts=tuple(parts),
         searched=int(np.ceil(trials)),
+        seen=of_frequency(runs, noise, f),
     )
-
-
-def _power(time: Floats, value: Floats, f: float) -> float:
-    """|sum value exp(-2 pi i f t)|^2 / n."""
-    angle = 2 * np.pi * f * time
-    return float((value @ np.cos(angle)) ** 2 + (value @ np.sin(angle)) ** 2) / time.size
 
 
 def _coefficients(time: Floats, value: Floats, f: float) -> tuple[float, float]:
@@ -290,4 +294,5 @@ def _locked(found: RotorOrder, unit: Literal["rev", "V s"]) -> Line:
         unit=unit,
         law=found.law,
         top=found.top,
+        seen=found.seen,
     )

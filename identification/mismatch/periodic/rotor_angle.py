@@ -1,6 +1,9 @@
-"""The angle that the rotor has turned at any time."""
+"""The angle that the rotor has turned at any time, and a wave over it, or over time."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,4 +26,25 @@ def turned_by_rate(time: Floats, rate: Floats, at: Floats) -> Floats:
     slope = np.append(np.diff(n) / np.maximum(np.diff(t), 1e-12), 0.0)[index]
     inside = np.clip(since, 0.0, np.append(np.diff(t), 0.0)[index])
     out: Floats = total[index] + n[index] * since + 0.5 * slope * inside**2
+    return out
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """a cos(phi) + b sin(phi) from `start` to `end` (s) of one run."""
+
+    run: int
+    start: float
+    end: float
+    a: float
+    b: float
+
+
+def wave_of(parts: Sequence[Part], run: int, time: Floats, angle: Floats) -> Floats:
+    """(n,) N at these times of a run, from phi = angle (n,) rad; 0 where no part is."""
+    out = np.zeros_like(time)
+    for part in parts:
+        if part.run == run:
+            inside = (time >= part.start) & (time < part.end)
+            out[inside] += part.a * np.cos(angle[inside]) + part.b * np.sin(angle[inside])
     return out

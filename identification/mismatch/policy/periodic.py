@@ -205,6 +205,14 @@ STRETCH_SPEED_JUMP = Threshold(
     unit="share of the highest speed",
     reason="A larger change between samples begins a new stretch: over it no wave of the rotor keeps its frequency.",
 )
+COMES_AGAIN_P = Threshold(
+    0.01,
+    unit="probability",
+    reason=(
+        "A line is told by name where the runs, or the quarters of the only run, other than the one that shows it best "
+        "would look so much like it once in a hundred times by noise alone; else it was seen once."
+    ),
+)
 MAINS_WANDER = Threshold(
     0.002,
     unit="share of the frequency",

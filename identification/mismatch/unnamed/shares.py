@@ -74,8 +74,8 @@ def with_shares(
 def share(without: Score, with_it: Score, least: float) -> float:
     """Of the squared error that could be taken off, down to `least` N, how much is (0 to 1).
 
-    >>> share(Score(2.0, 0.0), Score(1.2, 0.0), 1.0)
-    0.8533333333333333
+    >>> round(share(Score(2.0, 0.0), Score(1.2, 0.0), 1.0), 3)
+    0.853
     """
     could = without.rmse**2 - least**2
     return min(max((without.rmse**2 - with_it.rmse**2) / could, 0.0), 1.0) if could > 0 else 0.0

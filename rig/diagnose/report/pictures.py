@@ -145,8 +145,7 @@ def _signature(finding: Finding, runs: Sequence[Run], driver: str, *, several: b
     what = "what the model lacks without it" if several and found.alone else "what the baseline lacks"
     caption = f"{words(finding.statement)} Points: {what}, with 95 % intervals; line: the model in the same bins."
     plot = _signature_plot(found, label, driver)
-    sure = words(evidence(finding))
-    return Picture(f"{name[0].upper()}{name[1:]}", plot, f"{caption} {sure[:1].upper()}{sure[1:]}.")
+    return Picture(f"{name[0].upper()}{name[1:]}", plot, f"{caption} {words(evidence(finding))}.")
 
 
 def _signature_plot(found: Signature, label: str, driver: str) -> Plot:

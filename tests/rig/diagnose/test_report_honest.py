@@ -96,7 +96,7 @@ def test_a_p_value_says_among_how_many_it_was_searched():
     found = replace(LAGS, searched=812, asked=9)
     for told in (said(answer(findings=(found,))), shown(answer(findings=(found,)))):
         assert "the best of 812 alternatives looked at" in told
-        assert "weight 0.7 among the 9 effects asked (none of these is not asked)" in told
+        assert "weight 0.7 among the 9 effects asked ('none of these' was not)" in told
         assert "probability among" not in told
     alone = replace(LAGS, searched=None, rivals=())
     assert "alternatives" not in said(answer(findings=(alone,)))

@@ -112,6 +112,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
     for j, other in enumerate(found.terms):
         if other not in best or rho[j] > best[other][0]:
             best[other] = (float(rho[j]), mirrored(other, found.values[j], data) if against[j] else found.values[j])
+    best |= {other: (1.0, now.values[term]) for other in best if _same_limit(other, term, data)}
     ranked = sorted(best.items(), key=lambda item: -item[1][0])
     out = []
     extra_now = price(term, data)
@@ -142,6 +143,13 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
         loss = new.chi2 - now.chi2 + extra
         out.append(RivalTerm(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))
     return sorted(out, key=lambda rival: rival.bic_loss)
+
+
+def _same_limit(other: Term, term: Term, data: Data) -> bool:
+    """Whether it is the same limit in another form: it begins where this one is, for trials at other limits change
+    other readings and look like nothing of it."""
+    names = [[p.name for p in each.parameters(data.scale)] for each in (other, term)]
+    return bool(term.traits.limits) and other.id == term.id and names[0] == names[1]
 
 
 def mirrored(term: Term, values: tuple[float, ...], data: Data) -> tuple[float, ...]:

@@ -17,8 +17,8 @@ from identification.mismatch.answer.periodic_findings import (
     with_lines,
 )
 from identification.mismatch.answer.report_assembly import values_of
-from identification.mismatch.periodic.order_tracking import Part
 from identification.mismatch.periodic.periodic_disturbances import Line
+from identification.mismatch.periodic.rotor_angle import Part
 from identification.mismatch.value import Value, Where
 from identification.twin import Twin
 from tests.identification.diagnosed_runs import dead_band

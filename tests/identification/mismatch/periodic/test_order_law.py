@@ -6,10 +6,12 @@ import pytest
 from identification.mismatch import policy
 from identification.mismatch.answer.periodic_findings import line_finding, twin_line
 from identification.mismatch.periodic.order_law import FORCE, PICK_UP, OrderLaw, response
-from identification.mismatch.periodic.order_tracking import find_locked, wave_of
+from identification.mismatch.periodic.order_search import OrderCandidate, aliases
+from identification.mismatch.periodic.order_tracking import find_locked
 from identification.mismatch.periodic.periodic_disturbances import find_lines
-from identification.mismatch.periodic.rotor_angle import turned
+from identification.mismatch.periodic.rotor_angle import turned, wave_of
 from identification.mismatch.periodic.spectrum import Series
+from identification.mismatch.periodic.steady_segments import stretches
 from identification.run_history.filters import resonant
 from tests.identification.mismatch.small import rng
 
@@ -82,3 +84,19 @@ def test_it_is_said_and_handed_to_a_twin():
     assert twin_line(line).growth == 2.0
     (steady,) = find_lines([turning(2, lambda n: 0.6 + 0 * n)])
     assert "growth" not in line_finding(steady).parameters
+
+
+def test_an_order_that_samples_show_as_another_is_told_by_the_other_speeds():
+    """At 9 turns/s, where nearly all of it is, 20 samples/s show 2.6 waves a turn as 20/9 more or fewer."""
+    rng = np.random.default_rng(11)
+    t = np.arange(6000) / 20.0
+    edges = np.arange(0.0, 303.0, 3.0)
+    speed = rng.choice([5.0, 6.2, 7.3, 9.0], edges.size - 1, p=[0.15, 0.15, 0.15, 0.55])
+    turns, at = turned(edges, speed, t), speed[np.searchsorted(edges, t, side="right") - 1]
+    wave = 0.5 * (at / 9.0) ** 2 * np.sin(2 * np.pi * 2.6 * turns + 1.0)
+    series = Series(t, rng.standard_normal(t.size) + wave, turns)
+    (line,) = find_lines([series], turns_unit="V s")
+    assert line.ratio == pytest.approx(2.6, abs=5 * line.ratio_std)
+    seen = {round(abs(2.6 * 9.0 + k * 20.0) / 9.0, 6) for k in range(-5, 6)}
+    found = aliases(list(stretches([(0, series)], 9.0)), OrderCandidate(2.6, 0.01, 1e-9), 20.0, 9.0)
+    assert {round(each.ratio, 6) for each in found} >= {z for z in seen if 0.2 < z < 12 and abs(z - 2.6) > 0.1}

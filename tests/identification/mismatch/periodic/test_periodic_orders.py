@@ -8,8 +8,8 @@ import pytest
 from identification.mismatch import policy
 from identification.mismatch.periodic.line_or_order import as_turning
 from identification.mismatch.periodic.order_search import candidates
-from identification.mismatch.periodic.order_tracking import Part, find_locked, wave_of
-from identification.mismatch.periodic.rotor_angle import turned
+from identification.mismatch.periodic.order_tracking import find_locked
+from identification.mismatch.periodic.rotor_angle import Part, turned, wave_of
 from identification.mismatch.periodic.spectrum import Series
 from identification.mismatch.periodic.steady_segments import Colour, quick, speed_of, stretches
 from tests.identification.mismatch.small import rng

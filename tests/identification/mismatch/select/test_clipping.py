@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.mismatch.estimate.estimate import fit_without
 from identification.mismatch.name.naming import checks
+from identification.mismatch.select.exchange.rivals import swaps
 from identification.mismatch.select.limits.clipping import beyond, contradiction
 from identification.physics.cavitation import Cavitation
 from identification.physics.command_saturation import CommandSaturation
@@ -110,6 +112,17 @@ def test_noise_of_the_force_ends_with_the_cell_and_that_of_the_amplifier_goes_on
         data, estimate = known_noise({CELL: (46.0,)}, [replace(made, channels=(command, replace(thrust, value=value)))])
         noise = replace(estimate.noise, proportional=0.05**2)
         assert bool(contradiction(estimate.fit, CELL, noise, data)) is doubted
+
+
+def test_the_same_limit_in_another_form_is_tried_where_it_is_and_goes_before_one_that_noise_contradicts():
+    """A cell that stops half a newton below the largest force: trials at other limits look like nothing of it."""
+    hard = LoadCellSaturation("hard")
+    data, estimate = known_noise({hard: (71.0,)}, [clipping("cell", limit=71.5)], NOISE)
+    assert "noise goes on" in contradiction(estimate.fit, hard, estimate.noise, data)
+    found = swaps(estimate, hard, fit_without(estimate, hard, data), data, (hard, CELL))
+    (rival,) = [each for each in found if each.term == CELL]
+    assert rival.fit.values[CELL][0] == pytest.approx(71.5, abs=0.1)
+    assert rival.bic_loss < 4
 
 
 @pytest.mark.parametrize("what", ["drive", "cell"])
