@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 from identification.mismatch import policy
 from identification.mismatch.value import Value, Where
-from identification.mismatch.verdict_clauses import either, mostly
+from identification.mismatch.verdict_clauses import beside, either
 from identification.recording import Floats
 from identification.twin import Twin
 
@@ -292,7 +292,4 @@ class Diagnosis:
                 known = f" Left out besides: {sure}" if sure else ""
                 return f"These recordings cannot tell {rivals}: run the next experiment.{known}"
             case Unexplained(findings, remainder):
-                most = [f for f in findings if f.doubts]
-                sure = " ".join(f.statement for f in findings if not f.doubts)
-                known = f" Known: {sure}" if sure else ""
-                return " ".join([*map(mostly, most), remainder.statement]) + known
+                return beside(findings, remainder.statement, self.heldout, self.unit)

@@ -98,6 +98,7 @@ def traced(
     completed = unnamed.run(selected, located, validated, unseen, draws.unnamed)
     news = told_lines(cleaned.lines, baseline)
     experiment = next_experiment.run(now, data, completed.earned, news, limits)
-    case = answer.Case(prepared.recordings, sound, unseen, cleaned.lines, baseline, (*sound.notes, *unpredicted))
+    notes = (*sound.notes, *cleaned.notes, *unpredicted)
+    case = answer.Case(prepared.recordings, sound, unseen, cleaned.lines, baseline, notes)
     diagnosis = answer.run(case, selected, located, completed, experiment, draws.answer)
     return Trace(prepared, sound, first, cleaned, selected, located, named, validated, completed, diagnosis)

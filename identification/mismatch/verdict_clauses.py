@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from identification.mismatch.diagnosis import Finding
+    from identification.mismatch.diagnosis import Finding, HeldOutRmse
 
 NOT_WHITE = (
     "intervals and p-values rest on the noise model, which does not describe all of it: they may be surer than they "
@@ -13,16 +14,36 @@ NOT_WHITE = (
 )
 
 
-def mostly(f: Finding) -> str:
-    """With what it does on what was not fitted."""
-    says = f"Mostly {f.statement[:1].lower()}{f.statement[1:]}"
+def graded(f: Finding, unit: str) -> str:
+    """With what it does on what was not fitted, in `unit`."""
+    says = f"{'Partly' if f.grade == 'partly' else 'Mostly'} {f.statement[:1].lower()}{f.statement[1:]}"
     if f.heldout is None or f.share is None:
         return says
     without, with_it = f.heldout
     return (
-        f"{says} It takes the error on what was not fitted from {without:.3g} to {with_it:.3g}, "
+        f"{says} It takes the error on what was not fitted from {without:.3g} to {with_it:.3g} {unit}, "
         f"{100 * f.share:.0f} % of what any shape could take off."
     )
+
+
+def together(findings: Sequence[Finding], held: HeldOutRmse, unit: str) -> str:
+    """What several names do on what was not fitted; empty where one is all there is, or they do not do better."""
+    reached = [f.heldout[1] for f in findings if f.heldout is not None]
+    if len(reached) < 2 or reached[0] >= held.before:
+        return ""
+    return (
+        f"Together they take the error on what was not fitted from {held.before:.3g} to {reached[0]:.3g} {unit}, of "
+        f"which {held.noise:.3g} is noise."
+    )
+
+
+def beside(findings: Sequence[Finding], left: str, held: HeldOutRmse, unit: str) -> str:
+    """What is known, those that are not the whole of it first, and then the sentence of what is left."""
+    most = [graded(f, unit) for f in findings if f.doubts]
+    sure = [f.statement for f in findings if not f.doubts]
+    named = [*most, *(["Left out:", *sure] if sure else []), together(findings, held, unit)]
+    said = f"Beside that {left[:1].lower()}{left[1:]}" if findings else left
+    return " ".join([*filter(None, named), said])
 
 
 def either(f: Finding) -> str:

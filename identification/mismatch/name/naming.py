@@ -26,6 +26,8 @@ from identification.physics.term import Term
 from identification.recording import Floats
 
 Named = NamedTerm[Term, Fit]
+REPAIR = "no repair of another shape"
+"""What is asked of two shapes on one static curve."""
 AT_LEAST = 0.01
 """Of the least time that samples can show: what is no longer ends there."""
 
@@ -141,8 +143,7 @@ def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[
 
 
 def _not_repaired(told: tuple[str, ...]) -> tuple[Check, ...]:
-    asked = "no repair of another shape"
-    return tuple(Check(asked, each) for each in told) or (Check(asked),)
+    return tuple(Check(REPAIR, each) for each in told) or (Check(REPAIR),)
 
 
 def name(

@@ -18,6 +18,7 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.periodic.full_rate import scale_std_of, series_of, with_scale
 from identification.mismatch.periodic.periodic_disturbances import Line, find_lines
+from identification.mismatch.periodic.recurrence import recurring
 from identification.mismatch.periodic.resonances import find_bands
 from identification.mismatch.periodic.spectrum import Series
 from identification.recording import Floats
@@ -34,6 +35,8 @@ class Cleaned:
     """(Hz, quality) of broad peaks of the noise."""
     histories: tuple[History, ...]
     """The runs without the lines."""
+    notes: tuple[str, ...] = ()
+    """On each line that does not come again."""
 
     @property
     def changed(self) -> bool:
@@ -46,13 +49,13 @@ def run(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned:
     series = series_of(fitted, data)
     if all(s.time.size < policy.periodic.FULL_RATE_SAMPLES for s in series):
         return Cleaned((), (), tuple(originals))
-    lines = _lines(fitted, data, series)
+    lines, notes = recurring(_lines(fitted, data, series), series)
     bands = find_bands(_still(series, lines, data))
     histories = tuple(
         _without(h, [line.at(s.time, s.turns, i) for line in lines])
         for i, (h, s) in enumerate(zip(originals, series, strict=True))
     )
-    return Cleaned(lines, bands, histories)
+    return Cleaned(lines, bands, histories, notes)
 
 
 def _lines(fitted: Fit, data: Data, series: Sequence[Series]) -> tuple[Line, ...]:

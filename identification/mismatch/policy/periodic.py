@@ -45,6 +45,14 @@ LINE_SAMPLES = Count(
     unit="samples",
     reason="A run with fewer samples has too few frequencies to tell a line from its neighbours.",
 )
+LINE_RECURS_P = Threshold(
+    0.05,
+    unit="probability",
+    reason=(
+        "The frequency is known from all runs together, so that a run by itself need not be beyond doubt; but two runs "
+        "must show the line, and by chance they do so once in four hundred."
+    ),
+)
 LINE_KINDS_CHI2 = Threshold(
     10.0,
     unit="chi-square",

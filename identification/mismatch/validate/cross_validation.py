@@ -59,12 +59,17 @@ def _alike(data: Data) -> bool:
 def _judged(estimate: Estimate, data: Data, fold: Sequence[int]) -> tuple[float, float]:
     """RMSE in N and samples of the runs of a fold, by the model fitted to the others."""
     others = [i for i in range(len(data.histories)) if i not in fold]
-    model = _fitted(estimate, _of(data, others), others)
+    model = fitted_to(estimate, data, others)
     unseen = replace(_of(data, fold), with_rate=False)
     theta = with_tares(model.model, model.theta, unseen)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
     samples = sum(float(h.count[r].sum()) for h, r in zip(unseen.histories, unseen.rows, strict=True))
     return rmse(model.model, theta, unseen, every), samples
+
+
+def fitted_to(estimate: Estimate, data: Data, runs: Sequence[int]) -> Fit:
+    """The model fitted to some of the runs, by their numbers."""
+    return _fitted(estimate, _of(data, runs), runs)
 
 
 def _of(data: Data, runs: Sequence[int]) -> Data:
