@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 
 from identification.mismatch import policy
 from identification.mismatch.value import Value, Where
-from identification.mismatch.verdict_clauses import beside, either
+from identification.mismatch.verdict_clauses import beside, unsettled
 from identification.recording import Floats
 from identification.twin import Twin
 
@@ -287,9 +287,7 @@ class Diagnosis:
             case Explained(findings):
                 return "Left out: " + " ".join(f.statement for f in findings)
             case Ambiguous(findings):
-                rivals = "; ".join(either(f) for f in findings if f.rivals)
-                sure = " ".join(f.statement for f in findings if not f.rivals)
-                known = f" Left out besides: {sure}" if sure else ""
-                return f"These recordings cannot tell {rivals}: run the next experiment.{known}"
+                told = [f.statement for f in findings if not f.rivals] + [unsettled(f) for f in findings if f.rivals]
+                return f"Left out: {' '.join(told)} Run the next experiment."
             case Unexplained(findings, remainder):
                 return beside(findings, remainder.statement, self.heldout, self.unit)

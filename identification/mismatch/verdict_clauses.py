@@ -46,8 +46,8 @@ def beside(findings: Sequence[Finding], left: str, held: HeldOutRmse, unit: str)
     return " ".join([*filter(None, named), said])
 
 
-def either(f: Finding) -> str:
-    """It or its rivals; by form, where they are one effect."""
-    every = [(f.effect, f.form), *((r.effect, r.form) for r in f.rivals)]
-    same = len({effect for effect, _ in every}) < len(every)
-    return " or ".join(f"{effect} ({form})" if same and form else effect for effect, form in every)
+def unsettled(f: Finding) -> str:
+    """It, and by name the rivals that would do as well; by form, where they are the same effect."""
+    names = [r.effect if r.effect != f.effect else f"{r.effect} ({r.form})" for r in f.rivals]
+    others = " or ".join(name.replace("_", " ") for name in names)
+    return f"{f.statement} Or it is {others}: these recordings cannot tell them apart."
