@@ -19,7 +19,7 @@ from identification.mismatch.name.naming import Named
 from identification.mismatch.select.forward_selection import STATIC, Selected
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
-from identification.mismatch.unnamed.shares import mostly_right, only_repairs, repairs, with_shares
+from identification.mismatch.unnamed.shares import mostly_right, repairs, with_shares
 from identification.mismatch.validate.prediction import predicting, predicts
 from identification.mismatch.validate.stage import Validated
 from identification.physics.term import Term
@@ -68,7 +68,7 @@ def run(
         over = foremost_covariate(left, unearned, data)
         flexible = extend(now, before, data, over, unearned, split, rng)
         best = min(split.judge(split.estimate.fit).rmse, np.inf if flexible is None else flexible.held)
-        mostly = mostly_right(split, unearned if located.structured else only_repairs(unearned), best)
+        mostly = mostly_right(split, unearned if located.structured else (), best)
         if mostly.right:  # back: a free shape is for what they leave
             earned, unearned = (*earned, *mostly.right), mostly.others
             flexible = extend(now, before, data, over, unearned, split, rng)
