@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from identification.mismatch import policy
 from identification.mismatch.value import Value, Where
-from identification.mismatch.verdict_clauses import beside, unsettled
+from identification.mismatch.verdict_clauses import beside, together, unsettled
 from identification.recording import Floats
 from identification.twin import Twin
 
@@ -285,9 +285,13 @@ class Diagnosis:
             case Adequate():
                 return f"Nothing is missing: {self.baseline_model} describes these recordings within their noise."
             case Explained(findings):
-                return "Left out: " + " ".join(f.statement for f in findings)
+                return self._left_out([f.statement for f in findings])
             case Ambiguous(findings):
                 told = [f.statement for f in findings if not f.rivals] + [unsettled(f) for f in findings if f.rivals]
-                return f"Left out: {' '.join(told)} Run the next experiment."
+                return f"{self._left_out(told)} Run the next experiment."
             case Unexplained(findings, remainder):
                 return beside(findings, remainder.statement, self.heldout, self.unit)
+
+    def _left_out(self, told: Sequence[str]) -> str:
+        """Of the findings, each told, and what they do together."""
+        return " ".join(filter(None, ["Left out:", *told, together(self.findings, self.heldout, self.unit)]))
