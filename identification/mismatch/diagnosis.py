@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar, Literal
 
 from identification.mismatch import policy
 from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Value, Where
-from identification.mismatch.verdict_clauses import either, mostly
+from identification.mismatch.verdict_clauses import beside, together, unsettled
 from identification.recording import Floats
 from identification.twin import Twin
 
@@ -228,14 +228,13 @@ class Diagnosis:
             case Adequate():
                 return f"Nothing is missing: {self.baseline_model} describes these recordings within their noise."
             case Explained(findings):
-                return "Left out: " + " ".join(f.statement for f in findings)
+                return self._left_out([f.statement for f in findings])
             case Ambiguous(findings):
-                rivals = "; ".join(either(f) for f in findings if f.rivals)
-                sure = " ".join(f.statement for f in findings if not f.rivals)
-                known = f" Left out besides: {sure}" if sure else ""
-                return f"These recordings cannot tell {rivals}: run the next experiment.{known}"
+                told = [f.statement for f in findings if not f.rivals] + [unsettled(f) for f in findings if f.rivals]
+                return f"{self._left_out(told)} Run the next experiment."
             case Unexplained(findings, remainder):
-                most = [f for f in findings if f.doubts]
-                sure = " ".join(f.statement for f in findings if not f.doubts)
-                known = f" Known: {sure}" if sure else ""
-                return " ".join([*map(mostly, most), remainder.statement]) + known
+                return beside(findings, remainder.statement, self.heldout, self.unit)
+
+    def _left_out(self, told: Sequence[str]) -> str:
+        """Of the findings, each told, and what they do together."""
+        return " ".join(filter(None, ["Left out:", *told, together(self.findings, self.heldout, self.unit)]))

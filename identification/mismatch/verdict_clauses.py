@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from identification.mismatch.diagnosis import Finding
+    from identification.mismatch.diagnosis import Finding, HeldOutRmse
 
 NOT_WHITE = (
     "intervals and p-values rest on the noise model, which does not describe all of it: they may be surer than they "
@@ -31,20 +32,40 @@ def degree(f: Finding) -> str:
     )
 
 
-def mostly(f: Finding) -> str:
-    """With what it does on what was not fitted."""
-    says = f"Mostly {f.statement[:1].lower()}{f.statement[1:]}"
+def graded(f: Finding, unit: str) -> str:
+    """With what it does on what was not fitted, in `unit`."""
+    says = f"{'Partly' if f.grade == 'partly' else 'Mostly'} {f.statement[:1].lower()}{f.statement[1:]}"
     if f.heldout is None or f.share is None:
         return says
     without, with_it = f.heldout
     return (
-        f"{says} It takes the error on what was not fitted from {without:.3g} to {with_it:.3g}, "
+        f"{says} It takes the error on what was not fitted from {without:.3g} to {with_it:.3g} {unit}, "
         f"{100 * f.share:.0f} % of what any shape could take off."
     )
 
 
-def either(f: Finding) -> str:
-    """It or its rivals; by form, where they are one effect."""
-    every = [(f.effect, f.form), *((r.effect, r.form) for r in f.rivals)]
-    same = len({effect for effect, _ in every}) < len(every)
-    return " or ".join(f"{effect} ({form})" if same and form else effect for effect, form in every)
+def together(findings: Sequence[Finding], held: HeldOutRmse, unit: str) -> str:
+    """What several names do on what was not fitted; empty where one is all there is, or they do not do better."""
+    reached = [f.heldout[1] for f in findings if f.heldout is not None]
+    if len(reached) < 2 or reached[0] >= held.before:
+        return ""
+    return (
+        f"Together they take the error on what was not fitted from {held.before:.3g} to {reached[0]:.3g} {unit}, of "
+        f"which {held.noise:.3g} is noise."
+    )
+
+
+def beside(findings: Sequence[Finding], left: str, held: HeldOutRmse, unit: str) -> str:
+    """What is known, those that are not the whole of it first, and then the sentence of what is left."""
+    most = [graded(f, unit) for f in findings if f.doubts]
+    sure = [f.statement for f in findings if not f.doubts]
+    named = [*most, *(["Left out:", *sure] if sure else []), together(findings, held, unit)]
+    said = f"Beside that {left[:1].lower()}{left[1:]}" if findings else left
+    return " ".join([*filter(None, named), said])
+
+
+def unsettled(f: Finding) -> str:
+    """It, and by name the rivals that would do as well; by form, where they are the same effect."""
+    names = [r.effect if r.effect != f.effect else f"{r.effect} ({r.form})" for r in f.rivals]
+    others = " or ".join(name.replace("_", " ") for name in names)
+    return f"{f.statement} Or it is {others}: these recordings cannot tell them apart."

@@ -10,6 +10,7 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.unexplained import Remainder
 from identification.mismatch.unnamed.flexible import foremost
 from identification.mismatch.unnamed.flexible_shape import with_flexible
+from identification.mismatch.unnamed.shares import only_repairs
 from identification.mismatch.unnamed.stage import Completed, foremost_covariate
 from identification.run_history.history import History
 
@@ -27,7 +28,10 @@ def remainder_of(completed: Completed, data: Data, unseen: Sequence[History]) ->
     where, share, table = where_of(judged, bare.fit, data, bare.weights)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.failed_checks)}" for n in unearned)
     text = f"Something is left that no term of the catalogue carries: {says(where, share, judged.covariate.what)}"
-    if unearned:
+    if unearned and len(only_repairs(unearned)) == len(unearned):
+        names = " or ".join(n.term.id.replace("_", " ") for n in unearned)
+        text += f" It is mostly {names}: each explains nearly the same alone, and neither all of it."
+    elif unearned:
         text += f" It resembles {', '.join(n.term.id for n in unearned)}, but {unearned[0].failed_checks[0]}."
     found = Remainder(where, judged.share, left.p_value, table, text, resembles)
     return with_flexible(found, flexible, data, unseen)

@@ -14,15 +14,17 @@ from identification.mismatch.answer.proxies import proxies
 from identification.mismatch.answer.remainder import remainder_of
 from identification.mismatch.answer.report_assembly import curves_of, finding_of, values_of
 from identification.mismatch.answer.verdict import decided
-from identification.mismatch.diagnosis import Diagnosis, NextExperiment, Rmse
+from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment, Rmse
 from identification.mismatch.faults.stage import Sound
 from identification.mismatch.locate.places import places_of
 from identification.mismatch.locate.stage import Located
+from identification.mismatch.model.data import Data
 from identification.mismatch.noise.whiteness import whiteness
 from identification.mismatch.periodic.periodic_disturbances import Line
 from identification.mismatch.select.forward_selection import Selected
 from identification.mismatch.unnamed.flexible_shape import with_held
 from identification.mismatch.unnamed.stage import Completed
+from identification.mismatch.validate.each_run import run_differences
 from identification.mismatch.validate.held_out import rmse
 from identification.mismatch.validate.stage import score
 from identification.recording import Recording
@@ -69,7 +71,7 @@ def run(
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
         mismatch=places_of(selected, after, rng, pulsing=located.left.pulses is not None),
-        findings=tuple(finding_of(n, data.scale, completed.intervals) for n in completed.earned),
+        findings=_findings(completed, data),
         model_terms=tuple(t.id for t in after.fit.model.terms),
         model=values_of(after.fit, data, completed.intervals),
     )
@@ -96,3 +98,15 @@ def run(
         curves=curves_of(before, after, data),
         twin=draft.twin,
     )
+
+
+def _findings(completed: Completed, data: Data) -> tuple[Finding, ...]:
+    """Each with what single runs say otherwise."""
+    inside = [n.term for n in completed.earned if n.term in completed.after.fit.model.terms]
+    apart = run_differences(completed.after, data, inside)
+    out = []
+    for n in completed.earned:
+        found = finding_of(n, data.scale, completed.intervals)
+        said = apart.get(n.term)
+        out.append(found if said is None else replace(found, statement=f"{found.statement} {said.statement}"))
+    return tuple(out)

@@ -28,6 +28,8 @@ from identification.recording import Floats
 
 Named = NamedTerm[Term, Fit]
 CLIPPING = "what else was recorded clips with it, or does not"
+REPAIR = "no repair of another shape"
+"""What is asked of two shapes on one static curve."""
 AT_LEAST = 0.01
 """Of the least time that samples can show: what is no longer ends there."""
 
@@ -145,8 +147,7 @@ def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[
 
 
 def _not_repaired(told: tuple[str, ...]) -> tuple[Check, ...]:
-    asked = "no repair of another shape"
-    return tuple(Check("repair", asked, each) for each in told) or (Check("repair", asked),)
+    return tuple(Check("repair", REPAIR, each) for each in told) or (Check("repair", REPAIR),)
 
 
 def name(

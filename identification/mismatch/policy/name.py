@@ -68,6 +68,16 @@ REPAIRED_ALONE_SHARE = Threshold(
         "and neither is told."
     ),
 )
+RUNS_DIFFER_P = Threshold(
+    1e-3,
+    unit="probability",
+    reason="That single runs want other values is said where noise makes them differ so once in a thousand diagnoses.",
+)
+RUNS_APART = Threshold(
+    0.5,
+    unit="share of the median value",
+    reason="Values of single runs within such a range are one value to a person, however small their errors are.",
+)
 PART_SIGMA = Threshold(
     0.3,
     unit="sigma",

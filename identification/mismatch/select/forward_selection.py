@@ -60,6 +60,8 @@ def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
             continue
         if term.traits.flow and data.scale.flow <= 0:
             continue
+        if term.traits.own_clock and term.traits.instant and len(data.histories) > 1:
+            continue  # what comes at one instant of every run follows the command
         if term.traits.seen_by in fine - set(term.needs):
             continue
         out.append(term)

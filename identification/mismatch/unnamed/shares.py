@@ -28,27 +28,31 @@ class Mostly:
 
 
 def mostly_right(split: TrainTestSplit, unearned: Sequence[Named], best: float) -> Mostly:
-    """Of the names that were not earned those that make most of what any shape could, one after the other.
+    """Of the names that were not earned the fewest that together make most of what any shape could.
 
+    The one that predicts best goes first; a further one is asked for most of what those before leave.
     `split`: the whole model fitted to a part of the data, and what judges it on the rest; `best`: RMSE in N there of
     what predicts best, free shapes and all.
     """
     now = _fitted(split, split.estimate.fit, [n.term for n in unearned])
+    before = score = split.judge(now)
     left = [n for n in unearned if _possible(n)]
     right: list[Named] = []
+    tried: list[Named] = []
     while left:
-        score = split.judge(now)
-        tried = [(n, one) for n in left if (one := _with(split, now, n)) is not None]
-        if not tried:
+        fits = [(n, one) for n in left if (one := _with(split, now, n)) is not None]
+        if not fits:
             break
-        most, one = min(tried, key=lambda each: split.judge(each[1]).rmse)
-        new = split.judge(one)
-        gains = better(new, score, len(most.theta))
-        if not gains or share(score, new, min(best, new.rmse)) < policy.unnamed.MOSTLY_SHARE:
+        most, now = min(fits, key=lambda each: split.judge(each[1]).rmse)
+        new = split.judge(now)
+        if not better(new, score, len(most.theta)):
             break
-        right.append(most)
-        left.remove(most)
-        now = one
+        tried.append(most)
+        left = [n for n in left if n is not most and not (repairs(n) and repairs(most))]
+        score = new
+        if share(before, score, min(best, score.rmse)) >= policy.unnamed.MOSTLY_SHARE:
+            right, before = [*right, *tried], score
+            tried = []
     return Mostly(tuple(right), tuple(n for n in unearned if n not in right))
 
 
@@ -79,6 +83,16 @@ def share(without: Score, with_it: Score, least: float) -> float:
     """
     could = without.rmse**2 - least**2
     return min(max((without.rmse**2 - with_it.rmse**2) / could, 0.0), 1.0) if could > 0 else 0.0
+
+
+def only_repairs(unearned: Sequence[Named]) -> tuple[Named, ...]:
+    """Names that failed nothing but that another shape on the same curve explains nearly the same."""
+    return tuple(n for n in unearned if all(c.kind == "repair" for c in n.checks if c.failed))
+
+
+def repairs(named: Named) -> bool:
+    """Whether another shape on the same curve explains nearly the same."""
+    return any(check.kind == "repair" for check in named.checks if check.failed)
 
 
 def _possible(named: Named) -> bool:

@@ -19,7 +19,7 @@ from identification.mismatch.name.naming import Named
 from identification.mismatch.select.forward_selection import STATIC, Selected
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
-from identification.mismatch.unnamed.shares import mostly_right, with_shares
+from identification.mismatch.unnamed.shares import mostly_right, repairs, with_shares
 from identification.mismatch.validate.prediction import predicting, predicts
 from identification.mismatch.validate.stage import Validated
 from identification.physics.term import Term
@@ -80,14 +80,15 @@ def run(
         valued, known = _with_values(earned, now, flexible.estimate, data, flexible)
         return Completed(flexible.estimate, valued, known, unearned, flexible, open_ended, bare, left)
     after = predicting(now, split, data, selected.terms, [n.term for n in unearned], unseen)
-    if earned and unearned and not predicts(after, before, data, unseen):
+    if earned and located.left.groups and not predicts(after, before, data, unseen, grown=not unearned):
+        open_ended = True
         refuted = Check("predicts", "predicts better than the baseline", ALONE)
         after, unearned, earned = before, (*unearned, *(n.asked(refuted) for n in earned)), ()
         bare, left = _without(now, data, unearned, rng)
         if left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM:
             bare, left = now, located.left
     earned = with_shares(split, earned, [n.term for n in unearned], split.judge(split.estimate.fit).rmse)
-    valued, known = _with_values(earned, now, after, data, None)
+    valued, known = _with_values(earned, now, after, data, None, [n.term for n in unearned])
     return Completed(after, valued, known, unearned, None, open_ended, bare, left)
 
 
@@ -111,15 +112,23 @@ def foremost_covariate(left: ResidualStructure, unearned: Sequence[Named], data:
 
 
 def _with_values(
-    earned: Sequence[Named], before: Estimate, after: Estimate, data: Data, free: Extended | None
+    earned: Sequence[Named],
+    before: Estimate,
+    after: Estimate,
+    data: Data,
+    free: Extended | None,
+    unnamed: Sequence[Term] = (),
 ) -> tuple[tuple[Named, ...], dict[Term, tuple[Interval, ...]]]:
-    """Names with their values and intervals in the final model, `after`; of those that share a covariate with a
-    flexible term in the model without any."""
-    alone = shared([n.term for n in earned], free) if free is not None else []
+    """Names with their values and intervals in the final model, `after`. Of those that share a covariate with a
+    flexible term in the model without any; of those that a term without a name repairs, in the model without it."""
+    if free is not None:
+        alone, dropped = shared([n.term for n in earned], free), free.dropped
+    else:
+        alone, dropped = [n.term for n in earned if repairs(n) and unnamed], tuple(unnamed)
     named = restated([n for n in earned if n.term not in alone], after.fit)
     known = intervals(after.fit, data, after.weights, [n.term for n in named])
-    if free is not None and alone:
-        bare = refresh(*before.fit.less(*free.dropped), data, None, None)  # what it leaves is noise to it
+    if alone:
+        bare = refresh(*before.fit.less(*dropped), data, None, None)  # what it leaves is noise to it
         named += restated([n for n in earned if n.term in alone], bare.fit)
         known |= intervals(bare.fit, data, bare.weights, alone)
     return tuple(sorted(named, key=lambda n: -n.chi2_gain)), known

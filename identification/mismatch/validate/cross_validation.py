@@ -71,10 +71,15 @@ def _alike(data: Data) -> bool:
 def _judged(estimate: Estimate, data: Data, fold: Sequence[int], leaving: Sequence[Term] = ()) -> Squares:
     """Errors in the runs of a fold, by the model fitted to the others."""
     others = [i for i in range(len(data.histories)) if i not in fold]
-    model, theta = _fitted(estimate, _of(data, others), others).less(*leaving)
+    model, theta = fitted_to(estimate, data, others).less(*leaving)
     unseen = replace(_of(data, fold), with_rate=False)
     every = [np.ones(r.size, dtype=bool) for r in unseen.rows]
     return squares(model, with_tares(model, theta, unseen), unseen, every)
+
+
+def fitted_to(estimate: Estimate, data: Data, runs: Sequence[int]) -> Fit:
+    """The model fitted to some of the runs, by their numbers."""
+    return _fitted(estimate, _of(data, runs), runs)
 
 
 def _of(data: Data, runs: Sequence[int]) -> Data:

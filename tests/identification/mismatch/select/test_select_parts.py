@@ -198,3 +198,11 @@ def test_levels_of_a_measured_driver_share_the_error_of_their_mean():
     dof = data.size - 2
     assert estimate.fit.chi2 < dof + 6 * np.sqrt(2 * dof), "levels scatter more than their samples, and may"
     assert white(data, *placed({}, theta)).prior_factor is None
+
+
+def test_a_jump_at_one_instant_of_several_runs_is_none_of_the_zero():
+    jump = {("zero_offset", "")}
+    one, several = (data_of([short(seed=i) for i in range(runs)])[0] for runs in (1, 2))
+    assert jump <= {(t.id, t.form) for t in available(one)}
+    assert not jump & {(t.id, t.form) for t in available(several)}
+    assert {t.id for t in available(one)} - {t.id for t in available(several)} == {"zero_offset"}

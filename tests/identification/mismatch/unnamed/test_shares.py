@@ -3,10 +3,16 @@
 import numpy as np
 import pytest
 
-from identification.mismatch.unnamed.shares import share
+from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.name.naming import REPAIR, Check, name
+from identification.mismatch.unnamed.shares import mostly_right, only_repairs, share
 from identification.mismatch.validate.held_out import Score
+from identification.mismatch.validate.train_test_split import train_test_split
+from identification.physics.asymmetry import Asymmetry
+from identification.physics.dead_band import DeadBand
 from tests.identification.diagnosed_runs import dead_band, run
 from tests.identification.mismatch.pipeline.whole_diagnoses import diagnosed
+from tests.identification.mismatch.small import known_noise, short
 
 
 def lumpy(_t, V, F):
@@ -39,3 +45,42 @@ def test_a_name_beside_a_lump_is_said_and_what_is_left_stands_beside_it():
     assert 0.8 < band.share <= 1.0
     assert found.unexplained is not None
     assert found.heldout.after < 0.5 * found.heldout.before
+
+
+def doubted(checks, widths=(1.2, 0.7)):
+    """Dead band and asymmetry, both right, but each with a check that it is said to have failed; and the judge."""
+    made = short(change=lambda _t, V, F: np.where(V < 0, widths[1], 1.0) * F, volts=dead_band(widths[0]))
+    data, estimate = known_noise({DeadBand(): (widths[0],), Asymmetry(): (widths[1],)}, [made])
+    named = [n.asked(Check(check, "so it is said")) for n, check in zip(name(estimate, data, []), checks, strict=True)]
+    return train_test_split(estimate, data, ()), named
+
+
+SHAPE = "nothing is left over its own covariate"
+
+
+def test_names_of_which_none_makes_most_of_it_alone_are_said_together():
+    split, named = doubted((SHAPE, SHAPE))
+    best = split.judge(split.estimate.fit).rmse
+    for n in named:
+        assert mostly_right(split, [n], 0.9 * best).right == (n,)  # the other one stands as if it were earned
+    found = mostly_right(split, named, best)
+    assert {n.term.id for n in found.right} == {"dead_band", "asymmetry"}
+    first = fit(*split.estimate.fit.less(Asymmetry()), split.data, split.estimate.weights)
+    bare = fit(*split.estimate.fit.less(DeadBand(), Asymmetry()), split.data, split.estimate.weights)
+    assert share(split.judge(bare), split.judge(first), best) < 0.8
+
+
+def test_what_makes_too_little_even_together_is_not_said():
+    split, named = doubted((SHAPE, SHAPE))
+    best = 0.1 * split.judge(split.estimate.fit).rmse
+    bare = fit(*split.estimate.fit.less(DeadBand(), Asymmetry()), split.data, split.estimate.weights)
+    most = share(split.judge(bare), split.judge(split.estimate.fit), best)
+    assert bool(mostly_right(split, named, best).right) is (most >= 0.8)
+
+
+def test_of_two_shapes_that_repair_each_other_one_is_said():
+    split, named = doubted((REPAIR, REPAIR))
+    found = mostly_right(split, named, split.judge(split.estimate.fit).rmse)
+    assert len(found.right) <= 1
+    assert only_repairs(named) == tuple(named)
+    assert only_repairs([n.asked(Check("its values are possible", "no")) for n in named]) == ()
