@@ -171,3 +171,53 @@ COMMAND_REST_SCATTER = Threshold(
     unit="ratio to the mean time between changes",
     reason="A command rests for very different times at its levels.",
 )
+RELATION_STEADY = Threshold(
+    0.02,
+    unit="share of the range, per cell",
+    reason="A channel that moves faster than this counts less in what goes with it: what is behind it lags.",
+)
+RELATION_SPREAD = Threshold(
+    0.2,
+    unit="ratio of standard deviations",
+    reason="Two runs that share less than this of a channel's range say nothing of a factor between them.",
+)
+RUN_TO_RUN = Threshold(
+    0.025,
+    unit="standard deviation of a logarithm",
+    reason="TODO",
+)
+RUN_TO_RUN_DEGREES = Count(
+    8,
+    unit="degrees of freedom",
+    reason="TODO",
+)
+CHANGED_FACTOR = Threshold(
+    1.1,
+    unit="ratio",
+    reason="TODO",
+)
+EXCHANGED_AGREE = Threshold(
+    4.0,
+    unit="standard deviations",
+    reason="TODO",
+)
+STRANGE_ALONE = Threshold(
+    0.5,
+    unit="R^2",
+    reason="TODO",
+)
+STILL_FOLLOWS = Threshold(
+    0.8,
+    unit="R^2",
+    reason="TODO",
+)
+SCATTER_RUN_TO_RUN = Threshold(
+    3.0,
+    unit="ratio of variances",
+    reason="TODO",
+)
+SCATTER_ALLOWED = Threshold(
+    0.03,
+    unit="share of the variance",
+    reason="TODO",
+)
