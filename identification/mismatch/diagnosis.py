@@ -54,6 +54,10 @@ class Finding:
     """RMSE per sample on what was not fitted, without it and with it."""
     doubts: tuple[str, ...] = ()
     """Why it is not the whole of it: checks of its shape that it failed."""
+    channels: tuple[str, ...] = ()
+    """Of a channel fault, quantities: the one that lies, and the one that it was exchanged with."""
+    recording: str = ""
+    """Of a channel fault, the id of the recording that it is in."""
 
     @property
     def grade(self) -> Literal["all", "mostly", "partly"]:

@@ -150,6 +150,7 @@ def concealable() -> Kinds:
         tuple(found["recorded_effects"]),
         found["recorded_version"],
         tuple(found["wide_noise"]),
+        tuple(found["wiring"]),
     )
 
 

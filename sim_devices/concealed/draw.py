@@ -61,7 +61,9 @@ def case(
     """
     if wiring:
         rate, long = sampling or _log(rng, *WIRED_RATE), duration or float(rng.uniform(*WIRED_DURATION))
-        return miswired_runs(rng, _bare(rng, (), plan, noise, voltage, thrust, rate, long, WIRED_CHANNELS, 1, ""), wiring)
+        return miswired_runs(
+            rng, _bare(rng, (), plan, noise, voltage, thrust, rate, long, WIRED_CHANNELS, 1, ""), wiring
+        )
     for _ in range(TRIES):
         drawn = _bare(rng, effects, plan, noise, voltage, thrust, sampling, duration, channels, runs, lie)
         if channels is None and not lie:

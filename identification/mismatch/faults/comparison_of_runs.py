@@ -6,7 +6,7 @@ thrust is not blamed where the command, the rotation rate and the current change
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from math import exp, log
@@ -31,6 +31,8 @@ from identification.recording import Floats, Recording
 
 Change = Literal["swapped", "reversed", "rescaled", "driver", "strange"]
 DRIVER = "command_voltage"
+LEAST_ERROR = 0.005
+"""Of a factor between runs: nearer to 1 is no more evidence."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -66,13 +68,16 @@ def relations_of(table: Table, sound: Curves) -> Relations:
     return found
 
 
-def best_foretold(found: Relations, without: str = "") -> dict[str, Relation]:
-    """Of each channel, its relation to the one that foretells it best; `without`: of one that is not to be believed."""
-    out: dict[str, Relation] = {}
+def usually(found: Relations, without: str = "") -> dict[str, Relation]:
+    """Of each channel its relation to the others: the middle one, of two the nearer one.
+
+    One of them may be rough, or to a channel that is itself to blame; `without`: of one that is not to be believed.
+    """
+    by: dict[str, list[Relation]] = {}
     for (a, b), one in found.items():
-        if without not in (a, b) and (b not in out or _order(one) < _order(out[b])):
-            out[b] = one
-    return out
+        if without not in (a, b):
+            by.setdefault(b, []).append(one)
+    return {b: sorted(each, key=_order)[(len(each) - 1) // 2] for b, each in by.items()}
 
 
 def _order(one: Relation) -> tuple[float, float]:
@@ -80,27 +85,30 @@ def _order(one: Relation) -> tuple[float, float]:
 
 
 def broken(found: Relations, tests: int, without: str = "") -> dict[str, Relation]:
-    """Channels that go with none of the others as they do in the sound run, `tests` of them looked at."""
+    """Channels that do not go with the others as they do in the sound run, `tests` of them looked at."""
     alarm = policy.faults.CHANNEL_FALSE_ALARM
-    return {b: one for b, one in best_foretold(found, without).items() if tests * one.p_value < alarm}
+    return {b: one for b, one in usually(found, without).items() if tests * one.p_value < alarm}
 
 
-def changed(table: Table, sound: Table, tests: int) -> Changed | None:
+def apart(found: Relations) -> bool:
+    """Whether some two channels go together so differently that the run is worth a closer look."""
+    most = policy.faults.RELATION_APART
+    return any(one.beyond > most or one.scatter > policy.faults.SCATTER_RUN_TO_RUN for one in found.values())
+
+
+def changed(table: Table, sound: Table, curves: Curves, tests: int) -> Changed | None:
     """The change that explains all; None where nothing is broken, or nothing by itself explains it."""
-    curves = curves_of(sound)
     found = relations_of(table, curves)
+    if not apart(found):
+        return None
     bad = broken(found, tests)
-    if not bad:
-        return None
-    p = min(1.0, tests * min(one.p_value for one in bad.values()))
     kept = sorted((_one(found, q, tests) for q in bad if _alone(found, q, tests)), key=lambda s: s.p_value)
-    if not kept or kept[0].kind == "strange":
-        exchange = _exchange(table, sound, curves, bad)
-        if exchange is not None:
-            return replace(exchange, p_value=p)
-    if not kept:
-        return None
-    sure = len(kept) == 1 and len(best_foretold(found, kept[0].channel)) > 1
+    left = _misfit(found) if not kept or kept[0].kind == "strange" else _misfit(_explained(found, kept[0]))
+    p = min((one.p_value for one in bad.values()), default=1.0) * tests
+    exchange = _exchange(table, sound, curves, left, p)
+    if exchange is not None or not kept:
+        return exchange
+    sure = len(kept) == 1 and len(usually(found, kept[0].channel)) > 1
     kept = kept if sure else [s for s in kept if s.channel == "thrust"] or kept
     return _meant(replace(kept[0], sure=sure), table, sound)
 
@@ -161,19 +169,57 @@ def exchanges(table: Table) -> Iterator[tuple[str, str, Table]]:
                 yield a, b, again
 
 
-def _exchange(table: Table, sound: Table, curves: Curves, bad: Mapping[str, Relation]) -> Changed | None:
-    """The two channels that, put back, make everything go together as in the sound run."""
-    found = []
+def _explained(found: Relations, one: Changed) -> Relations:
+    """The relations with the factor of the channel to blame taken out of those to it, and without those from it."""
+    sign = -1.0 if one.kind == "reversed" else 1.0
+    return {
+        (a, b): replace(each, factor=each.factor * sign / one.factor) if b == one.channel else each
+        for (a, b), each in found.items()
+        if a != one.channel
+    }
+
+
+def _exchange(table: Table, sound: Table, curves: Curves, left: float, p_value: float) -> Changed | None:
+    """The two channels that, put back, make everything go together as in the sound run.
+
+    `left`: the misfit without an exchange; `p_value`: that nothing changed.
+    """
+    tried, out = 0, []
     for a, b, again in exchanges(table):
-        both = {a, b} & set(table.chain)
-        if not both & set(bad) or (both != {a, b} and not _as_before(table, sound, a, b)):
+        tried += 1
+        both = [q for q in (a, b) if q in table.chain]
+        if len(both) < 2 and not _as_before(table, sound, a, b):
             continue
-        best = best_foretold(relations_of(again, curves))
+        put_back = relations_of(again, curves)
+        best = usually(put_back)
         worst = max((one.beyond for one in best.values()), default=np.inf)
-        if set(best) >= set(bad) & set(again.chain) and worst < policy.faults.EXCHANGED_AGREE:
-            factor = max((one.factor for q, one in best.items() if q in (a, b)), key=lambda f: abs(log(f)))
-            found.append((worst, Changed("swapped", a, 0.0, other=b, factor=factor, by=tuple(set(best) - {a, b}))))
-    return min(found, key=lambda f: f[0])[1] if found else None
+        if worst > policy.faults.EXCHANGED_AGREE or not set(both) <= set(best):
+            continue
+        if _misfit(put_back) < policy.faults.EXCHANGED_BETTER * left:
+            factor = max((best[q].factor for q in both), key=lambda f: abs(log(f)))
+            by = tuple(q for q in best if q not in (a, b))
+            out.append((worst, Changed("swapped", a, _chance([best[q] for q in both]), b, factor, by=by)))
+    if not out:
+        return None
+    one = min(out, key=lambda f: f[0])[1]
+    p = min(p_value, tried * one.p_value)
+    return replace(one, p_value=p) if p < policy.faults.CHANNEL_FALSE_ALARM else None
+
+
+def _misfit(found: Relations) -> float:
+    """Root mean square of how far relations are from those of the sound run, in size and in shape; what follows no more
+    counts as a factor of e."""
+    squares = [
+        min(one.log**2, 1.0) + 1.0 - one.explained if one.follows and one.factor > 0 else 1.0 for one in found.values()
+    ]
+    return float(np.sqrt(np.mean(squares))) if squares else np.inf
+
+
+def _chance(put_back: Sequence[Relation]) -> float:
+    """That two channels fit into each other's places so nearly by chance: the figures of channels lie anywhere within
+    a factor of RANGE_OF_FIGURES either way."""
+    span = 2 * log(policy.faults.RANGE_OF_FIGURES)
+    return float(np.prod([min(1.0, 2 * max(abs(one.log), one.error, LEAST_ERROR) / span) for one in put_back]))
 
 
 def _as_before(table: Table, sound: Table, a: str, b: str) -> bool:
@@ -211,17 +257,15 @@ def stranger(table: Table) -> Changed | None:
     if p >= policy.faults.CHANNEL_FALSE_ALARM:
         return None
     for a, b, again in exchanges(table):
-        if q in (a, b) and not {a, b} <= set(table.chain) and _all_follow(again):
+        if q in (a, b) and not {a, b} <= set(table.chain) and _follows(again, q):
             return Changed("swapped", a, p, other=b, by=tuple(others))
     return Changed("strange", q, p, by=tuple(others))
 
 
-def _all_follow(table: Table) -> bool:
-    """Each of the chain goes with some other one, sign and all."""
-    lines = {q: evenly(q, table.values[q]) for q in table.chain}
-    return all(
-        max(_correlation(lines[q], lines[a]) for a in lines if a != q) ** 2 > policy.faults.FOLLOWS_LAW for q in lines
-    )
+def _follows(table: Table, q: str) -> bool:
+    """The channel goes with some other one by the laws of their kinds, sign and all."""
+    lines = {a: evenly(a, table.values[a]) for a in table.chain}
+    return max(_correlation(lines[q], lines[a]) for a in lines if a != q) ** 2 > policy.faults.FOLLOWS_LAW
 
 
 def _correlation(x: Floats, y: Floats) -> float:

@@ -7,7 +7,7 @@ things: that the channel's own law fails, and that the law of the fault holds, o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -209,25 +209,3 @@ def reversed_channels(cells: Cells, done: set[str]) -> Iterator[Scaled]:
         says = f"{q} goes against the {cells.driver_quantity}: its sign is reversed"
         says += "." if len(slopes) > 1 else ", or that of the driver: no other channel tells which."
         yield q, says, p, {"slope": Value(slope, error, "1")}
-
-
-def between_runs(runs: Sequence[tuple[Cells, set[str]]]) -> Iterator[tuple[Cells, str, str, dict[str, Value]]]:
-    """Channels whose scale differs from the other runs' by a factor of units."""
-    for q in (*LINEAR, *SQUARE):
-        found = []
-        for cells, lying in runs:
-            y = cells.values.get(q)
-            columns = shapes(cells.driver)["linear" if q in LINEAR else "quadratic"]
-            if y is not None and q not in lying and explained(columns, y) > policy.faults.FOLLOWS_LAW:
-                slope, error, _ = gain(cells, columns, y, 1)
-                found.append((cells, slope / cells.size ** (1 if q in LINEAR else 2), error / abs(slope)))
-        logs = np.log(np.abs([f[1] for f in found])) if len(found) > 1 else np.empty(0)
-        for i in range(logs.size):
-            others = np.delete(logs, i)
-            factor = float(np.exp(logs[i] - np.median(others)))
-            alone = logs.size > 2 or i == 1  # of two runs nobody knows which: the later one is named
-            if alone and np.ptp(others) < policy.faults.OTHER_RUNS_AGREE and _telling(factor):
-                _, what = named_factor(factor)
-                says = f"{q} is {factor:.4g} times that of the other {'runs' if logs.size > 2 else 'run'}"
-                says += f" ({what})." if what else "."
-                yield found[i][0], q, says, {"factor": Value(factor, factor * found[i][2], "1")}

@@ -9,10 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import permutations
+from itertools import combinations, permutations
 from math import atanh, inf, isfinite, log, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.estimation.tails import normal_sf, student_sf
 from identification.mismatch import policy
@@ -28,6 +29,8 @@ MOST_CELLS = 400
 KNOTS = 9
 FEW_ROWS, LONG_GAP = 0.25, 20.0
 """Of a channel's rows, that they are changes: so few of them beside the thrust's, or a gap so much longer than most."""
+LEAST_LEFT = 1e-4
+"""Share of a variance: a law that leaves less is not the better for it."""
 PASSES = 3
 """Of a fit whose residuals are clipped: starting currents and the moments after a step are no relation."""
 
@@ -58,6 +61,8 @@ class Relation:
     """In standard errors that grow with the run-to-run variation, how far the size is from 1."""
     p_value: float = 1.0
     """That it goes with the other as in the sound run."""
+    scatter: float = 1.0
+    """Share of the channel's variance that is left, over that in the sound run (SCATTER_ALLOWED at least)."""
 
     @property
     def log(self) -> float:
@@ -127,7 +132,8 @@ def curves_of(table: Table) -> Curves:
 
 def evenly(quantity: str, value: Floats) -> Floats:
     """On a scale over which what goes with it is nearly straight."""
-    return np.sign(value) * np.sqrt(np.abs(value)) if quantity in SQUARES else value
+    out: Floats = np.sign(value) * np.sqrt(np.abs(value)) if quantity in SQUARES else value
+    return out
 
 
 def _steady(x: Floats, size: float) -> Floats:
@@ -150,11 +156,11 @@ def _curve(x: Floats, y: Floats) -> Curve | None:
     rough = np.diff(np.eye(many), 2, axis=0) * 0.03 * np.sqrt(np.sum(weight))
     beta, left = np.zeros(many), y[good]
     for _ in range(PASSES):
-        w = np.sqrt(weight * _clipped(left, weight))
+        w = np.sqrt(weight * _clipped(left))
         A = np.vstack([H * w[:, None], rough])
         beta = np.linalg.lstsq(A, np.concatenate([y[good] * w, np.zeros(rough.shape[0])]), rcond=None)[0]
         left = y[good] - H @ beta
-    kept = weight * _clipped(left, weight)
+    kept = weight * _clipped(left)
     total = _variance(y[good], kept)
     if not total > 0:
         return None
@@ -167,14 +173,33 @@ def _curve(x: Floats, y: Floats) -> Curve | None:
 def _hats(x: Floats, knots: Floats) -> Floats:
     """(n, k): the columns of a line broken at `knots`."""
     at = np.clip((x - knots[0]) / (knots[1] - knots[0]), 0, knots.size - 1)
-    return np.maximum(0.0, 1.0 - np.abs(at[:, None] - np.arange(knots.size)[None, :]))
+    out: Floats = np.maximum(0.0, 1.0 - np.abs(at[:, None] - np.arange(knots.size)[None, :]))
+    return out
 
 
-def _clipped(left: Floats, weight: Floats) -> Floats:
+def _clipped(left: Floats) -> Floats:
     """Huber's weights at 3 robust standard deviations."""
     size = np.abs(left - np.median(left))
     scale = 3 * 1.4826 * float(np.median(size))
     return np.ones_like(left) if not scale > 0 else np.minimum(1.0, scale / np.maximum(size, 1e-300))
+
+
+def lawless(table: Table) -> float:
+    """Mean logarithm of the share of a channel that the law of its kind leaves: proportion among voltages and rates,
+    the square, of its own on either side, for currents and forces."""
+    left = []
+    for a, b in combinations(table.chain, 2):
+        x, y = (evenly(q, table.values[q]) for q in (a, b))
+        good = np.isfinite(x) & np.isfinite(y)
+        columns = np.column_stack([np.ones(x.size), np.maximum(x, 0), np.minimum(x, 0)])[good]
+        weight, rest = _steady(x, float(np.ptp(x[good])))[good], y[good]
+        for _ in range(PASSES):
+            w = weight * _clipped(rest)
+            root = np.sqrt(w)
+            beta = np.linalg.lstsq(columns * root[:, None], y[good] * root, rcond=None)[0]
+            rest = y[good] - columns @ beta
+        left.append(log(max(_variance(rest, w) / max(_variance(y[good], w), 1e-300), LEAST_LEFT)))
+    return float(np.mean(left)) if left else 0.0
 
 
 def _variance(y: Floats, weight: Floats) -> float:
@@ -201,11 +226,11 @@ def relation(table: Table, sound: Curves, a: str, b: str) -> Relation | None:
     return _judged(_fitted(expected, y[good], weight, block), b, curve.explained)
 
 
-def _fitted(expected: Floats, y: Floats, weight: Floats, block: Floats) -> tuple[float, float, float]:
+def _fitted(expected: Floats, y: Floats, weight: Floats, block: NDArray[np.intp]) -> tuple[float, float, float]:
     """Slope, its standard error over blocks (sandwich of clusters, Liang and Zeger 1986), and R^2."""
     slope, level, w, left = 0.0, 0.0, weight, y
     for i in range(PASSES):
-        w = weight * _clipped(left, weight) if i else weight
+        w = weight * _clipped(left) if i else weight
         middle = float(np.sum(w * expected) / np.sum(w))
         centred = expected - middle
         slope = float(np.sum(w * centred * y) / np.sum(w * centred**2))
@@ -220,15 +245,15 @@ def _fitted(expected: Floats, y: Floats, weight: Floats, block: Floats) -> tuple
 def _judged(fit: tuple[float, float, float], b: str, sound: float) -> Relation:
     slope, error, explained = fit
     if slope == 0.0:
-        return Relation(1e-12, inf, 0.0, inf, 0.0)
-    relative = error / abs(slope)
+        return Relation(1e-12, inf, 0.0, inf, 0.0, inf)
+    relative, scatter = error / abs(slope), (1.0 - explained) / max(1.0 - sound, float(policy.faults.SCATTER_ALLOWED))
     if explained < policy.faults.STILL_FOLLOWS:
-        least = 1.0 - max(policy.faults.SCATTER_RUN_TO_RUN * (1.0 - sound), policy.faults.SCATTER_ALLOWED)
-        return Relation(slope, relative, explained, inf, strange_p(explained, least))
+        least = 1.0 - policy.faults.SCATTER_RUN_TO_RUN * max(1.0 - sound, float(policy.faults.SCATTER_ALLOWED))
+        return Relation(slope, relative, explained, inf, strange_p(explained, least), scatter)
     if slope < 0:
-        return Relation(slope, relative, explained, inf, float(normal_sf(abs(1 / max(relative, 1e-9)))))
+        return Relation(slope, relative, explained, inf, float(normal_sf(1 / max(relative, 1e-9))), scatter)
     z = log(slope) / sqrt(relative**2 + run_to_run(b) ** 2)
-    return Relation(slope, relative, explained, abs(z), varied_p(z))
+    return Relation(slope, relative, explained, abs(z), varied_p(z), scatter)
 
 
 def run_to_run(quantity: str) -> float:

@@ -29,8 +29,8 @@ class Sound:
     """What was left aside, as not every run holds it."""
 
 
-def run(prepared: Prepared) -> Sound | Refusal:
-    """Refused where a recording that was put right cannot be diagnosed."""
+def run(prepared: Prepared, told: Sequence[Fault] = ()) -> Sound | Refusal:
+    """Refused where a recording that was put right cannot be diagnosed; `told`: faults that were put right before."""
     faults, histories = _put_right(prepared.recordings, prepared.histories)
     faults_of_unseen, unseen = _put_right(prepared.held_out, prepared.unseen)
     if isinstance(histories, Refusal):
@@ -38,7 +38,7 @@ def run(prepared: Prepared) -> Sound | Refusal:
     if isinstance(unseen, Refusal):
         return unseen
     histories, notes = held_by_all(prepared.recordings, histories)
-    return Sound(histories, unseen, faults + faults_of_unseen, notes)
+    return Sound(histories, unseen, (*told, *faults, *faults_of_unseen), notes)
 
 
 def _put_right(

@@ -182,7 +182,7 @@ RELATION_SPREAD = Threshold(
     reason="Two runs that share less than this of a channel's range say nothing of a factor between them.",
 )
 RUN_TO_RUN = Threshold(
-    0.025,
+    0.02,
     unit="standard deviation of a logarithm",
     reason="TODO",
 )
@@ -217,7 +217,27 @@ SCATTER_RUN_TO_RUN = Threshold(
     reason="TODO",
 )
 SCATTER_ALLOWED = Threshold(
-    0.03,
+    0.01,
     unit="share of the variance",
+    reason="TODO",
+)
+RELATION_APART = Threshold(
+    3.0,
+    unit="standard deviations",
+    reason="TODO",
+)
+EXCHANGED_BETTER = Threshold(
+    0.5,
+    unit="ratio",
+    reason="TODO",
+)
+RANGE_OF_FIGURES = Threshold(
+    30.0,
+    unit="ratio",
+    reason="TODO",
+)
+UNIT_BETWEEN_RUNS = Threshold(
+    0.12,
+    unit="logarithm of a ratio",
     reason="TODO",
 )

@@ -11,6 +11,7 @@ from rig.blind.design import LADDER, ORACLE, PAIR_STRENGTH, STRENGTHS, WITHIN
 from rig.blind.scoring.on_benches import bench_besides, bench_goals
 from rig.blind.scoring.rates import Goal, Rate, of_groups, of_rate, rate
 from rig.blind.scoring.score import LOCATED, OPEN_CELLS, Score
+from rig.blind.scoring.wired import wired_besides, wired_goals
 
 LARGE: Final = 9.9
 MODELLED: Final = (*STRENGTHS, "pair", "form", "variant")
@@ -53,7 +54,7 @@ def goals(scores: Sequence[Score]) -> list[Goal]:
         of_rate("open world: a wrong name instead", rate(s.outcome == "wrong name" for s in counted), most=0.05),
     ]
     found += [*_alarms(scores), *_errors(scores), *_coverage(scores), *_power(scores)]
-    return [*found, *bench_goals(cell(scores, "bench"))]
+    return [*found, *bench_goals(cell(scores, "bench")), *wired_goals(cell(scores, "wiring"))]
 
 
 def besides(scores: Sequence[Score]) -> list[Goal]:
@@ -94,6 +95,7 @@ def besides(scores: Sequence[Score]) -> list[Goal]:
         of_rate("models that predict another run", rate(s.held_out is not None for s in cell(scores, *MODELLED))),
         of_rate("crashed, refused or overdue", rate(s.failed for s in scores)),
         *bench_besides(cell(scores, "bench")),
+        *wired_besides(cell(scores, "wiring")),
     ]
 
 

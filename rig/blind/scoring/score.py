@@ -23,6 +23,7 @@ from identification.recording import Floats
 from rig.blind.design import Order
 from rig.blind.scoring.places import PLACES, UPSTREAM
 from rig.blind.scoring.same_parameters import true_values
+from rig.blind.scoring.wired import Wired, wired
 
 Table = Mapping[str, Any]
 
@@ -90,11 +91,15 @@ class Score:
     """What the recording was like, in words."""
     constant: Interval | None = None
     """C of the model; None where the answer has none, or what is concealed gives it another meaning."""
+    wired: Wired | None = None
+    """Of cases about the wiring of several runs: what was said of it."""
 
     @property
     def right(self) -> bool:
         if self.failed:
             return False
+        if self.wired is not None:
+            return self.wired.right
         return set(self.truth) <= {*self.named, *self.rivals} if self.truth else self.said == "adequate"
 
     @property
@@ -180,6 +185,7 @@ def scored(
         seconds=answer["seconds"],
         case=described(truth),
         constant=thrust_constant(found, truth),
+        wired=wired(found, truth),
     )
 
 

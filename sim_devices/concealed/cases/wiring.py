@@ -1,4 +1,4 @@
-"""Runs of one thruster in one of which something is wired, scaled or driven otherwise; all hold effects of field size."""
+"""Runs of one thruster in one of which something is wired, scaled or driven otherwise, effects of field size in all."""
 
 from __future__ import annotations
 
@@ -56,7 +56,9 @@ def wiring(rng: Rng, bare: Case, kind: str) -> Case:
     """
     if kind not in (*KINDS, NOTHING):
         raise ValueError(f"wiring must be one of {', '.join((*KINDS, NOTHING))}, got {kind!r}")
-    case = with_bystanders(replace(bare, runs=_runs(rng, bare), effects=_effects(rng, bare)), rng.spawn(1)[0], frozenset())
+    case = with_bystanders(
+        replace(bare, runs=_runs(rng, bare), effects=_effects(rng, bare)), rng.spawn(1)[0], frozenset()
+    )
     if kind == NOTHING:
         return case
     at = int(rng.integers(len(case.runs)))
@@ -113,7 +115,10 @@ def _drawn(kind: str, rng: Rng) -> dict[str, Any]:
         case "thrust_reversed":
             return {"channel": "thrust", "factor": -1.0}
         case _:
-            return {"channel": "command_voltage", "other": "current" if kind == "current_for_command" else "bus_voltage"}
+            return {
+                "channel": "command_voltage",
+                "other": "current" if kind == "current_for_command" else "bus_voltage",
+            }
 
 
 def miswired(columns: Sequence[Column], told: Mapping[str, Any]) -> tuple[Column, ...]:
@@ -142,5 +147,7 @@ def _strange(channel: Column, told: Mapping[str, Any]) -> np.ndarray[Any, np.dty
     reach = max(int(value.size / channel.time[-1] * 2.0), 1)
     slow = np.convolve(rng.normal(size=value.size + reach - 1), np.ones(reach) / np.sqrt(reach), "valid")
     noise = (slow + rng.normal(size=value.size)) / np.sqrt(2)
-    out: np.ndarray[Any, np.dtype[np.float64]] = middle + np.sqrt(share) * (value - middle) + np.sqrt(1 - share) * size * noise
+    out: np.ndarray[Any, np.dtype[np.float64]] = (
+        middle + np.sqrt(share) * (value - middle) + np.sqrt(1 - share) * size * noise
+    )
     return out
