@@ -27,7 +27,7 @@ NOISE_KINDS = ("white", "mixed", "flicker", "slow", "heavy_tailed", "resonant")
 """white; white + correlated + proportional to |thrust|; 1/f; slower than a hold; Student t; a narrow AR(2) peak."""
 CHANNELS = ("rotation_rate", "current", "bus_voltage", "motor_temperature", "flow_speed")
 """Present or missing at random."""
-WIRED_RATE, WIRED_DURATION = (15.0, 60.0), (90.0, 240.0)
+WIRED_RATE, WIRED_DURATION = (10.0, 40.0), (60.0, 150.0)
 """1/s and s of each of several runs: channels that are exchanged show in the shortest."""
 TRIES = 30
 """Cases drawn before a strength is given up."""
