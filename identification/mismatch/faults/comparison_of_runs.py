@@ -109,8 +109,10 @@ def changed(table: Table, sound: Table, curves: Curves, tests: int) -> Changed |
     if exchange is not None or not kept:
         return exchange
     sure = len(kept) == 1 and len(usually(found, kept[0].channel)) > 1
-    kept = kept if sure else [s for s in kept if s.channel == "thrust"] or kept
-    return _meant(replace(kept[0], sure=sure), table, sound)
+    if sure:
+        return _meant(kept[0], table, sound)
+    first = next((s for s in kept if s.channel == "thrust"), kept[0])
+    return _meant(replace(first, sure=False, other=first.by[0] if first.kind == "strange" else ""), table, sound)
 
 
 def _alone(found: Relations, q: str, tests: int) -> bool:
@@ -246,8 +248,7 @@ def exchanged(recording: Recording, a: str, b: str) -> Recording | None:
 
 def stranger(table: Table) -> Changed | None:
     """A channel of a single run that goes with nothing where the others go together: a stranger, or one exchanged."""
-    curves = curves_of(table)
-    best = {q: max((c.explained for (a, b), c in curves.items() if b == q), default=0.0) for q in table.chain}
+    best = {q: _follows(table, q) for q in table.chain}
     lost = [q for q in best if best[q] < policy.faults.STRANGE_ALONE]
     others = [q for q in best if best[q] > policy.faults.STUCK_LAW]
     if len(lost) != 1 or len(others) < 2 or len(others) < len(best) - 1:
@@ -257,15 +258,17 @@ def stranger(table: Table) -> Changed | None:
     if p >= policy.faults.CHANNEL_FALSE_ALARM:
         return None
     for a, b, again in exchanges(table):
-        if q in (a, b) and not {a, b} <= set(table.chain) and _follows(again, q):
+        if q in (a, b) and not {a, b} <= set(table.chain) and _follows(again, q) > policy.faults.FOLLOWS_LAW:
             return Changed("swapped", a, p, other=b, by=tuple(others))
-    return Changed("strange", q, p, by=tuple(others))
+    shape = max((c.explained for (_, b), c in curves_of(table).items() if b == q), default=0.0)
+    return Changed("strange", q, p, by=tuple(others)) if shape < policy.faults.STRANGE_ALONE else None
 
 
-def _follows(table: Table, q: str) -> bool:
-    """The channel goes with some other one by the laws of their kinds, sign and all."""
+def _follows(table: Table, q: str) -> float:
+    """R^2 of the channel with that other one of the chain which it goes with best by the laws of their kinds, sign and
+    all."""
     lines = {a: evenly(a, table.values[a]) for a in table.chain}
-    return max(_correlation(lines[q], lines[a]) for a in lines if a != q) ** 2 > policy.faults.FOLLOWS_LAW
+    return max((_correlation(lines[q], lines[a]) ** 2 for a in lines if a != q), default=0.0)
 
 
 def _correlation(x: Floats, y: Floats) -> float:

@@ -38,6 +38,9 @@ FACTORS: Mapping[float, str] = {
     2.0: "a factor of two",
 }
 
+LEVEL_NEAR, LAW_LEVELS = 0.05, 6
+"""Of the largest driver: values so near one another are one level; and levels that a cubic law asks for."""
+
 Scaled = tuple[str, str, float, dict[str, Value]]
 
 
@@ -117,6 +120,8 @@ def _change(cells: Cells, y: Floats) -> tuple[float, float, float, float] | None
         slice(at + policy.faults.SCALE_CHANGE_CELLS, good.size),
     )
     if min(explained(X[before], v[before]), explained(X[after], v[after])) < policy.faults.FOLLOWS_LAW:
+        return None
+    if np.unique(np.round(cells.driver[good][before] / LEVEL_NEAR)).size < LAW_LEVELS:
         return None
     inner = np.abs(cells.driver[good]) <= np.max(np.abs(cells.driver[good][before])) + 0.02
     law = X @ np.linalg.lstsq(X[before], v[before], rcond=None)[0]

@@ -27,6 +27,7 @@ SQUARES = frozenset({"current", "torque", "thrust"})
 MOST_CELLS = 400
 """Cells of one run: a curve of nine knots asks for no more."""
 KNOTS = 9
+"""Of a curve, at most: a dead band and a weak side are two of them."""
 FEW_ROWS, LONG_GAP = 0.25, 20.0
 """Of a channel's rows, that they are changes: so few of them beside the thrust's, or a gap so much longer than most."""
 LEAST_LEFT = 1e-4

@@ -10,14 +10,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from identification.mismatch.faults.between_runs import Differs, differing
+from identification.mismatch.faults.cells import DRIVERS
 from identification.mismatch.faults.channel_faults import Fault, find_faults, repaired
-from identification.mismatch.faults.comparison_of_runs import DRIVER
 from identification.mismatch.faults.wiring_words import name_of, said, unit_of
 from identification.mismatch.value import Value
 from identification.recording import Recording
-
-NEEDED = ("thrust", DRIVER)
-"""Channels without which a run says nothing of the thruster."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -80,6 +77,12 @@ def _unconverted(one: Differs) -> Differs:
     return replace(one, recording=one.beside, beside=one.recording, changed=turned, known=True)
 
 
+def _needed(recording: Recording) -> tuple[str, ...]:
+    """Channels without which a run says nothing of the thruster: the thrust, and the best of what may drive it."""
+    held = {c.quantity for c in recording.channels}
+    return ("thrust", *[q for q in DRIVERS if q in held][:1])
+
+
 def _fault(one: Differs, *, last: bool) -> tuple[Fault, Recording | None]:
     """What is told of a run, and the run put right; None where nothing can be. `last`: no other run would be left."""
     change, recording = one.changed, one.recording
@@ -97,7 +100,7 @@ def _fault(one: Differs, *, last: bool) -> tuple[Fault, Recording | None]:
     if exact:
         done = f"{name_of(recording)}: {change.channel} was put right for the model."
         return replace(fault, done=done), repaired(recording, fault)
-    if change.channel not in NEEDED:
+    if change.sure and change.channel not in _needed(recording):
         kept = tuple(c for c in recording.channels if c.quantity != change.channel)
         done = f"{name_of(recording)}: {change.channel} was left out of the model."
         return replace(fault, done=done), replace(recording, channels=kept)

@@ -73,19 +73,26 @@ def said(one: Differs) -> str:
 def _found(one: Differs) -> str:
     change = one.changed
     with_ = ", ".join(change.by)
+    lone = len(change.by) == 1
     there = "the other runs" if one.runs > 2 else name_of(one.beside) if one.beside is not None else ""
     match change.kind:
         case "swapped":
             off = 100 * abs(log(change.factor)) if change.factor > 0 else 0.0
             agree = f" (to {max(off, 0.1):.2g} %)" if there else ""
+            also = f" with {with_}" if with_ else ""
             return (
-                f"{change.channel} and {change.other} are exchanged: put back, they go together with {with_} as "
+                f"{change.channel} and {change.other} are exchanged: put back, they go together{also} as "
                 f"{'in ' + there if there else 'they should'}{agree}"
             )
         case "reversed":
             return f"{change.channel} has the other sign than in {there}, against {with_}: it is reversed"
         case "strange":
-            also = f", which go together as in {there}" if there else ", which go together"
+            if not change.sure:
+                return (
+                    f"{change.channel} and {with_} do not go together as in {there}; no third channel tells which lies"
+                )
+            which = "which goes with the others" if lone else "which go together"
+            also = f", {which}" + (f" as in {there}" if there else "")
             return f"{change.channel} follows nothing that was recorded beside it ({with_}{also})"
         case "driver":
             return (
@@ -101,7 +108,7 @@ def _rescaled(change: Changed, with_: str, there: str) -> str:
     unit = unit_of(change)
     size = f"{change.channel} is {change.factor:.3g} times what {with_} let expect after {there}"
     if not change.sure:
-        size += ", unless the command is another: no third channel tells which"
+        size += f" (no third channel tells whether it is {change.channel} or {with_} that changed)"
     if unit is None:
         return f"{size}, and no unit explains it"
     si = SI[change.channel]
