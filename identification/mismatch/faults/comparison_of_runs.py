@@ -24,6 +24,7 @@ from identification.mismatch.faults.relations import (
     curves_of,
     evenly,
     relation,
+    run_to_run,
     strange_p,
     table_of,
 )
@@ -31,6 +32,8 @@ from identification.recording import Floats, Recording
 
 Change = Literal["swapped", "reversed", "rescaled", "driver", "strange"]
 DRIVER = "command_voltage"
+ROUGHER = 2.0
+"""Times the error of the most precise relation of a channel, or the run-to-run variation: rougher ones have no vote."""
 LEAST_ERROR = 0.005
 """Of a factor between runs: nearer to 1 is no more evidence."""
 
@@ -69,15 +72,20 @@ def relations_of(table: Table, sound: Curves) -> Relations:
 
 
 def usually(found: Relations, without: str = "") -> dict[str, Relation]:
-    """Of each channel its relation to the others: the middle one, of two the nearer one.
-
-    One of them may be rough, or to a channel that is itself to blame; `without`: of one that is not to be believed.
+    """Of each channel its relation to the others: of those that are as precise as any the middle one, of two the
+    nearer one, for one of them may be to a channel that is itself to blame. `without`: one that is not to be believed.
     """
     by: dict[str, list[Relation]] = {}
     for (a, b), one in found.items():
         if without not in (a, b):
             by.setdefault(b, []).append(one)
-    return {b: sorted(each, key=_order)[(len(each) - 1) // 2] for b, each in by.items()}
+    precise = {b: [one for one in each if one.error <= _roughest(b, each)] for b, each in by.items()}
+    return {b: sorted(each, key=_order)[(len(each) - 1) // 2] for b, each in precise.items()}
+
+
+def _roughest(b: str, each: Sequence[Relation]) -> float:
+    """Standard error up to which a relation has a vote."""
+    return max(ROUGHER * min(one.error for one in each), run_to_run(b))
 
 
 def _order(one: Relation) -> tuple[float, float]:
@@ -102,14 +110,15 @@ def changed(table: Table, sound: Table, curves: Curves, tests: int) -> Changed |
     if not apart(found):
         return None
     bad = broken(found, tests)
-    kept = sorted((_one(found, q, tests) for q in bad if _alone(found, q, tests)), key=lambda s: s.p_value)
+    suspects = [_one(found, q, tests) for q in bad if _alone(found, q, tests)]
+    kept = sorted(suspects, key=lambda s: _misfit(_explained(found, s)))
     left = _misfit(found) if not kept or kept[0].kind == "strange" else _misfit(_explained(found, kept[0]))
     p = min((one.p_value for one in bad.values()), default=1.0) * tests
     exchange = _exchange(table, sound, curves, left, p)
     if exchange is not None or not kept:
         return exchange
-    sure = len(kept) == 1 and len(usually(found, kept[0].channel)) > 1
-    if sure:
+    beyond = [s for s in kept[1:] if policy.faults.EXCHANGED_BETTER * _misfit(_explained(found, s)) < left]
+    if not beyond and len(usually(found, kept[0].channel)) > 1:
         return _meant(kept[0], table, sound)
     first = next((s for s in kept if s.channel == "thrust"), kept[0])
     return _meant(replace(first, sure=False, other=first.by[0] if first.kind == "strange" else ""), table, sound)
