@@ -61,6 +61,10 @@ class Finding:
     """Alternatives that were looked at; None where its test counts them otherwise."""
     asked: int = 1
     """Effects that were fitted in its place, and itself."""
+    channels: tuple[str, ...] = ()
+    """Of a channel fault, quantities: the one that lies, and the one that it was exchanged with."""
+    recording: str = ""
+    """Of a channel fault, the id of the recording that it is in."""
 
     def __post_init__(self) -> None:
         if self.bic_gain <= 0:

@@ -12,6 +12,7 @@ from identification.mismatch.answer.periodic_findings import told_lines
 from identification.mismatch.answer.trace import Trace
 from identification.mismatch.compare.saved_model_baseline import lasting, starting
 from identification.mismatch.faults import stage as faults
+from identification.mismatch.faults import wiring
 from identification.mismatch.locate import stage as locate
 from identification.mismatch.name import stage as name
 from identification.mismatch.next_experiment import stage as next_experiment
@@ -91,10 +92,11 @@ def traced(
     baseline = None if baseline is None else lasting(baseline, recordings)
     draws, given = Draws.of(seed), None if baseline is None else starting(baseline)
     watch.stage("reading the runs")
-    prepared = prepare.run(recordings, holdout, baseline)
+    wired = wiring.run(recordings, holdout)
+    prepared = prepare.run(wired.recordings, wired.holdout, baseline)
     if isinstance(prepared, Refusal):
         return prepared
-    sound = faults.run(prepared, None if baseline is None else baseline.rate_per_driver)
+    sound = faults.run(prepared, wired.faults, None if baseline is None else baseline.rate_per_driver)
     if isinstance(sound, Refusal):
         return sound
     watch.stage("looking for effects")

@@ -29,6 +29,8 @@ PAIR_STRENGTH: Final = 20.0
 PAIRS_PER_SEED = 10
 BENCH_STRENGTHS: Final = ("clear", "plain")
 BENCH_PAIRS_PER_SEED, BENCH_CLEAN_PER_SEED = 2, 3
+WIRED_PER = 2
+"""Seeds for each case of a fault between runs: 20 seeds are 10 of each kind, 80 with a fault and 80 without."""
 CLEAN_PER_SEED = 50
 """Clean runs of all kinds of noise together: 20 seeds are 1,000 runs."""
 WIDE_PER_SEED = 25
@@ -69,6 +71,8 @@ class Kinds:
     """Effects whose amounts can be drawn as the field has them."""
     added: tuple[str, ...] = ()
     """Effects that a second recording of the same thruster can have more."""
+    wiring: tuple[str, ...] = ()
+    """What may be wired otherwise in one of several runs; the first is nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,6 +144,7 @@ def design(world: Kinds, catalogue: Collection[str], seeds: int, only: Sequence[
         _others(world, catalogue, seeds, draw),
         _recorded(world, catalogue, seeds, draw),
         _composites(world, catalogue, seeds, draw),
+        _wired(world, seeds),
     )
     found = []
     for place, job in rows:
@@ -208,6 +213,14 @@ def _others(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -> 
     for cell, kinds, per_seed in (("clean", world.noise, CLEAN_PER_SEED), ("wide", world.wide_noise, WIDE_PER_SEED)):
         for kind in kinds:
             yield from _many(cell, kind, -(-per_seed * seeds // len(kinds)), {"noise": kind})
+
+
+def _wired(world: Kinds, seeds: int) -> Iterator[tuple[float, Job]]:
+    """Several runs in one of which something is wired otherwise, and as many cases in which nothing is."""
+    each = -(-seeds // WIRED_PER)
+    for kind in world.wiring:
+        count = each * (len(world.wiring) - 1) if kind == world.wiring[0] else each
+        yield from _many("wiring", kind, count, {"wiring": kind})
 
 
 def _recorded(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -> Iterator[tuple[float, Job]]:

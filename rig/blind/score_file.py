@@ -17,6 +17,7 @@ from typing import Any
 from rig.blind.collecting import Known
 from rig.blind.design import Job, Order
 from rig.blind.scoring.score import HeldOut, Interval, Near, Score
+from rig.blind.scoring.wired import Wired
 from rig.blind.store import ProofError
 
 
@@ -84,6 +85,7 @@ def _known(row: dict[str, Any]) -> Known:
     row["near"] = None if row["near"] is None else Near(**row["near"])
     row["held_out"] = None if row["held_out"] is None else HeldOut(**row["held_out"])
     row["constant"] = Interval(**row["constant"]) if row.get("constant") else None
+    row["wired"] = Wired(**row["wired"] | {"said": tuple(row["wired"]["said"])}) if row.get("wired") else None
     row["intervals"] = tuple(Interval(**each) for each in row["intervals"])
     row |= {name: tuple(row.get(name, ())) for name in ("strengths", "known")}
     return Known(Score(**row), version, asked)

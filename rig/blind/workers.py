@@ -152,6 +152,7 @@ def concealable() -> Kinds:
         tuple(found["wide_noise"]),
         tuple(found["field"]),
         tuple(found["added"]),
+        tuple(found["wiring"]),
     )
 
 

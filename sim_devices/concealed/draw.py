@@ -15,6 +15,8 @@ from sim_devices.concealed.cases.needs import NEEDS_DRIFT, NEEDS_FLOW, NEEDS_REV
 from sim_devices.concealed.cases.plans import KINDS, profile
 from sim_devices.concealed.cases.shapes import shape
 from sim_devices.concealed.cases.wide_noise import WIDE_NOISE_KINDS, Setting, usual_hold, wide_noise
+from sim_devices.concealed.cases.wiring import CHANNELS as WIRED_CHANNELS
+from sim_devices.concealed.cases.wiring import wiring as miswired_runs
 from sim_devices.concealed.visibility.oracle import OutOfReach, levelled, scaled_to
 from sim_devices.world.noise_law import NoiseLaw, Peak, Slow, flicker
 from sim_devices.world.settings import Thruster
@@ -25,6 +27,8 @@ NOISE_KINDS = ("white", "mixed", "flicker", "slow", "heavy_tailed", "resonant")
 """white; white + correlated + proportional to |thrust|; 1/f; slower than a hold; Student t; a narrow AR(2) peak."""
 CHANNELS = ("rotation_rate", "current", "bus_voltage", "motor_temperature", "flow_speed")
 """Present or missing at random."""
+WIRED_RATE, WIRED_DURATION = (10.0, 40.0), (60.0, 150.0)
+"""1/s and s of each of several runs: channels that are exchanged show in the shortest."""
 TRIES = 30
 """Cases drawn before a strength is given up."""
 
@@ -44,15 +48,22 @@ def case(
     channels: Sequence[str] | None = None,
     runs: int = 1,
     lie: str = "",
+    wiring: str = "",
 ) -> Case:
     """A case in which each of `effects` is seen by the oracle at `strength` sigma (all of them there together).
 
     What is not given is drawn: `forms` one per effect ("" draws), `plan` of plans.KINDS, `noise` of NOISE_KINDS
     (WIDE_NOISE_KINDS by name only), `voltage` V and `thrust` N at full command, `sampling` 1/s, `duration` s of each of
     `runs` recordings, `channels` beside command and thrust (where drawn, and none lies, with bystanders). `lie`: of
-    faults.KINDS, about a channel, beside the effects; none when not given.
+    faults.KINDS, about a channel, beside the effects; none when not given. `wiring`: of wiring.KINDS or `nothing`, in
+    one of several runs, which then all hold effects of field size and nothing else.
     Raises OutOfReach when no case of TRIES can show the effects so; ValueError for a name that is not known.
     """
+    if wiring:
+        rate, long = sampling or _log(rng, *WIRED_RATE), duration or float(rng.uniform(*WIRED_DURATION))
+        return miswired_runs(
+            rng, bare(rng, (), plan, noise, voltage, thrust, rate, long, WIRED_CHANNELS, 1, ""), wiring
+        )
     for _ in range(TRIES):
         drawn = bare(rng, effects, plan, noise, voltage, thrust, sampling, duration, channels, runs, lie)
         if channels is None and not lie:

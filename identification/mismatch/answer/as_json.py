@@ -90,6 +90,8 @@ def _finding(f: Finding) -> dict[str, object]:
         if f.heldout is None
         else {"rmse_without": _number(f.heldout[0]), "rmse_with": _number(f.heldout[1])},
         "doubts": list(f.doubts),
+        "channels": list(f.channels),
+        "recording": f.recording or None,
         "rivals": [r.effect for r in f.rivals],
         "rival_details": [
             {

@@ -120,6 +120,7 @@ def _faults(trace: Trace) -> Iterator[str]:
         yield "none"
     for fault in trace.sound.faults:
         done = "put right for the model" if fault.grave and fault.repairable else "left as it is"
+        done = fault.done or done
         yield f"{fault.kind}: {fault.statement} ({p_text(fault.p_value)}; {done})"
 
 

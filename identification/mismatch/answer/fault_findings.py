@@ -19,15 +19,28 @@ LEAST_P = 1e-300
 def fault_finding(fault: Fault) -> Finding:
     values = {k: Value(v.value, v.std, v.unit) for k, v in fault.parameters.items()}
     p = max(fault.p_value, LEAST_P)
-    return Finding(EFFECT, fault.kind, fault.statement, values, p, -2 * float(np.log(p)), 1.0, (), searched=None)
+    channels = (fault.channel, fault.other) if fault.other else (fault.channel,)
+    return Finding(
+        EFFECT,
+        fault.kind,
+        fault.statement,
+        values,
+        p,
+        -2 * float(np.log(p)),
+        1.0,
+        (),
+        searched=None,
+        channels=channels,
+        recording=fault.recording_id,
+    )
 
 
 def with_channels(draft: Draft, faults: Sequence[Fault], recordings: Sequence[str]) -> Draft:
     """`recordings`: ids of those that are diagnosed; a fault says its recording unless that is the only one."""
     grave = [f for f in faults if f.grave and f.kind != "nan"]
     alone = {f.recording_id for f in grave} <= set(recordings) and len(recordings) == 1
-    faulty = (f if alone else replace(f, statement=f"{f.recording_id}: {f.statement}") for f in grave)
+    faulty = (f if alone or f.done else replace(f, statement=f"{f.recording_id}: {f.statement}") for f in grave)
     notes = [f"{f.recording_id}: {f.statement}" for f in faults if f not in grave]
-    notes += [f"for the model this was put right: {f.statement}" for f in grave if f.repairable]
+    notes += [f.done or f"for the model this was put right: {f.statement}" for f in grave if f.done or f.repairable]
     findings = (*map(fault_finding, faulty), *draft.findings)
     return replace(draft, findings=findings, notes=(*draft.notes, *notes))

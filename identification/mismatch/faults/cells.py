@@ -67,7 +67,7 @@ def cells_of(recording: Recording, skip: Mapping[str, tuple[float, float]] | Non
     if edges.size <= policy.faults.CHANNEL_CELLS:
         return None
     quantity = str(driver.quantity)
-    x = _held_mean(driver, edges) if quantity == "command_voltage" else _means(driver, edges, None)
+    x = held_mean(driver, edges) if quantity == "command_voltage" else means(driver, edges, None)
     x = np.nan_to_num(x)
     size = float(np.max(np.abs(x)))
     if not size > 0:
@@ -76,7 +76,7 @@ def cells_of(recording: Recording, skip: Mapping[str, tuple[float, float]] | Non
     for q in dict.fromkeys(c.quantity for c in recording.channels if c.quantity):
         channel = own(recording, q)
         if channel is not None and channel is not driver:
-            mean = _means(channel, edges, (skip or {}).get(q))
+            mean = means(channel, edges, (skip or {}).get(q))
             if np.count_nonzero(np.isfinite(mean)) >= policy.faults.CHANNEL_CELLS:
                 values[q] = mean
     return Cells(recording, quantity, 0.5 * (edges[1:] + edges[:-1]), x / size, size, values)
@@ -99,7 +99,7 @@ def _edges(clock: Channel, driver: Channel) -> Floats:
     return np.linspace(t[0], t[-1] + 1e-9, MOST_CELLS + 1)
 
 
-def _held_mean(channel: Channel, edges: Floats) -> Floats:
+def held_mean(channel: Channel, edges: Floats) -> Floats:
     """Mean of a command over each cell; 0 before its first row."""
     good = np.isfinite(channel.value)
     time, value = channel.time[good], channel.value[good]
@@ -109,7 +109,7 @@ def _held_mean(channel: Channel, edges: Floats) -> Floats:
     return out
 
 
-def _means(channel: Channel, edges: Floats, skip: tuple[float, float] | None) -> Floats:
+def means(channel: Channel, edges: Floats, skip: tuple[float, float] | None) -> Floats:
     """Mean of the samples in each cell; a slow channel is interpolated into cells without any."""
     good = np.isfinite(channel.value)
     if skip is not None:

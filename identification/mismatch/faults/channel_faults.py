@@ -19,9 +19,8 @@ import numpy as np
 
 from identification.mismatch import policy
 from identification.mismatch.faults.bad_values import Stuck, missing, stuck
-from identification.mismatch.faults.cells import Cells, cells_of, own
+from identification.mismatch.faults.cells import cells_of, own
 from identification.mismatch.faults.driver_laws import (
-    between_runs,
     impossible,
     midway,
     reversed_channels,
@@ -33,7 +32,8 @@ from identification.recording import Channel, Recording
 
 EFFECT = "channel_fault"
 """Its id: it has no term, for a channel that lies is put right before any physics."""
-Kind = Literal["swapped", "rescaled", "reversed", "frozen", "unsigned", "nan"]
+Kind = Literal["swapped", "rescaled", "reversed", "frozen", "unsigned", "nan", "driver", "strange"]
+"""driver: the motor controller makes something else of the command; strange: it goes with no other channel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,38 +51,29 @@ class Fault:
     """The quantity it was swapped with."""
     grave: bool = True
     """Whether a model of the thrust would be wrong with it."""
+    done: str = ""
+    """What was done about it, where runs were compared; the statement then says which run it is."""
 
     @property
     def repairable(self) -> bool:
-        return self.kind != "nan"
+        return self.kind in _REPAIRS or self.kind == "swapped"
 
 
 def find_faults(recordings: Sequence[Recording]) -> tuple[Fault, ...]:
-    """Every fault of every recording of one thruster, in order of recording; empty for vehicles."""
-    out: list[Fault] = []
-    gains: list[tuple[Cells, set[str]]] = []
-    for recording in recordings:
-        if recording.kind == "vehicle":
-            continue
-        found, cells = _of_one(recording)
-        out += found
-        if cells is not None:
-            gains.append((cells, {f.channel for f in found} | {f.other for f in found}))
-    if len(gains) > 1:
-        for cells, q, says, values in between_runs(gains):
-            out.append(
-                Fault(cells.recording.recording_id, q, "rescaled", says, policy.faults.CHANNEL_FALSE_ALARM, values)
-            )
-    return tuple(out)
+    """Every fault of every recording by itself, in order of recording; empty for vehicles.
+
+    What is changed between runs: wiring.py.
+    """
+    return tuple(fault for recording in recordings if recording.kind != "vehicle" for fault in _of_one(recording))
 
 
-def _of_one(recording: Recording) -> tuple[list[Fault], Cells | None]:
+def _of_one(recording: Recording) -> list[Fault]:
     alarm = policy.faults.CHANNEL_FALSE_ALARM
     name = recording.recording_id
     out = [Fault(name, q, "nan", says, 0.0, values) for q, says, values in missing(recording)]
     first = cells_of(recording)
     if first is None:
-        return out, None
+        return out
     held: dict[str, Stuck] = {q: s for q, s in stuck(recording, first) if s.p_value < alarm}
     out += [
         Fault(name, q, "frozen", s.statement, s.p_value, {"start": s.start_value, "end": s.end_value, "value": s.at})
@@ -90,13 +81,13 @@ def _of_one(recording: Recording) -> tuple[list[Fault], Cells | None]:
     ]
     cells = cells_of(recording, {q: (s.start, s.end) for q, s in held.items()})
     if cells is None:
-        return out, None
+        return out
     exchanged = [*swapped_voltages(recording), *swaps(cells)]
     exchanged = [s for s in exchanged if s[3] < alarm][:1]
     out += [Fault(name, a, "swapped", says, p, other=b) for a, b, says, p in exchanged]
     done = {q for s in exchanged for q in s[:2]}
     if "command_voltage" in done:
-        return out, None
+        return out
     scaled = [r for r in midway(cells) if r[2] < alarm and r[0] not in done]
     out += [Fault(name, q, "rescaled", says, p, values) for q, says, p, values in scaled]
     done |= {r[0] for r in scaled}
@@ -107,7 +98,7 @@ def _of_one(recording: Recording) -> tuple[list[Fault], Cells | None]:
     done |= {u[0] for u in signless}
     backwards = [r for r in reversed_channels(cells, done) if r[2] < alarm]
     out += [Fault(name, q, "reversed", says, p, values) for q, says, p, values in backwards]
-    return out, cells
+    return out
 
 
 def repaired(recording: Recording, fault: Fault) -> Recording:

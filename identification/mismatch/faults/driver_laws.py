@@ -7,7 +7,7 @@ things: that the channel's own law fails, and that the law of the fault holds, o
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -37,6 +37,9 @@ FACTORS: Mapping[float, str] = {
     10.0: "a digit",
     2.0: "a factor of two",
 }
+
+LEVEL_NEAR, LAW_LEVELS = 0.05, 6
+"""Of the largest driver: values so near one another are one level; and levels that a cubic law asks for."""
 
 Scaled = tuple[str, str, float, dict[str, Value]]
 
@@ -117,6 +120,8 @@ def _change(cells: Cells, y: Floats) -> tuple[float, float, float, float] | None
         slice(at + policy.faults.SCALE_CHANGE_CELLS, good.size),
     )
     if min(explained(X[before], v[before]), explained(X[after], v[after])) < policy.faults.FOLLOWS_LAW:
+        return None
+    if np.unique(np.round(cells.driver[good][before] / LEVEL_NEAR)).size < LAW_LEVELS:
         return None
     inner = np.abs(cells.driver[good]) <= np.max(np.abs(cells.driver[good][before])) + 0.02
     law = X @ np.linalg.lstsq(X[before], v[before], rcond=None)[0]
@@ -209,25 +214,3 @@ def reversed_channels(cells: Cells, done: set[str]) -> Iterator[Scaled]:
         says = f"{q} goes against the {cells.driver_quantity}: its sign is reversed"
         says += "." if len(slopes) > 1 else ", or that of the driver: no other channel tells which."
         yield q, says, p, {"slope": Value(slope, error, "1")}
-
-
-def between_runs(runs: Sequence[tuple[Cells, set[str]]]) -> Iterator[tuple[Cells, str, str, dict[str, Value]]]:
-    """Channels whose scale differs from the other runs' by a factor of units."""
-    for q in (*LINEAR, *SQUARE):
-        found = []
-        for cells, lying in runs:
-            y = cells.values.get(q)
-            columns = shapes(cells.driver)["linear" if q in LINEAR else "quadratic"]
-            if y is not None and q not in lying and explained(columns, y) > policy.faults.FOLLOWS_LAW:
-                slope, error, _ = gain(cells, columns, y, 1)
-                found.append((cells, slope / cells.size ** (1 if q in LINEAR else 2), error / abs(slope)))
-        logs = np.log(np.abs([f[1] for f in found])) if len(found) > 1 else np.empty(0)
-        for i in range(logs.size):
-            others = np.delete(logs, i)
-            factor = float(np.exp(logs[i] - np.median(others)))
-            alone = logs.size > 2 or i == 1  # of two runs nobody knows which: the later one is named
-            if alone and np.ptp(others) < policy.faults.OTHER_RUNS_AGREE and _telling(factor):
-                _, what = named_factor(factor)
-                says = f"{q} is {factor:.4g} times that of the other {'runs' if logs.size > 2 else 'run'}"
-                says += f" ({what})." if what else "."
-                yield found[i][0], q, says, {"factor": Value(factor, factor * found[i][2], "1")}

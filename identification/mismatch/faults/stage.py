@@ -30,8 +30,9 @@ class Sound:
     """What was left aside, as not every run holds it."""
 
 
-def run(prepared: Prepared, rate_per_driver: float | None = None) -> Sound | Refusal:
-    """Refused where a recording that was put right cannot be diagnosed. `rate_per_driver`: of a twin, for all runs."""
+def run(prepared: Prepared, told: Sequence[Fault] = (), rate_per_driver: float | None = None) -> Sound | Refusal:
+    """Refused where a recording that was put right cannot be diagnosed; `told`: faults that were put right before;
+    `rate_per_driver`: of a twin, for all runs."""
     faults, histories = _put_right(prepared.recordings, prepared.histories)
     faults_of_unseen, unseen = _put_right(prepared.held_out, prepared.unseen)
     if isinstance(histories, Refusal):
@@ -42,7 +43,7 @@ def run(prepared: Prepared, rate_per_driver: float | None = None) -> Sound | Ref
     histories = of_one_rate(histories, rate_per_driver)
     turning = next((h.rate_per_driver for h in histories if h.rate is not None), None)
     unseen = of_one_rate(unseen, turning)
-    return Sound(histories, unseen, faults + faults_of_unseen, notes)
+    return Sound(histories, unseen, (*told, *faults, *faults_of_unseen), notes)
 
 
 def _put_right(

@@ -8,8 +8,8 @@ CHANNEL_FALSE_ALARM = Threshold(
     1e-3,
     unit="probability",
     reason=(
-        "Of one test of one channel; what is said must also be far beyond what any physics of a thruster "
-        "does, so noise alone never passes."
+        "Of one test of one channel, or of all channels of all runs that are compared; what is said must also be far "
+        "beyond what any physics of a thruster does, so noise alone never passes."
     ),
     evidence="docs/proof.md (benchmarks/proof/scores.jsonl.gz): no channel fault in 1,002 clean recordings.",
 )
@@ -138,8 +138,8 @@ EVEN_LAW = Threshold(
 )
 OTHER_RUNS_AGREE = Threshold(
     0.3,
-    unit="logarithm of a ratio",
-    reason="A run whose scale differs is told only where the others agree among themselves to some 30 per cent.",
+    unit="share of its value",
+    reason="A supply or a temperature that was exchanged is, put back, as near as this to that of the other run.",
 )
 MILLIVOLTS_RATIO = Threshold(
     300.0,
@@ -170,4 +170,103 @@ COMMAND_REST_SCATTER = Threshold(
     0.3,
     unit="ratio to the mean time between changes",
     reason="A command rests for very different times at its levels.",
+)
+RELATION_STEADY = Threshold(
+    0.02,
+    unit="share of the range, per cell",
+    reason="A channel that moves faster than this counts less in what goes with it: what is behind it lags.",
+)
+RELATION_SPREAD = Threshold(
+    0.2,
+    unit="ratio of standard deviations",
+    reason="Two runs that share less than this of a channel's range say nothing of a factor between them.",
+)
+RUN_TO_RUN = Threshold(
+    0.02,
+    unit="standard deviation of a logarithm",
+    reason=(
+        "What heat, recirculation, lag and another plan make of the ratio of two voltages or rates from run to "
+        "run at the same values of the one; of currents and forces, their squares, twice as much."
+    ),
+)
+RUN_TO_RUN_DEGREES = Count(
+    8,
+    unit="degrees of freedom",
+    reason="How well that variation is known, as the degrees of freedom of Student's law: thrusters differ in it.",
+)
+CHANGED_FACTOR = Threshold(
+    1.1,
+    unit="ratio",
+    reason=(
+        "A command, voltage or rate that is another by less is physics from run to run, a current or torque by "
+        "less than its square; of the thrust NAMED_SCALE_FACTOR counts."
+    ),
+)
+EXCHANGED_AGREE = Threshold(
+    4.0,
+    unit="standard deviations",
+    reason=(
+        "Two channels were exchanged where, put back, nothing is farther than this from the other run: a tenth of "
+        "a rate, a fifth of a force, dynamics and all."
+    ),
+)
+STRANGE_ALONE = Threshold(
+    0.5,
+    unit="R^2",
+    reason=(
+        "Of a single run: a channel that the others explain to less than half where they explain one another "
+        "follows something else."
+    ),
+)
+STILL_FOLLOWS = Threshold(
+    0.8,
+    unit="R^2",
+    reason=(
+        "A channel that another explains to less than this, where it did so well in a sound run, has no factor "
+        "any more."
+    ),
+)
+SCATTER_RUN_TO_RUN = Threshold(
+    3.0,
+    unit="ratio of variances",
+    reason=(
+        "What is left of a channel may be so much louder in one run than in another before it counts as followed less."
+    ),
+)
+SCATTER_ALLOWED = Threshold(
+    0.01,
+    unit="share of the variance",
+    reason="Of what follows so well that next to nothing is left, as much may be left in another run, three times.",
+)
+RELATION_APART = Threshold(
+    3.0,
+    unit="standard deviations",
+    reason=(
+        "Runs whose channels all go together within this are not looked at any further: a sound pair of runs is "
+        "beyond it in one of twenty."
+    ),
+)
+EXCHANGED_BETTER = Threshold(
+    0.5,
+    unit="ratio",
+    reason=(
+        "An exchange must leave half of the misfit that one changed channel leaves, or a sound run would be "
+        "exchanged with itself."
+    ),
+)
+RANGE_OF_FIGURES = Threshold(
+    30.0,
+    unit="ratio",
+    reason=(
+        "Figures of channels in SI units lie within so much of one another either way: how likely two fit into "
+        "each other's places by chance."
+    ),
+)
+UNIT_BETWEEN_RUNS = Threshold(
+    0.12,
+    unit="logarithm of a ratio",
+    reason=(
+        "A factor between runs so near to that of a unit is taken for it: the units of a quantity lie farther "
+        "apart, and the thrust constant may differ by some per cent beside it."
+    ),
 )

@@ -12,6 +12,7 @@ from rig.blind.scoring.composites import composite_besides, difference_goals, fi
 from rig.blind.scoring.on_benches import bench_besides, bench_goals
 from rig.blind.scoring.rates import Goal, Rate, of_groups, of_rate, rate
 from rig.blind.scoring.score import LOCATED, OPEN_CELLS, Score
+from rig.blind.scoring.wired import wired_besides, wired_goals
 
 LARGE: Final = 9.9
 MODELLED: Final = (*STRENGTHS, "pair", "form", "variant")
@@ -54,7 +55,7 @@ def goals(scores: Sequence[Score]) -> list[Goal]:
         of_rate("open world: a wrong name instead", rate(s.outcome == "wrong name" for s in counted), most=0.05),
     ]
     found += [*_alarms(scores), *_errors(scores), *_coverage(scores), *_power(scores)]
-    found += bench_goals(cell(scores, "bench"))
+    found += [*bench_goals(cell(scores, "bench")), *wired_goals(cell(scores, "wiring"))]
     return [*found, *field_goals(cell(scores, "field")), *difference_goals(cell(scores, "difference"))]
 
 
@@ -97,6 +98,7 @@ def besides(scores: Sequence[Score]) -> list[Goal]:
         of_rate("crashed, refused or overdue", rate(s.failed for s in scores)),
         *bench_besides(cell(scores, "bench")),
         *composite_besides(cell(scores, "field"), cell(scores, "difference")),
+        *wired_besides(cell(scores, "wiring")),
     ]
 
 

@@ -27,6 +27,7 @@ from rig.blind.design import STRENGTHS, Order
 from rig.blind.scoring.places import PLACES, UPSTREAM
 from rig.blind.scoring.same_parameters import true_values
 from rig.blind.scoring.sealed import concealed, described, strengths
+from rig.blind.scoring.wired import Wired, wired
 
 Table = Mapping[str, Any]
 
@@ -98,11 +99,15 @@ class Score:
     """d' of each effect of `truth` beside the others; empty where a lie is among them."""
     known: tuple[str, ...] = ()
     """Effects that an earlier recording of the same thruster had as well."""
+    wired: Wired | None = None
+    """Of cases about the wiring of several runs: what was said of it."""
 
     @property
     def right(self) -> bool:
         if self.failed:
             return False
+        if self.wired is not None:
+            return self.wired.right
         return set(self.truth) <= {*self.named, *self.rivals} if self.truth else self.said == "adequate"
 
     @property
@@ -204,6 +209,7 @@ def scored(
         constant=thrust_constant(found, truth),
         strengths=strengths(truth),
         known=tuple(truth.get("known", ())),
+        wired=wired(found, truth),
     )
 
 

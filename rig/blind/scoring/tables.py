@@ -53,6 +53,7 @@ def said(s: Score) -> dict[str, Any]:
         "nearest": None if s.near is None else [s.near.rival, round(s.near.left, 1)],
         "case": s.case,
         "statement": s.statement,
+        "wired": list(s.wired.said) if s.wired is not None else [],
         "seconds": round(s.seconds, 1),
     }
 

@@ -61,6 +61,8 @@ class Run:
     """s of world time at which the recording begins."""
     seed: int
     """of the noise."""
+    drive: float = 1.0
+    """Of the recorded command, what the motor controller of this run puts on the motor."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -111,7 +113,7 @@ def history(case: Case, run: Run, *, without: frozenset[str] = frozenset()) -> H
     """The world's run on its grid, noise-free."""
     t = clock(int(run.profile.duration / case.dt), case.dt)
     times, speeds = np.array(run.flow, dtype=np.float64).T
-    command = held(run.profile.time, run.profile.volts, t)
+    command = run.drive * held(run.profile.time, run.profile.volts, t)
     water = case.water_temperature + case.temperature_drift * (run.start + t)
     world = replace(settings(case, without=without), cell=Cell(zero_offset=run.tare))
     return sweep(world, case.dt, command, held(times, speeds, t), water, run.start)

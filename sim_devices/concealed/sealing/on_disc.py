@@ -8,7 +8,7 @@
     OUT/sealed/<token>.npz              `thrust` and `measured` of that other run at the times `at`
 
 A case is asked for by a table: `token` (its name, which should tell nothing), `seed` (integers), and what is not to be
-left to chance: `effects`, `strength`, `forms`, `noise`, `plan`, `lie`, `runs`, `sampling`, `duration` as of
+left to chance: `effects`, `strength`, `forms`, `noise`, `plan`, `lie`, `runs`, `sampling`, `duration`, `wiring` as of
 `concealed.case`; `rivals`: names whose likeness to the first effect goes into the seal (`concealed.twins`);
 `world`: the version that is to make it, where that matters.
 
@@ -34,6 +34,8 @@ from sim_devices.concealed.cases.faults import KINDS as LIES
 from sim_devices.concealed.cases.forms import FORMS, VARIANTS
 from sim_devices.concealed.cases.shapes import SHAPES
 from sim_devices.concealed.cases.wide_noise import WIDE_NOISE_KINDS
+from sim_devices.concealed.cases.wiring import KINDS as WIRINGS
+from sim_devices.concealed.cases.wiring import NOTHING as WIRED_RIGHT
 from sim_devices.concealed.composites import ADDED, FIELD, composite, difference
 from sim_devices.concealed.draw import NOISE_KINDS
 from sim_devices.concealed.draw import case as drawn
@@ -55,10 +57,11 @@ KINDS: Mapping[str, Any] = {
     "wide_noise": list(WIDE_NOISE_KINDS),
     "field": list(FIELD),
     "added": list(ADDED),
+    "wiring": [WIRED_RIGHT, *WIRINGS],
     "version": version(),
 }
 """What may be asked for, and of what world."""
-CHOSEN = ("effects", "strength", "forms", "noise", "plan", "lie", "runs", "sampling", "duration")
+CHOSEN = ("effects", "strength", "forms", "noise", "plan", "lie", "runs", "sampling", "duration", "wiring")
 CHOSEN_OF_COMPOSITES = ("noise", "plan", "sampling", "duration")
 KNOWN = frozenset({"token", "seed", "world", "rivals", "field", "more", *CHOSEN})
 NEAREST = 5
@@ -94,7 +97,7 @@ def conceal(asked: Mapping[str, Any], out: Path) -> None:
     if asked.get("rivals") and case.effects:
         near = twins(case, case.effects[0].effect, list(asked["rivals"]), np.random.default_rng([*seed, 1]))
         told["twins"] = [asdict(twin) for twin in near[:NEAREST]]
-    if case.fault is None:
+    if case.fault is None and "wiring" not in asked:
         other = another(case, np.random.default_rng([*seed, 2]))
         write_rows(folder / "drive.npz", other.drive, at=other.at)
         exact, seen = other.thrust.astype(np.float32), other.measured.astype(np.float32)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 from uuid import UUID
@@ -12,6 +13,7 @@ from numpy.typing import NDArray
 from sim_devices.concealed.cases.definition import Case, Run, Sensor, history, settings, thrust_of
 from sim_devices.concealed.cases.faults import Column, lying
 from sim_devices.concealed.cases.plans import Step
+from sim_devices.concealed.cases.wiring import miswired
 from sim_devices.concealed.visibility.oracle import strength
 from sim_devices.world.history import History, clock
 from sim_devices.world.noise_law import drawn, rounded
@@ -53,9 +55,18 @@ def _one(case: Case, run: Run, thruster: str) -> Rows:
         *(_sensed(case, sensor, h, seconds, rng) for sensor in case.sensors),
         *_neighbour(case, run),
     ]
-    columns = list(lying(columns, case.fault, run.start)) if case.fault else columns
+    columns = list(_told(columns, case, run))
     steps = run.profile.steps if case.with_steps else ()
     return Rows(recording_id(run), thruster, tuple(columns), steps, run.profile.duration)
+
+
+def _told(columns: list[Column], case: Case, run: Run) -> Sequence[Column]:
+    """With the lie in them: about all runs, or about one of them where it says so."""
+    if case.fault is None:
+        return columns
+    if "run" in case.fault:
+        return miswired(columns, case.fault) if run is case.runs[case.fault["run"]] else columns
+    return lying(columns, case.fault, run.start)
 
 
 def _sensed(case: Case, sensor: Sensor, h: History, seconds: Floats, rng: np.random.Generator) -> Column:
