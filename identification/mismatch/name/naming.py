@@ -10,8 +10,9 @@ from itertools import combinations
 import numpy as np
 
 from identification.mismatch import policy
+from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.estimate import Estimate, fit_without
-from identification.mismatch.estimate.fitting import Fit, at_bound
+from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.locate.residual_structure_test import ResidualStructure
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict

@@ -9,8 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.mismatch import policy
+from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
-from identification.mismatch.estimate.fitting import Fit, at_bound, fit
+from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta

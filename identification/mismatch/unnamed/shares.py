@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from identification.mismatch import policy
-from identification.mismatch.estimate.fitting import Fit, at_bound, fit
+from identification.mismatch.estimate.at_bounds import at_bound
+from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.name.named_term import GRAVE, Attained
 from identification.mismatch.name.naming import Named
 from identification.mismatch.validate.held_out import Score

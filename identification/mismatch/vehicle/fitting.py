@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.estimation.singular_values import thin_svd
+from identification.mismatch.estimate.at_bounds import impossible
 from identification.mismatch.estimate.bounded_least_squares import MOST_STEPS, Minimum, least_squares
 from identification.mismatch.estimate.estimate import independent
-from identification.mismatch.estimate.fitting import impossible
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise, Rows, Shapes, Whitener
 from identification.mismatch.noise.variances import fit_noise

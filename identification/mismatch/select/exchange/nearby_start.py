@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch import policy
-from identification.mismatch.estimate.fitting import Fit, at_bound, bounds_of, change_of, fit, residual_of
+from identification.mismatch.estimate.at_bounds import at_bound
+from identification.mismatch.estimate.fitting import Fit, bounds_of, change_of, fit, residual_of
 from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.model import Model, extended
 from identification.mismatch.model.parameters import Theta

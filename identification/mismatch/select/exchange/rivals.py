@@ -9,8 +9,9 @@ from itertools import combinations
 import numpy as np
 
 from identification.mismatch import policy
+from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.estimate import Estimate, fit_without
-from identification.mismatch.estimate.fitting import Fit, at_bound, change_of, fit
+from identification.mismatch.estimate.fitting import Fit, change_of, fit
 from identification.mismatch.model.data import Data, price
 from identification.mismatch.select.exchange.nearby_start import best_forms, nearer
 from identification.mismatch.select.family_wise import orthogonal_basis

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
+from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.estimate import curves, fit_without, reading_step, refresh, unweighted
-from identification.mismatch.estimate.fitting import at_bound, bounds_of, fit, residual_of
+from identification.mismatch.estimate.fitting import bounds_of, fit, residual_of
 from identification.mismatch.model.data import price
 from identification.mismatch.model.model import Model
 from identification.physics.asymmetry import Asymmetry
