@@ -50,8 +50,8 @@ def together(findings: Sequence[Finding], held: HeldOutRmse, unit: str) -> str:
     if len(reached) < 2 or reached[0] >= held.before:
         return ""
     return (
-        f"Together they take the error on what was not fitted from {held.before:.3g} to {reached[0]:.3g} {unit}, of "
-        f"which {held.noise:.3g} is noise."
+        f"Together they take the error on what was not fitted from {held.before:.3g} to {reached[0]:.3g} {unit}; "
+        f"noise alone gives {held.noise:.3g} {unit}."
     )
 
 
