@@ -181,10 +181,13 @@ def exchanges(table: Table) -> Iterator[tuple[str, str, Table]]:
 
 
 def _explained(found: Relations, one: Changed) -> Relations:
-    """The relations with the factor of the channel to blame taken out of those to it, and without those from it."""
-    sign = -1.0 if one.kind == "reversed" else 1.0
+    """The relations with the factor of the channel to blame taken out of those to it, and without those from it.
+
+    A sign is a factor of -1 and no other: a supply that sags, in the place of a current, goes down as that goes up.
+    """
+    factor = -1.0 if one.kind == "reversed" else one.factor
     return {
-        (a, b): replace(each, factor=each.factor * sign / one.factor) if b == one.channel else each
+        (a, b): replace(each, factor=each.factor / factor) if b == one.channel else each
         for (a, b), each in found.items()
         if a != one.channel
     }

@@ -47,7 +47,10 @@ def run(recordings: Sequence[Recording], holdout: Sequence[Recording]) -> Wired:
 
 
 def _unexplained_alone(every: Sequence[Recording]) -> list[Differs]:
-    """Without those of which a fault within the run explains all: they are found and put right by themselves."""
+    """Without those of which a fault within the run explains all: they are found and put right by themselves.
+
+    An exchange stays: of a supply in the place of a current the run by itself would say that its sign is turned.
+    """
     found = differing(every)
     if not found:
         return []
@@ -56,7 +59,7 @@ def _unexplained_alone(every: Sequence[Recording]) -> list[Differs]:
     again = {
         one.recording.recording_id for one in differing([_mended(r) if r.recording_id in flagged else r for r in every])
     }
-    return [one for one in found if one.recording.recording_id in again]
+    return [one for one in found if one.changed.kind == "swapped" or one.recording.recording_id in again]
 
 
 def _mended(recording: Recording) -> Recording:

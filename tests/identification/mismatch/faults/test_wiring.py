@@ -111,6 +111,12 @@ def test_of_two_runs_the_laws_tell_in_which_two_channels_are_exchanged(at: int) 
     assert told(wiring.run(runs, ())) == [(f"id-{at + 1}", "swapped", {"command_voltage", "current"})]
 
 
+def test_a_supply_that_sags_in_the_place_of_a_current_is_no_sign() -> None:
+    runs = [wired_run(seed, sag=0.02, forward=True) for seed in (1, 2, 3)]
+    runs[1] = put("current", "bus_voltage")(runs[1])
+    assert told(wiring.run(runs, ())) == [("id-2", "swapped", {"current", "bus_voltage"})]
+
+
 def test_without_a_third_channel_nobody_says_which_of_the_two_it_is() -> None:
     first, second = (only(wired_run(seed), "command_voltage", "thrust") for seed in (1, 2))
     (fault,) = wiring.run([first, edited(second, "thrust", strange)], ()).faults
