@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from math import floor, inf, isfinite, log10
+from math import floor, isfinite, log10
 from textwrap import wrap
 
 from identification.mismatch.diagnosis import Diagnosis, Finding
@@ -13,8 +13,6 @@ from identification.mismatch.verdict_clauses import NOT_WHITE, degree, sureness
 
 WIDTH = 100
 MOST_STEPS = 12
-PHASE_KNOWN = 1.0
-"""rad, standard error from which a phase is any."""
 BAR = 24
 """Characters of the longest bar in the table of a shape."""
 
@@ -53,17 +51,6 @@ def with_error(value: Value) -> str:
     return f"{value.value:.{digits}f} +- {value.std:.{digits}f}{unit}"
 
 
-def determined(name: str, value: Value) -> bool:
-    """Whether a figure is worth printing: a tare and a phase may be 0, what else is told must differ from it.
-
-    >>> determined("time_constant", Value(24.0, 5.8e9, "s")), determined("tare", Value(0.1, 0.2, "N"))
-    (False, True)
-    """
-    if not isfinite(value.std) or name.split("[", maxsplit=1)[0] in ("tare", "C"):
-        return True
-    return value.std < (PHASE_KNOWN if value.unit == "rad" else abs(value.value) or inf)
-
-
 def rarity(p: float) -> str:
     """A p value as text.
 
@@ -89,9 +76,7 @@ def _para(text: str, indent: str = "") -> list[str]:
 
 
 def _values(values: Mapping[str, Value]) -> str:
-    return ", ".join(
-        f"{name} {with_error(value) if determined(name, value) else 'not determined'}" for name, value in values.items()
-    )
+    return ", ".join(f"{name} {with_error(value)}" for name, value in values.items())
 
 
 def _where(d: Diagnosis) -> Iterator[str]:

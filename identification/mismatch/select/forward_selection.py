@@ -49,9 +49,9 @@ def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
     What stands for a channel is among them where that was not recorded, or in a few steps only.
     """
     have = set.intersection(*(set(h.others) for h in data.histories))
-    fine = have.difference(*(h.coarse for h in data.histories))
     if data.scale.torque <= 0:
         have.discard("torque")  # a channel of zeros
+    fine = have.difference(*(h.coarse for h in data.histories))
     static = any(h.static for h in data.histories)
     out = []
     for term in CATALOGUE:

@@ -80,8 +80,7 @@ def run(
         valued, known = _with_values(earned, now, flexible.estimate, data, flexible)
         return Completed(flexible.estimate, valued, known, unearned, flexible, open_ended, bare, left)
     after = predicting(now, split, data, selected.terms, [n.term for n in unearned], unseen)
-    if earned and located.left.groups and not predicts(after, before, data, unseen, grown=not unearned):
-        open_ended = True
+    if earned and unearned and not predicts(after, before, data, unseen):
         refuted = Check("predicts", "predicts better than the baseline", ALONE)
         after, unearned, earned = before, (*unearned, *(n.asked(refuted) for n in earned)), ()
         bare, left = _without(now, data, unearned, rng)

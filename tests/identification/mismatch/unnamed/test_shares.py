@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.name.naming import REPAIR, Check, name
+from identification.mismatch.name.naming import Check, name
 from identification.mismatch.unnamed.shares import mostly_right, only_repairs, share
 from identification.mismatch.validate.held_out import Score
 from identification.mismatch.validate.train_test_split import train_test_split
@@ -51,11 +51,14 @@ def doubted(checks, widths=(1.2, 0.7)):
     """Dead band and asymmetry, both right, but each with a check that it is said to have failed; and the judge."""
     made = short(change=lambda _t, V, F: np.where(V < 0, widths[1], 1.0) * F, volts=dead_band(widths[0]))
     data, estimate = known_noise({DeadBand(): (widths[0],), Asymmetry(): (widths[1],)}, [made])
-    named = [n.asked(Check(check, "so it is said")) for n, check in zip(name(estimate, data, []), checks, strict=True)]
+    named = [
+        n.asked(Check(kind, "its shape", "so it is said"))
+        for n, kind in zip(name(estimate, data, []), checks, strict=True)
+    ]
     return train_test_split(estimate, data, ()), named
 
 
-SHAPE = "nothing is left over its own covariate"
+SHAPE = "own_covariate"
 
 
 def test_names_of_which_none_makes_most_of_it_alone_are_said_together():
@@ -79,8 +82,8 @@ def test_what_makes_too_little_even_together_is_not_said():
 
 
 def test_of_two_shapes_that_repair_each_other_one_is_said():
-    split, named = doubted((REPAIR, REPAIR))
+    split, named = doubted(("repair", "repair"))
     found = mostly_right(split, named, split.judge(split.estimate.fit).rmse)
     assert len(found.right) <= 1
     assert only_repairs(named) == tuple(named)
-    assert only_repairs([n.asked(Check("its values are possible", "no")) for n in named]) == ()
+    assert only_repairs([n.asked(Check("possible", "its values", "no")) for n in named]) == ()

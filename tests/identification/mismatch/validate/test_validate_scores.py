@@ -273,8 +273,6 @@ def test_a_model_predicts_where_it_does_better_than_the_baseline(fitted):
     assert not predicts(before, after, data, ())
     assert predicts(after, before, data, [history(banded(seed=5))])
     assert not predicts(after, before, data, [history(short(seed=5))])
-    assert predicts(after, before, data, (), grown=True)
-    assert not predicts(after, before, data, [history(short(seed=5))], grown=True)
 
 
 def test_the_stage_parts_names_into_those_that_predict_and_those_that_do_not(fitted):

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from rig.twin.reading import read_twin
-from tests.rig.diagnose.acted_twins import SCALE, entry, file_of
 from tests.rig.diagnose.diagnosed_files import with_line
+from tests.rig.diagnose.in_the_world.acted_twins import SCALE, entry, file_of
 
 
 def test_the_simulated_bench_runs_on_a_twin(dead, tmp_path):

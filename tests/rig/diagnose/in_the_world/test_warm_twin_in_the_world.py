@@ -9,7 +9,7 @@ from sim_devices.tables import WorldError
 from sim_devices.world.settings import read_world
 from sim_devices.world.sweep import sweep
 from sim_devices.world.twin import world_of
-from tests.rig.diagnose.acted_twins import acted, entry, file_of, told
+from tests.rig.diagnose.in_the_world.acted_twins import acted, entry, file_of, told
 
 WARM = [
     ([entry("heating", "winding", 0.1, 20.0)], -0.1),
