@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import pty
 import select
@@ -37,8 +38,11 @@ class Running:
 
     @property
     def quiet(self) -> bool:
-        """Whether nothing is to be read from its terminal."""
-        return not select.select([self._master], [], [], 0.0)[0]
+        """Whether it has shown nothing; of a process that has ended, whose terminal hangs up (EIO) after the rest."""
+        try:
+            return not os.read(self._master, 4096)
+        except OSError as error:
+            return error.errno == errno.EIO
 
     def close(self) -> None:
         self.process.kill()
