@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 from identification.mismatch import policy
 from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Value, Where
-from identification.mismatch.verdict_clauses import beside, together, unsettled
+from identification.mismatch.verdict_clauses import beside, to_settle, together, unsettled
 from identification.recording import Floats
 from identification.twin import Twin
 
@@ -235,7 +235,7 @@ class Diagnosis:
                 return self._left_out([f.statement for f in findings])
             case Ambiguous(findings):
                 told = [f.statement for f in findings if not f.rivals] + [unsettled(f) for f in findings if f.rivals]
-                return f"{self._left_out(told)} Run the next experiment."
+                return f"{self._left_out(told)} {to_settle(self.next_experiment)}"
             case Unexplained(findings, remainder):
                 return beside(findings, remainder.statement, self.heldout, self.unit)
 

@@ -6,12 +6,14 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from identification.mismatch.diagnosis import Finding, HeldOutRmse
+    from identification.mismatch.diagnosis import Finding, HeldOutRmse, NextExperiment
 
 NOT_WHITE = (
     "intervals and p-values rest on the noise model, which does not describe all of it: they may be surer than they "
     "should"
 )
+MOST_REFUSED = 3
+"""Names in a sentence: all of them are in the answer."""
 
 
 def sureness(f: Finding) -> str:
@@ -68,4 +70,22 @@ def unsettled(f: Finding) -> str:
     """It, and by name the rivals that would do as well; by form, where they are the same effect."""
     names = [r.effect if r.effect != f.effect else f"{r.effect} ({r.form})" for r in f.rivals]
     others = " or ".join(name.replace("_", " ") for name in names)
-    return f"{f.statement} Or it is {others}: these recordings cannot tell them apart."
+    return f"{f.statement} In its place it may be {others}: these recordings cannot tell which."
+
+
+def to_settle(found: NextExperiment | None) -> str:
+    """What would tell the rivals, in a sentence."""
+    if found is None:
+        return "Run the next experiment."
+    why = found.why.split(";", maxsplit=1)[0]
+    if not found.steps:
+        return f"No sweep settles it: {why}."
+    seconds = sum(step.duration for step in found.steps)
+    return f"To settle it run the next experiment, {len(found.steps)} steps of {seconds:.0f} s together: it {why}."
+
+
+def refused(candidates: Sequence[tuple[str, str]]) -> str:
+    """What was tried for it, each (name, first check that it failed); the first few."""
+    told = [f"{name.replace('_', ' ')} ({why})" for name, why in candidates[:MOST_REFUSED]]
+    more = len(candidates) - len(told)
+    return f"Tried for it and refused: {'; '.join(told)}{f'; and {more} more' if more else ''}."

@@ -12,6 +12,7 @@ from identification.mismatch.unnamed.flexible import foremost
 from identification.mismatch.unnamed.flexible_shape import with_flexible
 from identification.mismatch.unnamed.shares import only_repairs
 from identification.mismatch.unnamed.stage import Completed, foremost_covariate
+from identification.mismatch.verdict_clauses import refused
 from identification.run_history.history import History
 
 
@@ -32,6 +33,6 @@ def remainder_of(completed: Completed, data: Data, unseen: Sequence[History]) ->
         names = " or ".join(n.term.id.replace("_", " ") for n in unearned)
         text += f" It is mostly {names}: each explains nearly the same alone, and neither all of it."
     elif unearned:
-        text += f" It resembles {', '.join(n.term.id for n in unearned)}, but {unearned[0].failed_checks[0]}."
+        text += f" {refused([(n.term.id, n.failed_checks[0]) for n in unearned])}"
     found = Remainder(where, judged.share, left.p_value, table, text, resembles)
     return with_flexible(found, flexible, data, unseen)

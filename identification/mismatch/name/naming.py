@@ -45,9 +45,7 @@ def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check
     change = _raw_effect(estimate.fit, (term,), data)
     cancelled = _cancelled(estimate.fit, term, change, data)
     return (
-        Check(
-            "possible", "its values are possible", "its parameters end at what is physically possible" if ended else ""
-        ),
+        Check("possible", "its values are possible", "it would take values that are not possible" if ended else ""),
         Check("sampled", "the samples can show it", "it is faster than the samples can show" if unseen else ""),
         *((Check("clipping", CLIPPING, elsewhere),) if term.traits.limits else ()),
         *(Check("undone", "no other term undoes it", f"it and {other.id} nearly cancel") for other in cancelled),

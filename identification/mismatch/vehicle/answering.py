@@ -18,6 +18,7 @@ from identification.mismatch.vehicle.free_force import BACK, Left, Structure, pl
 from identification.mismatch.vehicle.naming import Named
 from identification.mismatch.vehicle.runs import Prepared
 from identification.mismatch.vehicle.search import State
+from identification.mismatch.verdict_clauses import refused
 
 
 def baseline_words(data: Prepared) -> str:
@@ -107,7 +108,7 @@ def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Remain
     )
     resembles = tuple(f"{n.term.id}: {'; '.join(n.failed_checks)}" for n in named)
     if named:
-        says += f" It resembles {', '.join(n.term.id for n in named)}, but {named[0].failed_checks[0]}."
+        says += f" {refused([(n.term.id, n.failed_checks[0]) for n in named])}"
     table = place_of(structure).table
     return Remainder(where, structure.share, left.p_value, table, says, resembles)
 

@@ -36,9 +36,7 @@ def name(state: State, vehicle: Vehicle) -> tuple[State, tuple[Named, ...]]:
 def checks(state: State, data: Prepared, term: VehicleTerm) -> Iterator[Check]:
     """Whether its values are possible, and a parameter the same in parts of the recordings."""
     fitted, ended = state.fit, at_bound(state.fit, term)
-    yield Check(
-        "possible", "its values are possible", "its parameters end at what is physically possible" if ended else ""
-    )
+    yield Check("possible", "its values are possible", "it would take values that are not possible" if ended else "")
     layout, i = fitted.layout, fitted.layout.of(term).start
     amount = fitted.theta[i] - (layout.parts[term][0].neutral or 0.0)
     if len(layout.parts[term]) > 1 or amount == 0 or not fitted.free[i]:

@@ -59,7 +59,7 @@ HELD = HeldOutRmse(5.0, 0.11, 0.1, "every fourth block of time")
 NEXT = NextExperiment("separates motor_lag from time_skew", (PlanStep(2.0, 4.0), PlanStep(-9.0, 3.0, 0.5)), 0.97)
 ODD = Remainder(
     *(Where("time", 5.0, 20.0, "s"), 0.3, 1e-5, ((2.0, 0.1, 0.02), (8.0, -0.3, 0.03), (20.0, np.nan, np.nan))),
-    *("Something is left at time 5 to 20 s.", ("heating: its parameters end at what is physically possible",)),
+    *("Something is left at time 5 to 20 s.", ("heating: it would take values that are not possible",)),
 )
 
 

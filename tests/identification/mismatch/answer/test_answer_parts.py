@@ -144,7 +144,7 @@ def test_what_no_name_carries_is_told_with_its_place_and_what_resembles_it():
     assert found.findings == ()
     left = found.unexplained
     assert any(text.startswith("dead_band: ") and "both directions" in text for text in left.resembles)
-    assert "It resembles dead_band, but its parameter is not the same" in left.statement
+    assert "Tried for it and refused: dead band (its parameter is not the same" in left.statement
     assert left.where.low < left.where.high
     assert left.shape
     quiet = replace(completed, open_ended=False)
