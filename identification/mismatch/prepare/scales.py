@@ -14,6 +14,9 @@ from identification.run_history.remembered import RememberedRun
 MANY_SAMPLES = 100
 """Samples, above which scatter is told by second differences: fewer are compared level by level."""
 
+SHORT = 0.01
+"""Of a run: what a current does for so short a time warms nothing."""
+
 THERMOMETER = "motor_temperature"
 
 
@@ -35,7 +38,7 @@ def scale_of(runs: Sequence[RememberedRun], C: float) -> Scale:
         torque=_full_torque(histories) * driver**2,
         spacing=min(h.spacing for h in histories),
         bus=_largest(histories, "bus_voltage"),
-        current=_largest(histories, "current"),
+        current=max((_lasting_current(h) for h in histories if "current" in h.others), default=0.0),
         neighbour=_largest(histories, "neighbour_thrust"),
         cold=min((_begun(h) for h in histories if THERMOMETER in h.others), default=0.0),
     )
@@ -45,6 +48,14 @@ def _largest(histories: Sequence[History], quantity: str) -> float:
     """In the unit of the quantity, over all runs that hold it; 0 where none does."""
     sizes = (float(np.nanmax(np.abs(h.others[quantity]))) for h in histories if quantity in h.others)
     return max(sizes, default=0.0)
+
+
+def _lasting_current(history: History) -> float:
+    """A, exceeded in SHORT of the time only: a rotor that is set going draws several times what it turns with."""
+    size = np.nan_to_num(np.abs(history.others["current"]))
+    order = np.argsort(size)
+    until = np.cumsum(history.dt[order])
+    return float(size[order][np.searchsorted(until, (1 - SHORT) * until[-1])])
 
 
 def _begun(history: History) -> float:

@@ -67,3 +67,10 @@ def test_runs_share_one_rate_per_driver_that_of_a_twin_where_there_is_one() -> N
     assert [h.rate_per_driver for h in of_one_rate(runs, 4.0)] == [4.0, 4.0]
     unturned = replace(made, rate=None)
     assert of_one_rate((unturned,)) == (unturned,)
+
+
+def test_what_a_rotor_draws_while_it_is_set_going_is_no_reference(pair) -> None:
+    made = pair[0].history
+    others = dict(made.others)
+    others["current"] = np.where(np.arange(made.dt.size) == np.argmin(made.dt), 9.0, 1.0) * np.abs(made.driver)
+    assert scale_of([RememberedRun(replace(made, others=others))], 0.5).current == np.max(np.abs(made.driver))
