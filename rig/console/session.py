@@ -3,7 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import select
 import signal
+import sys
+import threading
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -59,6 +63,7 @@ async def _sit(feed: Feed, clock: Callable[[], float], again: str) -> Sitting:
         loop.call_soon_threadsafe(leave)
 
     before = {number: signal.signal(number, on_signal) for number in (signal.SIGHUP, signal.SIGTERM)}
+    threading.Thread(target=_tell_of_hang_up, name="hang-up", daemon=True).start()
     loop.add_signal_handler(signal.SIGINT, app.action_stop)
     try:
         await app.run_async()
@@ -71,6 +76,18 @@ async def _sit(feed: Feed, clock: Callable[[], float], again: str) -> Sitting:
     detached = app.parting is not None and app.parting.kind == "detach"
     status = 128 + caught[0] if caught else max(app.return_code or 0, exit_status(app.state, detached))
     return Sitting(status, app.state.snapshot, detached and not caught)
+
+
+def _tell_of_hang_up() -> None:
+    """SIGHUP to this process once its terminal is gone, if the kernel has not sent it: it does so to the session's
+    leader alone. Without it the reader of keys would find an end of file for ever, and the screen's writer nobody."""
+    terminal = sys.stdin.fileno() if sys.stdin.isatty() else None
+    if terminal is None:
+        return
+    gone = select.poll()
+    gone.register(terminal, 0)  # POLLHUP is always told
+    gone.poll()
+    os.kill(os.getpid(), signal.SIGHUP)
 
 
 def exit_status(view: View, detached: bool) -> int:

@@ -73,11 +73,14 @@ class Terminal:
 
 
 @contextmanager
-def on_terminal(code: str, *arguments: str) -> Iterator[tuple[subprocess.Popen[bytes], Terminal]]:
-    """Python `code` in a process whose controlling terminal is ours. Leaving waits for its end, and at last kills."""
+def on_terminal(code: str, *arguments: str, leading: bool = True) -> Iterator[tuple[subprocess.Popen[bytes], Terminal]]:
+    """Python `code` in a process whose controlling terminal is ours. Leaving waits for its end, and at last kills.
+
+    Not `leading`: the terminal is not its session's, and the kernel tells it of no hang-up.
+    """
     terminal = Terminal()
     process = subprocess.Popen(
-        [sys.executable, "-c", TAKE_THE_TERMINAL + code, *arguments],
+        [sys.executable, "-c", (TAKE_THE_TERMINAL if leading else "") + code, *arguments],
         stdin=terminal.slave,
         stdout=terminal.slave,
         stderr=terminal.slave,

@@ -14,10 +14,10 @@ from tests.rig.console.terminal import Terminal, on_terminal
 
 
 @contextmanager
-def seated(out: Path) -> Iterator[tuple[subprocess.Popen[bytes], Terminal]]:
+def seated(out: Path, *, leading: bool = True) -> Iterator[tuple[subprocess.Popen[bytes], Terminal]]:
     """A console process that has drawn its first screen."""
     with on_terminal(
-        "import runpy; runpy.run_module('tests.rig.console.seated', run_name='__main__')", str(out)
+        "import runpy; runpy.run_module('tests.rig.console.seated', run_name='__main__')", str(out), leading=leading
     ) as seat:
         seat[1].until(b"T1 hold")
         yield seat
@@ -29,6 +29,14 @@ def test_it_goes_and_its_link_is_closed(tmp_path, number):
         process.send_signal(number)
     assert process.returncode == 128 + number
     assert (tmp_path / "out").read_text() == f"{128 + number} True"
+
+
+@pytest.mark.parametrize("leading", [True, False])
+def test_it_goes_when_its_terminal_is_gone(tmp_path, leading):
+    """Also where the kernel does not say so: a console that is not its session's leader gets no SIGHUP."""
+    with seated(tmp_path / "out", leading=leading) as (process, terminal):
+        terminal.close()
+        assert process.wait(10.0) in (128 + signal.SIGHUP, -signal.SIGALRM)
 
 
 @pytest.mark.parametrize("keys", [b"\x03", b"\x1b[20~"], ids=["ctrl+c", "f9 as xterm sends it"])
