@@ -204,8 +204,8 @@ class CanBus:
         except can.CanOperationError as error:
             if not isinstance(error.__cause__, UnicodeDecodeError):
                 raise
-            self._bad.add(str(error.__cause__))
             bus.flush()  # type: ignore[attr-defined]  # only slcan decodes text, and it has flush()
+            self._bad.add(str(error.__cause__))  # when it is told, what comes next is read
             return
         if message is None:
             return
