@@ -24,9 +24,9 @@ HARDER = 8.0
 """By how much the damping grows where a step is no better."""
 LEAST_HARDER = 1e-2
 """Damping of a second try at least: beside slopes of size 1 a smaller one changes no step."""
-NEARLY = 1e-2
+LAST_LOOK = 1e-2
 """Of that fall: where slopes that were followed by secants are asked for at last, a step is tried that promises it."""
-AS_FORETOLD = 0.25
+FALL_MET = 0.25
 """Of the fall that slopes foretold: where it was met as closely, they are not asked for anew before the next step."""
 CLOSE = 1e-2
 """Fall of chi-square at which a fit has ended, or of which the slopes promise less; a difference of 1 is one sigma."""
@@ -73,7 +73,7 @@ def least_squares(
             break
         if found is None:  # by secants the end is only nearly met
             J, fresh, asked = slopes_of(at), True, asked + 1
-            found = _step(residual_of, at, residual, J, low, high, damping, NEARLY * close)
+            found = _step(residual_of, at, residual, J, low, high, damping, LAST_LOOK * close)
             if found is None:
                 break
         fall = chi2 - float(found.residual @ found.residual)
@@ -84,7 +84,7 @@ def least_squares(
         damping = max(found.damping / 10, 1e-9)
         if fall < close and fresh:
             break
-        if fall >= close and abs(fall - found.foretold) <= AS_FORETOLD * found.foretold:
+        if fall >= close and abs(fall - found.foretold) <= FALL_MET * found.foretold:
             J, fresh = _secant(J, step, change), False
         else:
             J, fresh, asked = slopes_of(at), True, asked + 1

@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
-from identification.mismatch.estimate.estimate import Estimate, forces, refresh
+from identification.mismatch.estimate.estimate import Estimate, by_run, forces, refresh
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.family_wise import beside, orthogonal_basis
@@ -67,14 +67,15 @@ def _each_its_own(parts: Sequence[Floats]) -> Floats:
     return out
 
 
+def span_of(columns: Floats, estimate: Estimate, data: Data) -> Floats:
+    """(n, r) orthonormal basis of what raw columns (n, p) of all runs take beside the model's own, whitened."""
+    whitened = Weights(estimate.weights.thrust).whiten(by_run(columns, data), [])
+    return orthogonal_basis(beside(whitened, orthogonal_basis(estimate.fit.jacobian[: data.size])))
+
+
 def _taken(estimate: Estimate, data: Data, columns: Floats) -> tuple[float, float]:
     """Of the whitened residual's square by the columns beside the model's own; and how much noisier it is there than
     the noise's model has it."""
-    n = data.size
-    parts = np.split(columns, np.cumsum([rows.size for rows in data.rows])[:-1])
-    whitened = Weights(estimate.weights.thrust).whiten(list(parts), [])
-    basis = orthogonal_basis(estimate.fit.jacobian[:n])
-    span = orthogonal_basis(beside(whitened, basis))
-    residual = estimate.fit.residual[:n]
+    span, residual = span_of(columns, estimate, data), estimate.fit.residual[: data.size]
     score = span.T @ residual
     return float(score @ score), dispersion(span, residual)

@@ -14,22 +14,21 @@ import numpy as np
 from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, refresh
+from identification.mismatch.locate.slow_change import span_of
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
-from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.select.covariates import covariates
-from identification.mismatch.select.family_wise import beside, orthogonal_basis
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 
 DECAYS = (0.08, 0.2, 0.5, 1.25, 3.1)
 """s, in which water may settle: from a rotor's own time to that of a tank's turn-over near it."""
-SHARES = np.concatenate([[0.0], np.geomspace(1e-4, 0.3, 24)])
+TRIED_SHARES = np.concatenate([[0.0], np.geomspace(1e-4, 0.3, 24)])
 """Standard deviation over the thrust that has not settled."""
-PARTS = (0.1, 0.5)
+TIME_CONSTANTS = (0.1, 0.5)
 """Time constants of the noise in units of that decay: quick eddies, and ones that live half as long as the unrest."""
-USED = 1e-5
+LEAST_SLOW_SHARE = 1e-5
 """Of a sample's white variance: a slow part with less is none."""
 
 
@@ -38,7 +37,8 @@ def beside_unrest(estimate: Estimate, data: Data) -> Estimate | None:
     if any(h.static for h in data.histories):
         return None
     shapes = np.column_stack([np.concatenate(c.columns) for c in covariates(estimate.fit, data)])
-    rest = _rest(estimate, data, shapes)
+    span, residual = span_of(shapes, estimate, data), estimate.fit.residual[: data.size]
+    rest = residual - span @ (span.T @ residual)
     tried = [(decay, _unsettled(estimate, data, decay)) for decay in DECAYS]
     found = [(*_likeliest_share(rest, estimate, size), decay, size) for decay, size in tried]
     gain, share, decay, size = max(found, key=lambda each: each[0])
@@ -51,22 +51,10 @@ def beside_unrest(estimate: Estimate, data: Data) -> Estimate | None:
 
 def _with_part_after_steps(noise: Noise, decay: float, share: float) -> Noise:
     """A law to begin the search for variances at: time scales that have none give way."""
-    used = [(T, v) for T, v in zip(noise.scales, noise.slow, strict=True) if v > USED * noise.white]
-    parts = [(decay * part, 0.5 * share**2) for part in PARTS]
+    used = [(T, v) for T, v in zip(noise.scales, noise.slow, strict=True) if v > LEAST_SLOW_SHARE * noise.white]
+    parts = [(decay * part, 0.5 * share**2) for part in TIME_CONSTANTS]
     scales, slow = zip(*used, *parts, strict=True)
     return replace(noise, scales=scales, slow=slow, after_steps=len(parts))
-
-
-def _rest(estimate: Estimate, data: Data, shapes: Floats) -> Floats:
-    """(n,) whitened residual beside any shape."""
-    n = data.size
-    parts = np.split(shapes, np.cumsum([rows.size for rows in data.rows])[:-1])
-    whitened = Weights(estimate.weights.thrust).whiten(list(parts), [])
-    basis = orthogonal_basis(estimate.fit.jacobian[:n])
-    span = orthogonal_basis(beside(whitened, basis))
-    residual = estimate.fit.residual[:n]
-    out: Floats = residual - span @ (span.T @ residual)
-    return out
 
 
 def _unsettled(estimate: Estimate, data: Data, decay: float) -> list[Floats]:
@@ -82,7 +70,7 @@ def _unsettled(estimate: Estimate, data: Data, decay: float) -> list[Floats]:
 def _likeliest_share(rest: Floats, estimate: Estimate, size: list[Floats]) -> tuple[float, float]:
     """(fall of the deviance, share) where unit innovations (n,) have the variance 1 + (share size)^2 / what it was."""
     more = np.concatenate([s**2 / w.innovation for s, w in zip(size, estimate.weights.thrust, strict=True)])
-    variance = 1.0 + SHARES[:, None] ** 2 * more
+    variance = 1.0 + TRIED_SHARES[:, None] ** 2 * more
     deviance = np.sum(np.log(variance) + rest**2 / variance, axis=1)
     best = int(np.argmin(deviance))
-    return float(deviance[0] - deviance[best]), float(SHARES[best])
+    return float(deviance[0] - deviance[best]), float(TRIED_SHARES[best])

@@ -14,7 +14,7 @@ from identification.run_history.remembered import RememberedRun
 MANY_SAMPLES = 100
 """Samples, above which scatter is told by second differences: fewer are compared level by level."""
 
-SHORT = 0.01
+STARTING_SHARE = 0.01
 """Of a run: what a current does for so short a time warms nothing."""
 
 THERMOMETER = "motor_temperature"
@@ -51,11 +51,11 @@ def _largest(histories: Sequence[History], quantity: str) -> float:
 
 
 def _lasting_current(history: History) -> float:
-    """A, exceeded in SHORT of the time only: a rotor that is set going draws several times what it turns with."""
+    """A, exceeded in STARTING_SHARE of the time only: a rotor that is set going draws several times as much."""
     size = np.nan_to_num(np.abs(history.others["current"]))
     order = np.argsort(size)
     until = np.cumsum(history.dt[order])
-    return float(size[order][np.searchsorted(until, (1 - SHORT) * until[-1])])
+    return float(size[order][np.searchsorted(until, (1 - STARTING_SHARE) * until[-1])])
 
 
 def _begun(history: History) -> float:

@@ -121,22 +121,10 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
     for other, (r, values) in ranked[:MOST_REFITS]:
         if (1 - r**2) * gain > policy.select.RIVAL_REFIT_CHI2 and r < policy.select.RIVAL_REFIT_LIKENESS:
             break
-        begin = refined(less, data, estimate.weights, other, values)
         more = price(other, data) - extra_now
         extra = more * logn
-        bigger, begun = nearer(less, now, term, other, begin, data, estimate.weights)
-        if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
-            new = fit(bigger, begun, data, estimate.weights, near=now)
-        else:
-            new = fit(
-                bigger,
-                begun,
-                data,
-                estimate.weights,
-                RIVAL_STEPS,
-                now.chi2 + policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more),
-                near=now,
-            )
+        hopeless = now.chi2 + policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more)
+        new = _in_its_place(other, values, term, less, estimate, data, hopeless)
         if new.chi2 - now.chi2 + extra < FORMS_BEYOND * policy.select.RIVAL_STATED_BIC:
             new = best_forms(new, [t for t in terms if t.id != other.id], data, estimate.weights, estimate.noise)
         if at_bound(other, new, data, estimate.weights) or contradiction(new, other, estimate.noise, data):
@@ -144,6 +132,24 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
         loss = new.chi2 - now.chi2 + extra
         out.append(RivalTerm(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))
     return sorted(out, key=lambda rival: rival.bic_loss)
+
+
+def _in_its_place(
+    other: Term,
+    values: tuple[float, ...],
+    term: Term,
+    less: Fit,
+    estimate: Estimate,
+    data: Data,
+    hopeless: float,
+) -> Fit:
+    """The model with `other`, begun at a trial's `values`, where `term` was; `less` is without either."""
+    now, weights = estimate.fit, estimate.weights
+    begin = refined(less, data, weights, other, values)
+    bigger, begun = nearer(less, now, term, other, begin, data, weights)
+    if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
+        return fit(bigger, begun, data, weights, near=now)
+    return fit(bigger, begun, data, weights, RIVAL_STEPS, hopeless, near=now)
 
 
 def _same_limit(other: Term, term: Term, data: Data) -> bool:
