@@ -27,11 +27,12 @@ This package knows nothing of identification or rig; `tests/concealed/recordings
 from sim_devices.concealed.cases.definition import Case
 from sim_devices.concealed.cases.faults import KINDS as LIES
 from sim_devices.concealed.cases.faults import Column
+from sim_devices.concealed.cases.field_size import FIELD
 from sim_devices.concealed.cases.forms import FORMS, VARIANTS
 from sim_devices.concealed.cases.plans import KINDS as PLAN_KINDS
 from sim_devices.concealed.cases.shapes import SHAPES
 from sim_devices.concealed.cases.wide_noise import WIDE_NOISE_KINDS
-from sim_devices.concealed.composites import ADDED, FIELD, Difference, composite, difference
+from sim_devices.concealed.composites import ADDED, Difference, composite, difference
 from sim_devices.concealed.draw import NOISE_KINDS, case
 from sim_devices.concealed.sealing.records import Rows, rows, truth
 from sim_devices.concealed.visibility.oracle import OutOfReach, scaled_to, strength

@@ -11,9 +11,9 @@ import numpy as np
 from sim_devices.concealed.cases.bystanders import with_bystanders
 from sim_devices.concealed.cases.definition import Case, Concealed, Run
 from sim_devices.concealed.cases.faults import Column
+from sim_devices.concealed.cases.field_size import FIELD, of_field_size
 from sim_devices.concealed.cases.plans import KINDS as PLAN_KINDS
 from sim_devices.concealed.cases.plans import profile
-from sim_devices.concealed.cases.shapes import shape
 
 Rng = np.random.Generator
 
@@ -29,18 +29,6 @@ KINDS = (
 )
 NOTHING = "nothing"
 """Runs of one thruster in which nothing is wired otherwise."""
-FIELD: Mapping[str, tuple[float, float]] = {
-    "dead_band": (0.02, 0.10),
-    "asymmetry": (0.05, 0.40),
-    "winding_resistance": (0.05, 0.35),
-    "motor_lag": (0.05, 0.3),
-    "inflow_dynamics": (0.1, 0.5),
-    "heating": (0.01, 0.08),
-    "recirculation": (0.01, 0.08),
-}
-"""Effect -> amounts that are met in the field: shares of the largest command or thrust, s of a motor's lag."""
-COPPER = 0.0039
-"""1/K: what copper gains in resistance."""
 CHANNELS = ("rotation_rate", "current", "bus_voltage")
 """Recorded in every run: without a third channel beside command and thrust nobody can say which of the two changed."""
 THRUST_UNITS = {"lbf": 1 / 4.4482216152605, "gf": 1000 / 9.80665, "kgf": 1 / 9.80665}
@@ -73,16 +61,7 @@ def wiring(rng: Rng, bare: Case, kind: str) -> Case:
 def _effects(rng: Rng, bare: Case) -> tuple[Concealed, ...]:
     """Two to five of them."""
     names = sorted(rng.choice(sorted(FIELD), int(rng.integers(2, 6)), replace=False).tolist())
-    return tuple(_concealed(name, bare, rng) for name in names)
-
-
-def _concealed(name: str, bare: Case, rng: Rng) -> Concealed:
-    """Heat is drawn as the share of the thrust that it moves when the motor is warm, its knob is what does so per K."""
-    drawn, amount = shape(name, bare.scale, rng), float(np.exp(rng.uniform(*np.log(FIELD[name]))))
-    if name == "heating":
-        per_kelvin = 2 * bare.scale.rise * (COPPER if drawn.knob == "resistance" else 1.0)
-        amount = min(amount / per_kelvin, drawn.highest)
-    return Concealed(drawn, amount)
+    return of_field_size(names, bare, rng)
 
 
 def _runs(rng: Rng, bare: Case) -> tuple[Run, ...]:

@@ -31,12 +31,13 @@ from numpy.typing import NDArray
 
 from sim_devices.concealed.cases.definition import Case
 from sim_devices.concealed.cases.faults import KINDS as LIES
+from sim_devices.concealed.cases.field_size import FIELD
 from sim_devices.concealed.cases.forms import FORMS, VARIANTS
 from sim_devices.concealed.cases.shapes import SHAPES
 from sim_devices.concealed.cases.wide_noise import WIDE_NOISE_KINDS
 from sim_devices.concealed.cases.wiring import KINDS as WIRINGS
 from sim_devices.concealed.cases.wiring import NOTHING as WIRED_RIGHT
-from sim_devices.concealed.composites import ADDED, FIELD, composite, difference
+from sim_devices.concealed.composites import ADDED, composite, difference
 from sim_devices.concealed.draw import NOISE_KINDS
 from sim_devices.concealed.draw import case as drawn
 from sim_devices.concealed.sealing.another import another

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from sim_devices import concealed
+from sim_devices.concealed.cases.field_size import warm_change
 from sim_devices.concealed.cases.shapes import shape
-from sim_devices.concealed.composites import warm_change
 from sim_devices.concealed.sealing.on_disc import KINDS, conceal
 from sim_devices.concealed.visibility.oracle import added_at, measured, with_amount
 from sim_devices.tables import WorldError
