@@ -27,6 +27,8 @@ RIVAL_STEPS = 15
 """Steps of the fit of a rival: what is not near by then is no rival."""
 FORMS_BEYOND = 5.0
 """Times what is stated: a rival that loses so much may do as well with the other terms in other forms."""
+FORMS_SHARE = 1e-3
+"""Of what the term gains: a rival that loses no more does the same, and the rest may be a form that suits the term."""
 SMALL_TERM = 0.05
 """Of what the largest term gains: one that gains less may be a repair."""
 MOST_REFITS = 7
@@ -125,7 +127,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
         extra = more * logn
         hopeless = now.chi2 + policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more)
         new = _in_its_place(other, values, term, less, estimate, data, hopeless)
-        if new.chi2 - now.chi2 + extra < FORMS_BEYOND * policy.select.RIVAL_STATED_BIC:
+        if new.chi2 - now.chi2 + extra < max(FORMS_BEYOND * policy.select.RIVAL_STATED_BIC, FORMS_SHARE * gain):
             new = best_forms(new, [t for t in terms if t.id != other.id], data, estimate.weights, estimate.noise)
         if at_bound(other, new, data, estimate.weights) or contradiction(new, other, estimate.noise, data):
             continue

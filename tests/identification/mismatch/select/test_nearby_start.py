@@ -2,14 +2,17 @@
 
 import numpy as np
 
+from identification.mismatch.estimate.estimate import fit_without
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.select.exchange.nearby_start import best_forms, nearer
+from identification.mismatch.select.exchange.rivals import swaps
 from identification.physics.asymmetry import Asymmetry
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.dead_band import DeadBand
+from identification.physics.recirculation import Recirculation
 from identification.physics.torque_crosstalk import TorqueCrosstalk
 from tests.identification.diagnosed_runs import C, dead_band
-from tests.identification.mismatch.small import estimated, short
+from tests.identification.mismatch.small import estimated, known_noise, short
 
 JUMP, SHRINK = DeadBand("jump"), DeadBand("shrink")
 
@@ -36,3 +39,26 @@ def test_a_rival_that_is_the_same_curve_begins_where_it_does_the_same():
     assert abs(coefficient - 0.05 * C) < 0.001, "0.95 C x|x| + 0.05 C x^2 is C x^2 one way and 0.9 C x^2 the other"
     assert abs(theta.C - 0.95 * C) < 0.001
     assert fit(model, theta, data, estimate.weights, 3).chi2 < estimate.fit.chi2 + 1
+
+
+def test_a_rival_is_judged_beside_the_forms_that_suit_it():
+    """The jet of a weaker direction goes by the rate; beside a cross-talk of the same curve it seems to go by the
+    thrust, and the asymmetry by itself does worse there."""
+
+    def uneven_and_round(t, V, F):
+        jet = np.zeros_like(V)
+        for i in range(1, t.size):
+            jet[i] = jet[i - 1] + (1 - np.exp(-(t[i] - t[i - 1]) / 6.0)) * (V[i - 1] - jet[i - 1])
+        return np.where(F < 0, 0.94, 1.0) * F - 0.1 * C * np.abs(V) * jet
+
+    uneven, cell = Asymmetry(), TorqueCrosstalk()
+    by_rate, by_thrust = Recirculation("rate"), Recirculation("thrust")
+    made = short(change=uneven_and_round, noise=0.02)
+    data, estimate = known_noise({cell: (0.015,), by_thrust: (0.05, 6.0)}, [made], std=0.02)
+    less = fit_without(estimate, cell, data)
+    alone = swaps(estimate, cell, less, data, (uneven, cell))
+    beside = swaps(estimate, cell, less, data, (uneven, cell, by_rate, by_thrust))
+    assert by_rate in beside[0].fit.model.terms
+    assert beside[0].term == alone[0].term == uneven
+    assert alone[0].bic_loss > 45
+    assert abs(beside[0].bic_loss) < 0.1, "the same curve, so neither is better"
