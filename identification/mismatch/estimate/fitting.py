@@ -20,6 +20,9 @@ from identification.mismatch.model.whitening import Weights
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 
+BEYOND_CLOCKS = 2.0
+"""Times the chi-square of which a fit is hopeless: no other shift of the clocks brings one down that ends above it."""
+
 
 @dataclass(frozen=True, eq=False)
 class Fit:
@@ -198,6 +201,8 @@ def fit(
     weights, with whose slopes it begins.
     """
     found = _descended(model, start, data, weights, most_steps, hopeless, near)
+    if found.chi2 > BEYOND_CLOCKS * hopeless:
+        return found
     shift = max(abs(found.theta.shift), abs(found.theta.rate_shift))
     if shift == 0:
         return found
@@ -241,7 +246,11 @@ def _descended(
     best = theta.with_part(may, found.at)
     still = may.copy()
     still[[at.shift, at.rate_shift]] = False
-    if may[at.rate_shift] and promised(found, low[may], high[may], still[may]) > CLOSE:
+    if (
+        may[at.rate_shift]
+        and not (found.given_up and float(found.residual @ found.residual) > BEYOND_CLOCKS * hopeless)
+        and promised(found, low[may], high[may], still[may]) > CLOSE
+    ):
         # rows at the edge of a tick stopped the rate's clock, and all others with it
         best = best.with_part(still, descended(best, still).at)
         left, slopes = residual_of(model, best, data, weights), columns_of(model, best, data, weights, may)

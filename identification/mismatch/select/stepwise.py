@@ -218,8 +218,10 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
             if system.impossible(state, term):
                 price = policy.select.PRESSED_TERM_HANDICAP * (less.chi2 - state.fit.chi2)
             for rival in rivals:
-                ordinary = policy.select.RIVALS_EQUAL_BIC if system.rarer(term, rival.term) else 0.0
-                loss = rival.bic_loss - max(price, ordinary)
+                # a rarer one stays only where it is better by more than this: it must be so to come at all
+                rarer = int(system.rarer(term, rival.term)) - int(system.rarer(rival.term, term))
+                ordinary = rarer * policy.select.RIVALS_EQUAL_BIC
+                loss = rival.bic_loss - (max(price, ordinary) if price > 0 else ordinary)
                 lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.fit.values[rival.term]))
                 if lasts and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):
                     best = (loss, rival.fit)
