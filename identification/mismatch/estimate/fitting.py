@@ -14,6 +14,7 @@ from identification.mismatch.model.at_samples import at_samples
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model, extended, parameters, reduced
 from identification.mismatch.model.parameters import Layout, Theta
+from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.step_response import ticked
 from identification.mismatch.model.sub_interval import delay_of, turning
 from identification.mismatch.model.whitening import Weights
@@ -131,6 +132,15 @@ def _raw(model: Model, theta: Theta, data: Data, there: Theta, *, with_rate: boo
     return thrust, rate
 
 
+def _rates(model: Model, theta: Theta, data: Data, there: Theta) -> list[Floats]:
+    """Predicted rates at their rows, run by run, as in `raw`."""
+    out = []
+    for run, tare in zip(data.runs, theta.tares, strict=True):
+        _, x = predict(model, theta, run, data.scale, tare)
+        out.append(theta.k * turning(model, theta, run, x, data.scale, there.rate_shift)[run.history.rate_rows])
+    return out
+
+
 def residual_of(model: Model, theta: Theta, data: Data, weights: Weights) -> Floats:
     thrust, rate = raw(model, theta, data, with_rate=bool(weights.rate))
     left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
@@ -171,13 +181,18 @@ def _column(model: Model, theta: Theta, data: Data, j: int, h: float) -> list[li
     """Of thrust, rate and what ticks tell, run by run, by a difference of `h` of parameter `j`; not whitened."""
     thrust, rate = raw(model, theta, data, with_rate=data.with_rate)
     ticks = ticked(model, theta, data)
-    run = model.layout(theta).run_of(j)
+    at = model.layout(theta)
+    nothing = [[np.zeros(f.size) for f in each] for each in (thrust, rate, ticks)]
+    run = at.run_of(j)
     if run is not None:  # a tare moves its own run by one
-        own = [np.full(f.size, float(i == run)) for i, f in enumerate(thrust)]
-        return [own, *([np.zeros(f.size) for f in each] for each in (rate, ticks))]
+        return [[np.full(f.size, float(i == run)) for i, f in enumerate(thrust)], *nothing[1:]]
     vector = theta.vector
     vector[j] += h
     moved = theta.with_vector(vector)
+    if j in (at.k, at.rate_shift):  # they move the rate alone
+        turned = _rates(model, moved, data, theta) if data.with_rate else []
+        slopes = [(after - before) / h for after, before in zip(turned, rate, strict=True)]
+        return [nothing[0], slopes, nothing[2]]
     now = (*raw(model, moved, data, with_rate=data.with_rate, near=theta), ticked(model, moved, data))
     pairs = (zip(after, before, strict=True) for after, before in zip(now, (thrust, rate, ticks), strict=True))
     return [[(after - before) / h for after, before in each] for each in pairs]

@@ -104,8 +104,12 @@ class System(Protocol[T, F, S, Judged]):
     def rarer(self, term: T, other: T, /) -> bool:
         """Whether `other` is the ordinary one of two, and is named where both do as well."""
 
-    def merged(self, state: S, best: tuple[float, F] | None, /) -> tuple[float, F] | None:
-        """The better of `best`, a BIC loss and a fit, and a smaller model: one term for two, or one term less."""
+    def merged(
+        self, state: S, standing: Mapping[T, Standing[F, T]], best: tuple[float, F] | None, /
+    ) -> tuple[float, F] | None:
+        """The better of `best`, a BIC loss and a fit, and a smaller model: one term for two, or one term less.
+
+        `standing`: how each term of the model stands."""
 
 
 def forward(
@@ -225,7 +229,7 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
                 lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.fit.values[rival.term]))
                 if lasts and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):
                     best = (loss, rival.fit)
-        best = system.merged(state, best)
+        best = system.merged(state, standing, best)
         if best is None:
             return state, standing
         state = system.replaced(state, best[1])

@@ -111,7 +111,7 @@ class Columns:
     def impossible(self, state, term):
         return term in self.pressed
 
-    def merged(self, state, best):
+    def merged(self, state, standing, best):
         return best
 
 
