@@ -212,8 +212,8 @@ def fit(
     What comes late and clocks that differ look alike, and small steps of the command at few phases of the samples leave
     valleys between: where a shift of the clocks was found beside such a term, it is also looked for without one. So it
     is where none at all is better: chi-square has an edge where a step passes from one sample into the next.
-    Ends early once chi-square is above `hopeless` and falls too slowly to get there. `near`: a fit with the same
-    weights, with whose slopes it begins.
+    Ends early once chi-square is above `hopeless` and falls too slowly to get there; so does the second look. `near`: a
+    fit with the same weights, with whose slopes it begins.
     """
     found = _descended(model, start, data, weights, most_steps, hopeless, near)
     if found.chi2 > BEYOND_CLOCKS * hopeless:
@@ -229,7 +229,7 @@ def fit(
         left = residual_of(model, alike, data, weights)
         if not float(left @ left) < found.chi2:
             return found
-    other = _descended(model, alike, data, weights, most_steps, hopeless, found)
+    other = _descended(model, alike, data, weights, most_steps, min(hopeless, found.chi2), found)
     return min(found, other, key=lambda each: each.chi2)
 
 
