@@ -30,6 +30,8 @@ FALL_MET = 0.25
 """Of the fall that slopes foretold: where it was met as closely, they are not asked for anew before the next step."""
 CLOSE = 1e-2
 """Fall of chi-square at which a fit has ended, or of which the slopes promise less; a difference of 1 is one sigma."""
+MISFIT = 1e-2
+"""Of chi-square per row: where it is more than 1, a fit has ended at as much more."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -42,6 +44,8 @@ class Minimum:
     """(n,) whitened: measured less predicted."""
     slopes: Floats
     """(n, p) of the prediction, there or so near that the sum of squares is within CLOSE of the same."""
+    given_up: bool = False
+    """Ended early: what was hoped for is out of reach, and the slopes may be of a place before."""
 
 
 def least_squares(
@@ -67,7 +71,7 @@ def least_squares(
     damping, fresh, asked = 1e-3, slopes is None, 1
     while asked <= most_steps:
         chi2 = float(residual @ residual)
-        close = CLOSE * max(1.0, 1e-3 * chi2 / max(residual.size, 1))
+        close = CLOSE * max(1.0, MISFIT * chi2 / max(residual.size, 1))
         found = _step(residual_of, at, residual, J, low, high, damping, close, MOST_TRIES if fresh else FEW_TRIES)
         if found is None and fresh:
             break
@@ -79,12 +83,13 @@ def least_squares(
         fall = chi2 - float(found.residual @ found.residual)
         step, change = found.at - at, residual - found.residual
         at, residual = found.at, found.residual
-        if chi2 - (1 + SLOW_FALLS) * fall > hopeless:
-            return Minimum(at, residual, J)
+        slow = chi2 - (1 + SLOW_FALLS) * fall > hopeless
+        if slow and fresh:
+            return Minimum(at, residual, J, given_up=True)
         damping = max(found.damping / 10, 1e-9)
         if fall < close and fresh:
             break
-        if fall >= close and abs(fall - found.foretold) <= FALL_MET * found.foretold:
+        if not slow and fall >= close and abs(fall - found.foretold) <= FALL_MET * found.foretold:
             J, fresh = _secant(J, step, change), False
         else:
             J, fresh, asked = slopes_of(at), True, asked + 1

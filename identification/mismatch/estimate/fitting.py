@@ -14,11 +14,15 @@ from identification.mismatch.model.at_samples import at_samples
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model, extended, parameters, reduced
 from identification.mismatch.model.parameters import Layout, Theta
+from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.step_response import ticked
 from identification.mismatch.model.sub_interval import delay_of, turning
 from identification.mismatch.model.whitening import Weights
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
+
+BEYOND_CLOCKS = 2.0
+"""Times the chi-square of which a fit is hopeless: no other shift of the clocks brings one down that ends above it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,6 +132,15 @@ def _raw(model: Model, theta: Theta, data: Data, there: Theta, *, with_rate: boo
     return thrust, rate
 
 
+def _rates(model: Model, theta: Theta, data: Data, there: Theta) -> list[Floats]:
+    """Predicted rates at their rows, run by run, as in `raw`."""
+    out = []
+    for run, tare in zip(data.runs, theta.tares, strict=True):
+        _, x = predict(model, theta, run, data.scale, tare)
+        out.append(theta.k * turning(model, theta, run, x, data.scale, there.rate_shift)[run.history.rate_rows])
+    return out
+
+
 def residual_of(model: Model, theta: Theta, data: Data, weights: Weights) -> Floats:
     thrust, rate = raw(model, theta, data, with_rate=bool(weights.rate))
     left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
@@ -168,13 +181,18 @@ def _column(model: Model, theta: Theta, data: Data, j: int, h: float) -> list[li
     """Of thrust, rate and what ticks tell, run by run, by a difference of `h` of parameter `j`; not whitened."""
     thrust, rate = raw(model, theta, data, with_rate=data.with_rate)
     ticks = ticked(model, theta, data)
-    run = model.layout(theta).run_of(j)
+    at = model.layout(theta)
+    nothing = [[np.zeros(f.size) for f in each] for each in (thrust, rate, ticks)]
+    run = at.run_of(j)
     if run is not None:  # a tare moves its own run by one
-        own = [np.full(f.size, float(i == run)) for i, f in enumerate(thrust)]
-        return [own, *([np.zeros(f.size) for f in each] for each in (rate, ticks))]
+        return [[np.full(f.size, float(i == run)) for i, f in enumerate(thrust)], *nothing[1:]]
     vector = theta.vector
     vector[j] += h
     moved = theta.with_vector(vector)
+    if j in (at.k, at.rate_shift):  # they move the rate alone
+        turned = _rates(model, moved, data, theta) if data.with_rate else []
+        slopes = [(after - before) / h for after, before in zip(turned, rate, strict=True)]
+        return [nothing[0], slopes, nothing[2]]
     now = (*raw(model, moved, data, with_rate=data.with_rate, near=theta), ticked(model, moved, data))
     pairs = (zip(after, before, strict=True) for after, before in zip(now, (thrust, rate, ticks), strict=True))
     return [[(after - before) / h for after, before in each] for each in pairs]
@@ -194,10 +212,12 @@ def fit(
     What comes late and clocks that differ look alike, and small steps of the command at few phases of the samples leave
     valleys between: where a shift of the clocks was found beside such a term, it is also looked for without one. So it
     is where none at all is better: chi-square has an edge where a step passes from one sample into the next.
-    Ends early once chi-square is above `hopeless` and falls too slowly to get there. `near`: a fit with the same
-    weights, with whose slopes it begins.
+    Ends early once chi-square is above `hopeless` and falls too slowly to get there; so does the second look. `near`: a
+    fit with the same weights, with whose slopes it begins.
     """
     found = _descended(model, start, data, weights, most_steps, hopeless, near)
+    if found.chi2 > BEYOND_CLOCKS * hopeless:
+        return found
     shift = max(abs(found.theta.shift), abs(found.theta.rate_shift))
     if shift == 0:
         return found
@@ -209,7 +229,7 @@ def fit(
         left = residual_of(model, alike, data, weights)
         if not float(left @ left) < found.chi2:
             return found
-    other = _descended(model, alike, data, weights, most_steps, hopeless, found)
+    other = _descended(model, alike, data, weights, most_steps, min(hopeless, found.chi2), found)
     return min(found, other, key=lambda each: each.chi2)
 
 
@@ -241,7 +261,11 @@ def _descended(
     best = theta.with_part(may, found.at)
     still = may.copy()
     still[[at.shift, at.rate_shift]] = False
-    if may[at.rate_shift] and promised(found, low[may], high[may], still[may]) > CLOSE:
+    if (
+        may[at.rate_shift]
+        and not (found.given_up and float(found.residual @ found.residual) > BEYOND_CLOCKS * hopeless)
+        and promised(found, low[may], high[may], still[may]) > CLOSE
+    ):
         # rows at the edge of a tick stopped the rate's clock, and all others with it
         best = best.with_part(still, descended(best, still).at)
         left, slopes = residual_of(model, best, data, weights), columns_of(model, best, data, weights, may)

@@ -227,10 +227,12 @@ class Thruster:
     def rarer(self, term: Term, other: Term) -> bool:
         return term.traits.rare and not other.traits.rare
 
-    def merged(self, estimate: Estimate, best: tuple[float, Fit] | None) -> tuple[float, Fit] | None:
+    def merged(
+        self, estimate: Estimate, standing: Mapping[Term, SwapTest], best: tuple[float, Fit] | None
+    ) -> tuple[float, Fit] | None:
         self.watch.trying("one term in the place of two")
         best = one_less(estimate, self.data, self.terms, best)
-        return one_for_two(estimate, self.data, self.terms, best)
+        return one_for_two(estimate, self.data, self.terms, standing, best)
 
 
 def _told(terms: Collection[Term]) -> str:

@@ -104,8 +104,12 @@ class System(Protocol[T, F, S, Judged]):
     def rarer(self, term: T, other: T, /) -> bool:
         """Whether `other` is the ordinary one of two, and is named where both do as well."""
 
-    def merged(self, state: S, best: tuple[float, F] | None, /) -> tuple[float, F] | None:
-        """The better of `best`, a BIC loss and a fit, and a smaller model: one term for two, or one term less."""
+    def merged(
+        self, state: S, standing: Mapping[T, Standing[F, T]], best: tuple[float, F] | None, /
+    ) -> tuple[float, F] | None:
+        """The better of `best`, a BIC loss and a fit, and a smaller model: one term for two, or one term less.
+
+        `standing`: how each term of the model stands."""
 
 
 def forward(
@@ -218,12 +222,14 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
             if system.impossible(state, term):
                 price = policy.select.PRESSED_TERM_HANDICAP * (less.chi2 - state.fit.chi2)
             for rival in rivals:
-                ordinary = policy.select.RIVALS_EQUAL_BIC if system.rarer(term, rival.term) else 0.0
-                loss = rival.bic_loss - max(price, ordinary)
+                # a rarer one stays only where it is better by more than this: it must be so to come at all
+                rarer = int(system.rarer(term, rival.term)) - int(system.rarer(rival.term, term))
+                ordinary = rarer * policy.select.RIVALS_EQUAL_BIC
+                loss = rival.bic_loss - (max(price, ordinary) if price > 0 else ordinary)
                 lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.fit.values[rival.term]))
                 if lasts and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):
                     best = (loss, rival.fit)
-        best = system.merged(state, best)
+        best = system.merged(state, standing, best)
         if best is None:
             return state, standing
         state = system.replaced(state, best[1])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +12,7 @@ from identification.mismatch import policy
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.select.rounds import Candidate
-from identification.mismatch.select.stepwise import RivalTerm, forward
+from identification.mismatch.select.stepwise import RivalTerm, Standing, forward
 from identification.mismatch.vehicle.fitting import Fit, at_bound, fit, noise_of, weights
 from identification.mismatch.vehicle.model import Layout, VehicleModel, begin, layout_of, with_term, without_term
 from identification.mismatch.vehicle.runs import Prepared
@@ -131,7 +131,9 @@ class Vehicle:
         """No effect of a vehicle is rarer than its rivals."""
         return False
 
-    def merged(self, _: State, best: tuple[float, Fit] | None) -> tuple[float, Fit] | None:
+    def merged(
+        self, _: State, _standing: Mapping[VehicleTerm, Standing[Fit, VehicleTerm]], best: tuple[float, Fit] | None
+    ) -> tuple[float, Fit] | None:
         """One term in the place of two is not tried: each trial is a simulation for every slope."""
         return best
 

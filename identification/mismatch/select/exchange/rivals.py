@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -11,15 +11,14 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.estimate import Estimate, fit_without
-from identification.mismatch.estimate.fitting import Fit, change_of, fit
+from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data, price
+from identification.mismatch.select.exchange.likeness import alike, mirrored, worth_refitting
 from identification.mismatch.select.exchange.nearby_start import best_forms, nearer
-from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.limits.clipping import contradiction
 from identification.mismatch.select.screening import directions, refined
-from identification.mismatch.select.stepwise import RivalTerm
+from identification.mismatch.select.stepwise import RivalTerm, Standing
 from identification.physics.term import Term
-from identification.recording import Floats
 
 MOST_MERGERS = 3
 """Terms tried in the place of each pair."""
@@ -36,14 +35,20 @@ MOST_REFITS = 7
 
 
 def one_for_two(
-    estimate: Estimate, data: Data, terms: Sequence[Term], best: tuple[float, Fit] | None
+    estimate: Estimate,
+    data: Data,
+    terms: Sequence[Term],
+    standing: Mapping[Term, Standing[Fit, Term]],
+    best: tuple[float, Fit] | None,
 ) -> tuple[float, Fit] | None:
     """The better of `best` and one term in the place of two: a search that goes step by step may miss it."""
     now = estimate.fit
     logn = float(np.log(max(now.residual.size, 2)))
     for pair in combinations(now.model.terms, 2):
+        others = [t for t in terms if _for_both(t, pair, estimate, data, terms, standing)]
+        if not others:
+            continue
         less = fit_without(replace(estimate, fit=fit_without(estimate, pair[0], data)), pair[1], data)
-        others = [t for t in terms if t.id not in {u.id for u in less.model.terms} and t not in pair]
         found = directions(less, data, estimate.weights, others)
         score = found.columns.T @ less.residual
         tried: set[Term] = set()
@@ -74,6 +79,32 @@ def one_for_two(
     return best
 
 
+def _for_both(
+    other: Term,
+    pair: tuple[Term, Term],
+    estimate: Estimate,
+    data: Data,
+    terms: Sequence[Term],
+    standing: Mapping[Term, Standing[Fit, Term]],
+) -> bool:
+    """Whether `other` may do what both do: then it does as well in the place of each, beside the other of them."""
+    now = estimate.fit
+    if other in pair or other.id in {t.id for t in now.model.terms if t not in pair}:
+        return False
+    logn = float(np.log(max(now.residual.size, 2)))
+    most = (sum(price(t, data) for t in pair) - price(other, data)) * logn + policy.select.RIVAL_STATED_BIC
+    for term in pair:
+        less, rivals = standing[term]
+        if other.id == term.id:
+            if not any(r.term == other and r.fit.chi2 - now.chi2 < most for r in rivals):
+                return False
+        elif other.id not in {t.id for t in pair}:
+            like, _ = alike(estimate, term, less, data, terms).get(other, (0.0, ()))
+            if not worth_refitting(like, less.chi2 - now.chi2):
+                return False
+    return True
+
+
 def one_less(
     estimate: Estimate, data: Data, terms: Sequence[Term], best: tuple[float, Fit] | None
 ) -> tuple[float, Fit] | None:
@@ -97,31 +128,12 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
     """Every other term (and form) that could do what this one does, refitted in its place; best first."""
     now = estimate.fit
     gain = less.chi2 - now.chi2
-    inside = {t.id for t in now.model.terms} - {term.id}
-    others = [t for t in terms if t.id not in inside and t != term]
-    found = directions(less, data, estimate.weights, others)
-    if not found.terms:
-        return []
-    change = _effect(now, term, data, estimate)
-    basis = orthogonal_basis(less.jacobian)
-    change = change - basis @ (basis.T @ change)
-    size = float(np.linalg.norm(change))
-    if size == 0:
-        return []
-    rho = found.columns.T @ (change / size)
-    against = (rho < 0) & ~np.array(found.one_sided)
-    rho = np.where(found.one_sided, np.maximum(rho, 0.0), np.abs(rho))
-    best: dict[Term, tuple[float, tuple[float, ...]]] = {}
-    for j, other in enumerate(found.terms):
-        if other not in best or rho[j] > best[other][0]:
-            best[other] = (float(rho[j]), mirrored(other, found.values[j], data) if against[j] else found.values[j])
-    best |= {other: (1.0, now.values[term]) for other in best if _same_limit(other, term, data)}
-    ranked = sorted(best.items(), key=lambda item: -item[1][0])
+    ranked = sorted(alike(estimate, term, less, data, terms).items(), key=lambda item: -item[1][0])
     out = []
     extra_now = price(term, data)
     logn = float(np.log(max(now.residual.size, 2)))
     for other, (r, values) in ranked[:MOST_REFITS]:
-        if (1 - r**2) * gain > policy.select.RIVAL_REFIT_CHI2 and r < policy.select.RIVAL_REFIT_LIKENESS:
+        if not worth_refitting(r, gain):
             break
         more = price(other, data) - extra_now
         extra = more * logn
@@ -152,22 +164,3 @@ def _in_its_place(
     if other.id == term.id:  # the same physics in another form: it is worth more steps, however slow they are
         return fit(bigger, begun, data, weights, near=now)
     return fit(bigger, begun, data, weights, RIVAL_STEPS, hopeless, near=now)
-
-
-def _same_limit(other: Term, term: Term, data: Data) -> bool:
-    """Whether it is the same limit in another form: it begins where this one is, for trials at other limits change
-    other readings and look like nothing of it."""
-    names = [[p.name for p in each.parameters(data.scale)] for each in (other, term)]
-    return bool(term.traits.limits) and other.id == term.id and names[0] == names[1]
-
-
-def mirrored(term: Term, values: tuple[float, ...], data: Data) -> tuple[float, ...]:
-    """The amount on the other side of neutral."""
-    first = term.parameters(data.scale)[0]
-    assert first.neutral is not None
-    return (min(max(2 * first.neutral - values[0], first.low), first.high), *values[1:])
-
-
-def _effect(now: Fit, term: Term, data: Data, estimate: Estimate) -> Floats:
-    """(n,) whitened change that the term makes at its fitted values; the rate's rows with it."""
-    return estimate.weights.whiten(*change_of(now.less(term), (now.model, now.theta), data, estimate.weights))

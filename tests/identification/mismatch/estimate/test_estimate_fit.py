@@ -10,16 +10,18 @@ from scipy.optimize import least_squares
 
 from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.estimate import curves, fit_without, reading_step, refresh, unweighted
-from identification.mismatch.estimate.fitting import bounds_of, fit, residual_of
+from identification.mismatch.estimate.fitting import bounds_of, columns_of, fit, residual_of
 from identification.mismatch.model.data import price
 from identification.mismatch.model.model import Model
 from identification.physics.asymmetry import Asymmetry
 from identification.physics.dead_band import DeadBand
 from identification.physics.exponent import Exponent
 from identification.physics.load_cell_saturation import LoadCellSaturation
+from identification.physics.motor_lag import MotorLag
 from identification.physics.time_skew import TimeSkew
 from identification.physics.zero_offset import ZeroOffset
-from tests.identification.diagnosed_runs import NOISE, TOP, C, dead_band, table
+from identification.recording import Channel
+from tests.identification.diagnosed_runs import NOISE, TOP, C, dead_band, levels, table
 from tests.identification.mismatch.small import (
     data_of,
     estimated,
@@ -152,6 +154,28 @@ def test_the_residual_is_measured_less_predicted_over_the_noise(fitted):
     theta = replace(estimate.fit.theta, terms=((0.0,), (1.0,)), C=0.0, tares=(0.0, 0.0))
     bare = residual_of(estimate.fit.model, theta, data, unweighted(data))
     assert bare == pytest.approx(np.concatenate(data.thrust))
+
+
+def test_the_slopes_of_the_rate_alone_are_those_of_the_whole_prediction():
+    """Its scale and its clock, beside a difference of residuals; the thrust's rows have none of it."""
+    t = np.arange(0.0, 80.0, 0.02)
+    start, level = levels(0, 80.0)
+    command = level[np.maximum(np.searchsorted(start, t, side="right") - 1, 0)]
+    turns = Channel(
+        "rotation_rate", "esc", "rotation_rate", "rev/s", t, 2.5 * command + 0.01 * rng(1).normal(size=t.size)
+    )
+    data, estimate = estimated({MotorLag("first_order"): (0.3,)}, [short(extra=(turns,), rate=40.0)], clocks=True)
+    assert data.with_rate
+    model, theta = estimate.fit.model, replace(estimate.fit.theta, rate_shift=0.3 * data.most_shift)
+    at = model.layout(theta)
+    for j, part in ((at.k, 1e-3), (at.rate_shift, 1e-4)):
+        which = np.arange(at.size) == j
+        (slope,) = columns_of(model, theta, data, estimate.weights, which).T
+        moved = theta.with_part(which, theta.vector[which] + part)
+        change = residual_of(model, theta, data, estimate.weights) - residual_of(model, moved, data, estimate.weights)
+        assert np.linalg.norm(slope) > 1.0
+        assert not slope[: data.size].any()
+        assert slope == pytest.approx(change / part, abs=1e-6 * np.abs(slope).max())
 
 
 # ---------------------------------------------------------------- noise with the fit

@@ -9,7 +9,8 @@ import pytest
 
 from identification.mismatch.estimate.estimate import fit_without
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.select.exchange.rivals import mirrored, swaps
+from identification.mismatch.select.exchange.likeness import mirrored
+from identification.mismatch.select.exchange.rivals import swaps
 from identification.mismatch.select.forward_selection import Thruster, prune, resumed
 from identification.mismatch.select.stage import exchange_rivals
 from identification.mismatch.select.stepwise import accept_threshold, exchanged

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.name.named_term import Check, named_term, restated
 from identification.mismatch.select.rounds import Candidate, Unhidden
 from identification.mismatch.select.stepwise import ROUNDS, RivalTerm, accept_threshold, exchanged, forward, pruned
@@ -111,7 +112,7 @@ class Columns:
     def impossible(self, state, term):
         return term in self.pressed
 
-    def merged(self, state, best):
+    def merged(self, state, standing, best):
         return best
 
 
@@ -180,6 +181,16 @@ def test_what_has_impossible_values_gives_way_to_what_does_nearly_as_well():
     assert list(exchanged(whole, whole.state(A))[0].fit.values) == [A]
     pressed = Columns(9 * wave(0), columns, frozenset({A}))
     assert list(exchanged(pressed, pressed.state(A))[0].fit.values) == [B]
+
+
+def test_a_rarer_rival_comes_only_where_it_would_stay():
+    """Better by 2 of BIC, it would go again for the ordinary one; better by more than equal ones differ, it stays."""
+    for gain, last in ((2.0, A), (policy.select.RIVALS_EQUAL_BIC + 2.0, B)):
+        y = 9 * wave(0) + np.sqrt(gain) * wave(1)
+        system = Columns(y, {A: wave(0), B: y / np.linalg.norm(y)}, rare=frozenset({B}))
+        end, standing = exchanged(system, system.state(A))
+        assert list(end.fit.values) == [last]
+        assert standing is not None
 
 
 def test_exchanges_that_go_in_circles_end():
