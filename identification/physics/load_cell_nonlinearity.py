@@ -12,8 +12,8 @@ from identification.physics.traits import Traits
 from identification.recording import Floats
 
 MOST = 0.12
-"""Of the largest thrust. A cell in order is straight within 0.0002 to 0.002 of its range; one that is off by an eighth is
-broken, and a dead weight shows it at once."""
+"""Of the largest thrust. A cell in order is straight within 0.0002 to 0.002 of its range; one that is off by an eighth
+is broken, and a dead weight shows it at once."""
 
 
 @dataclass(frozen=True, slots=True)
