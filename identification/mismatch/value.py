@@ -26,6 +26,8 @@ class Value:
     """Of the 95 % interval, where it is not value +- 1.96 std."""
     limits: tuple[float, float] | None = None
     """What it could be before anything was measured: the bounds of the physics, or the reach of what is measured."""
+    told: str = ""
+    """As a noun in a sentence; empty: the name under which it stands says it."""
 
     @property
     def interval(self) -> tuple[float, float]:

@@ -30,7 +30,7 @@ def degree(f: Finding) -> str:
     without, with_it = f.heldout
     return (
         f"{f.grade}: not fitted {without:.4g} without it, {with_it:.4g} with it, {100 * f.share:.0f} % of what any "
-        "shape could take off"
+        "shape in its place could take off"
     )
 
 
@@ -42,7 +42,7 @@ def graded(f: Finding, unit: str) -> str:
     without, with_it = f.heldout
     return (
         f"{says} It takes the error on what was not fitted from {without:.3g} to {with_it:.3g} {unit}, "
-        f"{100 * f.share:.0f} % of what any shape could take off."
+        f"{100 * f.share:.0f} % of what any shape in its place could take off."
     )
 
 
@@ -53,8 +53,19 @@ def together(findings: Sequence[Finding], held: HeldOutRmse, unit: str) -> str:
         return ""
     return (
         f"Together they take the error on what was not fitted from {held.before:.3g} to {reached[0]:.3g} {unit}; "
-        f"noise alone gives {held.noise:.3g} {unit}."
+        f"{of_noise(reached[0], held.noise, unit)}."
     )
+
+
+def of_noise(error: float, noise: float, unit: str) -> str:
+    """An error on what was not fitted beside the noise of what was, as a clause.
+
+    >>> of_noise(1.47, 0.31, "N"), of_noise(0.51, 0.72, "N")
+    ('noise alone gives 0.31 N', 'it is no larger than the noise where it was fitted (0.72 N)')
+    """
+    if error <= noise:
+        return f"it is no larger than the noise where it was fitted ({noise:.3g} {unit})"
+    return f"noise alone gives {noise:.3g} {unit}"
 
 
 def beside(findings: Sequence[Finding], left: str, held: HeldOutRmse, unit: str) -> str:

@@ -15,6 +15,12 @@ LEAST = 0.5
 """Below the least that a drive makes: 2 where speed or voltage is regulated, 1 for torque, 2/3 for power
 (Smogeli 2006, *Control of marine propellers*, NTNU 2006:187), and something lost beside it."""
 
+BY_WATER = 1.5
+"""A propeller by itself has 2.0 to 2.1, by its Reynolds number: what is so far below is the drive."""
+REGULATED = (
+    "a drive that holds its torque (1) or its power (2/3) does so: rate and current recorded at ten levels show which"
+)
+
 
 @dataclass(frozen=True, slots=True)
 class Exponent:
@@ -43,7 +49,8 @@ class Exponent:
         return out
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        return f"Exponent: thrust grows as |V|^{theta[0]:.2f}, not as V^2."
+        hint = f"; {REGULATED}" if theta[0] < BY_WATER and scale.driver_unit == "V" else ""
+        return f"Exponent: thrust grows as |V|^{theta[0]:.2f}, not as V^2{hint}."
 
 
 FORMS = (Exponent(),)

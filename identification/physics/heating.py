@@ -67,7 +67,7 @@ class Heating:
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         tau = Parameter("time_constant", "s", 5.0, _slowest(scale))
-        later = Parameter("magnet_time_constant", "s", 5.0, _slowest(scale))
+        later = Parameter("magnet_time_constant", "s", 5.0, _slowest(scale), told="time constant of the magnets")
         loss = Parameter("loss", "1", 0.0, 0.95, 0.0)
         match self.form:
             case "winding":
@@ -145,7 +145,7 @@ class MeasuredHeating:
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         loss = Parameter("loss_per_kelvin", "1/K", 0.0, MOST_PER_KELVIN, 0.0)
-        later = Parameter("magnet_time_constant", "s", 5.0, _slowest(scale))
+        later = Parameter("magnet_time_constant", "s", 5.0, _slowest(scale), told="time constant of the magnets")
         match self.form:
             case "measured_winding":
                 return (loss,)

@@ -29,7 +29,7 @@ class LoadCellEvenBend:
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("coefficient", "1/N", -MOST / scale.thrust, MOST / scale.thrust, 0.0),)
+        return (Parameter("coefficient", "1/N", -MOST / scale.thrust, MOST / scale.thrust, 0.0, told="bend"),)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.01 / scale.thrust,),)

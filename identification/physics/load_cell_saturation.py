@@ -24,6 +24,8 @@ LEAST_MOVE = 1e-6
 """Of the limit: what moves less within an interval stands still."""
 LEAST_BLUR = 0.01
 """The same, of the noise."""
+LOWEST_KNEE = 0.25
+"""Of the largest reading: what bends from less on is no limit, but another curve."""
 
 
 def _beyond(z: Floats, half: Floats, noise: float) -> Floats:
@@ -76,7 +78,7 @@ class LoadCellSaturation:
         if self.sharp:
             return (Parameter("limit", "N", 0.1 * scale.reading, most, most),)
         bend = Parameter("bend", "1/N", 0.0, 50.0 / scale.reading, 0.0)
-        return bend, Parameter("onset", "N", 0.1 * scale.reading, 0.98 * scale.reading)
+        return bend, Parameter("onset", "N", LOWEST_KNEE * scale.reading, 0.98 * scale.reading)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         if self.sharp:

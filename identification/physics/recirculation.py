@@ -43,7 +43,14 @@ class Recirculation:
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (
-            Parameter("coefficient", f"N/{scale.driver_unit}^2", 0.0, 0.9 * scale.thrust / scale.driver**2, 0.0),
+            Parameter(
+                "coefficient",
+                f"N/{scale.driver_unit}^2",
+                0.0,
+                0.9 * scale.thrust / scale.driver**2,
+                0.0,
+                told="strength",
+            ),
             Parameter("time_constant", "s", 3.0, max(30.0, min(300.0, 0.5 * scale.duration))),
         )
 

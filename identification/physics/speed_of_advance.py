@@ -33,7 +33,14 @@ class SpeedOfAdvance:
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         u = max(scale.flow, 1e-6)
         return (
-            Parameter("coefficient", f"N/({scale.driver_unit} m/s)", 0.0, 3 * scale.thrust / scale.driver / u, 0.0),
+            Parameter(
+                "coefficient",
+                f"N/({scale.driver_unit} m/s)",
+                0.0,
+                3 * scale.thrust / scale.driver / u,
+                0.0,
+                told="loss per speed of the water",
+            ),
         )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:

@@ -45,7 +45,7 @@ class StandResonance:
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         return (
-            Parameter("compliance", "1", 0.0, 1.0, 0.0, whole=True),
+            Parameter("compliance", "1", 0.0, 1.0, 0.0, whole=True, told="share that rings"),
             Parameter("frequency", "Hz", 0.1, min(0.45 / scale.interval, HIGHEST)),
             Parameter("damping", "1", 0.005, 0.4),
         )

@@ -30,7 +30,11 @@ class StrutDrag:
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         u = max(scale.flow, 1e-6)
-        return (Parameter("coefficient", "N/(m/s)^2", -scale.thrust / u**2, scale.thrust / u**2, 0.0),)
+        return (
+            Parameter(
+                "coefficient", "N/(m/s)^2", -scale.thrust / u**2, scale.thrust / u**2, 0.0, told="drag of the strut"
+            ),
+        )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((-0.02 * scale.thrust / max(scale.flow, 1e-6) ** 2,),)

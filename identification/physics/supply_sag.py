@@ -131,7 +131,7 @@ class Discharge:
     form: ClassVar[str] = "discharge"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("drop", "1", 0.0, 2.0, 0.0),)
+        return (Parameter("drop", "1", 0.0, 2.0, 0.0, told="drop of the supply"),)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.05,),)
@@ -177,7 +177,7 @@ class Loaded:
     form: ClassVar[str] = "loaded"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("drop", "1", 0.0, 0.5, 0.0),)
+        return (Parameter("drop", "1", 0.0, 0.5, 0.0, told="drop of the supply"),)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.03,),)

@@ -70,6 +70,8 @@ class Parameter:
     """The prediction jumps at this value (an instant, a threshold): chi-square rises in stairs, not as a parabola."""
     blur: float = 0.0
     """Over which the term spreads a threshold, so that its prediction is continuous: none is told more closely."""
+    told: str = ""
+    """As a noun in a sentence; empty: its name says it."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -43,6 +43,7 @@ class TorqueCrosstalk:
                 -MOST * scale.thrust / scale.driver**2,
                 MOST * scale.thrust / scale.driver**2,
                 0.0,
+                told="share of the torque",
             ),
         )
 
@@ -82,7 +83,7 @@ class MeasuredTorque:
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         most = MOST * _lever(scale)
-        return (Parameter("coefficient", "1/m", -most, most, 0.0),)
+        return (Parameter("coefficient", "1/m", -most, most, 0.0, told="share of the torque"),)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ((0.01 * _lever(scale),),)

@@ -33,7 +33,11 @@ class WindingResistance:
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("loss", f"1/{scale.driver_unit}", 0.0, 5.0 / scale.driver, 0.0),)
+        return (
+            Parameter(
+                "loss", f"1/{scale.driver_unit}", 0.0, 5.0 / scale.driver, 0.0, told="voltage lost in the winding"
+            ),
+        )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((share / scale.driver,) for share in (0.02, 0.2, 0.8))

@@ -26,7 +26,10 @@ class ZeroOffset:
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         most = 2 * scale.reading
-        return (Parameter("offset", "N", -most, most, 0.0), Parameter("at", "s", 0.0, scale.duration, jumps=True))
+        return (
+            Parameter("offset", "N", -most, most, 0.0),
+            Parameter("at", "s", 0.0, scale.duration, jumps=True, told="instant"),
+        )
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         return tuple((0.01 * scale.thrust, share * scale.duration) for share in np.linspace(0.02, 0.98, 80))

@@ -48,13 +48,14 @@ def values_told(
 ) -> dict[str, Value]:
     told = term.parameters(scale)
     if known is None:
-        return {p.name: Value(v, s, p.unit, limits=_limits(p)) for p, v, s in zip(told, theta, std, strict=True)}
+        triples = zip(told, theta, std, strict=True)
+        return {p.name: Value(v, s, p.unit, limits=_limits(p), told=p.told) for p, v, s in triples}
     return {p.name: _within(v, p, i) for p, v, i in zip(told, theta, known, strict=True)}
 
 
 def _within(value: float, known: Any, interval: Interval) -> Value:
     far = max(interval.high - value, value - interval.low)
-    return Value(value, far / QUANTILE, known.unit, (interval.low, interval.high), _limits(known))
+    return Value(value, far / QUANTILE, known.unit, (interval.low, interval.high), _limits(known), known.told)
 
 
 def _limits(known: Any) -> tuple[float, float] | None:
@@ -65,7 +66,7 @@ def _limits(known: Any) -> tuple[float, float] | None:
 def finding_of(named: NamedTerm[T, F], scale: Any, known: Mapping[T, tuple[Interval, ...]]) -> Finding:
     """Of any term, a thruster's or a vehicle's; `scale`: what its parameters refer to; `known`: intervals, if any."""
     values = values_told(named.term, named.theta, named.std, scale, known.get(named.term))
-    lost = " and ".join(name.replace("_", " ") for name, value in values.items() if not value.determined)
+    lost = " and ".join(value.told or name.replace("_", " ") for name, value in values.items() if not value.determined)
     return Finding(
         named.term.id,
         named.term.form,

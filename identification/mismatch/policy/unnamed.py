@@ -102,3 +102,16 @@ ALL_SHARE = Threshold(
     unit="share of the squared error that could be taken off what was not fitted",
     reason="Less than a twentieth left beside a name is nothing that a person would look for.",
 )
+TOLD_APART = Threshold(
+    0.5,
+    unit="share of the larger amount",
+    reason=(
+        "A name is earned beside the terms that have none, and told without them: where its amount is another by half, "
+        "it mended one of them."
+    ),
+)
+TOLD_SIGMA = Threshold(
+    3.0,
+    unit="sigma",
+    reason="Both amounts have errors of their own.",
+)

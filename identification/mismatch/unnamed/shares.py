@@ -66,14 +66,21 @@ def with_shares(
     """
     if not named:
         return ()
-    now = _fitted(split, split.estimate.fit, others)
-    score = split.judge(now)
+    score, without = scores_alone(split, named, others)
     least = min(best, score.rmse)
-    out = []
-    for n in named:
-        less = split.judge(_fitted(split, now, [n.term]))
-        out.append(replace(n, attained=Attained(less.rmse, score.rmse, share(less, score, least))))
-    return tuple(out)
+    return tuple(
+        replace(n, attained=Attained(less.rmse, score.rmse, share(less, score, least)))
+        for n in named
+        for less in (without[n.term],)
+    )
+
+
+def scores_alone(
+    split: TrainTestSplit, named: Sequence[Named], others: Sequence[Term]
+) -> tuple[Score, dict[Term, Score]]:
+    """On what was not fitted, of the model without the terms `others`, and of it without each of these names too."""
+    now = _fitted(split, split.estimate.fit, others)
+    return split.judge(now), {n.term: split.judge(_fitted(split, now, [n.term])) for n in named}
 
 
 def share(without: Score, with_it: Score, least: float) -> float:
@@ -91,9 +98,20 @@ def only_repairs(unearned: Sequence[Named]) -> tuple[Named, ...]:
     return tuple(n for n in unearned if all(c.kind == "repair" for c in n.checks if c.failed))
 
 
+def any_curve(unearned: Sequence[Named]) -> tuple[Named, ...]:
+    """Names that failed nothing but that with others on the same curve they make any: what one of them makes of it by
+    itself can still be said."""
+    return tuple(n for n in unearned if all(c.kind == "any_curve" for c in n.checks if c.failed))
+
+
 def repairs(named: Named) -> bool:
     """Whether another shape on the same curve explains nearly the same."""
     return any(check.kind == "repair" for check in named.checks if check.failed)
+
+
+def mended(named: Named) -> bool:
+    """Whether other shapes on the same curve mend it: its value means something without them alone."""
+    return any(check.kind in ("repair", "any_curve") for check in named.checks if check.failed)
 
 
 def _possible(named: Named) -> bool:

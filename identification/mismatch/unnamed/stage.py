@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -17,14 +18,18 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.name.named_term import Check, restated
 from identification.mismatch.name.naming import Named
 from identification.mismatch.select.forward_selection import STATIC, Selected
+from identification.mismatch.unnamed.confirmed import not_standing
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
-from identification.mismatch.unnamed.shares import mostly_right, repairs, with_shares
+from identification.mismatch.unnamed.shares import any_curve, mended, mostly_right, scores_alone, with_shares
 from identification.mismatch.validate.prediction import predicting, predicts
 from identification.mismatch.validate.stage import Validated
+from identification.mismatch.validate.train_test_split import TrainTestSplit
 from identification.physics.term import Term
 from identification.run_history.history import History
 
+ROUNDS = 3
+"""How often names are asked again in the model that is told: one that falls makes it another."""
 ALONE = "without terms that have no name it predicts what was not fitted worse than the baseline"
 
 
@@ -71,10 +76,14 @@ def run(
         over = foremost_covariate(left, unearned, data)
         flexible = extend(now, before, data, over, unearned, split, rng)
         best = min(split.judge(split.estimate.fit).rmse, np.inf if flexible is None else flexible.held)
-        mostly = mostly_right(split, unearned if located.structured else (), best)
+        mostly = mostly_right(split, unearned if located.structured else any_curve(unearned), best)
         if mostly.right:  # back: a free shape is for what they leave
-            earned, unearned = (*earned, *mostly.right), mostly.others
+            earned, unearned = (*earned, *mostly.right), tuple(n for n in unearned if n not in mostly.right)
+            bare, left = _left_by_names(now, data, unearned, (bare, left), rng)
             flexible = extend(now, before, data, over, unearned, split, rng)
+    if flexible is not None and unearned:
+        again = partial(extend, now, before, data, over, split=split, rng=rng)
+        earned, unearned, flexible = _standing(earned, unearned, flexible, now, split, data, again)
     if flexible is not None:
         earned = with_shares(split, earned, [n.term for n in unearned], flexible.held)
         valued, known = _with_values(earned, now, flexible.estimate, data, flexible)
@@ -99,6 +108,45 @@ def _without(
     return bare, residual_structure(bare.fit, data, after.weights, rng)
 
 
+def _left_by_names(
+    now: Estimate,
+    data: Data,
+    unearned: Sequence[Named],
+    otherwise: tuple[Estimate, ResidualStructure],
+    rng: np.random.Generator,
+) -> tuple[Estimate, ResidualStructure]:
+    """The model of the names, and what it leaves; `otherwise` where that shows no place."""
+    bare, left = _without(now, data, unearned, rng)
+    return (bare, left) if left.p_value < policy.locate.RESIDUAL_FALSE_ALARM else otherwise
+
+
+def _standing(
+    earned: tuple[Named, ...],
+    unearned: tuple[Named, ...],
+    flexible: Extended,
+    now: Estimate,
+    split: TrainTestSplit,
+    data: Data,
+    again: Callable[[Sequence[Named]], Extended | None],
+) -> tuple[tuple[Named, ...], tuple[Named, ...], Extended]:
+    """Names that stand where they are told, all others, and the free shapes beside them: back, as a name may only mend
+    a term that has none. One that falls stays in the model without a name where no shape does as well in its place.
+
+    `again`: shapes in the place of all that has no name.
+    """
+    for _ in range(ROUNDS):
+        told, _known = _with_values(earned, now, flexible.estimate, data, flexible)
+        fallen = not_standing(earned, told, data.scale, scores_alone(split, earned, [n.term for n in unearned]))
+        if not fallen:
+            break
+        unearned = (*unearned, *(n.asked(fallen[n.term]) for n in earned if n.term in fallen))
+        earned = tuple(n for n in earned if n.term not in fallen)
+        other = again(unearned)
+        if other is not None and other.held <= flexible.held:
+            flexible = other
+    return earned, unearned, flexible
+
+
 def foremost_covariate(left: ResidualStructure, unearned: Sequence[Named], data: Data) -> str:
     """The covariate over which it is left most clearly; a static curve is one over what drives."""
     if (
@@ -119,11 +167,11 @@ def _with_values(
     unnamed: Sequence[Term] = (),
 ) -> tuple[tuple[Named, ...], dict[Term, tuple[Interval, ...]]]:
     """Names with their values and intervals in the final model, `after`. Of those that share a covariate with a
-    flexible term in the model without any; of those that a term without a name repairs, in the model without it."""
+    flexible term in the model without any; of those that a term without a name mends, in the model without it."""
     if free is not None:
         alone, dropped = shared([n.term for n in earned], free), free.dropped
     else:
-        alone, dropped = [n.term for n in earned if repairs(n) and unnamed], tuple(unnamed)
+        alone, dropped = [n.term for n in earned if mended(n) and unnamed], tuple(unnamed)
     named = restated([n for n in earned if n.term not in alone], after.fit)
     known = intervals(after.fit, data, after.weights, [n.term for n in named])
     if alone:

@@ -68,8 +68,8 @@ def places_of(left: Left, data: Prepared, channel: str) -> tuple[Mismatch, ...]:
     for structure in clear[: policy.locate.PLACES_TOLD]:
         where = where_of(structure)
         says = (
-            f"{structure.covariate.what} explains {100 * structure.share:.0f} % of the whitened residual, most at "
-            f"{_place(where, data)}."
+            f"{structure.covariate.what} explains {100 * structure.share:.0f} % of what is left, in units of its "
+            f"noise, most at {_place(where, data)}."
         )
         out.append(Mismatch(channel, where, structure.share, structure.p_value, says[0].upper() + says[1:]))
     return tuple(out)
@@ -87,8 +87,8 @@ def place_of_findings(left: Left, before: State, after: State, data: Prepared, c
     p = max(float(chi2_sf(gain, count)), BACK)
     where, share = where_of(structure), gain / before.fit.chi2
     says = (
-        f"What was found explains {100 * share:.2g} % of the whitened residual together; of a free force over "
-        f"{structure.covariate.quantity} most would act at {_place(where, data)}."
+        f"What was found together explains {100 * share:.2g} % of what the baseline leaves, in units of its noise; of "
+        f"a free force over {structure.covariate.quantity} most would act at {_place(where, data)}."
     )
     return (Mismatch(channel, where, share, p, says),)
 
@@ -104,7 +104,7 @@ def unexplained_of(left: Left, named: Sequence[Named], data: Prepared) -> Remain
     where = where_of(structure)
     says = (
         f"Something is left that no effect of the catalogue carries: {structure.covariate.what}, clearest at "
-        f"{_place(where, data)}, {100 * structure.share:.2g} % of the whitened residual."
+        f"{_place(where, data)}, {100 * structure.share:.2g} % of what is left, in units of its noise."
     )
     resembles = tuple(f"{n.term.id}: {'; '.join(n.failed_checks)}" for n in named)
     if named:

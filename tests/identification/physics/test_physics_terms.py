@@ -197,3 +197,19 @@ def test_the_engine_names_no_effect():
         path.name for path in engine.rglob("*.py") if rooms & set(re.findall(r"from (\S+) import", path.read_text()))
     ]
     assert reached == []
+
+
+def test_an_exponent_far_below_a_propellers_says_what_the_drive_may_hold():
+    exponent = term("exponent")
+    assert "a drive that holds" in exponent.statement((0.65,), S)
+    assert "drive" not in exponent.statement((1.9,), S)
+    assert "drive" not in exponent.statement((0.65,), replace(S, driver_unit="rev/s")), "a measured rate has none"
+
+
+@pytest.mark.parametrize(
+    ("id", "form", "most"), [("load_cell_creep", "one_constant", 0.1), ("load_cell_nonlinearity", "cubic", 0.12)]
+)
+def test_no_cell_in_service_is_off_by_more(id, form, most):
+    known = term(id, form).parameters(S)[0]
+    largest = S.thrust**2 if form == "cubic" else 1.0
+    assert (known.low * largest, known.high * largest) == pytest.approx((-most, most))

@@ -86,7 +86,10 @@ PARTLY = replace(LAGS, share=0.64, heldout=(0.8276, 0.8091), doubts=("more is le
 
 def test_share_and_grade_stand_beside_a_findings_sentence():
     for told in (said(answer(findings=(PARTLY,))), shown(answer(findings=(PARTLY,)))):
-        assert "artly: not fitted 0.8276 without it, 0.8091 with it, 64 % of what any shape could take off" in told
+        assert (
+            "artly: not fitted 0.8276 without it, 0.8091 with it, 64 % of what any shape in its place could take off"
+            in told
+        )
         assert "more is left over its own covariate, time" in told
     hum = replace(PARTLY, effect="periodic_disturbance", statement="A line.", doubts=(), share=0.97, rivals=())
     assert "All: not fitted 0.8276 without it" in shown(answer(findings=(hum,))), "without a picture too"

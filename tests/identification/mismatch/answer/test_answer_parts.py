@@ -23,8 +23,10 @@ from identification.mismatch.diagnosis import (
 from identification.mismatch.estimate.confidence_intervals import Interval
 from identification.mismatch.faults.channel_faults import Fault
 from identification.mismatch.locate.residual_structure_test import residual_structure
+from identification.mismatch.name.naming import name
 from identification.mismatch.unnamed.stage import Completed
 from identification.mismatch.value import Value
+from identification.physics.zero_offset import ZeroOffset
 from tests.identification.diagnosed_runs import NOISE, C, dead_band
 from tests.identification.mismatch.answer.answered import BAND, LEFT, SWEEP, draft, finding, told
 from tests.identification.mismatch.small import known_noise, rng, selected, short
@@ -160,3 +162,15 @@ def test_a_place_without_a_flexible_term_is_that_of_the_clearest_structure():
     assert found.where.quantity == "time"
     assert found.flexible == ()
     assert found.p_value == left.p_value
+
+
+def test_what_is_not_determined_is_told_by_what_it_is():
+    """The instant of a jump, whose parameter is called `at`."""
+    jump = ZeroOffset()
+    data, estimate = known_noise({jump: (0.5, 40.0)}, [short(change=lambda t, _V, F: F + 0.5 * (t > 40.0))])
+    (named,) = name(estimate, data, [])
+    lost = finding_of(replace(named, std=(0.1, 1e9)), data.scale, {})
+    assert lost.statement.endswith("The data do not determine its instant.")
+    assert lost.parameters["at"].told == "instant"
+    known = finding_of(replace(named, std=(0.1, 0.2)), data.scale, {})
+    assert "do not determine" not in known.statement

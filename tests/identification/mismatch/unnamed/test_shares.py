@@ -5,7 +5,7 @@ import pytest
 
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.name.naming import Check, name
-from identification.mismatch.unnamed.shares import mostly_right, only_repairs, share
+from identification.mismatch.unnamed.shares import any_curve, mended, mostly_right, only_repairs, share
 from identification.mismatch.validate.held_out import Score
 from identification.mismatch.validate.train_test_split import train_test_split
 from identification.physics.asymmetry import Asymmetry
@@ -87,3 +87,13 @@ def test_of_two_shapes_that_repair_each_other_one_is_said():
     assert len(found.right) <= 1
     assert only_repairs(named) == tuple(named)
     assert only_repairs([n.asked(Check("possible", "its values", "no")) for n in named]) == ()
+
+
+def test_of_shapes_that_with_others_make_any_curve_each_may_still_be_asked_what_it_makes():
+    _, named = doubted(("any_curve", "any_curve"))
+    assert any_curve(named) == tuple(named)
+    assert all(mended(n) for n in named), "its value means something without the others alone"
+    assert any_curve([n.asked(Check("possible", "its values", "no")) for n in named]) == ()
+    _, named = doubted((SHAPE, SHAPE))
+    assert any_curve(named) == ()
+    assert not any(mended(n) for n in named)
