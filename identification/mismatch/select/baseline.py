@@ -15,12 +15,12 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.predictor import Predictor
 from identification.mismatch.model.whitening import Weights
+from identification.mismatch.noise.rounding_error import rounding_errors
 from identification.mismatch.prepare.scales import scale_of
 from identification.mismatch.select.clock_shifts import with_clock_shifts
 from identification.mismatch.select.covariates import covariates
 from identification.mismatch.select.family_wise import MOST_PLAIN, lengths, matching_pursuit, orthogonal_basis
 from identification.mismatch.select.likeliest_trials import jumps
-from identification.mismatch.select.rounding_error import rounding_errors
 from identification.physics.term import Term
 from identification.recording import Floats
 from identification.run_history.history import History

@@ -60,8 +60,8 @@ def rounding_errors(h: History, C: float) -> Floats:
     left = np.where(passed < 1, np.sinc(np.minimum(passed, 1.0)), 0.0)
     _, which = np.unique(places, return_inverse=True)
     weight = np.bincount(which, weights=h.count * left**2)
-    told = weight * variance > policy.select.ROUNDING_UNSEEN * scatter
-    chosen = np.argsort(-weight * told, kind="stable")[: min(int(told.sum()), policy.select.ROUNDED_LEVELS)]
+    told = weight * variance > policy.estimate.ROUNDING_UNSEEN * scatter
+    chosen = np.argsort(-weight * told, kind="stable")[: min(int(told.sum()), policy.estimate.ROUNDED_LEVELS)]
     out = np.where(which[:, None] == chosen, left[:, None], 0.0) * np.sqrt(variance)
     return np.asarray(out, dtype=np.float64)
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from identification.mismatch import diagnose
+from identification.mismatch.noise.rounding_error import level_variance, rounding_errors
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.select.baseline import level_error_factor
-from identification.mismatch.select.rounding_error import level_variance, rounding_errors
 from tests.identification.diagnosed_runs import C, dead_band, run
 from tests.identification.mismatch.small import data_of
 
