@@ -108,6 +108,8 @@ class History:
     """s by which the time stamps of the thrust may be off."""
     delay_std: float = 0.0
     """s by which all of them may be, against the driver, as the recording itself says."""
+    quantum: float = 0.0
+    """N, step of the thrust's values; 0 where they have none."""
     converter: Converter = field(default_factory=Converter)
     """Between the thrust and a sample of it."""
     rate_spacing: float = 1.0

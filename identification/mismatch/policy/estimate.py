@@ -47,3 +47,13 @@ DOUBTFUL_CLOCK_SHIFT = Threshold(
         "fit is tried without one too."
     ),
 )
+ROUNDING_UNSEEN = Threshold(
+    0.02,
+    unit="share of the variance of the mean of all samples of a level",
+    reason="What rounding shifts a level by is left aside where even the mean of all of its samples does not show it.",
+)
+ROUNDED_LEVELS = Count(
+    300,
+    unit="levels",
+    reason="Each has an error of its own, which costs time; those with most samples are the ones that bend a curve.",
+)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from identification.mismatch import policy
 from identification.mismatch.prepare.channels import followed, is_coarse, jumps, neighbour_at, supply, torque
 from identification.mismatch.prepare.grid import Held, distinct, edges_of
+from identification.mismatch.prepare.quantum import quantum_of
 from identification.recording import Channel, Floats, Recording
 from identification.run_history.converter import Converter
 from identification.run_history.history import CHANGED, History
@@ -60,7 +61,7 @@ def history_of(recording: Recording, most_intervals: int = MOST_INTERVALS) -> Hi
     if time.size < policy.prepare.THRUST_SAMPLES:
         return Refusal(f"{name}: almost every thrust sample coincides with a change of the driver")
     edges = edges_of(time, held, MOST_MOVING if held.changes().size > MANY_CHANGES else most_intervals)
-    return _filled(recording, driver, held, edges, time, force)
+    return replace(_filled(recording, driver, held, edges, time, force), quantum=quantum_of(thrust))
 
 
 def _own_first(recording: Recording) -> Recording:

@@ -15,6 +15,7 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.predictor import Predictor
 from identification.mismatch.model.whitening import Weights
+from identification.mismatch.noise.rounding_error import rounding_errors
 from identification.mismatch.prepare.scales import scale_of
 from identification.mismatch.select.clock_shifts import with_clock_shifts
 from identification.mismatch.select.covariates import covariates
@@ -58,18 +59,26 @@ def _most_shift(histories: Sequence[History]) -> float:
 
 
 def level_error_factor(data: Data, C: float) -> PriorPredictionFactor | None:
-    """What the thrust C n|n| is off by where a noisy driver stood still: at all of a level alike, so that levels
-    scatter more than their samples say."""
-    parts: list[list[Floats]] = [[] for _ in data.histories]
-    for i, h in enumerate(data.histories):
-        for error in h.level_errors.T:
-            for k, other in enumerate(data.histories):
-                column = np.zeros(other.rows.size)
-                parts[k].append((2 * C * np.abs(h.driver) * error)[h.rows] if k == i else column)
-    if not parts[0]:
+    """What the thrust C n|n| is off by where a noisy driver stood still, and its reading where steps round it: at all
+    of a level alike, so that levels scatter more than their samples say."""
+    own = [_level_errors(h, C)[h.rows] for h in data.histories]
+    total = sum(errors.shape[1] for errors in own)
+    if not total:
         return None
-    still = tuple(np.zeros((h.rates.size, len(parts[0]))) for h in data.histories)
-    return PriorPredictionFactor(tuple(np.column_stack(p) for p in parts), still)
+    thrust, at = [], 0
+    for errors in own:
+        columns = np.zeros((errors.shape[0], total))
+        columns[:, at : at + errors.shape[1]] = errors
+        thrust.append(columns)
+        at += errors.shape[1]
+    return PriorPredictionFactor(tuple(thrust), tuple(np.zeros((h.rates.size, total)) for h in data.histories))
+
+
+def _level_errors(h: History, C: float) -> Floats:
+    """(M, k) N, of the driver and of the reading."""
+    if not h.level_errors.size:
+        return rounding_errors(h, C)
+    return np.column_stack([2 * C * np.abs(h.driver)[:, None] * h.level_errors, rounding_errors(h, C)])
 
 
 def _k(histories: Sequence[History]) -> float:
