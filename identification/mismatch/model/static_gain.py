@@ -17,6 +17,8 @@ from identification.run_history.remembered import RememberedRun
 
 SMALL = 1e-4
 """Relative change that is tried."""
+ROUNDING = 1e-9
+"""Of the largest change: what is smaller is none."""
 MOST_GAIN = 5.0
 """Where a curve is steeper, an interval is no place to speak of its slope."""
 ROTOR = ("command", "rotor")
@@ -78,7 +80,7 @@ def _alternating(size: int) -> NDArray[np.int64]:
 
 
 def _ratio(new: Floats, old: Floats) -> Floats:
-    """1 where nothing was moved."""
-    moved = old != 0
+    """1 where nothing was moved, but for what rounding leaves."""
+    moved = np.abs(old) > ROUNDING * np.max(np.abs(old), initial=0.0)
     out: Floats = np.where(moved, new / np.where(moved, old, 1.0), 1.0)
     return np.clip(out, 0.0, MOST_GAIN)

@@ -24,6 +24,7 @@ CREEP = LoadCellCreep()
 def fitted(term, values, **how):
     """(data, estimate) of C V|V| with one term, from `values`."""
     data, theta = start([history_of(run(**how))])
+    data = replace(data, most_shift=0.0)  # a clock that is off by nothing takes samples at an edge into the next step
     return data, refresh(Model((term,)), replace(theta, terms=(values,)), data, None, None)
 
 
