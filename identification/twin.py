@@ -98,18 +98,6 @@ class Alternative:
 
 
 @dataclass(frozen=True, slots=True)
-class Candidates:
-    """Effects of the catalogue that were not named, and how much of each the twin's own recordings allow together."""
-
-    terms: tuple[TwinTerm, ...]
-    """Each at the values that were tried."""
-    amounts: tuple[float, ...]
-    """Times what that would change."""
-    covariance: tuple[tuple[float, ...], ...]
-    """Of the amounts."""
-
-
-@dataclass(frozen=True, slots=True)
 class Source:
     """A recording that the numbers come from."""
 
@@ -145,8 +133,6 @@ class Twin:
     """Periodic disturbances, the clearest first."""
     alternatives: tuple[Alternative, ...] = ()
     """What other textbook forms would have said: how far the forms may be off in another run."""
-    candidates: Candidates | None = None
-    """What it does not name and yet may have; None where nobody asked."""
     created: str = ""
     """ISO 8601 UTC."""
     software: str = ""

@@ -14,9 +14,9 @@ import numpy as np
 
 from identification.flexible_terms.flexible import MULTIPLIERS, Flexible
 from identification.physics.term import Scale, Term
-from identification.twin import TERMS, Alternative, Candidates, Source, Twin, TwinLine, TwinNoise, TwinTerm, names_of
+from identification.twin import TERMS, Alternative, Source, Twin, TwinLine, TwinNoise, TwinTerm, names_of
 from rig.errors import TwinError
-from rig.twin.writing import FORMAT, VERSION, candidate_names
+from rig.twin.writing import FORMAT, VERSION
 
 DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
 ASYMMETRY = 1e-9
@@ -113,7 +113,6 @@ def _twin(top: Table) -> Twin:
         noise=_noise(top.table("noise")),
         lines=tuple(map(_line, top.tables("lines"))) if "lines" in top.content else (),
         alternatives=tuple(map(_alternative, top.tables("alternatives"))) if "alternatives" in top.content else (),
-        candidates=_candidates(top.table("candidates")) if "candidates" in top.content else None,
         sources=tuple(_source(each) for each in top.tables("recordings")),
         interval=top.number("interval", 1e-6),
         highest_driver=top.number("highest_driver", 0.0),
@@ -265,13 +264,6 @@ def _line(table: Table) -> TwinLine:
 def _alternative(table: Table) -> Alternative:
     terms = tuple(_term(each) for each in table.tables("terms"))
     return Alternative(table.number("C"), terms, table.number("loss"), table.number("gain"))
-
-
-def _candidates(table: Table) -> Candidates:
-    terms, amounts = tuple(_term(each) for each in table.tables("terms")), table.numbers("amounts")
-    if not terms or len(amounts) != len(terms):
-        raise table.wrong("amounts", f"as many numbers as there are terms ({len(terms)}, at least one)")
-    return Candidates(terms, amounts, _covariance(table.table("covariance"), candidate_names(terms)))
 
 
 def _source(table: Table) -> Source:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import asdict, replace
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
-from identification.twin import Alternative, Candidates, Twin, TwinLine, TwinTerm
+from identification.twin import Alternative, Twin, TwinLine, TwinTerm
 
 FORMAT = "thruster-rig-twin"
 VERSION = 2
@@ -30,7 +30,6 @@ def twin_json(twin: Twin) -> dict[str, object]:
         "noise": asdict(twin.noise),
         **({"lines": [_line_json(line) for line in twin.lines]} if twin.lines else {}),
         **({"alternatives": [_alternative(each) for each in twin.alternatives]} if twin.alternatives else {}),
-        **({} if twin.candidates is None else {"candidates": _candidates(twin.candidates)}),
         "recordings": [asdict(source) for source in twin.sources],
         "interval": twin.interval,
         "highest_driver": twin.highest_driver,
@@ -52,19 +51,6 @@ def _term_json(t: TwinTerm) -> dict[str, object]:
 
 def _alternative(other: Alternative) -> dict[str, object]:
     return {"C": other.C, "loss": other.loss, "gain": other.gain, "terms": [_term_json(t) for t in other.terms]}
-
-
-def _candidates(found: Candidates) -> dict[str, object]:
-    return {
-        "terms": [_term_json(t) for t in found.terms],
-        "amounts": list(found.amounts),
-        "covariance": {"names": candidate_names(found.terms), "matrix": [list(row) for row in found.covariance]},
-    }
-
-
-def candidate_names(terms: Sequence[TwinTerm]) -> list[str]:
-    """Rows of their covariance."""
-    return [f"{t.effect} ({t.form})" if t.form else t.effect for t in terms]
 
 
 def _line_json(line: TwinLine) -> dict[str, object]:

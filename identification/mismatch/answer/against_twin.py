@@ -20,7 +20,7 @@ from identification.mismatch.model.model import acting
 from identification.mismatch.name.naming import Named
 from identification.mismatch.value import Value
 from identification.recording import Recording
-from identification.twin import Alternative, Candidates, Source, Twin, TwinNoise, TwinTerm, names_of
+from identification.twin import Alternative, Source, Twin, TwinNoise, TwinTerm, names_of
 
 
 def with_twin(
@@ -30,15 +30,13 @@ def with_twin(
     recordings: Sequence[Recording],
     before: Twin | None,
     named: Sequence[Named] = (),
-    candidates: Candidates | None = None,
 ) -> Draft:
     """The draft with its twin; against an earlier twin the terms given are in the model, and a change is told.
 
-    `named`: the terms of the model with their other forms; `candidates`: what it may have beside them.
+    `named`: the terms of the model with their other forms.
     """
     twin = twin_of(estimate, data, recordings, before)
-    twin = replace(twin, alternatives=_alternatives(estimate, data, named), candidates=candidates)
-    draft = replace(draft, twin=twin)
+    draft = replace(draft, twin=replace(twin, alternatives=_alternatives(estimate, data, named)))
     if before is None:
         return draft
     known = before.origin

@@ -22,7 +22,6 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.noise.whiteness import whiteness
 from identification.mismatch.periodic.periodic_disturbances import Line
 from identification.mismatch.select.forward_selection import Selected
-from identification.mismatch.unnamed.candidates import candidates_of
 from identification.mismatch.unnamed.flexible_shape import with_held
 from identification.mismatch.unnamed.stage import Completed
 from identification.mismatch.validate.each_run import run_differences
@@ -78,9 +77,7 @@ def run(
     )
     ids = tuple(r.recording_id for r in case.recordings)
     draft = with_channels(draft, case.sound.faults, ids)
-    screened = selected.last.directions if selected.last is not None and after is selected.after else None
-    beside = candidates_of(after, data, selected.terms, screened)
-    draft = with_twin(draft, after, data, case.recordings, case.baseline, completed.earned, beside)
+    draft = with_twin(draft, after, data, case.recordings, case.baseline, completed.earned)
     draft = with_lines(draft, case.lines, train.before, case.baseline, ids)
     stands_in = proxies(after.fit.model, draft.findings, case.recordings, case.sound.histories)
     n, p = after.fit.residual.size, int(after.fit.free.sum())

@@ -61,13 +61,12 @@ def lasting(twin: Twin, recordings: Sequence[Recording]) -> Twin:
 def prior_factor(twin: Twin, data: Data, theta: Theta) -> PriorPredictionFactor | None:
     """How the prediction may be off, each direction one standard deviation long.
 
-    Along each principal axis of the terms' covariance; towards what each other textbook form would have said; in
-    proportion to what each term does; and by what effects that were not named may do unseen. C is fitted anew in each
-    diagnosis, so its own uncertainty is not in it.
+    Along each principal axis of the terms' covariance; towards what each other textbook form would have said; and in
+    proportion to what each term does. C is fitted anew in each diagnosis, so its own uncertainty is not in it.
     """
     base = raw(Model((), given(twin)), theta, data, with_rate=data.with_rate)
     moves = [*_along_axes(twin, theta, data, base), *_towards_forms(twin, theta, data, base)]
-    moves += [*_in_proportion(twin, theta, data, base), *_by_candidates(twin, theta, data, base)]
+    moves += _in_proportion(twin, theta, data, base)
     if not moves:
         return None
     thrust = tuple(np.column_stack(columns) for columns in zip(*(move[0] for move in moves), strict=True))
@@ -85,9 +84,10 @@ def _along_axes(twin: Twin, theta: Theta, data: Data, base: Predicted) -> list[P
         return []
     std = np.sqrt(np.diag(covariance))
     moving = std > 0
-    root = np.zeros((int(moving.sum()), std.size))
-    root[:, moving] = _axes(covariance[np.ix_(moving, moving)])
-    models = [Model((), given(_moved(twin, PROBE * axis))) for axis in root]
+    values, axes = np.linalg.eigh(covariance[np.ix_(moving, moving)] / np.outer(std[moving], std[moving]))
+    root = np.zeros((std.size, values.size))
+    root[moving] = std[moving, None] * axes * np.sqrt(np.maximum(values, 0.0))
+    models = [Model((), given(_moved(twin, PROBE * axis))) for axis in root.T]
     return [_change(model, theta, data, base, 1 / PROBE) for model in models]
 
 
@@ -106,63 +106,6 @@ def _in_proportion(twin: Twin, theta: Theta, data: Data, base: Predicted) -> lis
     every = given(twin)
     less = [Model((), every[:i] + every[i + 1 :]) for i in range(len(every))]
     return [_change(model, theta, data, base, policy.compare.FORM_ERROR) for model in less]
-
-
-def _by_candidates(twin: Twin, theta: Theta, data: Data, base: Predicted) -> list[Predicted]:
-    """Along each principal axis of what amounts the twin's own run allows, with what it saw of them: so what is new is
-    the difference of two estimates, and its variance the sum of theirs."""
-    if twin.candidates is None:
-        return []
-    have = set.intersection(*(set(h.others) for h in data.histories))
-    still = any(h.static for h in data.histories)
-    terms = [t.term for t in twin.candidates.terms]
-    seen = [i for i, t in enumerate(terms) if set(t.needs) <= have and not (still and t.traits.moving)]
-    if not seen:
-        return []
-    trials = [twin.candidates.terms[i] for i in seen]
-    every = given(twin)
-    changes = [_change(Model((), (*every, Given(t.term, t.values, t.scale))), theta, data, base, 1.0) for t in trials]
-    changes = _beside_constant(changes, twin, theta, data, base)
-    amounts = np.array(twin.candidates.amounts)[seen]
-    square = np.array(twin.candidates.covariance)[np.ix_(seen, seen)] + np.outer(amounts, amounts)
-    return [_summed(changes, axis) for axis in _axes(square)]
-
-
-def _beside_constant(
-    changes: Sequence[Predicted], twin: Twin, theta: Theta, data: Data, base: Predicted
-) -> list[Predicted]:
-    """Each less what C and the tares would follow of it: in the twin's own run they were fitted beside it, and how well
-    C is known there stands in the covariance."""
-    slope = _change(Model((), given(twin)), replace(theta, C=theta.C * (1 + PROBE)), data, base, 1 / PROBE)
-    weight = np.concatenate([np.sqrt(h.count[r]) for h, r in zip(data.histories, data.rows, strict=True)])[:, None]
-    which = np.repeat(np.arange(len(data.rows)), [r.size for r in data.rows])
-    tares = (which[:, None] == np.arange(len(data.rows))).astype(np.float64)
-    known = np.column_stack([np.concatenate(slope[0]), tares])
-    columns = np.column_stack([np.concatenate(change[0]) for change in changes])
-    part, *_ = np.linalg.lstsq(weight * known, weight * columns, rcond=None)
-    ends = np.cumsum([r.size for r in data.rows])[:-1]
-    thrust = [np.split(column, ends) for column in (columns - known @ part).T]
-    rate = [
-        [r - share * s for r, s in zip(change[1], slope[1], strict=True)]
-        for change, share in zip(changes, part[0], strict=True)
-    ]
-    return list(zip(thrust, rate, strict=True))
-
-
-def _axes(covariance: Floats) -> Floats:
-    """(k, p) principal axes, one standard deviation long, of what differs much in size and unit."""
-    std = np.sqrt(np.diag(covariance))
-    values, axes = np.linalg.eigh(covariance / np.outer(std, std))
-    out: Floats = (std[:, None] * axes * np.sqrt(np.maximum(values, 0.0))).T
-    return out
-
-
-def _summed(changes: Sequence[Predicted], amounts: Floats) -> Predicted:
-    def total(which: int) -> list[Floats]:
-        runs = zip(*(change[which] for change in changes), strict=True)
-        return [np.tensordot(amounts, np.array(each), axes=1) for each in runs]
-
-    return total(0), total(1)
 
 
 def _change(model: Model, theta: Theta, data: Data, base: Predicted, times: float) -> Predicted:

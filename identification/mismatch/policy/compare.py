@@ -54,15 +54,3 @@ SIGNATURE_THRUST = Threshold(
     unit="share of the largest change or thrust",
     reason="A smaller thrust tells nothing of a share of it.",
 )
-CANDIDATE_SIGMA = Threshold(
-    4.0,
-    unit="sigma in the twin's own run",
-    reason=(
-        "What was not named there is taken to be no larger, one standard deviation: about where a search takes notice. "
-        "Within that a second run may show what was there before."
-    ),
-    evidence=(
-        "difference/nothing of draw 2026-12-27: a heating of 2.7 sigma in the first run, rightly not named, stood out "
-        "by 5.1 sigma in the second."
-    ),
-)
