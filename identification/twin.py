@@ -129,6 +129,8 @@ class Twin:
     """The largest |driver| it was fitted with."""
     rate_per_driver: float | None = None
     """rev/s per unit of the driver; None where no rotation rate was recorded."""
+    slip_rate_per_driver: float | None = None
+    """The same before any effect was known: what a coupling to the rate refers the measured rate to, and C with it."""
     lines: tuple[TwinLine, ...] = ()
     """Periodic disturbances, the clearest first."""
     alternatives: tuple[Alternative, ...] = ()
@@ -138,6 +140,11 @@ class Twin:
     software: str = ""
     origin: str = "the twin"
     """What it is, in a sentence: `the twin T1.twin.json`, `the simulation SIM.h5`."""
+
+    @property
+    def slip_rate(self) -> float | None:
+        """rev/s per unit of the driver for all runs beside it; a twin that does not say which has `rate_per_driver`."""
+        return self.rate_per_driver if self.slip_rate_per_driver is None else self.slip_rate_per_driver
 
 
 def names_of(terms: tuple[TwinTerm, ...]) -> tuple[str, ...]:

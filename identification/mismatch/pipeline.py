@@ -96,7 +96,7 @@ def traced(
     prepared = prepare.run(wired.recordings, wired.holdout, baseline)
     if isinstance(prepared, Refusal):
         return prepared
-    sound = faults.run(prepared, wired.faults, None if baseline is None else baseline.rate_per_driver)
+    sound = faults.run(prepared, wired.faults, None if baseline is None else baseline.slip_rate)
     if isinstance(sound, Refusal):
         return sound
     watch.stage("looking for effects")

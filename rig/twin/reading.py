@@ -102,7 +102,7 @@ def _twin(top: Table) -> Twin:
         raise top.wrong("driver", f"one of {', '.join(DRIVERS)}")
     terms = tuple(_term(each) for each in top.tables("terms"))
     names = names_of(terms)
-    rate = top.get("rate_per_driver")
+    rate, slip = top.get("rate_per_driver"), top.content.get("slip_rate_per_driver")
     return Twin(
         thruster=top.text("thruster"),
         driver_quantity=driver,
@@ -117,6 +117,7 @@ def _twin(top: Table) -> Twin:
         interval=top.number("interval", 1e-6),
         highest_driver=top.number("highest_driver", 0.0),
         rate_per_driver=None if rate is None else top.number("rate_per_driver"),
+        slip_rate_per_driver=None if slip is None else top.number("slip_rate_per_driver"),
         created=top.text("created"),
         software=top.text("software"),
         origin=f"the twin {top.path.name}",

@@ -34,6 +34,7 @@ def twin_json(twin: Twin) -> dict[str, object]:
         "interval": twin.interval,
         "highest_driver": twin.highest_driver,
         "rate_per_driver": twin.rate_per_driver,
+        "slip_rate_per_driver": twin.slip_rate_per_driver,
         "created": twin.created,
         "software": twin.software,
     }

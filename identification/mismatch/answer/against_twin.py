@@ -133,6 +133,7 @@ def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], bef
         interval=_interval(recordings),
         highest_driver=max(data.scale.driver, 0.0 if before is None else before.highest_driver),
         rate_per_driver=fitted.theta.k if data.with_rate else None,
+        slip_rate_per_driver=next((h.rate_per_driver for h in data.histories if h.rate is not None), None),
     )
 
 

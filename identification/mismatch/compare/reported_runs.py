@@ -14,7 +14,7 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.prepare.preparing import history_of
-from identification.mismatch.prepare.scales import scale_of
+from identification.mismatch.prepare.scales import of_one_rate, scale_of
 from identification.recording import Floats, Recording
 from identification.run_history.history import TURNING, History
 from identification.run_history.remembered import RememberedRun
@@ -71,6 +71,8 @@ def _beyond_constants(runs: Sequence[Run]) -> tuple[Run, ...]:
 
 def _run(curves: Curves, recording: Recording | None, twin: Twin | None, C: float) -> Run:
     full = None if recording is None else history_of(recording)
+    if isinstance(full, History) and twin is not None:
+        (full,) = of_one_rate((full,), twin.slip_rate)
     if isinstance(full, History) and np.isin(curves.time, full.sampled).all():
         history, rows = full, np.searchsorted(full.sampled, curves.time)
         known = twin is not None and all(t.known for t in twin.terms)

@@ -17,7 +17,7 @@ from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.periodic.rotor_angle import turned
 from identification.mismatch.prepare.channels import neighbour_at
-from identification.mismatch.prepare.preparing import FOLLOWED, Refusal
+from identification.mismatch.prepare.preparing import FOLLOWED, Refusal, binned
 from identification.physics.term import Scale
 from identification.recording import Floats, Recording
 from identification.run_history.filters import within_intervals
@@ -112,6 +112,8 @@ def _history(twin: Twin, drive: Drive, times: Floats) -> tuple[History, NDArray[
     middle = 0.5 * (edges[1:] + edges[:-1])
     others = {name: np.interp(middle, *series) for name, series in drive.others.items()}
     M = middle.size
+    turning = drive.others.get("rotation_rate")
+    rate, rate_count, rate_sampled = (None, None, None) if turning is None else binned(*turning, edges)
     history = History(
         recording_id="",
         driver_quantity=twin.driver_quantity,
@@ -122,7 +124,10 @@ def _history(twin: Twin, drive: Drive, times: Floats) -> tuple[History, NDArray[
         sampled=middle,
         within=np.zeros(M),
         others=others,
-        rate_per_driver=twin.rate_per_driver or 1.0,
+        rate=rate,
+        rate_count=rate_count,
+        rate_sampled=rate_sampled,
+        rate_per_driver=twin.slip_rate or 1.0,
     )
     index = np.clip(np.searchsorted(edges, times, side="right") - 1, 0, M - 1)
     return history, index

@@ -144,7 +144,7 @@ def _clear_of_jumps(recording: Recording, time: Floats, force: Floats) -> tuple[
     )
 
 
-def _binned(time: Floats, value: Floats, edges: Floats) -> tuple[Floats, NDArray[np.int64], Floats]:
+def binned(time: Floats, value: Floats, edges: Floats) -> tuple[Floats, NDArray[np.int64], Floats]:
     """Mean value (NaN where none), number of samples and mean time in each interval."""
     M = edges.size - 1
     index = np.searchsorted(edges, time, side="right") - 1
@@ -182,9 +182,9 @@ def _converter(recording: Recording) -> Converter:
 
 
 def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, time: Floats, force: Floats) -> History:
-    _, whole, _ = _binned(time, force, edges)
+    _, whole, _ = binned(time, force, edges)
     time, force = _clear_of_jumps(recording, time, force)
-    mean, count, sampled = _binned(time, force, edges)
+    mean, count, sampled = binned(time, force, edges)
     torn = count < 0.5 * whole  # what is left at one end of an interval does not stand for all of it
     mean[torn], count[torn] = np.nan, 0
     within = _within(time, force, edges, mean)
@@ -198,7 +198,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
     if "rotation_rate" in others and turning is not None:
         good = np.isfinite(turning.value)
         turning_time = turning.time[good]
-        rate, rate_count, rate_sampled = _binned(turning.time[good], turning.value[good], edges)
+        rate, rate_count, rate_sampled = binned(turning.time[good], turning.value[good], edges)
         per_driver = _rate_per_driver(driven, others["rotation_rate"], edges)
     history = History(
         recording_id=recording.recording_id,
