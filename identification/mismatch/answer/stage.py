@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.answer.against_twin import with_twin
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.answer.fault_findings import with_channels
@@ -14,7 +15,7 @@ from identification.mismatch.answer.proxies import proxies
 from identification.mismatch.answer.remainder import remainder_of
 from identification.mismatch.answer.report_assembly import curves_of, finding_of, values_of
 from identification.mismatch.answer.verdict import decided
-from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment, Rmse
+from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment, Rmse, Unexplained
 from identification.mismatch.faults.stage import Sound
 from identification.mismatch.locate.places import places_of
 from identification.mismatch.locate.stage import Located
@@ -31,6 +32,10 @@ from identification.recording import Recording
 from identification.run_history.history import History
 from identification.twin import Twin
 
+TAKEN_BACK = (
+    "{} passed the search, but predicts what was not fitted worse than the baseline does, whose residual shows "
+    "nothing: it was noise that was followed"
+)
 DRIVER_NAMES = {"command_voltage": "V|V|", "motor_voltage": "V|V|", "rotation_rate": "n|n|"}
 
 
@@ -56,7 +61,34 @@ def run(
     experiment: NextExperiment | None,
     rng: np.random.Generator,
 ) -> Diagnosis:
-    """The verdict is decided last, from all findings: names, channel faults, a changed constant, lines."""
+    """The verdict is decided last, from all findings: names, channel faults, a changed constant, lines.
+
+    What predicts worse than the baseline, whose own residual shows nothing anywhere, was noise: it is taken back.
+    """
+    found = _answered(case, selected, located, completed, experiment, rng)
+    if not _was_noise(found):
+        return found
+    tried = " and ".join(dict.fromkeys(n.term.id for n in completed.earned))
+    bare = Completed(selected.before, (), {}, (), None, False, selected.before, located.left)
+    again = _answered(case, selected, located, bare, None, rng)
+    return replace(again, notes=(*again.notes, TAKEN_BACK.format(tried)))
+
+
+def _was_noise(found: Diagnosis) -> bool:
+    left = found.answer.remainder if isinstance(found.answer, Unexplained) else None
+    if left is None or not left.unpredictive or found.findings:
+        return False
+    return all(place.p_value >= policy.locate.RESIDUAL_FALSE_ALARM for place in found.mismatch)
+
+
+def _answered(
+    case: Case,
+    selected: Selected,
+    located: Located,
+    completed: Completed,
+    experiment: NextExperiment | None,
+    rng: np.random.Generator,
+) -> Diagnosis:
     data, before, after = selected.data, selected.before, completed.after
     measured = replace(data, histories=case.sound.histories)
     every = [np.ones(r.size, dtype=bool) for r in data.rows]

@@ -9,16 +9,22 @@ import numpy as np
 import pytest
 
 from identification.mismatch import policy
+from identification.mismatch.answer import stage
 from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.answer.verdict import decided
 from identification.mismatch.diagnosis import Explained, HeldOutRmse, Mismatch, Unexplained
+from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.faults.stage import Sound
+from identification.mismatch.locate.stage import run as located_by
+from identification.mismatch.name.stage import run as named_by
+from identification.mismatch.unnamed.stage import Completed
 from identification.mismatch.validate.held_out import Squares, growth_p, squares
 from identification.mismatch.validate.stage import score
 from identification.mismatch.value import Where
 from identification.physics.zero_offset import ZeroOffset
 from tests.identification.diagnosed_runs import NOISE
 from tests.identification.mismatch.answer.answered import SWEEP, UNEVEN, finding
-from tests.identification.mismatch.small import history, known_noise, selected, short
+from tests.identification.mismatch.small import history, known_noise, placed, rng, selected, short
 
 GROWN = HeldOutRmse(1.0, 1.2, 0.2, "blocks of time", 1e-4)
 A_LITTLE = replace(GROWN, after=1.04)
@@ -98,6 +104,33 @@ def test_a_jump_of_one_runs_zero_is_left_out_where_another_is_predicted():
     assert held.after <= 1.01 * held.before
     assert not held.grown
     assert "left out there: zero_offset" in held.what
+
+
+def answered_with(ratio, recording):
+    """What is said of a run where the search had ended with an asymmetry of that ratio, another run held out."""
+    chosen, unseen = selected({UNEVEN: (ratio,)}, [recording]), (history(short(seed=5)),)
+    model, theta = placed({UNEVEN: (ratio,)}, chosen.before.fit.theta)
+    off = replace(chosen.after, fit=fit(model, theta, chosen.data, chosen.before.weights, 0))
+    assert off.fit.values[UNEVEN] == (ratio,)
+    chosen = replace(chosen, after=off)
+    located = replace(located_by(chosen, rng(0)), estimate=off)
+    named = [replace(each, bic_gain=20.0) for each in named_by(chosen, located)]
+    completed = Completed(off, tuple(named), {}, (), None, False, off, located.left)
+    case = stage.Case((recording,), Sound(chosen.data.histories, unseen, (), ()), unseen, (), None, ())
+    return stage.run(case, chosen, located, completed, None, rng(2))
+
+
+def test_what_was_noise_is_taken_back_where_the_baseline_lacks_nothing():
+    found = answered_with(0.9, short())
+    assert found.verdict == "adequate"
+    assert found.model_terms == ()
+    assert found.heldout.after == found.heldout.before
+    assert any("noise that was followed" in note and "asymmetry" in note for note in found.notes)
+
+
+def test_it_stays_unexplained_where_the_baseline_does_lack_something():
+    found = answered_with(1.6, short(change=lambda _t, V, F: np.where(V < 0, 0.8, 1.0) * F))
+    assert found.verdict == "unexplained"
 
 
 def test_the_json_says_so(explained):
