@@ -224,7 +224,7 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
             for rival in rivals:
                 # a rarer one stays only where it is better by more than this: it must be so to come at all
                 rarer = int(system.rarer(term, rival.term)) - int(system.rarer(rival.term, term))
-                ordinary = rarer * policy.select.RIVALS_EQUAL_BIC
+                ordinary = rarer * policy.select.RARE_TERM_BIC
                 loss = rival.bic_loss - (max(price, ordinary) if price > 0 else ordinary)
                 lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.fit.values[rival.term]))
                 if lasts and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):

@@ -137,9 +137,10 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
             break
         more = price(other, data) - extra_now
         extra = more * logn
-        hopeless = now.chi2 + policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more)
-        new = _in_its_place(other, values, term, less, estimate, data, hopeless)
-        if new.chi2 - now.chi2 + extra < max(FORMS_BEYOND * policy.select.RIVAL_STATED_BIC, FORMS_SHARE * gain):
+        hopeless = policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more)
+        suited = max(FORMS_BEYOND * policy.select.RIVAL_STATED_BIC, FORMS_SHARE * gain)
+        new = _in_its_place(other, values, term, less, estimate, data, now.chi2 + max(hopeless, FORMS_SHARE * gain))
+        if new.chi2 - now.chi2 + extra < suited:
             new = best_forms(new, [t for t in terms if t.id != other.id], data, estimate.weights, estimate.noise)
         if at_bound(other, new, data, estimate.weights) or contradiction(new, other, estimate.noise, data):
             continue

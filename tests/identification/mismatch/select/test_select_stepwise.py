@@ -184,8 +184,8 @@ def test_what_has_impossible_values_gives_way_to_what_does_nearly_as_well():
 
 
 def test_a_rarer_rival_comes_only_where_it_would_stay():
-    """Better by 2 of BIC, it would go again for the ordinary one; better by more than equal ones differ, it stays."""
-    for gain, last in ((2.0, A), (policy.select.RIVALS_EQUAL_BIC + 2.0, B)):
+    """Better by 6 of BIC, it would go again for the ordinary one; better by more than rare ones must be, it stays."""
+    for gain, last in ((6.0, A), (policy.select.RARE_TERM_BIC + 2.0, B)):
         y = 9 * wave(0) + np.sqrt(gain) * wave(1)
         system = Columns(y, {A: wave(0), B: y / np.linalg.norm(y)}, rare=frozenset({B}))
         end, standing = exchanged(system, system.state(A))
