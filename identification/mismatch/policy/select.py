@@ -106,8 +106,8 @@ RARE_TERM_BIC = Threshold(
         "(blades that push less one way) to be named before it: odds of 50 to 1 of meeting one or the other."
     ),
     evidence=(
-        "docs/proof.md, lane field: of 40 composites 3 that hold an asymmetry were told as torque cross-talk, 3.6 to "
-        "61 BIC better beside other effects in a wrong form, C 3 to 7 % beside the truth."
+        "docs/proof.md, lane field: of 40 composites 4 that hold an asymmetry were told as torque cross-talk, 2 to 61 "
+        "BIC better beside other effects in a wrong form, C 3 to 7 % beside the truth."
     ),
 )
 RIVAL_REFIT_CHI2 = Threshold(
