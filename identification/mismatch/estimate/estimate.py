@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.singular_values import thin_svd
+from identification.mismatch.estimate.clock_hollows import in_best_hollow
 from identification.mismatch.estimate.fitting import Fit, bounds_of, columns_of, fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model
@@ -97,7 +98,7 @@ def refresh(
             shapes=shapes,
         )
     w = weights(data, noise, size, rate_noise, rows)
-    fitted = fit(model, theta, data, w)
+    fitted = in_best_hollow(fit(model, theta, data, w), data, w)
     return Estimate(fitted, noise, rate_noise, w, tuple(rows))
 
 

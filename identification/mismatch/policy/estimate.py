@@ -47,6 +47,11 @@ DOUBTFUL_CLOCK_SHIFT = Threshold(
         "fit is tried without one too."
     ),
 )
+CLOCK_HOLLOW_CHI2 = Threshold(
+    1.0,
+    unit="chi-square",
+    reason="A fit is begun again at another place of the clocks only where that is plainly better to first order.",
+)
 ROUNDING_UNSEEN = Threshold(
     0.02,
     unit="share of the variance of the mean of all samples of a level",

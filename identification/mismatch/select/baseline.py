@@ -17,7 +17,6 @@ from identification.mismatch.model.predictor import Predictor
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.rounding_error import rounding_errors
 from identification.mismatch.prepare.scales import scale_of
-from identification.mismatch.select.clock_shifts import with_clock_shifts
 from identification.mismatch.select.covariates import covariates
 from identification.mismatch.select.family_wise import MOST_PLAIN, lengths, matching_pursuit, orthogonal_basis
 from identification.mismatch.select.likeliest_trials import jumps
@@ -140,7 +139,7 @@ def baseline(data: Data, theta: Theta, terms: Sequence[Term], model: Model) -> E
     shapes by chance, and taken out at once they would make it look smaller than it is.
     """
     unit = unweighted(data)
-    first = fit(model, with_clock_shifts(model, theta, data), data, unit)
+    first = fit(model, theta, data, unit)
     estimate = refresh(model, first.theta, data, None, None)
     taken = 0
     shapes = every_shape(estimate.fit, data, terms)

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.mismatch.estimate.clock_hollows import in_best_hollow
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.select.baseline import baseline
-from identification.mismatch.select.clock_shifts import with_clock_shifts
 from identification.physics.motor_lag import MotorLag
 from identification.recording import Acquisition, Channel, Recording
 from tests.identification.diagnosed_runs import TOP, C
@@ -20,14 +20,14 @@ LATE = 0.002
 """s"""
 
 
-def in_step(late=LATE, after=0.0015, scatter=0.0006):
+def in_step(late=LATE, after=0.0015, scatter=0.0006, every=0.05):
     """Ramps written and rates told a hundred times a second, the rate 2 ms late, rows scattered about the ticks."""
     rng = np.random.default_rng(3)
     when = 0.01 * np.arange(4000) + 0.003
     volts = TOP * np.interp(when, np.arange(0.0, 41.0, 2.0), rng.uniform(-1.0, 1.0, 21))
     volts = np.round(volts / 0.05) * 0.05
     told = when + after + rng.normal(0.0, scatter, when.size)
-    thrust = np.arange(0.5, 39.5, 0.05)
+    thrust = np.arange(0.5, 39.5, every)
 
     def held(t):
         return volts[np.maximum(np.searchsorted(when, t, side="right") - 1, 0)]
@@ -43,10 +43,23 @@ def in_step(late=LATE, after=0.0015, scatter=0.0006):
     return Recording("in-step", "T1", channels, source="in-step.h5")
 
 
-def test_the_lateness_of_a_rate_in_step_is_found_past_a_tick():
-    data, theta = data_of([in_step()], clocks=True)
+def stood(data):
+    sizes = [np.zeros(rows.size) for rows in data.rows]
+    return weights(data, Noise(0.05**2, 0.0), sizes, Noise(0.003**2, 0.0), unit=True)
+
+
+def settled(data, theta):
+    w = stood(data)
+    return in_best_hollow(fit(Model(), theta, data, w), data, w)
+
+
+def test_the_lateness_of_both_is_found_past_a_tick_whatever_it_begins_with():
+    data, theta = data_of([in_step(every=0.0497)], clocks=True)  # samples that drift past the ticks tell of both
     assert data.with_rate
-    assert with_clock_shifts(Model(), theta, data).rate_shift == pytest.approx(LATE, abs=2e-4)
+    for begin in (0.0, -0.005, 0.005):
+        found = settled(data, replace(theta, shift=begin, rate_shift=-begin)).theta
+        assert found.rate_shift == pytest.approx(LATE, abs=2e-4)
+        assert found.shift == pytest.approx(LATE, abs=5e-4)
 
 
 def test_nothing_that_smooths_ticks_is_wanted_beside_it():
@@ -61,9 +74,9 @@ def test_nothing_that_smooths_ticks_is_wanted_beside_it():
 
 def test_clocks_that_agree_stay():
     data, theta = data_of([in_step(0.0)], clocks=False)
-    assert with_clock_shifts(Model(), theta, data) == theta
+    assert settled(data, theta).theta.rate_shift == 0
     doubted = replace(data, most_shift=0.006)
-    assert abs(with_clock_shifts(Model(), theta, doubted).rate_shift) < 2e-4
+    assert abs(settled(doubted, theta).theta.rate_shift) < 2e-4
 
 
 @pytest.mark.parametrize("off", [-3e-4, 3e-4])
@@ -72,9 +85,8 @@ def test_clocks_that_a_tick_stops_stop_nothing_else(off):
     parameters together was better, and C stayed where it began, two standard errors away."""
     recording = in_step(after=0.0023, scatter=0.0003)
     data, theta = data_of([recording], clocks=True)
-    begin = replace(with_clock_shifts(Model(), theta, data), C=C * (1 + off))
-    sizes = [np.zeros(rows.size) for rows in data.rows]
-    w = weights(data, Noise(0.05**2, 0.0), sizes, Noise(0.003**2, 0.0), unit=True)
+    begin = replace(settled(data, theta).theta, C=C * (1 + off))
+    w = stood(data)
     found = fit(Model(), begin, data, w)
     held, _ = data_of([recording], clocks=False)
     alone = fit(Model(), found.theta, replace(held, with_rate=False), replace(w, rate=()))

@@ -1,0 +1,78 @@
+"""A fit whose clocks ended in the wrong hollow is begun again in the right one.
+
+A command that ticks moves its samples by whole ticks: chi-square over the shift of a clock has a hollow for every tick
+that passes a sample, and a fit stays in the one it began in. What its other values then do to make up for it is a
+wrong lag and a wrong C, and looks like a delay or an inertia beside them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+
+from identification.mismatch import policy
+from identification.mismatch.estimate.fitting import Fit, bounds_of, fit, residual_of
+from identification.mismatch.model.data import Data
+from identification.mismatch.model.parameters import Theta
+from identification.mismatch.model.whitening import Weights
+from identification.recording import Floats
+
+Clock = Literal["shift", "rate_shift"]
+COARSE, FINE = 24, 5
+"""Steps from nothing to the most, and of one of those once it is found."""
+
+
+def in_best_hollow(found: Fit, data: Data, weights: Weights) -> Fit:
+    """The fit, or the better one that begins where chi-square over the clocks is least; its other values taken along.
+
+    As given where no run ticks, or the clocks are known.
+    """
+    if data.most_shift <= 0 or not any(h.ticks is not None for h in data.histories):
+        return found
+    for clock in _clocks(found, data, weights):
+        begin = _least(found, data, weights, clock)
+        if begin is not None:
+            other = fit(found.model, begin, data, weights, near=found)
+            found = min(found, other, key=lambda each: each.chi2)
+    return found
+
+
+def _clocks(found: Fit, data: Data, weights: Weights) -> Sequence[Clock]:
+    low, high, _ = bounds_of(found.model, data, found.theta)
+    thrust: Sequence[Clock] = ("shift",) if high[found.layout.shift] > low[found.layout.shift] else ()
+    return (*thrust, "rate_shift") if weights.rate else thrust
+
+
+def _least(found: Fit, data: Data, weights: Weights, clock: Clock) -> Theta | None:
+    """Where chi-square is least over one clock, all other values following it to first order; None: where it is."""
+    still = found.layout.shift if clock == "shift" else found.layout.rate_shift
+    free = np.flatnonzero(found.free)
+    others = free != still
+    columns = found.jacobian[:, others]
+    basis = np.linalg.qr(columns)[0]
+
+    def left(shift: float) -> Floats:
+        return residual_of(found.model, _moved(found.theta, clock, shift), data, weights)
+
+    def chi2(shift: float) -> float:
+        r = left(shift)
+        along = basis.T @ r
+        return float(r @ r - along @ along)
+
+    most = data.most_shift
+    step = most / COARSE
+    coarse = min((step * i for i in range(-COARSE, COARSE + 1)), key=chi2)
+    fine = (coarse + step * i / FINE for i in range(-FINE, FINE + 1))
+    best = min((shift for shift in fine if abs(shift) <= most), key=chi2)
+    if not chi2(best) < found.chi2 - policy.estimate.CLOCK_HOLLOW_CHI2:
+        return None
+    vector = _moved(found.theta, clock, best).vector
+    vector[free[others]] += np.linalg.lstsq(columns, left(best), rcond=None)[0]
+    return found.theta.with_vector(vector)
+
+
+def _moved(theta: Theta, clock: Clock, shift: float) -> Theta:
+    return replace(theta, shift=shift) if clock == "shift" else replace(theta, rate_shift=shift)
