@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import select
 import signal
 import sys
 from collections.abc import Callable
@@ -54,13 +56,21 @@ def main() -> None:
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of all noise (default: from the world file).")
 @click.option("--campaign", type=FILE, help="Run this campaign on the bench with `rig run`, compare its fits, and end.")
 @click.option("--output", type=FILE, default=Path("recordings"), help="Where --campaign records (default: recordings).")
+@click.option("--until-eof", is_flag=True, help="End when standard input ends too: with the process that holds it.")
 def run(
-    world: Path, links: Path | None, truth: Path | None, seed: int | None, campaign: Path | None, output: Path
+    world: Path,
+    links: Path | None,
+    truth: Path | None,
+    seed: int | None,
+    campaign: Path | None,
+    output: Path,
+    *,
+    until_eof: bool,
 ) -> None:
     """Start the bench of WORLD (TOML), print its ports and `ready`, live until SIGTERM or Ctrl+C."""
     if campaign is not None:
         raise SystemExit(calibrate(world, links, seed, campaign, output))
-    stop = stop_requests()
+    stop = stop_requests(until_eof=until_eof)
     try:
         bench = start(world, links, truth, seed)
     except WorldError as error:
@@ -167,8 +177,9 @@ def compare_vehicle(true: Path, answer: Path) -> None:
         fail(str(error))
 
 
-def stop_requests() -> Callable[[], bool]:
-    """From now on SIGTERM, SIGINT and SIGHUP only make the returned function say True."""
+def stop_requests(*, until_eof: bool) -> Callable[[], bool]:
+    """From now on SIGTERM, SIGINT and SIGHUP only make the returned function say True, with `until_eof` the end of
+    standard input too: no signal says that a parent was killed."""
     asked: list[int] = []
 
     def ask_to_stop(number: int, _frame: FrameType | None) -> None:
@@ -176,7 +187,12 @@ def stop_requests() -> Callable[[], bool]:
 
     for each in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
         signal.signal(each, ask_to_stop)
-    return lambda: bool(asked)
+    return lambda: bool(asked) or (until_eof and _ended(sys.stdin.fileno()))
+
+
+def _ended(descriptor: int) -> bool:
+    """Whether nothing more comes; what came is thrown away."""
+    return bool(select.select([descriptor], [], [], 0.0)[0]) and not os.read(descriptor, 4096)
 
 
 def live(bench: Bench, stop: Callable[[], bool]) -> None:

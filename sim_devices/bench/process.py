@@ -45,14 +45,16 @@ class RunningBench:
 
 @contextmanager
 def running(world: Path, links: Path, seed: int | None = None) -> Iterator[RunningBench]:
-    """Start the bench of a world file with its links and `truth.jsonl` in `links`; stop it at the end.
+    """Start the bench of a world file with its links and `truth.jsonl` in `links`; stop it at the end, which comes with
+    the end of this process at the latest, killed or not: the bench sees that nobody holds its standard input.
 
     Raises RuntimeError with the bench's own words when it does not start.
     """
     truth = links / "truth.jsonl"
     words = [sys.executable, "-m", "sim_devices", str(world.absolute()), "--links", str(links.absolute())]
-    words += ["--truth", str(truth.absolute())] + ([] if seed is None else ["--seed", str(seed)])
-    with subprocess.Popen(words, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, bufsize=0) as process:
+    words += ["--truth", str(truth.absolute()), "--until-eof"] + ([] if seed is None else ["--seed", str(seed)])
+    pipe = subprocess.PIPE
+    with subprocess.Popen(words, cwd=ROOT, stdin=pipe, stdout=pipe, stderr=pipe, bufsize=0) as process:
         try:
             _wait_until_ready(process)
             yield RunningBench(process, links, truth)

@@ -207,6 +207,28 @@ def test_links_are_removed_and_the_process_ends_in_order(tmp_path):
     assert [path.name for path in (tmp_path / "ports").iterdir()] == ["truth.jsonl"]
 
 
+HOLDS = """
+import sys, time
+from pathlib import Path
+from sim_devices.bench.process import running
+
+with running(Path(sys.argv[1]), Path(sys.argv[2])) as bench:
+    print(bench.process.pid, flush=True)
+    time.sleep(60.0)
+"""
+
+
+def test_a_bench_ends_with_the_process_that_started_it_killed_or_not(tmp_path):
+    holds = [sys.executable, "-c", HOLDS, str(WORLD), str(tmp_path / "ports")]
+    with subprocess.Popen(holds, cwd=ROOT, stdout=subprocess.PIPE, text=True) as holder:
+        bench = int(holder.stdout.readline())
+        words = Path(f"/proc/{bench}/cmdline")
+        assert words.read_bytes()
+        holder.kill()
+    wait_for(lambda: not words.exists() or not words.read_bytes(), "the end of the bench")  # a zombie has none
+    assert not [path for path in (tmp_path / "ports").iterdir() if path.is_symlink()]
+
+
 def test_a_world_that_cannot_be_ends_with_status_2(tmp_path):
     (tmp_path / "w.toml").write_text("seeed = 1\n")
     with pytest.raises(RuntimeError, match="did you mean 'seed'"), running(tmp_path / "w.toml", tmp_path / "ports"):
