@@ -7,6 +7,7 @@ wrong lag and a wrong C, and looks like a delay or an inertia beside them.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
@@ -21,8 +22,8 @@ from identification.mismatch.model.whitening import Weights
 from identification.recording import Floats
 
 Clock = Literal["shift", "rate_shift"]
-COARSE, FINE = 24, 5
-"""Steps from nothing to the most, and of one of those once it is found."""
+STEP, FINE = 0.00025, 5
+"""s of a first look, a fraction of what an interface takes to hand on a frame; and parts of it of the second."""
 
 
 def in_best_hollow(found: Fit, data: Data, weights: Weights) -> Fit:
@@ -62,11 +63,11 @@ def _least(found: Fit, data: Data, weights: Weights, clock: Clock) -> Theta | No
         along = basis.T @ r
         return float(r @ r - along @ along)
 
-    most = data.most_shift
-    step = most / COARSE
-    coarse = min((step * i for i in range(-COARSE, COARSE + 1)), key=chi2)
+    many = math.ceil(data.most_shift / STEP)
+    step = data.most_shift / many
+    coarse = min((step * i for i in range(-many, many + 1)), key=chi2)
     fine = (coarse + step * i / FINE for i in range(-FINE, FINE + 1))
-    best = min((shift for shift in fine if abs(shift) <= most), key=chi2)
+    best = min((shift for shift in fine if abs(shift) <= data.most_shift), key=chi2)
     if not chi2(best) < found.chi2 - policy.estimate.CLOCK_HOLLOW_CHI2:
         return None
     vector = _moved(found.theta, clock, best).vector

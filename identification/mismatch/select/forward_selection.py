@@ -176,18 +176,22 @@ class Thruster:
         return screen(estimate.fit, found, rng, spared)
 
     def additions(self, estimate: Estimate, judged: Screening) -> list[tuple[Candidate[Term], Fit]]:
-        """Candidates, fitted, that gain more than their parameters cost."""
+        """Candidates, fitted, that gain more than their parameters cost; one that plainly stays behind another is not
+        fitted to its end."""
         data, weights = self.data, estimate.weights
-        found = []
+        logn = float(np.log(estimate.fit.residual.size))
+        found, most = [], 0.0
         for term, values in _candidates(judged, data) if judged.largest > judged.threshold else []:
             self.watch.trying(f"{term.id} beside {_told(estimate.fit.model.terms)}")
             bigger, theta = estimate.fit.more(term, refined(estimate.fit, data, weights, term, values))
-            new = fit(bigger, theta, data, weights, near=estimate.fit)
-            gain = estimate.fit.chi2 - new.chi2
-            logn = float(np.log(new.residual.size))
             cost = price(term, data) * logn
+            behind = estimate.fit.chi2 - cost - policy.select.SIMPLER_TERM_GAIN * most
+            new = fit(bigger, theta, data, weights, hopeless=behind if most > 0 else np.inf, near=estimate.fit)
+            gain = estimate.fit.chi2 - new.chi2
             if gain > max(cost, logn):
-                found.append((Candidate(term, gain, cost, at_bound(term, new, data, weights)), new))
+                pressed = at_bound(term, new, data, weights)
+                found.append((Candidate(term, gain, cost, pressed), new))
+                most = most if pressed else max(most, gain - cost)
         return found
 
     def enlarged(self, estimate: Estimate, best: Fit) -> Estimate:
