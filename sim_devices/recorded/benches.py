@@ -13,6 +13,7 @@ import numpy as np
 
 from sim_devices.bench.settings import DeviceOptions
 from sim_devices.bench.virtual_wire import Host
+from sim_devices.concealed.cases.definition import Amplifier
 from sim_devices.instruments.line_sender import WIDTH, LineOptions
 from sim_devices.instruments.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.nortek import NortekOptions
@@ -49,6 +50,11 @@ class Cell:
     @property
     def average(self) -> int:
         return self.options.average
+
+    @property
+    def amplifier(self) -> Amplifier:
+        """The same for an oracle, to which a mean of pieces is one over time."""
+        return Amplifier(self.filter_time, 1.0 / self.rate if self.average > 1 else 0.0)
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sim_devices.concealed.cases.definition import Case, Concealed, Run, Sensor
-from sim_devices.concealed.cases.knob import Scale
+from sim_devices.concealed.cases.knob import Scale, Shape
 from sim_devices.concealed.cases.needs import NEEDS_DRIFT, NEEDS_FLOW
 from sim_devices.concealed.cases.shapes import SHAPES, shape
 from sim_devices.concealed.visibility.oracle import OutOfReach, levelled, scaled_to
@@ -21,6 +21,8 @@ Rng = np.random.Generator
 
 EFFECTS = tuple(e for e in SHAPES if e not in NEEDS_FLOW | NEEDS_DRIFT | {"thruster_interaction"})
 """What a run at rest water, alone on its bench, can show."""
+LEAST_SKEW = 0.012
+"""s; a recording of the rig states its commands and its stamps to 2 ms (1 sigma)."""
 TRIES = 30
 FINEST = 0.002
 """s: the world's longest step, and about that of the grid on which strengths are found."""
@@ -50,13 +52,18 @@ def drawn(
         case = found.case
         try:
             for effect in effects:
-                added = Concealed(shape(effect, case.scale, rng), 0.0)
+                added = Concealed(_told_apart(effect, shape(effect, case.scale, rng)), 0.0)
                 case = scaled_to(replace(case, effects=(*case.effects, added)), effect, strength)
             case = levelled(case, strength) if len(effects) > 1 else case
         except OutOfReach:
             continue
         return replace(found, case=case)
     raise OutOfReach(f"no case of {TRIES} shows {', '.join(effects)} at {strength} sigma; expected a lower strength")
+
+
+def _told_apart(effect: str, made: Shape) -> Shape:
+    """A delay is larger than what the recording says that it does not know of one: within that it is no finding."""
+    return replace(made, lowest=LEAST_SKEW) if effect == "time_skew" else made
 
 
 def _bare(rng: Rng, on: str, plan: str, duration: float) -> Drawn:
@@ -79,7 +86,7 @@ def _bare(rng: Rng, on: str, plan: str, duration: float) -> Drawn:
     case = Case(
         thruster=_thruster(scale, rng), scale=scale, dt=dt, every=every, first=0,
         runs=(Run(laid, ((0.0, 0.0),), tare, 0.0, int(rng.integers(2**62))),), noise_kind=kind, noise=law,
-        sensors=_sensors(scale, dt, rng),
+        sensors=_sensors(scale, dt, rng), amplifier=on_bench.cell.amplifier,
     )  # fmt: skip
     return Drawn(on_bench, made, case)
 

@@ -23,6 +23,9 @@ from identification.run_history.splines import spline
 MOST_NODES = 17
 """Nodes of the smooth curve beside which the noise of a table is judged: as many as covariates have hats."""
 
+HOLLOWS = 3
+"""Times that a fit may be begun again in another hollow of the clocks; noise and clocks agree after one."""
+
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
@@ -63,8 +66,22 @@ def refresh(
 ) -> Estimate:
     """Noise by REML on what the model leaves, the columns of the model (and of what was pursued) taken as fitted.
 
-    `like`: a noise whose time scales are kept, so that likelihoods can be compared.
+    `like`: a noise whose time scales are kept, so that likelihoods can be compared. Where the clocks stood in a wrong
+    hollow, what was left was not noise, and it is estimated anew.
     """
+    for _ in range(HOLLOWS):
+        estimate = _refreshed(model, theta, data, extra, estimate, like)
+        deeper = in_best_hollow(estimate.fit, data, estimate.weights)
+        if deeper is estimate.fit:
+            return estimate
+        theta = deeper.theta
+    return _refreshed(model, theta, data, extra, estimate, like)
+
+
+def _refreshed(
+    model: Model, theta: Theta, data: Data, extra: Floats | None, estimate: Estimate | None, like: Noise | None
+) -> Estimate:
+    """The noise of what this leaves, and the fit with it."""
     size = forces(model, theta, data)
     thrust, rate = raw(model, theta, data, with_rate=data.with_rate)
     left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]
@@ -98,8 +115,7 @@ def refresh(
             shapes=shapes,
         )
     w = weights(data, noise, size, rate_noise, rows)
-    fitted = in_best_hollow(fit(model, theta, data, w), data, w)
-    return Estimate(fitted, noise, rate_noise, w, tuple(rows))
+    return Estimate(fit(model, theta, data, w), noise, rate_noise, w, tuple(rows))
 
 
 def unweighted(data: Data) -> Weights:

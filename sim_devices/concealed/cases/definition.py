@@ -65,6 +65,16 @@ class Run:
     """Of the recorded command, what the motor controller of this run puts on the motor."""
 
 
+@dataclass(frozen=True, slots=True)
+class Amplifier:
+    """What is done to a force before it is a reading: a low pass of the first order, then a mean."""
+
+    low_pass: float = 0.0
+    """s; 0: none."""
+    window: float = 0.0
+    """s that end with the reading; 0: none."""
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Case:
     """Draw one with `draw.case`, measure it with `oracle.strength`, make its arrays with `records.rows`."""
@@ -91,6 +101,8 @@ class Case:
     """K/s."""
     with_steps: bool = True
     """Whether the recording holds a table of steps."""
+    amplifier: Amplifier = Amplifier()
+    """Of the bench that records it; arrays of a case are made without one."""
 
     @property
     def rate(self) -> float:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import math
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
+from scipy.signal import lfilter
 
-from sim_devices.concealed.cases.definition import Case, history, thrust_of
+from sim_devices.concealed.cases.definition import Amplifier, Case, history, thrust_of
 from sim_devices.concealed.cases.plans import held
 from sim_devices.concealed.visibility.whitening import Whitening
 from sim_devices.world.history import clock
@@ -16,8 +20,23 @@ Floats = NDArray[np.float64]
 
 
 def signals(case: Case, without: frozenset[str] = frozenset()) -> list[Floats]:
-    """Noise-free thrust of each run."""
-    return [thrust_of(case, run, history(case, run, without=without), without=without) for run in case.runs]
+    """Noise-free thrust of each run, as its amplifier hands it on."""
+    found = []
+    for run in case.runs:
+        h = history(case, run, without=without)
+        seen = replace(h, reading=amplified(h.reading, case.dt, case.amplifier))
+        found.append(thrust_of(case, run, seen, without=without))
+    return found
+
+
+def amplified(force: Floats, dt: float, how: Amplifier) -> Floats:
+    """A force on a grid of `dt` (s), behind the low pass and the mean of an amplifier; at rest before it began."""
+    if how.low_pass > 0:
+        keep = math.exp(-dt / how.low_pass)
+        force = lfilter([1.0 - keep], [1.0, -keep], force, zi=np.array([keep * force[0]]))[0]
+    pieces = max(round(how.window / dt), 1)
+    before = np.full(pieces - 1, force[0])
+    return np.convolve(np.concatenate([before, force]), np.full(pieces, 1.0 / pieces), "valid")
 
 
 class Projection:

@@ -2,6 +2,7 @@
 
 import json
 import tomllib
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,6 +10,9 @@ import pytest
 from rig.campaign.loading import load_campaign
 from rig.cli import record_in_virtual_time
 from rig.hdf5.load import load
+from sim_devices.concealed.cases.definition import Amplifier
+from sim_devices.concealed.visibility.oracle import strength
+from sim_devices.concealed.visibility.projection import amplified
 from sim_devices.recorded.benches import BENCHES
 from sim_devices.recorded.campaign import PLANS, bench_file, campaign_file
 from sim_devices.recorded.draw import EFFECTS, drawn
@@ -37,6 +41,24 @@ def test_the_same_seed_is_the_same_case_and_a_mean_is_as_noisy_as_asked():
     assert one.campaign == same.campaign
     assert one.case.thruster == same.case.thruster
     assert noises(one)["thrust"].white == pytest.approx(one.case.noise.white * 16**0.5)
+
+
+def test_strengths_are_of_what_the_amplifier_lets_through():
+    step, dt = np.where(np.arange(400) < 100, 0.0, 2.0), 0.001
+    behind = amplified(step, dt, Amplifier(low_pass=0.02))
+    assert behind[119] == pytest.approx(2.0 * (1.0 - np.exp(-1.0)), rel=0.01)
+    mean = amplified(step, dt, Amplifier(window=0.05))
+    assert mean[[99, 124, 149]] == pytest.approx([0.0, 1.0, 2.0], abs=0.05)
+    assert amplified(step, dt, Amplifier()) == pytest.approx(step)
+    made = drawn(np.random.default_rng(3), "balance", ["periodic_disturbance"], 40.0, "interleaved", 60.0).case
+    assert made.amplifier.window == pytest.approx(0.05)
+    assert strength(replace(made, amplifier=Amplifier(window=0.5)), "periodic_disturbance") < 30.0
+
+
+def test_a_delay_is_larger_than_what_the_recording_does_not_know_of_one():
+    for seed in range(3):
+        (skew,) = drawn(np.random.default_rng(seed), "amplifier", ["time_skew"], 40.0, "interleaved", 60.0).case.effects
+        assert skew.parameters["delay"] >= 0.01
 
 
 def test_what_a_bench_cannot_show_is_refused():
