@@ -26,7 +26,6 @@ from rig.twin.reading import read_twin
 from rig.twin.writing import twin_json, write_twin
 from tests.identification.diagnosed_runs import C, run
 
-
 QUIET = 0.2
 """N: five samples a second at this tell as much as ten at the noise of other runs, in a third of the time."""
 
