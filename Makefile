@@ -36,9 +36,10 @@ imports: $(VENV)/.test
 
 check: lint types imports
 
-test: check wheel
+test: $(VENV)/.test
+	$(MAKE) --no-print-directory --output-sync -j 2 types wheel lint imports
 	THRUSTER_RIG_CI=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m "not alone" --cov --cov-report= --durations=15
-	THRUSTER_RIG_CI=1 $(BIN)/python -m pytest -m alone --reruns 3 --only-rerun 'did not get where the test begins' --cov --cov-append --cov-report=term:skip-covered --durations=15
+	THRUSTER_RIG_CI=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m alone --reruns 3 --only-rerun 'did not get where the test begins' --cov --cov-append --cov-report=term:skip-covered --durations=15
 	$(BIN)/python tests/coverage_floor.py
 
 wheel: $(VENV)/.test

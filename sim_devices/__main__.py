@@ -1,4 +1,7 @@
-"""`python -m sim_devices WORLD.toml` starts a bench; `python -m sim_devices mount CONTROL THRUSTER` works its crane."""
+"""`python -m sim_devices WORLD.toml` starts a bench; `python -m sim_devices mount CONTROL THRUSTER` works its crane.
+
+What a command needs is imported when the command is called: a bench, and a thruster on it, shall not wait for scipy.
+"""
 
 from __future__ import annotations
 
@@ -11,24 +14,17 @@ from collections.abc import Callable
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from types import FrameType
-from typing import NoReturn, TextIO
+from typing import TYPE_CHECKING, NoReturn, TextIO
 
 import click
-import numpy as np
 
-from sim_devices.bench.bench import Bench, start
 from sim_devices.bench.process import running
-from sim_devices.bench.settings import load
 from sim_devices.bench.truth_table import SUSPICIOUS, compare, table
-from sim_devices.concealed.sealing.on_disc import KINDS, conceal
-from sim_devices.recorded.on_disc import KINDS as RECORDED_KINDS
-from sim_devices.recorded.on_disc import conceal as conceal_recorded
 from sim_devices.tables import WorldError
-from sim_devices.vehicle.documents import held_out, recorded, trials, truth, tunnel
-from sim_devices.vehicle.settings import load as load_vehicle
-from sim_devices.vehicle.truth_table import compare as compare_answer
-from sim_devices.vehicle.truth_table import table as vehicle_table
 from sim_devices.wires.ports import ask
+
+if TYPE_CHECKING:
+    from sim_devices.bench.bench import Bench
 
 FILE = click.Path(path_type=Path)
 FITS = "fits.json"
@@ -68,6 +64,8 @@ def run(
     until_eof: bool,
 ) -> None:
     """Start the bench of WORLD (TOML), print its ports and `ready`, live until SIGTERM or Ctrl+C."""
+    from sim_devices.bench.bench import start
+
     if campaign is not None:
         raise SystemExit(calibrate(world, links, seed, campaign, output))
     stop = stop_requests(until_eof=until_eof)
@@ -85,6 +83,7 @@ def calibrate(world: Path, links: Path | None, seed: int | None, campaign: Path,
     The console opens where there is a terminal, the progress bar elsewhere.
     """
     from rig.cli import main as rig
+    from sim_devices.bench.settings import load
 
     before = set(output.glob(f"*/{FITS}"))
     words = ["run", str(campaign), "--output", str(output), *([] if sys.stdout.isatty() else ["--headless"])]
@@ -110,7 +109,11 @@ def calibrate(world: Path, links: Path | None, seed: int | None, campaign: Path,
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of all noise (default: from the file).")
 def vehicle(settings: Path, out: Path, seed: int | None) -> None:
     """Simulate the vehicle of SETTINGS (TOML): recordings of tunnel, trials and trials to check on, into folder OUT."""
+    import numpy as np
+
     from rig.cli import main as rig
+    from sim_devices.vehicle.documents import held_out, recorded, trials, truth, tunnel
+    from sim_devices.vehicle.settings import load as load_vehicle
 
     try:
         described = load_vehicle(settings)
@@ -140,6 +143,9 @@ def vehicle(settings: Path, out: Path, seed: int | None) -> None:
 @main.command("concealable")
 def concealable() -> None:
     """What `conceal` can be asked for, as JSON: effects, their forms, lies about channels, kinds of noise, benches."""
+    from sim_devices.concealed.sealing.on_disc import KINDS
+    from sim_devices.recorded.on_disc import KINDS as RECORDED_KINDS
+
     click.echo(json.dumps({**KINDS, **RECORDED_KINDS}, indent=1))
 
 
@@ -153,6 +159,8 @@ def conceal_cases(spec: TextIO, out: Path) -> None:
     case with a `bench` is recorded on it by the rig's own control loop, drivers and file, in virtual time.
     """
     from rig.cli import record_in_virtual_time
+    from sim_devices.concealed.sealing.on_disc import conceal
+    from sim_devices.recorded.on_disc import conceal as conceal_recorded
 
     try:
         for line in filter(str.strip, iter(spec.readline, "")):
@@ -171,6 +179,9 @@ def conceal_cases(spec: TextIO, out: Path) -> None:
 @click.argument("answer", type=FILE)
 def compare_vehicle(true: Path, answer: Path) -> None:
     """The vehicle in TRUE (truth.json) beside ANSWER, what `rig vehicle --json` wrote of its recordings."""
+    from sim_devices.vehicle.truth_table import compare as compare_answer
+    from sim_devices.vehicle.truth_table import table as vehicle_table
+
     try:
         click.echo(vehicle_table(compare_answer(true, answer)))
     except WorldError as error:

@@ -15,8 +15,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.fft import dct
 from scipy.special import ndtr
-from scipy.stats import t as student
 
+from identification.estimation.tails import student_quantile
 from identification.recording import Floats
 
 SHARES = (0.0, 0.01, 0.03, 0.1, 0.3, 0.6, 0.85, 0.97, 1.0)
@@ -37,9 +37,9 @@ MIN_SAMPLES = 5
 """Fewer samples carry no usable information on their own correlation."""
 
 _DOF: Floats = np.geomspace(1.0, 1e4, 80)
-_T95: Floats = np.asarray(student.ppf(0.975, _DOF))
+_T95: Floats = student_quantile(0.975, _DOF)
 _ONE_SIGMA = 0.3173105078629141
-_RATIO: Floats = _T95 / np.asarray(student.ppf(1 - _ONE_SIGMA / 2, _DOF))
+_RATIO: Floats = _T95 / student_quantile(1 - _ONE_SIGMA / 2, _DOF)
 
 
 def ar1_spectrum(frequency: Floats, tau: Floats) -> Floats:

@@ -13,12 +13,12 @@ from dataclasses import dataclass, replace
 from typing import Generic, TypeVar
 
 import numpy as np
-from scipy.stats import chi2 as chi2_law
 
 from identification.estimation.even_noise import MIN_SAMPLES, NoiseModel, leverage
 from identification.estimation.information import Excitation, Information, excitation, linear_information
 from identification.estimation.regression import RANK_TOLERANCE, LinearFit, block_noise, correlated_std, least_squares
 from identification.estimation.singular_values import thin_svd
+from identification.estimation.tails import chi2_sf
 from identification.estimation.verdicts import (
     ALPHA,
     Significance,
@@ -149,7 +149,7 @@ class _Spectra:
 
     def rarity(self, chi2: float) -> float:
         """Chance of a larger J / sigma^2 than `chi2`, averaged over what the spectrum may be."""
-        rare = np.asarray(chi2_law.sf(chi2 / self.mean * self.worth, self.worth), dtype=np.float64)
+        rare = chi2_sf(chi2 / self.mean * self.worth, self.worth)
         return self.average(rare)
 
 

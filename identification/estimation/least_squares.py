@@ -15,11 +15,10 @@ from typing import Literal
 import numpy as np
 from scipy.fft import dct, idct
 from scipy.optimize import brentq
-from scipy.stats import norm
-from scipy.stats import t as student
 
 from identification.estimation.even_noise import MIN_SAMPLES, NoiseModel
 from identification.estimation.regression import LinearFit, block_noise, correlated_std, least_squares
+from identification.estimation.tails import normal_quantile, normal_sf, student_sf
 from identification.estimation.verdicts import Underfit, underfit
 from identification.recording import Floats
 
@@ -121,8 +120,8 @@ def _judge(rows: Rows, fit: LinearFit) -> Underfit:
     assert rows.dof is not None
     z = np.abs(fit.residual / rows.std_error)
     finite = np.isfinite(rows.dof)
-    rare = np.where(finite, student.sf(z, np.where(finite, rows.dof, 1.0)), norm.sf(z))
-    deviate = np.where(rare > 1e-300, norm.isf(np.maximum(rare, 1e-300)), z)
+    rare = np.where(finite, student_sf(z, np.where(finite, rows.dof, 1.0)), normal_sf(z))
+    deviate = np.where(rare > 1e-300, -normal_quantile(np.maximum(rare, 1e-300)), z)
     return underfit(float(deviate @ deviate), fit.dof, scale_dof=rows.most_dof)
 
 

@@ -1,4 +1,4 @@
-"""Tails of the laws that tests are judged by, right down to the smallest float, and quick to import.
+"""Tails and quantiles of the laws that tests are judged by, right down to the smallest float, and quick to import.
 
 scipy.special has what scipy.stats is made of, and comes up half a second sooner. The tail of the non-central chi-square
 is its Poisson mixture, summed where it has weight: one minus the distribution function is nothing below 1e-16.
@@ -7,7 +7,7 @@ is its Poisson mixture, summed where it has weight: one minus the distribution f
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import chdtrc, chdtri, fdtrc, gammaincc, gammaincinv, gammaln, ndtr, stdtr
+from scipy.special import chdtrc, chdtri, fdtrc, gammaincc, gammaincinv, gammaln, ndtr, ndtri, stdtr, stdtrit
 
 from identification.recording import Floats
 
@@ -17,7 +17,7 @@ AROUND = 40
 """Terms that are summed beside those."""
 
 
-def chi2_sf(x: Floats | float, dof: float) -> Floats:
+def chi2_sf(x: Floats | float, dof: Floats | float) -> Floats:
     """P(chi-square of `dof` > x).
 
     >>> round(float(chi2_sf(3.841459, 1)), 4)
@@ -38,9 +38,31 @@ def normal_sf(x: Floats | float) -> Floats:
     return out
 
 
-def student_sf(x: Floats | float, dof: float) -> Floats:
-    """P(Student's t of `dof` > x)."""
-    out: Floats = np.asarray(stdtr(dof, np.negative(x)), dtype=np.float64)
+def normal_quantile(p: Floats | float) -> Floats:
+    """Value that a standard normal stays below with probability p.
+
+    >>> round(float(normal_quantile(0.975)), 4)
+    1.96
+    """
+    out: Floats = np.asarray(ndtri(p), dtype=np.float64)
+    return out
+
+
+def student_sf(x: Floats | float, dof: Floats | float) -> Floats:
+    """P(Student's t of `dof` > x); infinitely many are the normal law."""
+    known = np.isposinf(dof)
+    out: Floats = np.where(known, ndtr(np.negative(x)), stdtr(np.where(known, 1.0, dof), np.negative(x)))
+    return out
+
+
+def student_quantile(p: float, dof: Floats | float) -> Floats:
+    """Value that Student's t of `dof` stays below with probability p; infinitely many are the normal law, 0 give NaN.
+
+    >>> round(float(student_quantile(0.975, 10)), 4), round(float(student_quantile(0.975, float("inf"))), 4)
+    (2.2281, 1.96)
+    """
+    known = np.isposinf(dof)
+    out: Floats = np.where(known, ndtri(p), stdtrit(np.where(known, 1.0, dof), p))
     return out
 
 

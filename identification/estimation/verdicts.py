@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2 as chi2_law
-from scipy.stats import f as f_law
-from scipy.stats import t as student
 
 from identification.estimation.ljung_box import ljung_box
+from identification.estimation.tails import chi2_sf, fisher_sf, student_quantile, student_sf
 from identification.recording import Floats
 
 ALPHA = 0.05
@@ -46,10 +44,10 @@ def significance(value: float, std: float, dof: float = float("inf"), alpha: flo
     """
     if not (np.isfinite(value) and np.isfinite(std)):
         return Significance(value, std, float("inf"), 0.0, False, 1.0)
-    c = float(student.ppf(1 - alpha / 2, dof)) if dof > 0 else float("inf")
+    c = float(student_quantile(1 - alpha / 2, dof)) if dof > 0 else float("inf")
     percent = 100 * std / abs(value) if value != 0 else float("inf")
     ratio = abs(value) / std if std > 0 else (float("inf") if value != 0 else 0.0)
-    p_value = float(2 * student.sf(ratio, dof)) if dof > 0 else 1.0
+    p_value = float(2 * student_sf(ratio, dof)) if dof > 0 else 1.0
     return Significance(value, std, percent, 100 / c, bool(ratio > c), p_value)
 
 
@@ -86,9 +84,9 @@ def underfit(chi2: float, dof: int, alpha: float = ALPHA, scale_dof: float = flo
     if dof <= 0:
         p_value = 1.0
     elif np.isfinite(scale_dof):
-        p_value = float(f_law.sf(chi2 / dof, dof, scale_dof))
+        p_value = float(fisher_sf(chi2 / dof, dof, scale_dof))
     else:
-        p_value = float(chi2_law.sf(chi2, dof))
+        p_value = float(chi2_sf(chi2, dof))
     return Underfit(chi2, dof, p_value, p_value < alpha)
 
 
@@ -132,5 +130,5 @@ def whiteness(residual: Floats, alpha: float = ALPHA) -> Whiteness | None:
     if n < 10:
         return None
     lags = min(10, n // 5)
-    p_value = float(chi2_law.sf(ljung_box([residual - residual.mean()], [lags]), lags))
+    p_value = float(chi2_sf(ljung_box([residual - residual.mean()], [lags]), lags))
     return Whiteness(p_value, lags, p_value >= alpha)

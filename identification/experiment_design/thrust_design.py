@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.stats import norm
 
 from identification.estimation.regression import Deficiency, least_squares
+from identification.estimation.tails import normal_quantile
 from identification.recording import Floats
 
 LEVEL, POWER = 0.05, 0.8
@@ -178,5 +178,5 @@ def noticed(found: Promise, levels: Floats, voltage: Floats) -> Floats:
         shift = (np.abs(voltage - level) < 1e-9) / found.std_error
         left = float(shift @ shift - shift @ hat @ shift)
         if left > 1e-9 * float(shift @ shift):
-            out[i] = (norm.ppf(1 - LEVEL / 2) + norm.ppf(POWER)) / np.sqrt(left)
+            out[i] = (normal_quantile(1 - LEVEL / 2) + normal_quantile(POWER)) / np.sqrt(left)
     return out

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import t as student
 
 from identification.estimation.even_noise import MIN_SAMPLES, fit_noise, leverage
+from identification.estimation.tails import student_quantile
 from identification.recording import Floats
 
 BATCH = 5
@@ -72,7 +72,7 @@ def _believed(size: float, residual: Floats, column: Floats) -> bool:
         return False
     power = float(column @ column)
     std, dof = fit_noise(residual, leverage(column[:, None] / np.sqrt(power))).combination_std(column / power)
-    return bool(abs(size) > np.sqrt(F_SHIFT) / 1.96 * float(student.ppf(0.975, dof)) * std)
+    return bool(abs(size) > np.sqrt(F_SHIFT) / 1.96 * float(student_quantile(0.975, dof)) * std)
 
 
 def _shifted(values: Floats, cut: int) -> bool:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import t as student
 
 from identification.estimation.even_noise import MIN_SAMPLES, NoiseModel, fit_noise, leverage
+from identification.estimation.tails import student_quantile
 from identification.recording import Floats
 from identification.steady_state.asymptote import Asymptote, asymptote
 from identification.steady_state.settling import settle
@@ -48,7 +48,7 @@ class MeanEstimate:
         """The slope is significant at 1 %."""
         if not np.isfinite(self.drift_std):
             return False
-        return bool(abs(self.drift) > student.ppf(1 - DRIFT_ALPHA / 2, self.drift_dof) * self.drift_std)
+        return bool(abs(self.drift) > student_quantile(1 - DRIFT_ALPHA / 2, self.drift_dof) * self.drift_std)
 
 
 def mean_estimate(

@@ -14,11 +14,8 @@ from itertools import combinations
 
 import numpy as np
 from scipy.optimize import brentq
-from scipy.stats import chi2 as chi2_law
-from scipy.stats import f as f_law
-from scipy.stats import nct, norm
-from scipy.stats import t as student
 
+from identification.estimation.tails import chi2_sf, fisher_sf, normal_sf, student_quantile, student_sf
 from identification.estimation.verdicts import ALPHA
 from identification.recording import Floats
 
@@ -106,7 +103,7 @@ def homogeneity(groups: Sequence[Group]) -> Homogeneity:
     c = dof + 2 * A - 6 * A / (dof + 2)
     dof_error = dof * (dof + 2) / (3 * A) if A > 0 else float("inf")
     F = chi2 / c
-    p_value = float(f_law.sf(F, dof, dof_error)) if dof_error < MANY else float(chi2_law.sf(F * dof, dof))
+    p_value = float(fisher_sf(F, dof, dof_error)) if dof_error < MANY else float(chi2_sf(F * dof, dof))
     return Homogeneity(chi2, F, dof, dof_error, p_value, common, cov)
 
 
@@ -157,7 +154,7 @@ def difference(a: Group, b: Group, i: int = 0, *, of: int = 1) -> Difference:
     value, std, dof = _welch(a, b, i)
     few = min(dof, MANY)
     ratio = abs(value) / std if std > 0 else (np.inf if value else 0.0)
-    t, p_value = float(student.ppf(1 - ALPHA / (2 * of), few)), float(2 * student.sf(ratio, few))
+    t, p_value = float(student_quantile(1 - ALPHA / (2 * of), few)), float(2 * student_sf(ratio, few))
     first = float(a.mean[i])
     relative = value / first if first else float("nan")
     low, high = _ratio_interval(a, b, i, t)
@@ -201,13 +198,15 @@ def smallest_change(std: float, dof: float, power: float = POWER) -> float:
     >>> round(smallest_change(1.0, 1e9), 2), round(smallest_change(1.0, 5.0), 2)
     (2.8, 3.51)
     """
+    from scipy.stats import nct  # half a second, for comparisons alone
+
     if not std > 0:
         return 0.0 if std == 0 else float("nan")
     few = min(dof, MANY)
-    t = float(student.ppf(1 - ALPHA / 2, few))
+    t = float(student_quantile(1 - ALPHA / 2, few))
 
     def surplus(shift: float) -> float:
-        seen = norm.sf(t - shift) if few >= MANY else nct.sf(t, few, shift)
+        seen = normal_sf(t - shift) if few >= MANY else nct.sf(t, few, shift)
         return float(seen) - power  # the other tail holds less than 1e-4
 
     return std * float(brentq(surplus, 0.0, 2 * t + 10, rtol=1e-6))

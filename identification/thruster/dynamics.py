@@ -17,10 +17,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import t as student
 
 from identification.estimation.maximum_likelihood import Gaussian
 from identification.estimation.regression import least_squares
+from identification.estimation.tails import student_quantile
 from identification.estimation.verdicts import Significance, Whiteness, significance, whiteness
 from identification.recording import Floats, Recording
 from identification.thruster.rotor_data import STEP, Drive, drive
@@ -98,7 +98,7 @@ class DynamicsFit:
     def interval(self, name: str) -> tuple[float, float]:
         """95 %."""
         value, std = self.estimate[name], self.estimate.std_of(name)
-        half = float(student.ppf(0.975, self.dof[name])) * std
+        half = float(student_quantile(0.975, self.dof[name])) * std
         return value - half, value + half
 
 

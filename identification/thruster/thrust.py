@@ -8,9 +8,9 @@ from itertools import combinations
 from typing import Literal
 
 import numpy as np
-from scipy.stats import t as student
 
 from identification.estimation.least_squares import Estimate, Method, estimate
+from identification.estimation.tails import student_quantile
 from identification.estimation.verdicts import Significance, Whiteness, significance, whiteness
 from identification.recording import Floats, Recording
 from identification.thruster.thrust_data import Run, Unusable, prepare
@@ -113,7 +113,7 @@ def _parameter(found: Estimate, runs: Sequence[Run], contrast: Floats, unit: str
     dof = spread.dof
     if std > 0 and spread.std > 0 and np.isfinite(dof):
         dof = spread.dof * (std / spread.std) ** 4  # Welch-Satterthwaite: the type B part has infinite dof
-    half = float(student.ppf(0.975, dof)) * std if dof > 0 else float("nan")
+    half = float(student_quantile(0.975, dof)) * std if dof > 0 else float("nan")
     white = float("nan")
     if np.isfinite(spread.std):
         white = _uncorrected(found, runs, contrast)

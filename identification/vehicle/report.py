@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from identification.estimation.maximum_likelihood import Gaussian
+from identification.estimation.tails import normal_quantile
 from identification.estimation.verdicts import significance
 from identification.vehicle.steady_drag import unit_of
 
-COVER_95 = float(norm.ppf(0.975))
+COVER_95 = float(normal_quantile(0.975))
 CALIBRATION = ("C[", "C+[", "C-[", "thrust[")
 """How names of thruster coefficients begin."""
 

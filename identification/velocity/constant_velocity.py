@@ -12,10 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.stats import chi2, norm
-from scipy.stats import t as student
 
 from identification.estimation.even_noise import fit_noise, leverage
+from identification.estimation.tails import chi2_sf, normal_quantile, student_sf
 from identification.estimation.verdicts import significance
 from identification.recording import Floats
 from identification.steady_state.pooling import moderate
@@ -130,9 +129,9 @@ def _seen(lines: Sequence[Line], T: Floats) -> bool:
     for line, constant in zip(lines, T, strict=True):
         if constant > 0:
             value, std, dof = _last_coefficient(_columns(line, constant), line.position)
-            rare = student.sf(abs(value) / std, dof) if std > 0 else 0.5
-            power, runs = power + float(norm.isf(max(float(rare), 1e-300))) ** 2, runs + 1
-    return bool(chi2.sf(power, runs + 1) * APPROACHES.size < CURVED)
+            rare = student_sf(abs(value) / std, dof) if std > 0 else 0.5
+            power, runs = power + float(-normal_quantile(max(float(rare), 1e-300))) ** 2, runs + 1
+    return bool(chi2_sf(power, runs + 1) * APPROACHES.size < CURVED)
 
 
 def velocities(

@@ -12,11 +12,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from scipy.stats import t as student
 
 from identification.estimation.batches import BatchSums, Sandwich, sandwich
 from identification.estimation.regression import LinearFit
 from identification.estimation.streaming import Block, Condensed, condense, join, solve
+from identification.estimation.tails import student_quantile
 from identification.recording import Channel, Floats, Recording
 from identification.steady_state.holds import Window, from_steps, overlap_free, without_waiting
 from identification.steady_state.points import FALLBACK
@@ -240,6 +240,6 @@ def _parameter(fit: LinearFit, spread: Sandwich, i: int, unit: str, gain: float)
     std, dof = float(np.hypot(scatter, calibration)), float(spread.dof[i])
     if scatter > 0:
         dof *= (std / scatter) ** 4  # Welch-Satterthwaite: the calibration has infinite dof
-    half = float(student.ppf(0.975, dof)) * std
+    half = float(student_quantile(0.975, dof)) * std
     alone = float(fit.std[i])
     return Parameter(value, std, unit, scatter, calibration, alone, dof, value - half, value + half)

@@ -7,9 +7,9 @@ normal errors in the same way (Atkinson, Plots, Transformations and Regression, 
 from __future__ import annotations
 
 import numpy as np
-from scipy.stats import norm
 
 from identification.estimation.least_squares import Estimate
+from identification.estimation.tails import normal_quantile
 from identification.recording import Floats
 from rig.report.regression_figures import NormalOrder
 
@@ -60,5 +60,6 @@ def _studentised(rows: Floats) -> Floats:
 def _order(measured: Floats, simulated: Floats) -> NormalOrder:
     n = measured.size
     low, middle, high = np.quantile(np.sort(simulated, axis=1), (0.025, 0.5, 0.975), axis=0)
-    quantile = norm.ppf((np.arange(1, n + 1) - 0.375) / (n + 0.25))  # Blom, Statistical Estimates, 1958
+    rank = np.arange(1, n + 1, dtype=np.float64)
+    quantile = normal_quantile((rank - 0.375) / (n + 0.25))  # Blom, Statistical Estimates, 1958
     return NormalOrder(quantile, np.sort(measured), low, middle, high)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+import os
 import time
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
@@ -12,6 +12,7 @@ import pytest
 
 from tests.reliability.live import NOT_BEGUN
 from tests.reliability.metronome import longest, metronome, stalled
+from tests.reliability.numbers_measured import keep
 
 HERE = Path(__file__).parent
 RESULTS = HERE.parents[1] / "build" / "reliability.json"
@@ -21,28 +22,28 @@ TRIPS = 0.1
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """They measure how late things happen: nothing else may run beside them."""
+    """They measure how late things happen: two at once, each of a third of a core, and nothing else."""
     for item in items:
         if HERE in item.path.parents:
             item.add_marker(pytest.mark.alone)
 
 
 @pytest.fixture(scope="session")
-def measured() -> Iterator[dict[str, dict[str, float | str]]]:
+def measured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, dict[str, float | str]]]:
     numbers: dict[str, dict[str, float | str]] = {}
     yield numbers
-    RESULTS.parent.mkdir(exist_ok=True)
-    RESULTS.write_text(json.dumps(numbers, indent=1) + "\n")
+    own = tmp_path_factory.getbasetemp()
+    keep(numbers, (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "reliability.json", RESULTS)
 
 
 @pytest.fixture
 def report(measured: dict[str, dict[str, float | str]]) -> Callable[[str, float, str], None]:
-    """Keep a measured number under its name."""
+    """Note a measured number under its name."""
 
-    def keep(name: str, value: float, unit: str) -> None:
+    def note(name: str, value: float, unit: str) -> None:
         measured[name] = {"value": round(value, 4), "unit": unit}
 
-    return keep
+    return note
 
 
 @pytest.fixture(scope="session", autouse=True)

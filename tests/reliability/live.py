@@ -20,6 +20,7 @@ from rig.link.front_end_messages import Request, Snapshot
 from rig.link.live_runs import Run
 from rig.link.sockets import Peer, connect
 from rig.operate.run import start_controller
+from sim_devices.wires.ports import ask
 
 PROJECT = Path(__file__).parents[2]
 WATCHDOG = 0.5
@@ -122,8 +123,8 @@ class LiveBench:
 
     def tell(self, *words: str) -> None:
         """Script a fault over the bench's control port."""
-        control = str(self.folder / "ports" / "control")
-        subprocess.run([sys.executable, "-m", "sim_devices", "tell", control, *words], check=True, cwd=PROJECT)
+        answer = ask(self.folder / "ports" / "control", " ".join(words))
+        assert answer.startswith("ok "), answer
 
 
 def unchanged(text: str) -> str:
@@ -131,12 +132,13 @@ def unchanged(text: str) -> str:
 
 
 def patient(text: str) -> str:
-    """A bench file whose samples may be `PATIENCE` late: the machine that the tests run on is not tried here.
+    """`whole` without flow meter and thermometer, for whose five slow rows every preflight would wait (2.5 s)."""
+    slow = text.index("[devices.flow]")
+    return whole(text[:slow] + text[text.index("[limits", slow) :])
 
-    Without the thermometer, for whose five slow rows every preflight would wait.
-    """
-    slow = text.index("[devices.thermometer]")
-    text = text[:slow] + text[text.index("[limits", slow) :]
+
+def whole(text: str) -> str:
+    """A bench file whose samples may be `PATIENCE` late: the machine that the tests run on is not tried here."""
     for limit in ("min = -300.0 ", "max = 40.0 "):  # of load_cell.thrust, of motor.current
         assert limit in text
         text = text.replace(limit, f"max_age = {PATIENCE}\n{limit}")
@@ -206,6 +208,16 @@ class FrontEnd:
         except AssertionError as error:
             raise AssertionError(f"{NOT_BEGUN}: {error}") from error
 
+    def to_the_end(self, bench: LiveBench) -> Snapshot:
+        """Follow the newest run until it is done, and leave: its controller shows the end as long as somebody is there.
+
+        Returns once that process has ended; its files are closed then.
+        """
+        last = self.until(lambda s: s.state == "done")
+        self.peer.close()
+        bench.controllers[-1].wait(15)
+        return last
+
 
 def _last(snapshot: Snapshot | None) -> str:
     if snapshot is None:
@@ -218,11 +230,11 @@ def attach(run: Run) -> FrontEnd:
     return FrontEnd(connect(Path(run.socket), "the controller"))
 
 
-def turning(volts: float) -> Callable[[Snapshot], bool]:
-    """Is a hold of that voltage going on, and has the propeller answered?"""
+def turning(volts: float, seconds: float = 0.5) -> Callable[[Snapshot], bool]:
+    """Has a hold of that voltage lasted so many `seconds`, and has the propeller answered?"""
 
     def wanted(s: Snapshot) -> bool:
-        held = s.progress is not None and s.progress.step_elapsed > 0.5
+        held = s.progress is not None and s.progress.step_elapsed > seconds
         return s.state == "hold" and abs(s.command - volts) < 0.01 and held
 
     return wanted

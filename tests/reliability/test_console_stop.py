@@ -126,7 +126,7 @@ def test_frozen_console_of_an_attended_run(tmp_path, report, prompt):
 def test_console_leaves_an_unattended_run_and_another_comes(tmp_path):
     """Detach, attach again, the table at the end from whoever is there; exit status 0 for both."""
     with live_bench(tmp_path) as bench:
-        run = bench.start(unattended=True, dwell=2.0)
+        run = bench.start(unattended=True, dwell=1.0)
         with at_console(bench, run) as (first, terminal):
             terminal.press(b"d")
             terminal.until(b"Leave, campaign goes on")

@@ -43,13 +43,11 @@ def test_motor_that_ignores_stop_is_never_called_idle(tmp_path):
         front.begin(turning(10.0))
         bench.tell("fault", "motor", "ignores_commands")
         front.peer.send(Request("stop", "a test"))
-        last = front.until(lambda s: s.state == "done")
+        last = front.to_the_end(bench)
         assert last.stop_confirmed is False
         assert any("STOP NOT CONFIRMED" in line.text and line.level == "error" for line in last.log)
-        bench.controllers[0].wait(20)
         (path,) = Path(bench.runs[0].folder).glob("*.h5")
         assert any("STOP NOT CONFIRMED" in event.text for event in load(path).events)
-        front.peer.close()
 
 
 @pytest.mark.parametrize(
@@ -68,7 +66,7 @@ def test_sensor_that_lies(tmp_path, report, prompt, device, fault, amount, cause
         front.begin(turning(10.0))
         bench.tell("fault", device, fault, *amount)
         begun = next(line for line in reversed(bench.truth()) if line["event"] == "fault")
-        last = front.until(lambda s: s.state == "done")
+        last = front.to_the_end(bench)
         assert last.outcome == "tripped"
         assert cause in last.cause
         zero = next(
@@ -79,8 +77,6 @@ def test_sensor_that_lies(tmp_path, report, prompt, device, fault, amount, cause
         latency = (zero["t_ns"] - begun["t_ns"]) * 1e-9
         report(f"{device} {fault} to command 0", latency, "s")
         prompt(latency, within, begun["t_ns"])
-        bench.controllers[0].wait(15)
-        front.peer.close()
 
 
 def test_kill_9_at_random_instants(tmp_path, report, prompt):
@@ -99,7 +95,7 @@ def test_kill_9_at_random_instants(tmp_path, report, prompt):
 def test_resume_after_kill_9_gives_what_an_uninterrupted_campaign_gives(tmp_path):
     """Promise 22."""
     with live_bench(tmp_path) as bench:
-        front = attach(bench.start(thrusters=("T1", "T3"), dwell=1.0))
+        front = attach(bench.start(thrusters=("T1", "T3"), dwell=0.6))
         front.begin(lambda s: s.thruster == "T3" and s.state == "hold", timeout=60.0)
         os.kill(bench.runs[0].pid, signal.SIGKILL)
         front.peer.close()
@@ -122,21 +118,6 @@ def test_resume_after_kill_9_gives_what_an_uninterrupted_campaign_gives(tmp_path
         again = subprocess.run(words, cwd=PROJECT, capture_output=True, text=True, timeout=30, check=False)
         assert again.returncode == 2
         assert "nothing to resume" in again.stderr
-
-
-def test_recording_carries_what_came_before_it(tmp_path):
-    """Who the devices are, what the preflight found and how late the loop was are in the file, not only in the log."""
-    with live_bench(tmp_path) as bench:
-        front = attach(bench.start(dwell=0.6))
-        front.until(lambda s: s.state == "done")
-        bench.controllers[0].wait(15)
-        front.peer.close()
-        (path,) = Path(bench.runs[0].folder).glob("*.h5")
-        events = load(path).events
-        before = [event.text for event in events if event.time <= 0]
-        for wanted in ("motor: VESC", "preflight: watchdog", "preflight: load_cell rate", "T1 mounted", "scheduling"):
-            assert any(wanted in text for text in before), wanted
-        assert any("control loop: worst lateness" in event.text for event in events)
 
 
 def test_shutting_down_takes_no_longer_than_it_must(tmp_path, report):

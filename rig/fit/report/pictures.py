@@ -6,8 +6,8 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.stats import t as student
 
+from identification.estimation.tails import student_quantile
 from identification.recording import Floats
 from identification.thruster.thrust import Parameter, ThrustFit
 from rig.report import regression_figures
@@ -119,7 +119,7 @@ def _groups(fit: ThrustFit, x: Sequence[Floats], y: Sequence[Floats]) -> list[Gr
     step, out = _thinning(fit), []
     half = None
     if rows.std_error is not None:
-        wide = student.ppf(0.975, rows.dof) if rows.dof is not None else 1.96
+        wide = student_quantile(0.975, rows.dof) if rows.dof is not None else 1.96
         half = wide * rows.std_error
     for k, block in enumerate(rows.blocks):
         label = "measured" if len(rows.blocks) == 1 else f"recording {k + 1}"

@@ -1,4 +1,4 @@
-"""Tails against scipy.stats, right down to the smallest float."""
+"""Tails and quantiles against scipy.stats, right down to the smallest float."""
 
 import subprocess
 import sys
@@ -14,8 +14,10 @@ from identification.estimation.tails import (
     gamma_median,
     gamma_sf,
     noncentral_chi2_sf,
+    normal_quantile,
     normal_sf,
     poisson_mixture,
+    student_quantile,
     student_sf,
 )
 
@@ -36,6 +38,15 @@ def test_normal_tail_down_to_the_smallest_float():
     x = np.array([-3.0, 0.0, 2.0, 10.0, 37.0])
     np.testing.assert_allclose(normal_sf(x), stats.norm.sf(x), rtol=1e-12)
     assert 0 < float(normal_sf(37.0)) < 1e-299
+
+
+@pytest.mark.parametrize("p", [1e-6, 0.025, 0.5, 0.975, 1 - 1e-9])
+def test_quantiles(p):
+    dof = np.array([0.5, 1.0, 7.3, 1e4, np.inf])
+    np.testing.assert_allclose(student_quantile(p, dof), stats.t.ppf(p, dof), rtol=1e-12, atol=1e-15)
+    assert float(normal_quantile(p)) == pytest.approx(stats.norm.ppf(p), rel=1e-12, abs=1e-15)
+    np.testing.assert_allclose(student_sf(2.5, dof), stats.t.sf(2.5, dof), rtol=1e-10)
+    assert np.isnan(student_quantile(p, 0.0)), "no degrees of freedom, no interval"
 
 
 @pytest.mark.parametrize("dof", [1, 3, 17, 200])

@@ -20,4 +20,4 @@ def uneven():
 @pytest.fixture(scope="session")
 def bump():
     """15 % less at +8 V only: no term of the catalogue."""
-    return diagnosed(run(lambda _t, V, F: F * (1 - 0.15 * ((V > 7) & (V < 9)))))
+    return diagnosed(run(lambda _t, V, F: F * (1 - 0.15 * ((V > 7) & (V < 9))), rate=10.0, noise=0.2))

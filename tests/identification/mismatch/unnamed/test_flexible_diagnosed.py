@@ -26,6 +26,9 @@ from rig.twin.reading import read_twin
 from rig.twin.writing import twin_json, write_twin
 from tests.identification.diagnosed_runs import C, run
 
+QUIET = 0.2
+"""N: five samples a second at this tell as much as ten at the noise of other runs, in a third of the time."""
+
 
 def diagnosed(*runs, **how):
     found = diagnose(runs, **how)
@@ -36,7 +39,7 @@ def diagnosed(*runs, **how):
 @pytest.fixture(scope="module")
 def wave():
     """A gain that comes and goes."""
-    recording = run(lambda t, _V, F: F * (1 + 0.05 * np.sin(2 * np.pi * t / 80)), seconds=150.0, rate=10.0)
+    recording = run(lambda t, _V, F: F * (1 + 0.05 * np.sin(2 * np.pi * t / 80)), seconds=150.0, rate=5.0, noise=QUIET)
     return recording, diagnosed(recording)
 
 
@@ -81,7 +84,7 @@ def test_a_twin_keeps_it_and_simulates_it(wave, tmp_path):
     made = simulate(twin, Drive(command.time, command.value, others=others_of(recording)), thrust.time)
     assert isinstance(made, Prediction)
     error = thrust.value - made.thrust - found.twin.sources[0].tare
-    assert np.std(error) < 1.15 * 0.3
+    assert np.std(error) < 1.15 * QUIET
     again = diagnosed(recording, baseline=twin)
     assert again.verdict == "adequate"
     assert again.baseline["flexible:time." + twin.terms[0].term.parameters(twin.terms[0].scale)[0].name].std > 0
@@ -155,7 +158,7 @@ def test_a_formula_counts_its_gain_from_the_middle_of_the_data():
 
 def dented(seed):
     """20 % less at +8 V only."""
-    return run(lambda _t, V, F: F * (1 - 0.2 * ((V > 7) & (V < 9))), seed=seed, seconds=80.0, rate=10.0)
+    return run(lambda _t, V, F: F * (1 - 0.2 * ((V > 7) & (V < 9))), seed=seed, seconds=80.0, rate=5.0, noise=QUIET)
 
 
 def test_a_run_that_was_not_fitted_judges_the_flexible_term():
