@@ -149,11 +149,9 @@ def _best(runs: Sequence[Series], unit: Literal["rev", "V s"], ring: Ring | None
         locked = None if found is None else _locked(found, unit)
     if fixed is not None and locked is None and all(r.turns is not None for _, r in long):
         turning = as_turning(long, fixed.frequency, fixed.amplitude_std, fixed.p_value)
-        locked = (
-            None
-            if turning is None or fixed.gain - turning.gain > policy.periodic.LINE_KINDS_CHI2
-            else _locked(replace(turning, seen=fixed.seen), unit)
-        )
+        if turning is None or fixed.gain - turning.gain > policy.periodic.LINE_KINDS_CHI2:
+            return fixed
+        return replace(fixed, rival=_locked(replace(turning, seen=fixed.seen), unit))  # no search for orders found it
     if fixed is None or locked is None:
         return fixed or locked
     better, other = (fixed, locked) if fixed.gain >= locked.gain else (locked, fixed)

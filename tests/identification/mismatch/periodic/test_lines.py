@@ -180,3 +180,16 @@ def test_turns_of_a_measured_rate() -> None:
     at = np.array([-1.0, 0.05, 5.0, 10.0, 11.0])
     found = turned_by_rate(t, -t, at)
     assert np.allclose(found[1:4], at[1:4] ** 2 / 2)
+
+
+def test_an_order_that_only_the_line_led_to_is_a_rival_and_never_taken_out_in_its_place():
+    """It has no parts to be taken out by: a diagnosis once ended in an exception where it explained more."""
+    rng, time = np.random.default_rng(1), np.arange(0.0, 60.0, 0.02)
+    turns = np.cumsum(2.0 + 0.01 * (time / 60.0 - 0.5)) * 0.02
+    residual = 0.5 * np.cos(2 * np.pi * 3.0 * turns) + 0.3 * rng.standard_normal(time.size)
+    line, *_ = find_lines([Series(time, residual, turns)])
+    assert line.kind == "fixed"
+    assert line.frequency == pytest.approx(6.0, rel=0.005)
+    assert line.rival is not None
+    assert line.rival.kind == "rotation"
+    assert line.rival.gain > line.gain
