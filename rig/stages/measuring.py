@@ -164,4 +164,7 @@ def _last_words(session: Session) -> None:
             session.say("warning", text)
         if health.dropped:
             session.say("warning", f"{name}: {health.dropped} frames were lost: the loop did not take them in time")
+    learnt = session.loop.motor_watch.consistency.told()
+    if learnt:
+        session.say("info", f"learnt: {learnt}")
     session.say("info", f"control loop: {session.loop.late}")

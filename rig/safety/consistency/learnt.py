@@ -1,0 +1,43 @@
+"""The factors that a run has learnt so far, in words: rotation per volt, thrust per n|n|, current per n|n|, delays."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from statistics import fmean, median, pstdev
+
+from rig.safety.consistency.levels import Level
+
+LEAST = 2
+"""Levels from which on there is something to tell."""
+
+
+def factors(levels: Iterable[Level], delays: Sequence[float]) -> str:
+    """One clause per factor; empty while too little is known."""
+    driven = [each for each in levels if each.volts]
+    if len(driven) < LEAST:
+        return ""
+    said = [text for volts in (1.0, -1.0) for text in _of_one_way([e for e in driven if e.volts * volts > 0], volts)]
+    if delays:
+        said.append(f"thrust {median(delays):.2f} s after rotation (of {len(delays)} steps)")
+    return "; ".join(said)
+
+
+def _of_one_way(levels: list[Level], volts: float) -> list[str]:
+    way = "at +V" if volts > 0 else "at -V"
+    per_volt = [e.means.rate / e.volts for e in levels if e.means.rate is not None]
+    by = "V|V|" if not per_volt else "n|n|"
+    pushes = [e.push / e.turn for e in levels if e.push is not None and e.turn]
+    amps = [abs(e.means.current / e.turn) for e in levels if e.means.current is not None and e.turn]
+    return [
+        *_factor(f"{way} rotation", per_volt, "rev/s per V"),
+        *_factor(f"{way} thrust per {by}", pushes, "N"),
+        *_factor(f"{way} current per {by}", amps, "A"),
+    ]
+
+
+def _factor(name: str, values: list[float], unit: str) -> list[str]:
+    """Mean and spread over the levels: what is no constant spreads."""
+    if not values:
+        return []
+    spread = f" +- {pstdev(values):.2g}" if len(values) > 1 else ""
+    return [f"{name} {fmean(values):.4g}{spread} {unit} ({len(values)} level{'s' * (len(values) > 1)})"]
