@@ -18,7 +18,7 @@ WINDOW = 3
 """Blocks that a mean is taken of: 0.3 s."""
 KEPT = 3 * WINDOW
 """Blocks: the newest window, the one before it, and the oldest, which the newest is compared with."""
-MOVING, NOISE = 0.08, 3.0
+MOVING, NOISE = 0.03, 3.0
 """Share of a value, and times the mean step between blocks, by which what has settled may differ 0.2 s later."""
 SAME = 1e-6
 """V: two commands that are no further apart are one."""

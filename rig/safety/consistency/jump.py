@@ -9,7 +9,7 @@ from collections.abc import Callable
 
 from rig.safety.consistency.look import DIGITS, NAMES, THRUST, UNITS, Means
 
-MOST = (0.25, 0.35, 0.28)
+MOST = (0.25, 0.28, 0.28)
 """Of rotation, current and thrust: relative change within 0.3 s of a settled hold. Thrust is compared per n|n| where
 the rotation is known: a supply that sags moves both. An overshoot of half the step that decays within 0.2 s to 1.5 s
 moves it by 0.2 at most."""

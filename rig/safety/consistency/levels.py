@@ -6,7 +6,7 @@ A static curve may bend (dead band, winding loss, two unlike directions), but it
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf, log
+from math import copysign, inf, log
 from typing import NamedTuple
 
 from rig.safety.consistency.look import CURRENT, DIGITS, NAMES, RATE, THRUST, UNITS, Means
@@ -146,7 +146,8 @@ class Levels:
         again = AGAIN[THRUST] if new.volts * known.volts > 0 else ACROSS
         if new.means.rate is None or known.means.rate is None:
             bounds = self._curve(new, known, 1.0)
-            return pushes[0], pushes[1], Bounds(bounds.low**2 / again, bounds.high**2 * again)
+            along = copysign(1.0, new.volts * known.volts)
+            return pushes[0], along * pushes[1], Bounds(bounds.low**2 / again, bounds.high**2 * again)
         return pushes[0], pushes[1] * new.turn / known.turn, Bounds(1 / again, again)
 
     def _current(self, new: Level, known: Level) -> tuple[float, float, Bounds] | None:

@@ -1,4 +1,4 @@
-"""A campaign over real bytes in virtual time, on a simulated bench that begins to lie; what the run said, and how soon."""
+"""A campaign over real bytes in virtual time, on a simulated bench that begins to lie; what came of it, and how soon."""
 
 from __future__ import annotations
 
