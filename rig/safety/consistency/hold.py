@@ -23,11 +23,12 @@ MOVING, NOISE = 0.03, 3.0
 SAME = 1e-6
 """V: two commands that are no further apart are one."""
 
-_Block = tuple[list[float], list[float]]
+BEND = 3.0**0.5
+"""Of white noise a second difference is so many times a first one, which a rotor that gathers speed would spoil."""
 
 
 class Hold:
-    """The blocks of the present command. `noise`: mean step from one block to the next per channel, over all holds."""
+    """The blocks of the present command. `noise`: of a block, per channel, over all holds."""
 
     def __init__(self, rest_rate: float) -> None:
         self._rest_rate = rest_rate
@@ -78,7 +79,7 @@ class Hold:
         return True
 
     def noise(self, channel: int) -> float | None:
-        """Mean step between two blocks; None while too few were seen."""
+        """Mean step between two blocks by their noise; None while too few were seen."""
         count = self._step_counts[channel]
         return self._steps[channel] / count if count >= WINDOW else None
 
@@ -105,10 +106,10 @@ class Hold:
     def _end_block(self) -> None:
         means = (s / n if n else None for s, n in zip(self._sums, self._counts, strict=True))
         block = Means(*means)
-        if self.blocks:
-            for i, (new, old) in enumerate(zip(block, self.blocks[-1], strict=True)):
-                if new is not None and old is not None:
-                    self._steps[i] += abs(new - old)
+        if len(self.blocks) > 1:
+            for i, (new, old, older) in enumerate(zip(block, self.blocks[-1], self.blocks[-2], strict=True)):
+                if new is not None and old is not None and older is not None:
+                    self._steps[i] += abs(new - 2.0 * old + older) / BEND
                     self._step_counts[i] += 1
         self.blocks.append(block)
         self.count += 1

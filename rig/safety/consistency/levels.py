@@ -118,6 +118,9 @@ class Levels:
         low, high = sorted((factor.low * expected, factor.high * expected))
         if low <= value <= high or not self._evident(channel, new, max(abs(value), abs(expected))):
             return ""
+        before = known.push if channel == THRUST else known.means[channel]
+        if not self._evident(channel, new, abs(before or 0.0)):
+            return ""
         return (
             f"{NAMES[channel]} is {value:.4g} {UNITS[channel]} at {new.volts:g} V, where {low:.4g} to {high:.4g} "
             f"{UNITS[channel]} are expected by what {known.volts:g} V gave before"

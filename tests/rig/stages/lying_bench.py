@@ -1,4 +1,4 @@
-"""A campaign over real bytes in virtual time, on a simulated bench that begins to lie; what came of it, and how soon."""
+"""A campaign over real bytes in virtual time, on a simulated bench that begins to lie: what came of it, how soon."""
 
 from __future__ import annotations
 
@@ -33,6 +33,8 @@ slew = 24.0
 kind = "fixed"
 duration = {dwell}
 """
+FIRST = 8.0
+"""V, of the first level."""
 SETTLED = 2.0
 """s into a hold at which a lie begins: the check looks for jumps from 1.7 s on."""
 
@@ -54,7 +56,8 @@ class Found:
     outcome: str
     cause: str
     after: float
-    """s from the lie to the first of the zeros that ended the run; of a lie from the start, since the bench began."""
+    """s from the lie to the first of the zeros that ended the run; of a lie from the start, since the first level began,
+    0 when it never did."""
     events: tuple[str, ...]
 
 
@@ -109,6 +112,8 @@ def played(folder: Path, lie: Lie | None, dwell: float = 3.5, seed: int = 1) -> 
         assert world.begun is not None, "the lie never began"
     last = max((t for t, volts in world.bench.commands if volts), default=0.0)
     zero = next((t for t, _ in world.bench.commands if t > last), last)
+    first = next((t for t, volts in world.bench.commands if abs(volts - FIRST) < 0.01), zero)
+    since = first if lie is None or lie.volts is None else world.begun or 0.0
     events = tuple(event.text for event in recording.events) if recording else ()
     outcome, cause = (recording.outcome, recording.cause) if recording else ("refused", refused)
-    return Found(outcome, cause, zero - (world.begun or 0.0), events)
+    return Found(outcome, cause, zero - since, events)
