@@ -71,6 +71,10 @@ class ConsistencyWatch:
         """What this run has taught; empty while too little."""
         return self._check.told()
 
+    def doubts(self, expected_C: float | None) -> list[str]:
+        """What nothing ends a run for and somebody should look at; `expected_C` in N/V^2."""
+        return self._check.doubts(expected_C)
+
     def _beside(self, places: Iterable[tuple[str, int, str | None]], quantity: str) -> _Place | None:
         """Of the rotation's own stream, else the first."""
         found = [(stream, column) for stream, column, what in places if what == quantity]

@@ -163,7 +163,9 @@ def _last_words(session: Session) -> None:
             session.say("warning", text)
         if health.dropped:
             session.say("warning", f"{name}: {health.dropped} frames were lost: the loop did not take them in time")
-    learnt = session.loop.motor_watch.consistency.told()
-    if learnt:
+    consistency = session.loop.motor_watch.consistency
+    if learnt := consistency.told():
         session.say("info", f"learnt: {learnt}")
+    for doubt in consistency.doubts(session.campaign.expected_C):
+        session.say("warning", doubt)
     session.say("info", f"control loop: {session.loop.late}")

@@ -9,6 +9,8 @@ from rig.safety.consistency.levels import Level
 
 LEAST = 2
 """Levels from which on there is something to tell."""
+UNEXPECTED = 1.6
+"""Times the constant that the campaign expects, or a part of it: is told, and ends nothing."""
 
 
 def factors(levels: Iterable[Level], delays: Sequence[float]) -> str:
@@ -20,6 +22,23 @@ def factors(levels: Iterable[Level], delays: Sequence[float]) -> str:
     if delays:
         said.append(f"thrust {median(delays):.2f} s after rotation (of {len(delays)} steps)")
     return "; ".join(said)
+
+
+def doubts(levels: Iterable[Level], expected_C: float | None) -> list[str]:
+    """What no run can judge by itself: a sign and a scale that were there from the beginning. `expected_C`: N/V^2."""
+    pushing = [each for each in levels if each.volts > 0 and each.push is not None]
+    if not pushing:
+        return []
+    top = max(pushing, key=lambda each: each.volts)
+    found = (top.push or 0.0) / top.volts**2
+    said = f"{found:.3g} N/V^2 at {top.volts:g} V"
+    if found < 0:
+        return [f"the thrust is negative at a positive voltage, {said}: wired, mounted or scaled the other way round?"]
+    if expected_C is None or 1 / UNEXPECTED <= found / expected_C <= UNEXPECTED:
+        return []
+    return [
+        f"the thrust is {said}, {expected_C:.3g} are expected (expected_C): is the scale of the force sensor right?"
+    ]
 
 
 def _of_one_way(levels: list[Level], volts: float) -> list[str]:

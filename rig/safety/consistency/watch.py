@@ -9,7 +9,7 @@ from rig.safety.consistency.delay import SMALL as DELAY_SMALL
 from rig.safety.consistency.delay import Way
 from rig.safety.consistency.hold import WINDOW, Hold
 from rig.safety.consistency.jump import Jump
-from rig.safety.consistency.learnt import factors
+from rig.safety.consistency.learnt import doubts, factors
 from rig.safety.consistency.levels import Level, Levels
 from rig.safety.consistency.look import Look, Means
 
@@ -48,6 +48,10 @@ class Consistency:
     def told(self) -> str:
         """The factors learnt so far."""
         return factors(self._levels.known.values(), self.delays)
+
+    def doubts(self, expected_C: float | None) -> list[str]:
+        """What an analyst should look at, of the whole run."""
+        return doubts(self._levels.known.values(), expected_C)
 
     def _leave(self) -> None:
         if self._level is not None:

@@ -19,6 +19,7 @@ name = "lies"
 bench = "bench.toml"
 output = "out"
 thrusters = ["T2"]
+expected_C = 0.4
 [watch]
 off = true
 [tare]
@@ -56,7 +57,7 @@ class Found:
     outcome: str
     cause: str
     after: float
-    """s from the lie to the first of the zeros that ended the run; of a lie from the start, since the first level began,
+    """s from the lie to the first of the zeros that ended the run; of a lie from the start, since the first level began:
     0 when it never did."""
     events: tuple[str, ...]
 

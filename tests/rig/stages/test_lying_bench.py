@@ -25,6 +25,23 @@ def test_a_lie_is_found_by_what_the_page_says_and_in_time(tmp_path, row):
     assert found.after <= float(within.removesuffix(" s"))
 
 
+@pytest.mark.parametrize(
+    ("lie", "said"),
+    [
+        (
+            Lie("load_cell", "factor", 2.0, None),
+            "0.4 are expected (expected_C): is the scale of the force sensor right?",
+        ),
+        (Lie("load_cell", "sign", volts=None), "the thrust is negative at a positive voltage"),
+    ],
+    ids=["factor", "sign"],
+)
+def test_what_was_there_from_the_beginning_is_told(tmp_path, lie, said):
+    found = played(tmp_path, lie, dwell=2.0)
+    assert (found.outcome, found.cause) == ("completed", "")
+    assert said in "\n".join(found.events)
+
+
 def test_every_lie_of_a_force_sensor_is_in_the_table():
     played_faults = {fault for device, fault, *_ in ROWS if device == "load_cell"}
     assert {*LIES, *WIRE_FAULTS, "fast", "hasty", "slow", "frozen"} <= played_faults
