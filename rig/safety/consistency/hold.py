@@ -70,7 +70,8 @@ class Hold:
     def steady(self, zero: float) -> bool:
         """Rotation and thrust (less its `zero`, N) no longer move: no rotor that still gathers speed."""
         newest, before = self._mean(-2, None), self._mean(-4, -2)
-        for i, base in ((RATE, 0.0), (THRUST, zero)):
+        judged = ((RATE, 0.0), (THRUST, zero)) if self.command else ((THRUST, zero),)  # what is at rest may coast out
+        for i, base in judged:
             new, old, noise = newest[i], before[i], self.noise(i)
             if new is not None and old is not None and noise is not None:
                 allowed = max(MOVING * abs(new - base), NOISE * noise)

@@ -57,8 +57,8 @@ class Found:
     outcome: str
     cause: str
     after: float
-    """s from the lie to the first of the zeros that ended the run; of a lie from the start, since the first level began:
-    0 when it never did."""
+    """s from the lie to the first of the zeros that ended the run; of a lie from the start, since the first level
+    began; 0 when it never did."""
     events: tuple[str, ...]
 
 
