@@ -101,6 +101,8 @@ class BenchConfig:
     """s a propeller may take from command 0 to rest before `STOP NOT CONFIRMED`."""
     proof_voltage: float = 4.0
     """V at which the motor's watchdog is proved: low, but enough to turn the propeller."""
+    consistency: bool = True
+    """Whether a run ends when command, rotation, current and thrust contradict each other (rig.safety.consistency)."""
     mount: MountConfig = field(default_factory=MountConfig)
     overrides: Mapping[str, str] = field(default_factory=dict)
     """`[overrides]`: protection that this file takes away -> why (rig.campaign.disarmed)."""

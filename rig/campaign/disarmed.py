@@ -87,6 +87,8 @@ def _bench(bench: BenchConfig, streams: tuple[Stream, ...]) -> Iterator[tuple[st
         value = getattr(bench, key)
         if value > most:
             yield f"bench.{key}", f"{value:g} {unit} protects nobody; at most {most:g} {unit} is expected"
+    if not bench.consistency:
+        yield "bench.consistency", "a thrust, rotation or current that contradicts the command passes; true is expected"
     channels = {f"{s.name}.{c.name}": (c.quantity, s.period_s) for s in streams for c in s.channels}
     limits = {limit.channel: limit for limit in bench.limits}
     for quantity, ends in NEEDED.items():

@@ -114,7 +114,7 @@ class Loop:
         self.period_ns = round(1e9 / config.loop_rate)
         force = self.bench.instruments[config.force].streams[0].name
         self.thrust_channel = f"{force}.thrust"
-        self.motor_watch = MotorWatch(self.bench)
+        self.motor_watch = MotorWatch(self.bench, self.thrust_channel)
         self.rotation_channel = self.motor_watch.channel
         essential = [self.thrust_channel] + ([self.rotation_channel] if self.rotation_channel else [])
         streams = self.readings.streams.values()
@@ -143,7 +143,7 @@ class Loop:
         self.recorder.poll(now)
         requests = self._requests(now)
         self._watch_motor(tuple(samples), now)
-        trip = self._judge(now) if self.guarded else None
+        trip = self._judge(now, samples) if self.guarded else None
         self.thrust_rest.add(self.thrust_rows(tuple(samples), 0))
         rotation, thrust_rest = self.rotation(now), self.thrust_rest.judge(now)
         decision = decide(Inputs(now, tuple(samples), requests, trip, rotation, thrust_rest))
@@ -202,7 +202,7 @@ class Loop:
         in_run = self.recording_since_ns is not None
         self.motor_watch.advance(samples, self._sent, self.rotation(now), now, in_run=in_run)
 
-    def _judge(self, now: float) -> Trip | None:
+    def _judge(self, now: float, samples: list[Sample]) -> Trip | None:
         if self._command_error:
             return Trip(
                 f"the motor did not take a command: {self._command_error}", "link", now, self.bench.config.motor
@@ -214,7 +214,7 @@ class Loop:
         newest = {one.channel: self.readings.newest(one.channel) for one in self.guarded_channels}
         vitals = self._vitals(now)
         trip = guard.check(self.guarded_channels, newest, vitals, self.allowed)
-        return trip or self.motor_watch.trip or (self._paces.advance(vitals) if self._paces else None)
+        return trip or self.motor_watch.trip or (self._paces.advance(vitals, samples) if self._paces else None)
 
     def _vitals(self, now: float) -> Vitals:
         links = {name: instrument.health() for name, instrument in self.bench.instruments.items()}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from drivers.protocols import Sample
 from rig.campaign.bench import Bench
+from rig.control.consistency_watch import ConsistencyWatch
 from rig.safety.following import Following
 from rig.safety.frozen_motor import FrozenMotor, MotorRows
 from rig.safety.guard import Trip
@@ -21,32 +22,38 @@ def rotation_channel(bench: Bench) -> str | None:
 
 
 class MotorWatch:
-    """One bench's. Without a rotation rate there is nothing to judge, and rest is never confirmed."""
+    """One bench's. Without a rotation rate rest is never confirmed."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(self, bench: Bench, thrust: str) -> None:
+        """`thrust`: the channel of the force device, as `<stream>.<channel>`."""
         self.channel = rotation_channel(bench)
         """Of the rotation rate; None: not measured on this bench."""
         self._config = bench.config
         self._trip: Trip | None = None
         self._frozen = FrozenMotor(_rows(bench, self.channel)) if self.channel is not None else None
+        self.consistency = ConsistencyWatch(bench, self.channel, thrust)
         self.begin_run()
 
     def begin_run(self) -> None:
         """Another thruster may be wired the other way round."""
         self._following = Following(self.channel or "", self._config.proof_voltage, self._config.rest_rate)
+        self.consistency.begin_run()
 
     def advance(
         self, samples: tuple[Sample, ...], command: float | None, rate: float | None, now: float, *, in_run: bool
     ) -> None:
         """`command`: V sent in the last tick, None: nothing was; `rate`: rev/s, newest and fresh. Outside a run hands
         may turn the propeller: only the rows are looked at."""
+        inconsistent = self.consistency.advance(samples, command, now) if in_run else None
         if self._frozen is None:
+            self._trip = inconsistent
             return
         self._trip = self._frozen.advance(samples, command or 0.0, now)
         following = self._following.advance(now, command, rate) if in_run else None
         if following is not None:
             self._frozen.doubt(following)
             self._trip = self._trip or following
+        self._trip = self._trip or inconsistent
 
     @property
     def trip(self) -> Trip | None:

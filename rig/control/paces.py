@@ -1,14 +1,16 @@
-"""The pace of every stream that the guard judges, counted from the rows that came."""
+"""The pace of every stream that the guard judges, counted from the rows that came, and the way from row to row."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 
+from drivers.protocols import Sample
 from rig.campaign.bench import Bench
 from rig.campaign.limits import GuardedChannel
 from rig.control.readings import Readings
 from rig.safety.guard import Trip, Vitals
-from rig.safety.pace import Pace
+from rig.safety.pace import WINDOW, WINDOW_ROWS, Pace
+from rig.safety.row_spacing import RowSpacing
 
 
 class Paces:
@@ -17,18 +19,22 @@ class Paces:
     def __init__(self, bench: Bench, readings: Readings, guarded: Iterable[GuardedChannel], now: float) -> None:
         judged = {readings.place[one.channel][0] for one in guarded}
         self._readings = readings
-        self._paces = tuple(
-            (stream.name, Pace(stream.name, device, stream.period_s, now))
-            for device, stream in bench.streams()
-            if stream.name in judged
-        )
+        streams = [(device, stream) for device, stream in bench.streams() if stream.name in judged]
+        self._paces = tuple((s.name, Pace(s.name, device, s.period_s, now)) for device, s in streams)
+        self._spacings = {
+            s.name: RowSpacing(s.name, s.period_s, max(WINDOW, WINDOW_ROWS * s.period_s), now) for _, s in streams
+        }
         self._counted = dict(readings.rows)
 
-    def advance(self, vitals: Vitals) -> Trip | None:
-        """First stream that does not keep its pace, or None."""
+    def advance(self, vitals: Vitals, samples: Iterable[Sample] = ()) -> Trip | None:
+        """First stream that does not keep its pace, or None. `samples`: of this tick."""
         trips = []
+        for sample in samples:
+            if spacing := self._spacings.get(sample.stream):
+                spacing.add(sample.t_ns * 1e-9, sample.values)
         for stream, pace in self._paces:
             rows = self._readings.rows.get(stream, 0)
             trips.append(pace.advance(rows - self._counted.get(stream, 0), vitals))
+            trips.append(self._spacings[stream].advance(vitals.now))
             self._counted[stream] = rows
         return next((trip for trip in trips if trip), None)

@@ -53,7 +53,7 @@ def check_campaign(path: Path) -> CheckReport:
     thrust = _require_thrust(campaign, force)
     _require_samples(campaign, force)
     proof = settings_for(campaign, "").proof
-    proving = Duration(proof.expected, proof.worst) if proof else Duration(0.0, 0.0)
+    proving = Duration(2 * proof.expected, 2 * proof.worst) if proof else Duration(0.0, 0.0)
     plan, runs = campaign.plan.duration(), len(campaign.thrusters)
     run = Duration(plan.expected + proving.expected, plan.worst + proving.worst + campaign.bench.coast_time)
     total = Duration(runs * run.expected, runs * (run.worst + campaign.bench.mount.timeout))

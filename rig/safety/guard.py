@@ -26,6 +26,7 @@ Source = Literal[
     "slept",
     "link",
     "following",
+    "inconsistent",
     "recorder",
     "lease",
 ]

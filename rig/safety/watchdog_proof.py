@@ -15,8 +15,9 @@ SLOWED = 0.8
 """Share of the speed below which the motor has been let go; in water a rotor loses a fifth in tenths of a second."""
 SLOWING_TIME = 0.3
 """s after the watchdog's limit for the rotor to lose that fifth and for the status message to arrive."""
-SPIN_TIME = (0.5, 2.0)
-"""s at the proof voltage: at least, and at most until the propeller must turn."""
+SPIN_TIME = (1.3, 2.5)
+"""s at the proof voltage: at least, so that rotation and current have settled and are learnt, and at most until the
+propeller must turn."""
 QUIET_TIME = 0.3
 """s of command 0 after the proof in which the motor must not move."""
 

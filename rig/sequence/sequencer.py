@@ -47,7 +47,8 @@ class Sequencer:
         self._holding = Holding(0.0, self._steps[0], settings)
         self._taring = Taring(0.0, 0.0, settings.tare, settings.estimator)
         self._tare: float | None = None
-        self._proof = Proof(settings.proof) if settings.proof else None
+        self._proof: Proof | None = None
+        self._prove_before = settings.proofs_before
         self._time_to_zero: float | None = None
         self._stop = Stop(0.0, settings.rest_rate, settings.coast_time)
         self._outcome: Outcome = "running"
@@ -126,10 +127,10 @@ class Sequencer:
     def _begin(self, time: float) -> None:
         """Begin the step at the present position, by an approach ramp where the command is elsewhere."""
         self._since = time
-        if self._proof is not None and self._settings.proof is not None:
+        step = self._steps[self._position]
+        if self._settings.proof is not None and self._prove_before[:1] in (("start",), (step.phase,)):
             self._proof, self._state = Proof(self._settings.proof), "proving"
             return
-        step = self._steps[self._position]
         entry = step.from_voltage if step.swept else step.voltage
         self._approach = (step.phase != "ramp" or step.swept) and abs(self._command - entry) > EPSILON
         if self._approach:
@@ -178,10 +179,9 @@ class Sequencer:
             self._halt(tick.time, "tripped", verdict.cause)
             return True
         self._time_to_zero = verdict.time_to_zero_s
-        text = f"watchdog proved: at rest {verdict.time_to_zero_s:.2f} s after the last command"
-        self._journal.say(tick.time, "info", text)
+        self._journal.say(tick.time, "info", f"watchdog proved: at rest {verdict.time_to_zero_s:.2f} s after silence")
         self._end_row(tick.time)
-        self._proof = None
+        self._prove_before = self._prove_before[1:]
         self._begin(tick.time)
         return True
 

@@ -40,8 +40,17 @@ class Settings:
     """N/s"""
     proof: ProofSettings | None = None
     """None: the watchdog is not proved in this run."""
+    proved: bool = False
+    """It was in an earlier run of this motor: it is proved again at the first rest alone."""
     estimator: Callable[[], SteadyEstimator] = SteadyMonitor
     """Makes an empty estimator."""
+
+    @property
+    def proofs_before(self) -> tuple[str, ...]:
+        """Before what the watchdog is proved: the start of the run, then its first rest: it may break meanwhile."""
+        if self.proof is None:
+            return ()
+        return ("rest",) if self.proved else ("start", "rest")
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,7 +11,7 @@ from rig.control.readings import Readings
 from rig.errors import DeviceError, LinkError
 from rig.link.front_end_messages import Check
 from rig.recording.ledger import file_facts
-from rig.stages.preflight import all_checks, armed_checks, device_checks, flow_check
+from rig.stages.preflight import all_checks, armed_checks, consistency_check, device_checks, flow_check
 from rig.stages.session import Session, Stopped
 
 SETTLE_ROWS = 5
@@ -59,6 +59,7 @@ def preflight(session: Session) -> None:
     """Judge the bench until the operator starts it; the checks go on while he looks."""
     streams = [stream for _, stream in session.bench.streams()]
     devices, armed = list(session.status.checks), armed_checks(disarmed(session.campaign, streams))
+    armed.append(consistency_check(session.loop.motor_watch.consistency))
     flow = Flow(session.campaign.flow_speed, session.loop.now + FLOW_PATIENCE)
     session.turn_for(SETTLE_ROWS * max(stream.period_s for stream in streams))
     started, seen = False, session.loop.now

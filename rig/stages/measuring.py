@@ -40,8 +40,7 @@ def measure(session: Session) -> None:
         session.say("info", f"attempt {attempt} of {thruster}: the run is repeated from its first tare")
     session.ledger.write("run_start", thruster=thruster, recording=str(path), recording_t0_ns=t0_ns, attempt=attempt)
     settings = settings_for(session.campaign, thruster)
-    if session.proved:
-        settings = replace(settings, proof=None)  # the motor controller is the one that was proved in an earlier run
+    settings = replace(settings, proved=session.proved)
     _close(session, sequence(session, Sequencer(session.campaign.plan, settings), t0_ns))
 
 
@@ -114,7 +113,7 @@ def _close(session: Session, output: Output) -> None:
     )  # fmt: skip
     if outcome != "completed":
         raise Stopped(outcome, cause)
-    if output.time_to_zero_s is not None:
+    if output.time_to_zero_s is not None and not session.proved:
         session.proved = True
         text = f"watchdog proved in the run of {status.thruster}: at rest {output.time_to_zero_s:.2f} s after silence"
         session.say("info", text, of_bench=True)
@@ -164,4 +163,9 @@ def _last_words(session: Session) -> None:
             session.say("warning", text)
         if health.dropped:
             session.say("warning", f"{name}: {health.dropped} frames were lost: the loop did not take them in time")
+    consistency = session.loop.motor_watch.consistency
+    if learnt := consistency.told():
+        session.say("info", f"learnt: {learnt}")
+    for doubt in consistency.doubts(session.campaign.expected_C):
+        session.say("warning", doubt)
     session.say("info", f"control loop: {session.loop.late}")

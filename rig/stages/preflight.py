@@ -9,6 +9,7 @@ from typing import Literal
 from drivers.protocols import Stream, Watchdog
 from rig.campaign.config import BenchConfig
 from rig.campaign.disarmed import Disarmed
+from rig.control.consistency_watch import ConsistencyWatch
 from rig.control.readings import Readings
 from rig.link.front_end_messages import Check, Reading
 from rig.safety.pace import FASTEST, SLOWEST
@@ -135,6 +136,11 @@ def armed_checks(found: Iterable[Disarmed]) -> list[Check]:
         else Check("override", "warning", each.told)
         for each in found
     ]
+
+
+def consistency_check(watch: ConsistencyWatch) -> Check:
+    """On what the check of command against rotation, current and thrust rests; a bench may lack one of them."""
+    return Check("consistency", "warning" if watch.lacking else "passed", watch.rests_on)
 
 
 def all_checks(

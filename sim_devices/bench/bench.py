@@ -13,7 +13,7 @@ import numpy as np
 
 from sim_devices.bench.control import clear, fault, obey
 from sim_devices.bench.devices import say, serial_device, turnaround
-from sim_devices.bench.settings import BenchSettings, DeviceOptions, ScriptedFault, load
+from sim_devices.bench.settings import BenchSettings, DeviceOptions, load, script
 from sim_devices.bench.truth_log import TruthLog, header_fields, state_fields
 from sim_devices.instruments.motor_tap import MotorTap
 from sim_devices.instruments.serial_device import SerialDevice
@@ -68,7 +68,7 @@ class Bench:
         self.adapters = {name: (Adapter(), self._port(name, None)) for name in settings.can.adapters}
         for name, options in settings.devices.items():
             self._add(name, options)
-        self._script = _script(settings.faults)
+        self._script = script(settings.faults)
         self.log("header", seed=settings.seed, **header_fields(settings.world))
 
     def _port(self, name: str, baud: int | None) -> PtyPort:
@@ -206,10 +206,3 @@ class Bench:
             port.pull()
         self.control.close()
         self.truth.close()
-
-
-def _script(faults: tuple[ScriptedFault, ...]) -> list[tuple[float, bool, ScriptedFault]]:
-    """(s, begins, fault) in order of time."""
-    begins = [(each.at, True, each) for each in faults]
-    ends = [(each.at + each.duration, False, each) for each in faults if each.duration > 0]
-    return sorted(begins + ends, key=lambda entry: entry[0])

@@ -92,7 +92,7 @@ def mount(bench: ControlledBench, thruster: str) -> None:
 def fault(bench: ControlledBench, target: str, name: str, amount: float = DEFAULT_AMOUNT) -> None:
     """A device, or the wire of a device or adapter, goes wrong from now on. Raises ValueError or WorldError.
 
-    `pulled` takes the cable out. `amount` is a share (0..1) or, for `delayed`, seconds.
+    `pulled` takes the cable out. `amount` is a share (0..1), for `delayed` seconds; of a lie see its device.
     """
     port, device = _target(bench, target)
     if port is not None and name == "pulled":
@@ -100,7 +100,7 @@ def fault(bench: ControlledBench, target: str, name: str, amount: float = DEFAUL
     elif port is not None and name in WIRE_FAULTS:
         port.wire.fault(name, amount)
     elif device is not None and name in device.faults:
-        device.fault(name, bench.now())
+        device.fault(name, bench.now(), amount)
     else:
         known = (*(device.faults if device else ()), *(("pulled", *WIRE_FAULTS) if port else ()))
         raise ValueError(f"{target}: expected one of {', '.join(known)}, got {name!r}")

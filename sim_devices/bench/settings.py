@@ -115,3 +115,10 @@ def _device(name: str, table: Any) -> DeviceOptions:
         raise WorldError(f"devices.{name}: expected a table with kind = one of {', '.join(KINDS)}, got {table!r}")
     check_known(kind, KINDS, f"devices.{name}.kind")
     return build(KINDS[kind], table, f"devices.{name}")
+
+
+def script(faults: tuple[ScriptedFault, ...]) -> list[tuple[float, bool, ScriptedFault]]:
+    """(s, begins, fault) in order of time."""
+    begins = [(each.at, True, each) for each in faults]
+    ends = [(each.at + each.duration, False, each) for each in faults if each.duration > 0]
+    return sorted(begins + ends, key=lambda entry: entry[0])

@@ -12,7 +12,7 @@ from math import inf
 import numpy as np
 
 from sim_devices.bench.devices import say, serial_device, turnaround
-from sim_devices.bench.settings import BenchSettings
+from sim_devices.bench.settings import BenchSettings, script
 from sim_devices.bench.virtual_wire import Host, VirtualWire
 from sim_devices.instruments.low_pass import LowPass
 from sim_devices.instruments.motor_tap import MotorTap
@@ -20,7 +20,7 @@ from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.vesc import Vesc, VescOptions
 from sim_devices.tables import WorldError
 from sim_devices.wires.can_frame import CanFrame
-from sim_devices.wires.serial_line import Wire
+from sim_devices.wires.serial_line import DEFAULT_AMOUNT, WIRE_FAULTS, Wire
 from sim_devices.wires.slcan import Adapter
 from sim_devices.world import World
 
@@ -65,6 +65,22 @@ class VirtualBench:
         self._ends = [self._bus, *(wire for _, wire, _ in self.serial.values())]
         self.wires: Mapping[str, VirtualWire] = {wire.name: wire for wire in self._ends}
         self._next_stall = self._until_stall()
+        self._script = script(settings.faults)
+
+    def fault(self, device: str, name: str, amount: float = DEFAULT_AMOUNT) -> None:
+        """A device or its wire goes wrong from now on. Raises ValueError for a fault that neither has."""
+        found, wire = self.serial[device][:2] if device in self.serial else (self.vesc, None)
+        if wire is not None and name in WIRE_FAULTS:
+            wire.wire.fault(name, amount)
+        else:
+            found.fault(name, self._t, amount)
+
+    def clear(self, device: str) -> None:
+        """Device and wire are in order again."""
+        found, wire = self.serial[device][:2] if device in self.serial else (self.vesc, None)
+        found.clear(self._t)
+        if wire is not None:
+            wire.wire.clear()
 
     def _cell(self, time_constant: float) -> Callable[[], float] | None:
         """What a converter behind a low pass reads; None without one."""
@@ -124,6 +140,13 @@ class VirtualBench:
 
     def _run_to(self, t: float) -> None:
         """Event by event, each in the world of its own instant."""
+        while self._script and self._script[0][0] <= t:
+            at, begins, entry = self._script.pop(0)
+            self._move_world(max(at, self._t))
+            if begins:
+                self.fault(entry.device, entry.fault, entry.amount)
+            else:
+                self.clear(entry.device)
         while (due := self._next_event()) <= t:
             self._move_world(max(due, self._t))
             self._happen(self._t)

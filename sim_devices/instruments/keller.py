@@ -15,6 +15,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
+from sim_devices.wires.serial_line import DEFAULT_AMOUNT
+
 BLOCK = 12
 """registers in the block of measured values."""
 MIRROR = 0x0100
@@ -118,7 +120,7 @@ class Keller:
         bar = pressure / 1e5
         return struct.pack(">6f", 0.0, bar, 0.0, temperature, temperature, temperature)
 
-    def fault(self, name: str, _t: float) -> None:
+    def fault(self, name: str, _t: float, _amount: float = DEFAULT_AMOUNT) -> None:
         if name not in self.faults:
             raise ValueError(f"thermometer: expected one of {', '.join(self.faults)}, got {name!r}")
         self._fault = name

@@ -10,6 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf, isnan
 
+from sim_devices.instruments.lies import LIES, Lying
+from sim_devices.wires.serial_line import DEFAULT_AMOUNT
+
 WIDTH = 9
 """Characters of a number: padded, so that every line is as long as the next."""
 FULL_SCALE = 2**23 - 1
@@ -41,10 +44,10 @@ class LineOptions:
 class LineSender:
     """One amplifier. `read` gives the force on the cell in N (NaN: nothing is said)."""
 
-    faults = ("frozen", "silent")
+    faults = ("frozen", "silent", *LIES)
 
     def __init__(self, options: LineOptions, read: Callable[[], float]) -> None:
-        self._options, self._read = options, read
+        self._options, self._read = options, Lying(read, options.newtons_per_count)
         self._period = 1.0 / (options.rate * options.average * (1.0 + options.clock_error))
         self._next = self._period
         self._conversions: list[float] = []
@@ -76,11 +79,13 @@ class LineSender:
             self._last = b"" if isnan(value) else f"{counts:{WIDTH}d}\r\n".encode("ascii")
         return self._last
 
-    def fault(self, name: str, _t: float) -> None:
+    def fault(self, name: str, _t: float, amount: float = DEFAULT_AMOUNT) -> None:
         if name not in self.faults:
             raise ValueError(f"amplifier: expected one of {', '.join(self.faults)}, got {name!r}")
         self._fault = name
+        self._read.begin(name if name in LIES else "", amount)
 
     def clear(self, t: float) -> None:
         self._fault = ""
+        self._read.begin("", DEFAULT_AMOUNT)
         self._next = max(self._next, t)

@@ -11,7 +11,9 @@ from collections import deque
 from collections.abc import Callable
 from math import inf, isnan
 
+from sim_devices.instruments.lies import LIES, Lying
 from sim_devices.instruments.mt_sics_options import UNITS, MtSicsOptions, line, shown
+from sim_devices.wires.serial_line import DEFAULT_AMOUNT
 
 BALANCE_TIMEOUT = 30.0
 """s a command waits for stability."""
@@ -21,8 +23,8 @@ STABLE_WINDOW = 0.5
 """s over which a stable reading may not move by more than `stable_band`."""
 INTERNAL_ERROR = "Error 10b"
 """EEPROM error, from the electronics (manual, internal faults)."""
-RATE_FAULTS = {"fast": 10.0, "slow": 0.1}
-"""readings come this many times as often as they should."""
+RATE_FAULTS = {"fast": 10.0, "hasty": 2.3, "slow": 0.1}
+"""readings come this many times as often as they should; hasty: as often as a line of 38400 baud carries them."""
 ERRORS = {"transmission_error": "ET", "logical_error": "EL"}
 COMMANDS = ("@", "I0", "I1", "I2", "I3", "I4", "I10", "I11", "S", "SI", "SIR", "Z", "ZI", "T", "TA", "TAC", "TI", "UPD")
 LEVEL_1 = ("T", "TA", "TAC", "TI")
@@ -40,16 +42,18 @@ class MtSics:
         "internal_error",
         "wrong_unit",
         "fast",
+        "hasty",
         "slow",
         "reboot",
         "silent",
         "transmission_error",
         "logical_error",
+        *LIES,
     )
 
     def __init__(self, options: MtSicsOptions, read: Callable[[], float]) -> None:
         self._options = options
-        self._read = read
+        self._read = self._lying = Lying(read, options.digit * UNITS[options.unit])
         self._buffer = b""
         self._zero = self._tare = 0.0
         self._value = read()
@@ -95,7 +99,7 @@ class MtSics:
                 out += self._on_reading(t)
         return b"" if self._fault == "silent" else out
 
-    def fault(self, name: str, t: float) -> None:
+    def fault(self, name: str, t: float, amount: float = DEFAULT_AMOUNT) -> None:
         if name not in self.faults:
             raise ValueError(f"load cell: expected one of {', '.join(self.faults)}, got {name!r}")
         if name == "reboot":
@@ -105,11 +109,13 @@ class MtSics:
             self._boots_at = t + BOOT_TIME
             return
         self._fault = name
+        self._lying.begin(name if name in LIES else "", amount)
         if name == "wrong_unit":
             self._unit = "kg" if self._options.unit == "N" else "N"
 
     def clear(self, t: float) -> None:
         self._fault = ""
+        self._lying.begin("", DEFAULT_AMOUNT)
         self._unit = self._options.unit
         self._next = max(self._next, t)
 

@@ -23,6 +23,7 @@ from functools import reduce
 from math import inf, isnan
 
 from sim_devices.tables import WorldError
+from sim_devices.wires.serial_line import DEFAULT_AMOUNT
 
 SENTENCES = ("PNORC1", "PNORC3")
 CELL, POSITION = 1, 0.5
@@ -116,7 +117,7 @@ class Nortek:
                 made.append(pnorc3(9.0 if isnan(x) else abs(x), 0.0 if x >= 0 else 180.0, amplitude, correlation))
         return made
 
-    def fault(self, name: str, _t: float) -> None:
+    def fault(self, name: str, _t: float, _amount: float = DEFAULT_AMOUNT) -> None:
         if name not in self.faults:
             raise ValueError(f"flow meter: expected one of {', '.join(self.faults)}, got {name!r}")
         self._fault = name

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Protocol
 
+from sim_devices.wires.serial_line import DEFAULT_AMOUNT
+
 
 class SerialDevice(Protocol):
     """Bytes in, bytes out, at times (s of the bench clock) it is given. Holds no port and no clock."""
@@ -22,7 +24,7 @@ class SerialDevice(Protocol):
     def tick(self, t: float, /) -> bytes:
         """Everything the device says by itself until t."""
 
-    def fault(self, name: str, t: float, /) -> None:
+    def fault(self, name: str, t: float, amount: float = DEFAULT_AMOUNT, /) -> None:
         """Have one of `faults` from now on. Raises ValueError for another name."""
 
     def clear(self, t: float, /) -> None:

@@ -15,6 +15,7 @@ from math import copysign, inf
 from sim_devices.instruments import vesc_codec as codec
 from sim_devices.instruments.vesc_codec import Telemetry
 from sim_devices.wires.can_frame import CanFrame
+from sim_devices.wires.serial_line import DEFAULT_AMOUNT
 
 BROADCAST = 255
 FAULT_ABS_OVER_CURRENT, FAULT_OVER_TEMP_MOTOR = 4, 6
@@ -82,7 +83,8 @@ Log = Callable[..., None]
 class Vesc:
     """One controller. `measure` gives its telemetry in the world now; `log` writes what happened to the truth."""
 
-    faults = ("frozen", "silent", "broken_watchdog", "over_current", "over_temperature", "reboot", "ignores_commands")
+    faults = ("frozen", "silent", "broken_watchdog", "over_current", "over_temperature", "reboot", "ignores_commands",
+              "backwards", "redrives", "rate_factor", "current_factor")  # fmt: skip
 
     def __init__(self, options: VescOptions, nominal_bus: float, measure: Callable[[], Telemetry], log: Log) -> None:
         """`nominal_bus`: V that duty 1 stands for in the world's `volts`."""
@@ -91,7 +93,7 @@ class Vesc:
         self._last_command = -inf
         self._timed_out = True
         self._next = [0.0 if options.messages_1 else inf, 0.0 if options.messages_2 else inf]
-        self._fault = ""
+        self._fault, self._amount = "", DEFAULT_AMOUNT
         self._code = 0
         self._faulted_until = -inf
         self._boots_at = inf
@@ -117,8 +119,10 @@ class Vesc:
 
     def drive(self, n: float, dt: float) -> tuple[float | None, float]:
         """(volts, amps) for one world step at n rev/s: volts None means that the windings carry amps."""
+        if self._fault == "redrives":
+            return self._amount * self._bus, 0.0
         if self._mode == "duty":
-            return self._target * self._bus, 0.0
+            return self._target * (-self._bus if self._fault == "backwards" else self._bus), 0.0
         if self._mode == "rpm":
             return None, self._speed_loop(n, dt)
         if self._mode == "brake":
@@ -249,7 +253,13 @@ class Vesc:
     def _telemetry(self) -> Telemetry:
         if self._fault != "frozen":
             self._frozen = self._measure()
-        return self._frozen
+        match self._fault:
+            case "rate_factor":
+                return replace(self._frozen, erpm=self._frozen.erpm * self._amount)
+            case "current_factor":
+                return replace(self._frozen, current=self._frozen.current * self._amount)
+            case _:
+                return self._frozen
 
     def _averaged(self) -> Telemetry:
         """With the averages since the previous read, which this read resets (mc_interface_read_reset_avg_*)."""
@@ -262,7 +272,7 @@ class Vesc:
 
     # -- faults ------------------------------------------------------------------------------------------------------
 
-    def fault(self, name: str, t: float) -> None:
+    def fault(self, name: str, t: float, amount: float = DEFAULT_AMOUNT) -> None:
         """Have one of `faults`. Over-current and over-temperature stop the motor, as the firmware does."""
         if name not in self.faults:
             raise ValueError(f"motor: expected one of {', '.join(self.faults)}, got {name!r}")
@@ -274,7 +284,7 @@ class Vesc:
             self._mode, self._target = "current", 0.0
             self._faulted_until = t + FAULT_STOP_TIME if name == "over_current" else inf
         else:
-            self._fault = name
+            self._fault, self._amount = name, amount
 
     def clear(self, _t: float) -> None:
         self._fault, self._code, self._faulted_until = "", 0, -inf

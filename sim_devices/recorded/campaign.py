@@ -79,14 +79,15 @@ def bench_file(bench: Bench, scale: Scale) -> str:
     facts |= {"rest_rate": max(0.5, 0.05 * scale.rate), "coast_time": 15.0, "proof_voltage": 0.2 * scale.voltage}
     limit = toml({"min": -10.0 * scale.thrust, "max": 10.0 * scale.thrust})
     parts = [
-        "[bench]\n" + toml(facts),
+        "[bench]\n" + toml(facts) + "consistency = false\n",
         f"[can.{BUS}]\n" + toml({"interface": "slcan", "channel": "can0", "bitrate": 500000}),
         f"[devices.{CELL}]\n{bench.cell.told}",
         f"[devices.{MOTOR}]\n{bench.motor}",
         *([f"[devices.{FLOW}]\n{bench.flow}"] if bench.flow else []),
         f'[limits."{CELL}.thrust"]\n{limit}max_frozen = inf\n',
         f'[limits."{MOTOR}.current"]\nmax = {10.0 * scale.current}\n',
-        f'[overrides]\n"limits.{CELL}.thrust.max_frozen" = "a world without noise may stand still"\n',
+        f'[overrides]\n"limits.{CELL}.thrust.max_frozen" = "a world without noise may stand still"\n'
+        '"bench.consistency" = "what is concealed may contradict"\n',
     ]
     return "\n".join(parts)
 

@@ -8,6 +8,7 @@ from hypothesis import strategies as st
 from test_sequencer import FIXED, PERIOD, PROOF, SHORT, World, run
 
 from rig.safety.watchdog_proof import Proof, Proved, Refused
+from rig.sequence.sequencer import Sequencer
 
 SETTINGS = replace(FIXED, proof=PROOF)
 
@@ -105,3 +106,25 @@ def test_windmilling_in_the_flow_is_taken_into_account():
         world.step(volts)
     assert isinstance(verdict, Proved)
     assert sum(v == 0.0 for v in sent) * PERIOD >= PROOF.coast_time  # it was waited for before
+
+
+def test_watchdog_that_breaks_after_its_proof_is_noticed_at_the_next_rest():
+    world, sequencer = World(), Sequencer(SHORT, SETTINGS)
+    output = sequencer.advance(world.tick())
+    while not output.done:
+        world.step(output.volts)
+        output = sequencer.advance(world.tick())
+        if output.state == "hold":
+            world.watchdog = 1e9
+    assert output.outcome == "tripped"
+    assert "the motor's own watchdog is refused" in output.cause
+    assert output.time_to_zero_s == pytest.approx(0.9, abs=0.1), "it was proved before"
+
+
+def test_a_motor_that_was_proved_in_an_earlier_run_is_proved_at_the_first_rest():
+    ran = run(SHORT, replace(SETTINGS, proved=True))
+    assert ran.last.outcome == "completed"
+    assert ran.outputs[0].state == "tare"
+    proofs = [row for row in ran.rows if row.index == -1]
+    assert len(proofs) == 1
+    assert proofs[0].t_start > min(row.t_end for row in ran.rows if row.phase == "hold")
