@@ -35,7 +35,7 @@ def test_they_are_found_by_name_in_the_folders_and_by_hash_as_given(sound, tmp_p
     assert len(behind(twin, [tmp_path], [renamed])) == 1
     shutil.copy(second, tmp_path / "first.h5")
     assert behind(twin, [tmp_path]) == [], "another recording of that name"
-    assert "first.h5 behind the twin" in missing(twin)
+    assert "first.h5, behind the twin," in missing(twin)
 
 
 def test_a_file_that_is_none_of_them_is_refused(sound, tmp_path):
