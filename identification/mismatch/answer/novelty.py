@@ -10,7 +10,10 @@ from identification.mismatch.diagnosis import Finding
 from identification.physics.term import Term
 from identification.twin import Twin
 
-NOT_SHOWN = "Whether that is new cannot be told: the recordings behind {} could not have shown it."
+SAYS = {
+    "changed": "That is new: the recordings behind {} speak against it.",
+    "not shown before": "Whether that is new cannot be told: the recordings behind {} could not have shown it.",
+}
 NOT_NEW = "Not new, for it suits the recordings behind {} as well (chi-square of both {:+.3g} if it was there then): {}"
 
 
@@ -37,6 +40,6 @@ def told_new(findings: Mapping[Term, Finding], novelties: Mapping[Term, Novelty]
             not_new.append(finding.statement)
             notes.append(NOT_NEW.format(origin, novelty.loss, finding.statement))
         else:
-            says = f" {NOT_SHOWN.format(origin)}" if novelty.since == "not shown before" else ""
-            new.append(replace(finding, statement=finding.statement + says, since=novelty.since))
+            statement = f"{finding.statement} {SAYS[novelty.since].format(origin)}"
+            new.append(replace(finding, statement=statement, since=novelty.since))
     return ToldNew(tuple(new), tuple(not_new), tuple(notes))

@@ -42,7 +42,7 @@ FORM_ERROR = Threshold(
     ),
     evidence=(
         "A lag fitted as mixed where it was quadratic left a dead band of 9.6 sigma in a staircase after random levels "
-        "(field case 3 of the lane `difference` before this). With a share for effects of one form too, an asymmetry of "
+        "(field case 3 of the lane `difference` before this). With a share for effects of one form too, asymmetry of "
         "30 % hid a torque cross-talk of 15 sigma (difference/one_more/2 of draw 2027-01-03)."
     ),
 )

@@ -17,9 +17,10 @@ def test_what_is_not_new_is_no_finding_and_what_may_be_says_so():
     assert "chi-square of both -34" in both.notes[0]
 
 
-def test_what_is_new_and_what_nobody_asked_stays_as_it_is():
+def test_what_is_new_says_so_and_what_nobody_asked_stays_as_it_is():
     found = {BAND: finding(), UNEVEN: finding("asymmetry")}
     told = told_new(found, {BAND: Novelty("changed", 80.0)}, None)
     assert [f.since for f in told.findings] == ["changed", ""]
-    assert [f.statement for f in told.findings] == [f.statement for f in found.values()]
+    says = " That is new: the recordings behind the twin speak against it."
+    assert [f.statement for f in told.findings] == [found[BAND].statement + says, found[UNEVEN].statement]
     assert (told.not_new, told.notes) == ((), ())
