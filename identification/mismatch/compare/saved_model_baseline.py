@@ -46,7 +46,9 @@ def starting(twin: Twin) -> Callable[[Data, Theta], tuple[Data, Theta, Model]]:
     def begin(data: Data, theta: Theta) -> tuple[Data, Theta, Model]:
         model = Model((), given(twin))
         theta = replace(theta, C=twin.C)
-        return replace(data, prior_factor=_both(data.prior_factor, prior_factor(twin, data, theta))), theta, model
+        unsure = _both(data.prior_factor, prior_factor(twin, data, theta))
+        before = (twin.C, sqrt(twin.covariance[0][0]))
+        return replace(data, prior_factor=unsure, constant_before=before), theta, model
 
     return begin
 
