@@ -106,6 +106,8 @@ class Source:
     """Of the file; empty where there was none."""
     tare: float = 0.0
     """N, of that run; another run has another one."""
+    file: str = ""
+    """Its name, without the folder; empty where there was none."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -65,6 +65,8 @@ class Finding:
     """Of a channel fault, quantities: the one that lies, and the one that it was exchanged with."""
     recording: str = ""
     """Of a channel fault, the id of the recording that it is in."""
+    since: Literal["", "changed", "not shown before"] = ""
+    """Beside a twin: new since its own recordings, or nothing that those could have shown; empty: nobody asked."""
 
     def __post_init__(self) -> None:
         if self.bic_gain <= 0:
@@ -197,6 +199,8 @@ class Diagnosis:
     """What is explained: of a vehicle its `position`, `depth`, `heading` or `speed`."""
     unit: str = "N"
     """Of the response and its errors."""
+    not_new: tuple[str, ...] = ()
+    """Statements of what a twin lacks and its own recordings have as well."""
     force_unit: str = "N"
     """Of the shape of what is not explained: of a vehicle a force all the same."""
 
@@ -229,6 +233,8 @@ class Diagnosis:
     def statement(self) -> str:
         """The verdict in one sentence."""
         match self.answer:
+            case Adequate() if self.not_new:
+                return f"Nothing has changed. What is not in the baseline was there before: {' '.join(self.not_new)}"
             case Adequate():
                 return f"Nothing is missing: {self.baseline_model} describes these recordings within their noise."
             case Explained(findings):

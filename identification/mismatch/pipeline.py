@@ -10,6 +10,7 @@ import numpy as np
 from identification.mismatch.answer import stage as answer
 from identification.mismatch.answer.periodic_findings import told_lines
 from identification.mismatch.answer.trace import Trace
+from identification.mismatch.compare.earlier_recordings import Later, put_to_earlier
 from identification.mismatch.compare.saved_model_baseline import lasting, starting
 from identification.mismatch.faults import stage as faults
 from identification.mismatch.faults import wiring
@@ -63,6 +64,7 @@ def diagnose(
     limits: Limits | None = None,
     without: Collection[str] = (),
     watch: Observer = UNWATCHED,
+    before: Sequence[Recording] = (),
 ) -> Diagnosis | Refusal:
     """Everything that `rig diagnose` says, for recordings of one thruster. A Refusal says what is wrong with them.
 
@@ -70,12 +72,13 @@ def diagnose(
     `limits`: of the next experiment; None: what was recorded may be run again, for BUDGET s.
     `without`: ids of effects taken out of the catalogue (what does the tool say of a physics that it does not know?).
     `watch`: is told how far it is, and may end the search; then a note says what was not asked.
+    `before`: the recordings behind `baseline`; with them is told whether what is found is new.
     """
     if any(r.kind == "vehicle" for r in recordings):
         from identification.mismatch.vehicle.diagnose import diagnose_vehicle  # as much again to start, for a few
 
         return diagnose_vehicle(recordings, holdout, seed, without=without)
-    found = traced(recordings, holdout, seed, baseline, limits, without, watch)
+    found = traced(recordings, holdout, seed, baseline, limits, without, watch, before)
     return found if isinstance(found, Refusal) else found.diagnosis
 
 
@@ -87,9 +90,10 @@ def traced(
     limits: Limits | None = None,
     without: Collection[str] = (),
     watch: Observer = UNWATCHED,
+    before: Sequence[Recording] = (),
 ) -> Trace | Refusal:
     """The same of a thruster, with what each stage handed on."""
-    baseline = None if baseline is None else lasting(baseline, recordings)
+    whole, baseline = baseline, None if baseline is None else lasting(baseline, recordings)
     draws, given = Draws.of(seed), None if baseline is None else starting(baseline)
     watch.stage("reading the runs")
     wired = wiring.run(recordings, holdout)
@@ -120,10 +124,13 @@ def traced(
     completed = unnamed.run(selected, located, validated, unseen, draws.unnamed)
     news = told_lines(cleaned.lines, baseline)
     experiment = None if selected.undone else next_experiment.run(now, data, completed.earned, news, limits)
+    later = Later(recordings, data, completed.after)
+    asked = [] if selected.undone else [n.term for n in completed.earned]
+    novel, unasked = put_to_earlier(whole, before, later, asked)
     undone = (*selected.undone, *((NO_LINES,) if first.undone else ()))
-    notes = (*interrupted(undone), *sound.notes, *unpredicted)
+    notes = (*interrupted(undone), *sound.notes, *unpredicted, *unasked)
     case = answer.Case(prepared.recordings, sound, unseen, cleaned.lines, baseline, notes)
-    diagnosis = answer.run(case, selected, located, completed, experiment, draws.answer)
+    diagnosis = answer.run(case, answer.Found(selected, located, completed, experiment, novel), draws.answer)
     return Trace(prepared, sound, first, cleaned, selected, located, named, validated, completed, diagnosis)
 
 

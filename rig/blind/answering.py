@@ -2,8 +2,8 @@
 
 One JSON line in, {"token", "tag", "without", "code"}, one line out when the answer is there: ANSWERS/<token>/<tag>.json
 and beside it <tag>.npz, what the model that was found and the baseline predict for the other run. Where the thruster
-was recorded a second time the first recording is diagnosed, and the second against its twin: that is the answer, with
-the first beside it. From its start on it refuses to read any file of the store but recordings.
+was recorded a second time the first recording is diagnosed, and the second against its twin, with the first at hand:
+that is the answer, with the first beside it. From its start on it refuses to read any file of the store but recordings.
 """
 
 from __future__ import annotations
@@ -62,7 +62,7 @@ def answered(folder: Path, without: Sequence[str] = ()) -> tuple[dict[str, Any],
     try:
         first = found = diagnose(given, without=tuple(without))
         if again and not isinstance(first, Refusal):
-            found = diagnose(again, baseline=first.twin, without=tuple(without))
+            found = diagnose(again, baseline=first.twin, without=tuple(without), before=given)
     except Exception as error:  # noqa: BLE001  # a crash of any kind is an answer, and counts against it
         told = f"{type(error).__name__}: {error}"
         return {"seconds": perf_counter() - start, "error": told, "trace": traceback.format_exc()}, {}

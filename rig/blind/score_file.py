@@ -87,7 +87,7 @@ def _known(row: dict[str, Any]) -> Known:
     row["constant"] = Interval(**row["constant"]) if row.get("constant") else None
     row["wired"] = Wired(**row["wired"] | {"said": tuple(row["wired"]["said"])}) if row.get("wired") else None
     row["intervals"] = tuple(Interval(**each) for each in row["intervals"])
-    row |= {name: tuple(row.get(name, ())) for name in ("strengths", "known")}
+    row |= {name: tuple(row.get(name, ())) for name in ("strengths", "known", "not_shown")}
     return Known(Score(**row), version, asked)
 
 

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from rig.diagnose.behind_twin import behind, missing
 from rig.diagnose.next_plan import write_next
 from rig.diagnose.outputs import PATH, Wanted, answer_options, holdout_option, seed_option, wanted_of
 from rig.diagnose.progress import observed
@@ -78,13 +79,15 @@ def diagnose_files(
     wanted: Wanted = NOTHING,
     watched: Callable[[Trace], object] | None = None,
     observer: Observer | None = None,
+    before: Sequence[Path] = (),
 ) -> Diagnosis:
     """The diagnosis of recordings of one thruster, against C V|V| or a twin; its own twin knows the files' hashes.
 
     Of recordings of a vehicle, against its drag and its thrusters' models; `vehicle` says what is known of it.
     `limits`: of the next experiment. `wanted`: what is to be written of the answer; what cannot be is refused before
-    anything is computed. `watched` is given what each stage of a thruster's diagnosis handed on, `observer` is told how
-    far it is and may end its search.
+    anything is computed. `before`: recordings behind the twin that are neither beside it nor beside the files.
+    `watched` is given what each stage of a thruster's diagnosis handed on, `observer` is told how far it is and may end
+    its search.
     Raises RecordingError or ConfigError for what cannot be used, TwinError for such a twin.
     """
     from rig.twin.reading import read_twin
@@ -93,6 +96,8 @@ def diagnose_files(
     files, held = recordings_in(paths), recordings_in(holdout) if holdout else []
     refuse_both(files, held)
     baseline = None if twin is None else read_twin(twin)
+    if before and baseline is None:
+        raise RecordingError("--before is of the recordings behind a twin, and there is no --twin; give one")
     recordings = read(files)
     wanted.refuse(recordings)
     if is_vehicle(recordings):
@@ -102,10 +107,14 @@ def diagnose_files(
     refuse_for_tunnel(vehicle)
     if baseline is not None and any_thruster:
         baseline = replace(baseline, thruster=recordings[0].thruster)
-    trace = traced(recordings, read(held), seed, baseline, limits, observer)
+    folders = [path.parent for path in (twin, *files) if path is not None]
+    earlier = [] if baseline is None else behind(baseline, folders, before)
+    trace = traced(recordings, read(held), seed, baseline, limits, observer, earlier)
     if watched is not None:
         watched(trace)
     found = trace.diagnosis
+    if baseline is not None and not earlier and found.findings:
+        found = replace(found, notes=(*found.notes, missing(baseline)))
     by_id = {r.recording_id: path for r, path in zip(recordings, files, strict=True)}
     return found if found.twin is None else replace(found, twin=stamped(found.twin, by_id))
 
@@ -131,13 +140,14 @@ def traced(
     baseline: Twin | None = None,
     limits: Limits | None = None,
     observer: Observer | None = None,
+    before: Sequence[Recording] = (),
 ) -> Trace:
     """As identification has it for a thruster, a refusal raised as RecordingError."""
     from identification.mismatch.observer import UNWATCHED
     from identification.mismatch.pipeline import traced as trace_of
     from identification.mismatch.prepare.preparing import Refusal
 
-    found = trace_of(recordings, holdout, seed, baseline, limits, watch=observer or UNWATCHED)
+    found = trace_of(recordings, holdout, seed, baseline, limits, watch=observer or UNWATCHED, before=before)
     if isinstance(found, Refusal):
         raise RecordingError(found.reason)
     return found
@@ -197,6 +207,13 @@ def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) 
 @click.argument("files", nargs=-1, required=True, type=PATH)
 @click.option("--twin", type=PATH, help="Diagnose against this twin instead of C V|V|.")
 @click.option("--any-thruster", is_flag=True, help="The twin may be of another thruster.")
+@click.option(
+    "--before",
+    multiple=True,
+    type=PATH,
+    metavar="FILE",
+    help="A recording behind the twin, where it is not beside it: tells whether what is found is new.",
+)
 @holdout_option
 @answer_options
 @click.option("--thrusters", multiple=True, type=PATH, help="Vehicle: what `rig fit --json` wrote of its thrusters.")
@@ -212,6 +229,7 @@ def diagnose_command(
     files: tuple[Path, ...],
     twin: Path | None,
     any_thruster: bool,
+    before: tuple[Path, ...],
     holdout: tuple[Path, ...],
     thrusters: tuple[Path, ...],
     installation: Path | None,
@@ -246,6 +264,7 @@ def diagnose_command(
                 wanted=wanted,
                 watched=traces.append if wants_stages else None,
                 observer=observer,
+                before=before,
             )
         tell(found, wanted, read(recordings_in(files)) if wanted.report is not None else (), (*files, *holdout))
         for trace in traces:

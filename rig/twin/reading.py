@@ -268,4 +268,5 @@ def _alternative(table: Table) -> Alternative:
 
 
 def _source(table: Table) -> Source:
-    return Source(table.text("recording_id"), table.text("sha256"), table.number("tare"))
+    file = table.text("file") if "file" in table.content else ""
+    return Source(table.text("recording_id"), table.text("sha256"), table.number("tare"), file)

@@ -75,9 +75,13 @@ def _with_units(term: TwinTerm) -> dict[str, object]:
 
 
 def stamped(twin: Twin, paths: Mapping[str, Path]) -> Twin:
-    """With the time, this program's version and the hashes of the files: `paths` by recording id."""
+    """With the time, this program's version, names and hashes of the files: `paths` by recording id."""
     sources = tuple(
-        replace(s, sha256=hashlib.sha256(paths[s.recording_id].read_bytes()).hexdigest())
+        replace(
+            s,
+            sha256=hashlib.sha256(paths[s.recording_id].read_bytes()).hexdigest(),
+            file=paths[s.recording_id].name,
+        )
         if s.recording_id in paths
         else s
         for s in twin.sources

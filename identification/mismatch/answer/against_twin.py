@@ -9,18 +9,17 @@ from math import isfinite
 import numpy as np
 
 from identification.estimation.tails import normal_sf
-from identification.flexible_terms.flexible import Flexible
 from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
+from identification.mismatch.compare.saved_model_baseline import terms_of
 from identification.mismatch.diagnosis import Finding
 from identification.mismatch.estimate.estimate import Estimate
-from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.name.naming import Named
 from identification.mismatch.value import Value
 from identification.recording import Recording
-from identification.twin import Alternative, Source, Twin, TwinNoise, TwinTerm, names_of
+from identification.twin import Alternative, Source, Twin, TwinNoise, names_of
 
 
 def with_twin(
@@ -30,10 +29,12 @@ def with_twin(
     recordings: Sequence[Recording],
     before: Twin | None,
     named: Sequence[Named] = (),
+    *,
+    beside: bool = False,
 ) -> Draft:
     """The draft with its twin; against an earlier twin the terms given are in the model, and a change is told.
 
-    `named`: the terms of the model with their other forms.
+    `named`: the terms of the model with their other forms; `beside`: whether something was found that is not new.
     """
     twin = twin_of(estimate, data, recordings, before)
     draft = replace(draft, twin=replace(twin, alternatives=_alternatives(estimate, data, named)))
@@ -43,7 +44,7 @@ def with_twin(
     C = draft.model["C"]
     findings = tuple(_relative(f, before, known) for f in draft.findings)
     changed = changed_constant(before, estimate, known, C.unit)
-    if changed is not None and findings and abs(C.value / before.C - 1) < policy.answer.CONSTANT_MOVED:
+    if changed is not None and (findings or beside) and abs(C.value / before.C - 1) < policy.answer.CONSTANT_MOVED:
         draft = replace(draft, notes=(*draft.notes, f"{changed.statement} Part of what was found may be in it."))
     elif changed is not None:
         findings = (*findings, changed)
@@ -106,7 +107,7 @@ def changed_constant(twin: Twin, estimate: Estimate, known: str, unit: str) -> F
 def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], before: Twin | None) -> Twin:
     """The fitted model as a twin; files' hashes and the time are added by who knows them."""
     fitted = estimate.fit
-    terms = _terms(fitted, data)
+    terms = terms_of(fitted, data)
     return Twin(
         thruster=recordings[0].thruster,
         driver_quantity=data.histories[0].driver_quantity,
@@ -137,24 +138,11 @@ def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], bef
     )
 
 
-def _terms(fitted: Fit, data: Data) -> tuple[TwinTerm, ...]:
-    return tuple(
-        TwinTerm(
-            term.id,
-            term.form,
-            {p.name: value for p, value in zip(term.parameters(sizes), values, strict=True)},
-            sizes,
-            term if isinstance(term, Flexible) else None,
-        )
-        for term, values, sizes in acting(fitted.model, fitted.theta, data.scale)
-    )
-
-
 def _alternatives(estimate: Estimate, data: Data, named: Sequence[Named]) -> tuple[Alternative, ...]:
     """Of the final model with one effect in another form; none where it is not the model that was named."""
     model = estimate.fit.model
     return tuple(
-        Alternative(r.fit.theta.C, _terms(r.fit, data), max(r.fit.chi2 - n.chi2_of_all, 0.0), n.chi2_gain)
+        Alternative(r.fit.theta.C, terms_of(r.fit, data), max(r.fit.chi2 - n.chi2_of_all, 0.0), n.chi2_gain)
         for n in named
         for r in n.forms
         if set(r.fit.model.terms) - {r.term} == set(model.terms) - {n.term}

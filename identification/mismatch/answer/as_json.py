@@ -92,6 +92,7 @@ def _finding(f: Finding) -> dict[str, object]:
         "doubts": list(f.doubts),
         "channels": list(f.channels),
         "recording": f.recording or None,
+        "since": f.since or None,
         "rivals": [r.effect for r in f.rivals],
         "rival_details": [
             {

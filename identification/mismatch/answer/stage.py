@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,11 +11,13 @@ from identification.mismatch import policy
 from identification.mismatch.answer.against_twin import with_twin
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.answer.fault_findings import with_channels
+from identification.mismatch.answer.novelty import told_new
 from identification.mismatch.answer.periodic_findings import with_lines
 from identification.mismatch.answer.proxies import proxies
 from identification.mismatch.answer.remainder import remainder_of
 from identification.mismatch.answer.report_assembly import curves_of, finding_of, values_of
 from identification.mismatch.answer.verdict import decided
+from identification.mismatch.compare.earlier_recordings import Novelty
 from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment, Rmse, Unexplained
 from identification.mismatch.faults.stage import Sound
 from identification.mismatch.locate.places import places_of
@@ -28,6 +31,7 @@ from identification.mismatch.unnamed.stage import Completed
 from identification.mismatch.validate.each_run import run_differences
 from identification.mismatch.validate.held_out import rmse
 from identification.mismatch.validate.stage import score
+from identification.physics.term import Term
 from identification.recording import Recording
 from identification.run_history.history import History
 from identification.twin import Twin
@@ -53,24 +57,30 @@ class Case:
     """What was left aside, and what cannot be predicted."""
 
 
-def run(
-    case: Case,
-    selected: Selected,
-    located: Located,
-    completed: Completed,
-    experiment: NextExperiment | None,
-    rng: np.random.Generator,
-) -> Diagnosis:
+@dataclass(frozen=True, eq=False, slots=True)
+class Found:
+    """What the stages before found in it."""
+
+    selected: Selected
+    located: Located
+    completed: Completed
+    experiment: NextExperiment | None
+    novelties: Mapping[Term, Novelty]
+    """Of terms found beside a twin, whether its own recordings have them too; empty where nobody asked."""
+
+
+def run(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
     """The verdict is decided last, from all findings: names, channel faults, a changed constant, lines.
 
     What predicts worse than the baseline, whose own residual shows nothing anywhere, was noise: it is taken back.
     """
-    found = _answered(case, selected, located, completed, experiment, rng)
-    if not _was_noise(found):
-        return found
-    tried = " and ".join(dict.fromkeys(n.term.id for n in completed.earned))
-    bare = Completed(selected.before, (), {}, (), None, False, selected.before, located.left)
-    again = _answered(case, selected, located, bare, None, rng)
+    told = _answered(case, found, rng)
+    if not _was_noise(told):
+        return told
+    tried = " and ".join(dict.fromkeys(n.term.id for n in found.completed.earned))
+    before = found.selected.before
+    bare = Completed(before, (), {}, (), None, False, before, found.located.left)
+    again = _answered(case, replace(found, completed=bare, experiment=None), rng)
     return replace(again, notes=(*again.notes, TAKEN_BACK.format(tried)))
 
 
@@ -81,14 +91,8 @@ def _was_noise(found: Diagnosis) -> bool:
     return all(place.p_value >= policy.locate.RESIDUAL_FALSE_ALARM for place in found.mismatch)
 
 
-def _answered(
-    case: Case,
-    selected: Selected,
-    located: Located,
-    completed: Completed,
-    experiment: NextExperiment | None,
-    rng: np.random.Generator,
-) -> Diagnosis:
+def _answered(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
+    selected, located, completed = found.selected, found.located, found.completed
     data, before, after = selected.data, selected.before, completed.after
     measured = replace(data, histories=case.sound.histories)
     every = [np.ones(r.size, dtype=bool) for r in data.rows]
@@ -98,25 +102,26 @@ def _answered(
     remainder = remainder_of(completed, data, case.unseen)
     flexible = completed.flexible
     quiet = located.estimate.noise
+    new = told_new(_findings(completed, data), found.novelties, case.baseline)
     held = with_held(score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None), flexible)
     draft = Draft(
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
         mismatch=places_of(selected, after, rng, pulsing=located.left.pulses is not None),
-        findings=_findings(completed, data),
+        findings=new.findings,
         model_terms=tuple(t.id for t in after.fit.model.terms),
         model=values_of(after.fit, data, completed.intervals),
     )
     ids = tuple(r.recording_id for r in case.recordings)
     draft = with_channels(draft, case.sound.faults, ids)
-    draft = with_twin(draft, after, data, case.recordings, case.baseline, completed.earned)
+    draft = with_twin(draft, after, data, case.recordings, case.baseline, completed.earned, beside=bool(new.not_new))
     draft = with_lines(draft, case.lines, train.before, case.baseline, ids)
     stands_in = proxies(after.fit.model, draft.findings, case.recordings, case.sound.histories)
     n, p = after.fit.residual.size, int(after.fit.free.sum())
     return Diagnosis(
         recordings=ids,
         thruster=case.recordings[0].thruster,
-        answer=decided(draft.findings, remainder, experiment, held, draft.mismatch),
+        answer=decided(draft.findings, remainder, found.experiment, held, draft.mismatch),
         baseline_model=draft.baseline_model,
         baseline=draft.baseline,
         mismatch=draft.mismatch,
@@ -126,19 +131,20 @@ def _answered(
         heldout=held,
         chi2_per_dof=after.fit.chi2 / max(n - p, 1),
         whiteness_p=whiteness(after.fit.residual, [r.size for r in data.rows]),
-        notes=(*draft.notes, *case.notes, *stands_in),
+        notes=(*draft.notes, *new.notes, *case.notes, *stands_in),
         curves=curves_of(before, after, data),
         twin=draft.twin,
+        not_new=new.not_new,
     )
 
 
-def _findings(completed: Completed, data: Data) -> tuple[Finding, ...]:
+def _findings(completed: Completed, data: Data) -> dict[Term, Finding]:
     """Each with what single runs say otherwise."""
     inside = [n.term for n in completed.earned if n.term in completed.after.fit.model.terms]
     apart = run_differences(completed.after, data, inside)
-    out = []
+    out = {}
     for n in completed.earned:
         found = finding_of(n, data.scale, completed.intervals)
         said = apart.get(n.term)
-        out.append(found if said is None else replace(found, statement=f"{found.statement} {said.statement}"))
-    return tuple(out)
+        out[n.term] = found if said is None else replace(found, statement=f"{found.statement} {said.statement}")
+    return out

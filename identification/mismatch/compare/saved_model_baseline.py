@@ -8,13 +8,15 @@ from math import sqrt
 
 import numpy as np
 
+from identification.flexible_terms.flexible import Flexible
 from identification.mismatch import policy
-from identification.mismatch.estimate.fitting import raw
+from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data, PriorPredictionFactor
-from identification.mismatch.model.model import Given, Model
+from identification.mismatch.model.model import Given, Model, acting
 from identification.mismatch.model.parameters import Theta
+from identification.physics.catalogue import CATALOGUE
 from identification.recording import Floats, Recording
-from identification.twin import Twin, names_of
+from identification.twin import Twin, TwinTerm, names_of
 
 PROBE = 0.1
 """Standard deviations by which a parameter is moved for the slope of the prediction."""
@@ -24,13 +26,29 @@ def given(twin: Twin) -> tuple[Given, ...]:
     return tuple(Given(t.term, t.values, t.scale) for t in twin.terms)
 
 
+def terms_of(fitted: Fit, data: Data) -> tuple[TwinTerm, ...]:
+    """Of a fitted model, as a twin has them, in the order in which they act."""
+    return tuple(
+        TwinTerm(
+            term.id,
+            term.form,
+            {p.name: value for p, value in zip(term.parameters(sizes), values, strict=True)},
+            sizes,
+            term if isinstance(term, Flexible) else None,
+        )
+        for term, values, sizes in acting(fitted.model, fitted.theta, data.scale)
+    )
+
+
 def starting(twin: Twin) -> Callable[[Data, Theta], tuple[Data, Theta, Model]]:
     """For search(): the twin's terms at their values, C of the twin to begin with, and how uncertain they are."""
 
     def begin(data: Data, theta: Theta) -> tuple[Data, Theta, Model]:
         model = Model((), given(twin))
         theta = replace(theta, C=twin.C)
-        return replace(data, prior_factor=_both(data.prior_factor, prior_factor(twin, data, theta))), theta, model
+        unsure = _both(data.prior_factor, prior_factor(twin, data, theta))
+        before = (twin.C, sqrt(twin.covariance[0][0]))
+        return replace(data, prior_factor=unsure, constant_before=before), theta, model
 
     return begin
 
@@ -105,7 +123,26 @@ def _towards_forms(twin: Twin, theta: Theta, data: Data, base: Predicted) -> lis
 def _in_proportion(twin: Twin, theta: Theta, data: Data, base: Predicted) -> list[Predicted]:
     every = given(twin)
     less = [Model((), every[:i] + every[i + 1 :]) for i in range(len(every))]
-    return [_change(model, theta, data, base, policy.compare.FORM_ERROR) for model in less]
+    shares = _form_errors(twin)
+    return [_change(model, theta, data, base, share) for model, share in zip(less, shares, strict=True)]
+
+
+def _form_errors(twin: Twin) -> list[float]:
+    """Of each term, as a share of what it changes: of an effect that textbooks give one form no more than its amount's
+    own error, for a larger one would have been seen in the twin's own run."""
+    std = np.sqrt(np.diag(np.array(twin.covariance)))[1:].tolist()
+    out, at = [], 0
+    for term in twin.terms:
+        known = term.term.parameters(term.scale)
+        amounts = [
+            s / abs(v - p.neutral)
+            for p, v, s in zip(known, term.values, std[at : at + len(known)], strict=True)
+            if p.neutral is not None and v != p.neutral
+        ]
+        at += len(known)
+        alone = term.flexible is None and sum(each.id == term.effect for each in CATALOGUE) == 1
+        out.append(min([policy.compare.FORM_ERROR, *amounts]) if alone else policy.compare.FORM_ERROR)
+    return out
 
 
 def _change(model: Model, theta: Theta, data: Data, base: Predicted, times: float) -> Predicted:

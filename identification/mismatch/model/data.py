@@ -43,6 +43,8 @@ class Data:
     """s, bound of the nuisance shift; 0 where nothing moves."""
     prior_factor: PriorPredictionFactor | None = None
     """How uncertain the baseline's own prediction is, where a twin gives it."""
+    constant_before: tuple[float, float] | None = None
+    """C of a twin and its standard error; None without one."""
     predictor: Predictor = field(default_factory=Predictor, repr=False)
     """What predicts these runs, and remembers what it worked out; a part of them shares it."""
 

@@ -229,7 +229,8 @@ class Thruster:
         )
 
     def rarer(self, term: Term, other: Term) -> bool:
-        return term.traits.rare and not other.traits.rare
+        """Never against a twin: what most thrusters have all the time is no likelier to have come since."""
+        return self.data.constant_before is None and term.traits.rare and not other.traits.rare
 
     def merged(
         self, estimate: Estimate, standing: Mapping[Term, SwapTest], best: tuple[float, Fit] | None

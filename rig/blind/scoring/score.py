@@ -6,7 +6,8 @@
     extra      a finding is not what was concealed, whatever stands beside it
     exact      the findings are what was concealed and no other, rivals stated or not, and nothing is `unexplained`
 
-Of a second recording of a thruster, asked against the twin of the first, concealed is what came on top.
+Of a second recording of a thruster, asked against the twin of the first, concealed is what came on top. What is told
+as nothing that the first could have shown is not claimed to be new: it counts where nothing else is, and is no alarm.
 
 Where the physics is outside the catalogue, or was taken out of it, the outcome counts: `located` (unexplained, in the
 right place), `located, named` (the same, and a name beside it, wrong as every name is there), `misplaced` (unexplained,
@@ -34,6 +35,8 @@ Table = Mapping[str, Any]
 AS_RIVAL: Final = "among rivals"
 """The answer of a confusion matrix where the truth is a stated rival of what was found."""
 OPEN_CELLS: Final = ("outside", "removed")
+NOT_SHOWN: Final = "not shown before"
+"""What a finding is `since` where nobody can tell whether it is new."""
 LOCATED: Final = ("located", "located, named")
 REFERRED: Final = frozenset({"exponent"})
 """Effects that refer C to a voltage, which is not the same on both sides."""
@@ -101,6 +104,8 @@ class Score:
     """Effects that an earlier recording of the same thruster had as well."""
     wired: Wired | None = None
     """Of cases about the wiring of several runs: what was said of it."""
+    not_shown: tuple[str, ...] = ()
+    """Beside `named`, effects of which is said that an earlier recording could not have shown them."""
 
     @property
     def right(self) -> bool:
@@ -108,16 +113,23 @@ class Score:
             return False
         if self.wired is not None:
             return self.wired.right
-        return set(self.truth) <= {*self.named, *self.rivals} if self.truth else self.said == "adequate"
+        if self.truth:
+            return set(self.truth) <= {*self.named, *self.rivals, *self.not_shown}
+        return self.said == "adequate" or (self.said != "unexplained" and bool(self.not_shown) and not self.named)
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """What is claimed: what is new, or else what may be."""
+        return self.named or self.not_shown
 
     @property
     def alone(self) -> bool:
         wanted = "explained" if self.truth else "adequate"
-        return not self.failed and self.said == wanted and set(self.named) == set(self.truth)
+        return not self.failed and self.said == wanted and set(self.told) == set(self.truth)
 
     @property
     def wrong(self) -> bool:
-        return bool(self.named) and not set(self.truth) & {*self.named, *self.rivals}
+        return bool(self.named) and not set(self.truth) & {*self.named, *self.rivals, *self.not_shown}
 
     @property
     def extra(self) -> bool:
@@ -126,7 +138,7 @@ class Score:
     @property
     def exact(self) -> bool:
         told = ("explained", "ambiguous") if self.truth else ("adequate",)
-        return not self.failed and self.said in told and set(self.named) == set(self.truth)
+        return not self.failed and self.said in told and set(self.told) == set(self.truth)
 
     @property
     def clear(self) -> tuple[str, ...]:
@@ -136,7 +148,7 @@ class Score:
     @property
     def rival_only(self) -> bool:
         """Right, but something that was concealed is among the rivals alone."""
-        return self.right and not set(self.truth) <= set(self.named)
+        return self.right and not set(self.truth) <= {*self.named, *self.not_shown}
 
     @property
     def counted(self) -> bool:
@@ -196,7 +208,7 @@ def scored(
         order=order,
         truth=hidden,
         said=found["verdict"],
-        named=tuple(dict.fromkeys(f["effect"] for f in findings)),
+        named=tuple(dict.fromkeys(f["effect"] for f in findings if f.get("since") != NOT_SHOWN)),
         rivals=tuple(dict.fromkeys(r for f in findings for r in f["rivals"])),
         place=unexplained["where"]["quantity"] if unexplained else "",
         resembles=tuple(unexplained["resembles"]) if unexplained else (),
@@ -210,6 +222,7 @@ def scored(
         strengths=strengths(truth),
         known=tuple(truth.get("known", ())),
         wired=wired(found, truth),
+        not_shown=tuple(dict.fromkeys(f["effect"] for f in findings if f.get("since") == NOT_SHOWN)),
     )
 
 

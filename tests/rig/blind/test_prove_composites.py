@@ -112,6 +112,23 @@ def test_figures_of_differences():
     assert besides["difference: a thrust constant that is said to have changed"] == (pytest.approx(2 / 7), 7)
 
 
+def test_what_the_first_could_not_show_is_claimed_where_nothing_else_is():
+    def told(truth_, *found, verdict="explained"):
+        sealed = truth(*truth_) if truth_ else truth() | {"effects": []}
+        return scored(Order(f"difference/{'one_more' if truth_ else 'nothing'}/0"), sealed, answer(verdict, *found))
+
+    new, maybe = finding("heating") | {"since": "changed"}, finding("dead_band") | {"since": "not shown before"}
+    beside = told(("heating",), new, maybe)
+    assert (beside.named, beside.not_shown) == (("heating",), ("dead_band",))
+    assert (beside.exact, beside.extra, beside.wrong) == (True, False, False)
+    only = told(("dead_band",), maybe)
+    assert (only.right, only.exact, only.wrong) == (True, True, False)
+    assert not told(("heating",), maybe).right
+    assert told((), maybe).right
+    assert not told((), new, maybe).right
+    assert not told((), maybe, verdict="unexplained").right
+
+
 def test_only_what_came_on_top_is_hidden_in_a_second_recording(tmp_path):
     sealed = truth("asymmetry", "heating") | {"known": ["asymmetry"]}
     told = answer("explained", finding("heating"), finding("asymmetry", ratio=(0.7, 0.01)))

@@ -30,6 +30,8 @@ FORMS_SHARE = 1e-3
 """Of what the term gains: a rival that loses no more does the same, and the rest may be a form that suits the term."""
 SMALL_TERM = 0.05
 """Of what the largest term gains: one that gains less may be a repair."""
+REFERS = frozenset({"exponent", "supply_sag", "heating"})
+"""Effects that refer C to a voltage, a supply or a temperature: it moves with that, and nothing has changed."""
 MOST_REFITS = 7
 """Rivals of one term that are refitted, the most alike first: each costs a fit."""
 
@@ -137,16 +139,28 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
             break
         more = price(other, data) - extra_now
         extra = more * logn
-        hopeless = policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more)
+        moved = constant_moved(now, data)
+        hopeless = policy.select.RIVAL_STATED_BIC - min(extra, 2.0 * more) + moved
         suited = max(FORMS_BEYOND * policy.select.RIVAL_STATED_BIC, FORMS_SHARE * gain)
         new = _in_its_place(other, values, term, less, estimate, data, now.chi2 + max(hopeless, FORMS_SHARE * gain))
         if new.chi2 - now.chi2 + extra < suited:
             new = best_forms(new, [t for t in terms if t.id != other.id], data, estimate.weights, estimate.noise)
         if at_bound(other, new, data, estimate.weights) or contradiction(new, other, estimate.noise, data):
             continue
-        loss = new.chi2 - now.chi2 + extra
-        out.append(RivalTerm(other, new, float(loss), float(new.chi2 - now.chi2 + 2 * more)))
+        loss = new.chi2 - now.chi2 + constant_moved(new, data) - moved
+        out.append(RivalTerm(other, new, float(loss + extra), float(loss + 2 * more)))
     return sorted(out, key=lambda rival: rival.bic_loss)
+
+
+def constant_moved(fitted: Fit, data: Data) -> float:
+    """What a model costs in which C is not that of the twin: as much as its chi-square would rise if C had to be, at
+    most a parameter more. 0 without a twin, and where a term says what C refers to."""
+    if data.constant_before is None or any(term.id in REFERS for term in fitted.model.terms):
+        return 0.0
+    before, unsure = data.constant_before
+    both = float(np.hypot(fitted.std[0], unsure))
+    price = float(np.log(max(fitted.residual.size, 2)))
+    return min(((fitted.theta.C - before) / both) ** 2, price) if both > 0 else 0.0
 
 
 def _in_its_place(

@@ -52,7 +52,7 @@ def told(recording, values, terms=()):
     completed = completed_by(chosen, located, validated, (), rng(1))
     sound = Sound(chosen.data.histories, (), (), ())
     case = stage.Case((recording,), sound, (), (), None, ("a note",))
-    found = stage.run(case, chosen, located, completed, None, rng(2))
+    found = stage.run(case, stage.Found(chosen, located, completed, None, {}), rng(2))
     return found, chosen, completed, located
 
 

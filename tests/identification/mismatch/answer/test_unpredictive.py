@@ -117,7 +117,7 @@ def answered_with(ratio, recording):
     named = [replace(each, bic_gain=20.0) for each in named_by(chosen, located)]
     completed = Completed(off, tuple(named), {}, (), None, False, off, located.left)
     case = stage.Case((recording,), Sound(chosen.data.histories, unseen, (), ()), unseen, (), None, ())
-    return stage.run(case, chosen, located, completed, None, rng(2))
+    return stage.run(case, stage.Found(chosen, located, completed, None, {}), rng(2))
 
 
 def test_what_was_noise_is_taken_back_where_the_baseline_lacks_nothing():

@@ -165,12 +165,16 @@ def test_its_uncertainty_is_that_of_its_parameters_by_differences(twin):
         static(with_values(twin, [0.0 if i == 0 else values[0], 1.0 if i == 1 else values[1]]), V) for i in (0, 1)
     ]
     beside = np.column_stack([static(twin, V) - each for each in neutral])
-    forms = policy.compare.FORM_ERROR**2 * beside @ beside.T
+    own = np.sqrt(cov[1, 1]) / abs(values[1] - 1.0)
+    assert own < policy.compare.FORM_ERROR, "an asymmetry has one form: it is off by no more than its own error"
+    shapes = beside * [policy.compare.FORM_ERROR, own]
+    forms = shapes @ shapes.T
     expected = J @ cov @ J.T + forms
     assert found.thrust[0] @ found.thrust[0].T == pytest.approx(expected, abs=2e-2 * np.max(expected))
     sure = replace(twin, covariance=tuple((0.0,) * 3 for _ in range(3)))
     thrust = prior_factor(sure, data, theta).thrust[0]
-    assert thrust @ thrust.T == pytest.approx(forms, abs=2e-2 * np.max(forms)), "a form may be off"
+    band = policy.compare.FORM_ERROR**2 * np.outer(beside[:, 0], beside[:, 0])
+    assert thrust @ thrust.T == pytest.approx(band, abs=2e-2 * np.max(band)), "a form of several may be off"
     bare = replace(twin, terms=(), covariance=((1.0,),))
     assert prior_factor(bare, data, theta) is None
     assert given(bare) == ()
