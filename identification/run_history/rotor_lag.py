@@ -19,6 +19,8 @@ LAG_CLOSE = 1e-5
 """Relative change of the rate after which the quadratic lag has converged: what is left is about its square."""
 LEAST = 1e-9
 """Of what is divided by: below it a quotient is its limit."""
+NOTHING = 1e-200
+"""Of a rotor that is asked to turn the other way by the rounding of 0: it coasts."""
 BARELY = 1e-7
 """Of the linear brake: a quadratic one that is smaller is none."""
 
@@ -74,7 +76,7 @@ def follow_rate(w: Floats, n: Floats, quadratic: float, linear: float) -> Floats
 def to_rest(w: Floats, n: Floats, quadratic: float, linear: float) -> Floats:
     """(k,) s until a rotor at n, which turns against w, comes to rest."""
     size, against = np.abs(w), np.abs(n)
-    beyond = against / (quadratic * size**2 + linear * (size + 0.5 * against))
+    beyond = against / np.maximum(quadratic * size**2 + linear * (size + 0.5 * against), NOTHING)
     swing = quadratic * (quadratic * size**2 + linear * size) - 0.25 * linear**2
     turn = np.sqrt(np.abs(swing))
     reach = turn * beyond

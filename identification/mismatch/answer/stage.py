@@ -8,6 +8,7 @@ import numpy as np
 
 from identification.mismatch import policy
 from identification.mismatch.answer.against_twin import with_twin
+from identification.mismatch.answer.averaged_constant import averaged
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.answer.fault_findings import with_channels
 from identification.mismatch.answer.periodic_findings import with_lines
@@ -99,13 +100,16 @@ def _answered(
     flexible = completed.flexible
     quiet = located.estimate.noise
     held = with_held(score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None), flexible)
+    model = values_of(after.fit, data, completed.intervals)
+    model["C"], beside = averaged(model["C"], located.estimate.fit, completed.earned)
     draft = Draft(
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
         mismatch=places_of(selected, after, rng, pulsing=located.left.pulses is not None),
         findings=_findings(completed, data),
         model_terms=tuple(t.id for t in after.fit.model.terms),
-        model=values_of(after.fit, data, completed.intervals),
+        model=model,
+        notes=beside,
     )
     ids = tuple(r.recording_id for r in case.recordings)
     draft = with_channels(draft, case.sound.faults, ids)

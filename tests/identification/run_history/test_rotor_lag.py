@@ -44,6 +44,16 @@ def test_a_rotor_that_coasts_from_its_rate_loses_it_as_one_over_time():
     assert found == pytest.approx(-8.0 / (1 + 0.26 * 8.0 * since), abs=1e-12)
 
 
+@pytest.mark.parametrize("nearly", [0.0, 1e-300, 1e-160, -1e-160, 1e-12])
+def test_rounding_of_a_command_of_nothing_brakes_no_rotor(nearly):
+    w, dt = np.array([6.0, nearly, nearly]), np.array([3.0, 1.0, 2.0])
+    end, mean = lag(w, dt, 0.26, 0.0, start=-1.0)
+    coasting = lag(np.array([6.0, 0.0, 0.0]), dt, 0.26, 0.0, start=-1.0)
+    assert end == pytest.approx(coasting[0], abs=1e-9)
+    assert mean == pytest.approx(coasting[1], abs=1e-9)
+    assert lag(-w, dt, 0.26, 0.0, start=1.0)[0] == pytest.approx(-end, abs=1e-12)
+
+
 @pytest.mark.parametrize(("quadratic", "linear"), ROTORS)
 def test_a_rotor_turns_round_when_its_equation_says(quadratic, linear):
     w, n = np.array([3.0, -8.0, 0.5]), np.array([-7.0, 0.4, -6.0])
