@@ -13,7 +13,9 @@ import numpy as np
 
 from identification.estimation.tails import normal_sf
 from identification.mismatch import policy
+from identification.mismatch.answer.report_assembly import constant_of
 from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.select.stepwise import RivalTerm
 from identification.mismatch.value import QUANTILE, Value
@@ -42,12 +44,13 @@ class Answered:
     """The same with that."""
 
 
-def averaged(constant: Value, beside: Fit, named: Sequence[Named]) -> tuple[Value, tuple[str, ...]]:
+def averaged(constant: Value, beside: Fit, data: Data, named: Sequence[Named]) -> tuple[Value, tuple[str, ...]]:
     """C with the interval of the mixture, and what is said of rivals whose C is not within that of the model told.
 
     `beside`: the fit beside which rivals and other forms of the names stand. The value stays that of the model told.
     """
-    every = (_answered(constant, beside, n, r) for n in named for r in (*n.rivals, *n.forms) if _within_reach(r))
+    moved = constant.value - constant_of(beside, data)[0]
+    every = (_answered(moved, data, n, r) for n in named for r in (*n.rivals, *n.forms) if _within_reach(r))
     others = sorted((each for each in every if each.std > 0), key=lambda each: -each.odds)
     if not others or not constant.std > 0:
         return constant, ()
@@ -86,14 +89,14 @@ def _within_reach(rival: RivalTerm[Term, Fit]) -> bool:
     return rival.bic_loss < policy.select.RIVAL_STATED_BIC
 
 
-def _answered(constant: Value, beside: Fit, named: Named, rival: RivalTerm[Term, Fit]) -> Answered:
-    """A rare effect has the odds of meeting one against it, an ordinary one has them for it."""
+def _answered(moved: float, data: Data, named: Named, rival: RivalTerm[Term, Fit]) -> Answered:
+    """A rare effect has the odds of meeting one against it, an ordinary one has them for it. `moved`: by how much C of
+    the model told is not that of the fit beside which rivals stand."""
     rarer = int(rival.term.traits.rare) - int(named.term.traits.rare)
     loss = max(rival.bic_loss + rarer * policy.select.RARE_TERM_BIC, 0.0)
-    value = constant.value + rival.fit.theta.C - beside.theta.C
+    value, std = constant_of(rival.fit, data)
     told, other = _labels(named.term, rival.term)
-    std = float(np.nan_to_num(rival.fit.std[0]))
-    return Answered(value, std, float(np.exp(-loss / 2)), told, other)
+    return Answered(value + moved, float(np.nan_to_num(std)), float(np.exp(-loss / 2)), told, other)
 
 
 def _labels(term: Term, other: Term) -> tuple[str, str]:

@@ -101,7 +101,7 @@ def _answered(
     quiet = located.estimate.noise
     held = with_held(score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None), flexible)
     model = values_of(after.fit, data, completed.intervals)
-    model["C"], beside = averaged(model["C"], located.estimate.fit, completed.earned)
+    model["C"], beside = averaged(model["C"], located.estimate.fit, data, completed.earned)
     draft = Draft(
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),

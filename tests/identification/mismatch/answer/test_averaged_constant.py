@@ -38,15 +38,15 @@ def told(fitted, named, other, rival, less, loss):
 def test_without_a_rival_within_reach_it_is_that_of_the_fit(two_names):
     data, one, other, less = two_names
     C = values_of(one, data)["C"]
-    assert averaged(C, one, ()) == (C, ())
+    assert averaged(C, one, data, ()) == (C, ())
     far = told(one, ASYMMETRY, other, CROSSTALK, less, policy.select.RIVAL_STATED_BIC + 1)
-    assert averaged(C, one, [far]) == (C, ())
+    assert averaged(C, one, data, [far]) == (C, ())
 
 
 def test_a_rival_that_is_rarely_met_is_said_and_hardly_widens_it(two_names):
     data, one, other, less = two_names
     C = values_of(one, data)["C"]
-    found, said = averaged(C, one, [told(one, ASYMMETRY, other, CROSSTALK, less, 0.0)])
+    found, said = averaged(C, one, data, [told(one, ASYMMETRY, other, CROSSTALK, less, 0.0)])
     assert found.value == C.value
     assert C.std < found.std < 1.5 * C.std
     assert not found.interval[0] <= other.theta.C <= found.interval[1]
@@ -57,7 +57,7 @@ def test_a_rival_that_is_rarely_met_is_said_and_hardly_widens_it(two_names):
 def test_the_interval_of_the_rare_one_holds_the_ordinary_one(two_names):
     data, one, other, less = two_names
     C = values_of(other, data)["C"]
-    found, said = averaged(C, other, [told(other, CROSSTALK, one, ASYMMETRY, less, 0.0)])
+    found, said = averaged(C, other, data, [told(other, CROSSTALK, one, ASYMMETRY, less, 0.0)])
     assert found.value == C.value
     assert found.interval[0] <= C.value
     assert found.interval[0] <= one.theta.C <= found.interval[1]
@@ -75,7 +75,7 @@ def test_another_form_counts_by_its_odds(two_names, loss):
     C = values_of(one, data)["C"]
     named = replace(told(one, ASYMMETRY, other, CROSSTALK, less, 99.0), term=RATE)
     named = replace(named, forms=(RivalTerm(THRUST, other, loss, loss),))
-    found, said = averaged(C, one, [named])
+    found, said = averaged(C, one, data, [named])
     odds = np.array([1.0, np.exp(-loss / 2)])
     low, high = found.interval
     assert low <= C.interval[0]
