@@ -8,11 +8,6 @@ from scipy.linalg.lapack import dtbtrs, ztbtrs
 
 from identification.recording import Floats
 
-LAG_STEPS = 12
-LAG_CLOSE = 1e-5
-"""Relative change of the rate after which the quadratic lag has converged: what is left is about its square."""
-LEAST_STEADY = 0.3
-"""Smallest slope of the equation of one end over that end that a step trusts."""
 LEAST_MOVE = 1e-12
 """Share of the largest value: means over intervals of a level differ by rounding."""
 
@@ -43,103 +38,6 @@ def lowpass(u: Floats, dt: Floats, tau: Floats | float, start: float = 0.0) -> t
     before = np.concatenate([[start], end[:-1]])
     mean = u + (before - u) * (lost / share)
     return end, mean
-
-
-def lag(
-    w: Floats, dt: Floats, quadratic: float, linear: float, start: float = 0.0, near: Floats | None = None
-) -> tuple[Floats, Floats]:
-    """Rate of n' = quadratic (w|w| - n|n|) + linear (w - n) at the ends of intervals, and its means (rotor equation).
-
-    `near`: ends of a lag that is not far off.
-    """
-    if quadratic == 0:
-        return lowpass(w, dt, 1 / linear, start)
-    end = lag_ends(w, dt, quadratic, linear, start, near)
-    before = np.concatenate([[start], end[:-1]])
-    decay = quadratic * _secant(w, np.abs(w), 0.5 * (before + end)) + linear
-    decay *= dt
-    np.maximum(decay, 1e-12, out=decay)
-    mean: Floats = w - (before - w) * (np.expm1(-decay) / decay)
-    return end, mean
-
-
-def lag_ends(
-    w: Floats, dt: Floats, quadratic: float, linear: float, start: float = 0.0, near: Floats | None = None
-) -> Floats:
-    """The same rate at the ends of intervals alone.
-
-    The right side is lambda(n) (w - n) with lambda > 0, which each interval has at the middle of its two ends. All
-    ends at once by Newton's method: each step is one linear recursion.
-    """
-    if quadratic == 0:
-        keep = np.exp(-linear * dt)
-        return recursion(keep, (1 - keep) * w, start)
-    much = np.abs(w)
-    size = float(np.max(much, initial=0.0)) or 1.0
-    end = w if near is None else near
-    before = np.empty_like(w)
-    before[0] = start
-    for _ in range(LAG_STEPS):
-        before[1:] = end[:-1]
-        middle = before + end
-        middle *= 0.5
-        keep = quadratic * _secant(w, much, middle) + linear
-        keep *= -dt
-        np.exp(keep, out=keep)
-        left = (before - w) * keep
-        own = (0.5 * quadratic) * dt * _secant_slope(w, much, middle)  # d left / d end, less its sign
-        own *= left
-        steady = np.maximum(1 + own, LEAST_STEADY)
-        left += w
-        left -= end
-        left /= steady
-        keep -= own
-        keep /= steady
-        move = recursion(np.clip(keep, 0.0, 1.0, out=keep), left, 0.0)
-        end = end + move
-        if float(np.max(np.abs(move, out=move))) < LAG_CLOSE * size:
-            break
-    return end
-
-
-def lagged(w: Floats, before: Floats, since: Floats, quadratic: float, linear: float) -> Floats:
-    """Rate of the same equation `since` s after it was `before`, w constant since then; any one shape."""
-    much = np.abs(w)
-    gap = before - w
-    end = before
-    for _ in range(2):
-        rate = quadratic * _secant(w, much, 0.5 * (before + end)) + linear
-        rate *= -since
-        end = w + gap * np.exp(rate, out=rate)
-    return end
-
-
-def follow_rate(w: Floats, n: Floats, quadratic: float, linear: float) -> Floats:
-    """lambda(n) of the same equation, 1/s."""
-    out: Floats = quadratic * _secant(w, np.abs(w), n) + linear
-    return out
-
-
-def _secant(w: Floats, much: Floats, n: Floats) -> Floats:
-    """(w|w| - n|n|)/(w - n) without a difference of likes; `much` is |w|.
-
-    |w| + |n| where both turn one way, (w^2 + n^2)/(|w| + |n|) where they do not.
-    """
-    both = np.abs(n)
-    both += much
-    product = w * n
-    if float(np.min(product, initial=0.0)) < 0:
-        both += 2 * np.minimum(product, 0.0) / np.maximum(both, 1e-300)
-    return both
-
-
-def _secant_slope(w: Floats, much: Floats, n: Floats) -> Floats:
-    """Of `_secant` over n: 1 - 2 w^2/(|w| + |n|)^2 where both turn against each other, else 1, with the sign of n."""
-    bend = np.copysign(1.0, n)
-    against = np.flatnonzero(w * n < 0)
-    if against.size:
-        bend[against] *= 1 - 2 * (much[against] / (much[against] + np.abs(n[against]))) ** 2
-    return bend
 
 
 def integral(value: Floats, edges: Floats, at: Floats) -> Floats:

@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from identification.recording import Floats
 from identification.run_history.converter import Places
-from identification.run_history.filters import delayed, lag, lag_ends, places_of
+from identification.run_history.filters import delayed, places_of
 from identification.run_history.history import History, Samples
 from identification.run_history.least_recently_used import LeastRecentlyUsed
 from identification.run_history.rate_gap import RateGap, rate_gap
+from identification.run_history.rotor_lag import lag, lag_ends
 from identification.run_history.step_response_rows import TickRows, tick_rows
 
 Channel = Literal["thrust", "rate"]
@@ -63,13 +64,13 @@ class RememberedRun:
         return rate_gap(self.history)
 
     def followed(self, value: Floats, rotor: tuple[float, float]) -> Floats:
-        """(M,) means of the rate of a rotor that follows `value` (filters.lag)."""
+        """(M,) means of the rate of a rotor that follows `value` (rotor_lag.lag)."""
         h = self.history
         near = self._reference("intervals", h.driver, h.dt, rotor)
         return lag(value, h.dt, *rotor, float(value[0]), near)[1]
 
     def follower(self, value: Floats, rotor: tuple[float, float]) -> Floats:
-        """(M,) means of what follows a `value` (M,) as `filters.lag` says, from rest; worked out once of the same."""
+        """(M,) means of what follows a `value` (M,) as `rotor_lag.lag` says, from rest; worked out once of the same."""
 
         def made() -> Floats:
             h = self.history

@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 
 from identification.recording import Floats
 from identification.run_history.converter import Mode
-from identification.run_history.filters import complex_recursion, follow_rate, lag_ends, lagged, recursion, resonant
+from identification.run_history.filters import complex_recursion, recursion, resonant
 from identification.run_history.remembered import RememberedRun
+from identification.run_history.rotor_lag import follow_rate, lag_ends, lagged, to_rest
 
 SETTLED = 25.0
 """Time constants after which a rotor has followed and ringing has died away."""
@@ -120,7 +121,6 @@ class Passed:
         begin = np.concatenate([value[:1], ends[:-1]])
         at = np.flatnonzero(begin * value[:-1] < 0)
         w, n = value[at], begin[at]
-        rate = follow_rate(w, 0.5 * (n + ends[at]), *self.rotor)
-        found = when[at] + np.log1p(np.abs(n / w)) / np.maximum(rate, 1e-300)
+        found = when[at] + to_rest(w, n, *self.rotor)
         out: Floats = found[found < when[at + 1]]
         return out

@@ -39,6 +39,7 @@ class History:
     drag: float = 0.25
     torque_acceleration: float = 7.2
     nominal_bus: float = 48.0
+    series_loss: float = 0.0
     stand_frequency: float = 0.0
     stand_damping: float = 0.0
     zero: float = 0.0

@@ -46,6 +46,8 @@ class State:
     motor_rise: float = 0.0
     """K, winding over water."""
     # constants of the mounted thruster, the supply and the stand, here so that effects need no second argument
+    series_loss: float = 0.0
+    """1/V, of V = e + loss e^2 between the terminals and the cold motor's back-EMF e; 0 where the drive makes up."""
     rate_per_volt: float = 1.0
     thrust_constant: float = 0.4
     """C_t = C / k^2, N/(rev/s)^2."""

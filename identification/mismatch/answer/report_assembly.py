@@ -18,6 +18,7 @@ from identification.mismatch.name.named_term import NamedTerm
 from identification.mismatch.select.rounds import T
 from identification.mismatch.select.stepwise import F, RivalTerm
 from identification.mismatch.value import QUANTILE, Value, of_shape
+from identification.physics.rotation_coupling import RotationCoupling
 from identification.physics.term import Term
 
 Intervals = Mapping[Term, tuple[Interval, ...]]
@@ -30,7 +31,7 @@ def values_of(fitted: Fit, data: Data, known: Intervals | None = None) -> dict[s
     """
     std = fitted.std
     unit = data.scale.driver_unit
-    out = {"C": Value(fitted.theta.C, float(std[0]), f"N/{unit}^2" if unit == "V" else "N s^2/rev^2")}
+    out = {"C": Value(*constant_of(fitted, data), f"N/{unit}^2" if unit == "V" else "N s^2/rev^2")}
     at = fitted.layout
     for term, values in fitted.values.items():
         told = values_told(term, values, std[at.of(term)].tolist(), data.scale, (known or {}).get(term))
@@ -41,6 +42,25 @@ def values_of(fitted: Fit, data: Data, known: Intervals | None = None) -> dict[s
         key = "tare" if len(data.histories) == 1 else f"tare[{history.recording_id}]"
         out[key] = Value(tare, float(std[at.tare(run)]), "N", limits=(-reach, reach))
     return out
+
+
+def constant_of(fitted: Fit, data: Data) -> tuple[float, float]:
+    """C and its standard error, of the driver that the rotor makes a rate of.
+
+    Where thrust follows the measured rate n in a share s, the model's own C is of the driver (1 - s) x + s n / k_0, k_0
+    what the rate is per driver as it was recorded; with n = k x that is x (1 + s (k / k_0 - 1)).
+    """
+    C, at = fitted.theta.C, fitted.layout
+    followed = [term for term in fitted.model.terms if isinstance(term, RotationCoupling)]
+    known = [h.rate_per_driver for h in data.histories if h.rate is not None]
+    if not followed or not data.with_rate or not known:
+        return C, float(fitted.std[at.C])
+    share, more = fitted.values[followed[0]][0], fitted.theta.k / known[0] - 1
+    driven = 1 + share * more
+    slopes = np.zeros(at.size)
+    slopes[at.C], slopes[at.of(followed[0]).start] = driven**2, 2 * C * driven * more
+    slopes[at.k] = 2 * C * driven * share / known[0]
+    return C * driven**2, float(np.sqrt(slopes @ np.nan_to_num(fitted.cov) @ slopes))
 
 
 def values_told(

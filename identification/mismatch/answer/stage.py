@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.mismatch import policy
 from identification.mismatch.answer.against_twin import with_twin
+from identification.mismatch.answer.averaged_constant import averaged
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.answer.fault_findings import with_channels
 from identification.mismatch.answer.novelty import told_new
@@ -104,13 +105,16 @@ def _answered(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
     quiet = located.estimate.noise
     new = told_new(_findings(completed, data), found.novelties, case.baseline)
     held = with_held(score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None), flexible)
+    model = values_of(after.fit, data, completed.intervals)
+    model["C"], beside = averaged(model["C"], located.estimate.fit, data, completed.earned)
     draft = Draft(
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
         mismatch=places_of(selected, after, rng, pulsing=located.left.pulses is not None),
         findings=new.findings,
         model_terms=tuple(t.id for t in after.fit.model.terms),
-        model=values_of(after.fit, data, completed.intervals),
+        model=model,
+        notes=beside,
     )
     ids = tuple(r.recording_id for r in case.recordings)
     draft = with_channels(draft, case.sound.faults, ids)

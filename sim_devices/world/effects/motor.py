@@ -36,13 +36,13 @@ class WindingResistance:
         require_choice("form", self.form, ("balance", "linearised"))
 
     def apply(self, value: float, s: State, _dt: float) -> float:
-        loss = self._loss(s)
+        loss = s.series_loss = self._loss(s)
         if self.form == "linearised":
             return value * max(1.0 - loss * abs(value), 0.0)
         return copysign((sqrt(1.0 + 4.0 * loss * abs(value)) - 1.0) / (2.0 * loss), value)
 
     def over(self, value: Floats, h: History) -> Floats:
-        loss = self._loss(h)
+        loss = h.series_loss = self._loss(h)
         if self.form == "linearised":
             return np.asarray(value * np.maximum(1.0 - loss * np.abs(value), 0.0))
         return np.asarray(np.sign(value) * (np.sqrt(1.0 + 4.0 * loss * np.abs(value)) - 1.0) / (2.0 * loss))
@@ -62,8 +62,9 @@ class Heating:
     With a fifth of V_max lost in the cold winding, copper 40 K warmer costs 4.9 % of the thrust there and 0.9 % at a
     tenth of it.
 
-    What comes in is the back-EMF of the cold motor at these terminals, after `winding_resistance` where there is one;
-    where there is none, the drive makes up for the cold drop, and cold thrust is C V|V|. form "winding": copper warms
+    What comes in is the back-EMF of the cold motor at these terminals, after `winding_resistance` where there is one:
+    that is then all that is in series, of which `resistance` is what warms; where there is none, the drive makes up
+    for the cold drop, and cold thrust is C V|V|. form "winding": copper warms
     as the motor's thermometer sees it, magnets stay in the water. form "magnet": magnets follow with a lag of their
     own, `time_constant`, and the winding has no resistance to speak of. form "both": both do.
     """
@@ -92,26 +93,28 @@ class Heating:
     def apply(self, value: float, s: State, dt: float) -> float:
         self.rise += (s.motor_rise - self.rise) * min(dt / self.time_constant, 1.0)
         s.flux = float(self._flux(np.asarray(self.rise)))
-        hot = self._hot(np.asarray(abs(value)), np.asarray(s.motor_rise), np.asarray(s.flux), self._loss(s))
+        hot = self._hot(np.asarray(abs(value)), np.asarray(s.motor_rise), np.asarray(s.flux), s)
         return copysign(float(hot), value)
 
     def over(self, value: Floats, h: History) -> Floats:
         """`h.motor_rise` is that of the pass before: the sweep passes here until it stands still."""
         h.flux = self._flux(low_pass(h.motor_rise, self.time_constant, h.dt))
-        return np.asarray(np.copysign(self._hot(np.abs(value), h.motor_rise, h.flux, self._loss(h)), value))
+        return np.asarray(np.copysign(self._hot(np.abs(value), h.motor_rise, h.flux, h), value))
 
     def _flux(self, rise: Floats) -> Floats:
         """Of the magnets, of what they have when cold; never all of it lost."""
         return np.ones_like(rise) if self.form == "winding" else np.maximum(1.0 - self.magnet * rise, LEAST_FLUX)
 
-    def _hot(self, cold: Floats, rise: Floats, flux: Floats, loss: float) -> Floats:
-        """Back-EMF in volts of the cold motor, n/k: flux e + (loss hot / flux) e^2 = cold + loss cold^2."""
-        bend = loss * (1.0 + self.copper * rise) / flux
+    def _hot(self, cold: Floats, rise: Floats, flux: Floats, s: State | History) -> Floats:
+        """Back-EMF in volts of the cold motor, n/k: flux e + ((loss + hotter) / flux) e^2 = cold + loss cold^2."""
+        own = self._loss(s)
+        loss = s.series_loss or own
+        bend = (loss + own * self.copper * rise) / flux
         terminals = cold + loss * cold * cold
         return np.asarray(2.0 * terminals / (flux + np.sqrt(flux * flux + 4.0 * bend * terminals)))
 
     def _loss(self, s: State | History) -> float:
-        """1/V, of the cold winding: V = e + loss e^2."""
+        """1/V, of the cold winding that warms: V = e + loss e^2."""
         resistance = 0.0 if self.form == "magnet" else self.resistance
         return resistance * s.drag * s.rate_per_volt**2 / s.torque_acceleration
 

@@ -27,24 +27,6 @@ def test_lowpass_on_an_even_grid_is_a_recursive_filter():
     assert end == pytest.approx(lfilter([1 - a], [1, -a], u), abs=1e-12)
 
 
-@pytest.mark.parametrize(("quadratic", "linear"), [(0.5, 0.0), (0.05, 3.0), (5.0, 0.2)])
-def test_lag_is_the_rotor_equation(quadratic, linear):
-    """Intervals short against the lag, as preparing lays them after a step."""
-    fastest = quadratic * 20 + linear
-    u, dt = steps(100, low=0.05 / fastest, high=0.3 / fastest)
-    mean = filters.lag(u, dt, quadratic, linear, start=-3.0)[1]
-    _, means = integrated(
-        lambda y, v: [quadratic * (v * abs(v) - y[0] * abs(y[0])) + linear * (v - y[0])], [-3.0], u, dt
-    )
-    assert mean == pytest.approx(means, abs=0.02)  # of 10: the mean rate within an interval stands for the rate
-
-
-def test_lag_ends_at_its_command_and_stays_at_rest():
-    u = np.full(50, 6.0)
-    assert filters.lag(u, np.full(50, 1.0), 2.0, 0.0)[1][-1] == pytest.approx(6.0)
-    assert filters.lag(np.zeros(50), np.full(50, 1.0), 2.0, 0.0)[1].tolist() == [0.0] * 50
-
-
 @pytest.mark.parametrize(("frequency", "damping"), [(0.5, 0.02), (3.0, 0.3), (12.0, 0.9)])
 def test_resonant_is_a_mass_on_a_spring(frequency, damping):
     u, dt = steps(50)

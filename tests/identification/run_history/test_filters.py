@@ -6,7 +6,8 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import welch
 
 from identification.mismatch.periodic.spectrum import averaged, smoothed
-from identification.run_history.filters import delayed, integral, lag, lowpass, play, reconstructed, recursion
+from identification.run_history.filters import delayed, integral, lowpass, play, reconstructed, recursion
+from identification.run_history.rotor_lag import lag
 
 
 def _play(value, width):

@@ -13,7 +13,7 @@ from identification.mismatch.select.baseline import start
 from identification.physics.motor_lag import MotorLag
 from identification.physics.stand_resonance import StandResonance
 from identification.recording import Channel, Recording
-from identification.run_history.filters import lag, lag_ends
+from identification.run_history.rotor_lag import lag_ends
 from identification.run_history.sub_interval_dynamics import Passed
 
 TICK = 0.05
@@ -94,20 +94,6 @@ def test_a_rotor_that_turns_round_follows_the_torque_balance():
     found = passed.followed(*ticks_before(t, when), value, rates(passed, when, value))
     turned = w * np.where(t < stands, np.tan(q * w * t + np.arctan(n0 / w)), np.tanh(q * w * (t - stands)))
     assert found == pytest.approx(turned, abs=2e-3)
-
-
-def test_lag_ends_where_its_own_equation_says_at_every_step_through_zero():
-    rng = np.random.default_rng(0)
-    w = np.repeat(rng.uniform(-10, 10, 200), 30)
-    dt = rng.uniform(0.005, 0.05, w.size)
-    end, _ = lag(w, dt, 0.8, 0.1)
-    before = np.concatenate([[0.0], end[:-1]])
-    n = 0.5 * (before + end)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        slope = np.where(w == n, 2 * np.abs(w), (w * np.abs(w) - n * np.abs(n)) / (w - n))
-    again, _ = lag(w, dt, 0.8, 0.1, near=lag(w, dt, 0.1, 0.0)[0])
-    assert again == pytest.approx(end, abs=1e-7)
-    assert end == pytest.approx(w + (before - w) * np.exp(-(0.8 * slope + 0.1) * dt), abs=1e-7)
 
 
 def test_samples_in_step_with_the_ticks_of_a_ramp_are_foretold():

@@ -48,6 +48,18 @@ def test_hot_copper_costs_what_the_table_of_the_field_says():
     assert (high - 1.0, low - 1.0) == pytest.approx((-0.049, -0.009), abs=5e-4)
 
 
+@pytest.mark.parametrize("order", [("winding_resistance", "heating"), ("heating", "winding_resistance")])
+def test_of_what_is_in_series_the_copper_alone_warms(order):
+    """0.3 ohm in series, 0.1 of it copper that warms: V = e + (0.3 + 0.1 copper dT) LOSS e^2, thrust goes as e^2."""
+    kinds = {"winding_resistance": {"resistance": 0.3}, "heating": {"resistance": 0.1, "copper": 0.004}}
+    after = settled(TOP, {name: kinds[name] for name in order}, heating=0.3)
+    rise = after.motor_rise[-1]
+    loss = (0.3 + 0.1 * 0.004 * rise) * LOSS
+    e = brentq(lambda e: e + loss * e * e - TOP, 0.0, TOP)
+    assert rise > 5.0
+    assert after.reading[-1] == pytest.approx(0.4 * e * e, rel=1e-6)
+
+
 def test_hot_magnets_let_a_voltage_fed_motor_turn_faster_and_draw_more():
     """+2.2 % for 20 K where the winding takes a fifth, +4 % where it takes a fiftieth."""
     thrust, current = warmed(TOP, 20.0, resistance=fifth(), copper=0.0, magnet=0.0011, form="both")

@@ -32,6 +32,8 @@ SMALL_TERM = 0.05
 """Of what the largest term gains: one that gains less may be a repair."""
 REFERS = frozenset({"exponent", "supply_sag", "heating"})
 """Effects that refer C to a voltage, a supply or a temperature: it moves with that, and nothing has changed."""
+FIRST_LIKENESS = 0.7
+"""From which the rival that is most alike of all is refitted in any case: of a few trials none need be near."""
 MOST_REFITS = 7
 """Rivals of one term that are refitted, the most alike first: each costs a fit."""
 
@@ -134,8 +136,8 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
     out = []
     extra_now = price(term, data)
     logn = float(np.log(max(now.residual.size, 2)))
-    for other, (r, values) in ranked[:MOST_REFITS]:
-        if not worth_refitting(r, gain):
+    for rank, (other, (r, values)) in enumerate(ranked[:MOST_REFITS]):
+        if not worth_refitting(r, gain) and (rank > 0 or r < FIRST_LIKENESS):
             break
         more = price(other, data) - extra_now
         extra = more * logn

@@ -1,0 +1,71 @@
+"""The rotor's equation against a solver that knows nothing of its closed form: short intervals, holds, turns."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from identification.run_history.rotor_lag import lag, lag_ends, lagged, to_rest
+from tests.identification.physics.one_term import integrated, steps
+
+ROTORS = [(0.5, 0.0), (0.05, 3.0), (5.0, 0.2), (0.02, 0.9), (0.4, 1e-9), (1e-9, 2.0), (1e-5, 2.0)]
+
+
+def equation(quadratic, linear):
+    return lambda y, v: [quadratic * (v * abs(v) - y[0] * abs(y[0])) + linear * (v - y[0])]
+
+
+@pytest.mark.parametrize(("quadratic", "linear"), ROTORS)
+@pytest.mark.parametrize("longest", [0.3, 40.0])
+def test_lag_is_the_rotor_equation_however_long_a_command_is_held(quadratic, linear, longest):
+    """The longest holds are many time constants; every third asks the rotor to stand."""
+    fastest = quadratic * 20 + linear
+    w, dt = steps(90, low=0.05 / fastest, high=longest / fastest)
+    w[::3] = 0.0
+    end, mean = lag(w, dt, quadratic, linear, start=-3.0)
+    ends, means = integrated(equation(quadratic, linear), [-3.0], w, dt)
+    assert end == pytest.approx(ends[:, 0], abs=1e-6)
+    assert mean == pytest.approx(means, abs=1e-6)
+    assert lag_ends(w, dt, quadratic, linear, -3.0) == pytest.approx(end, abs=1e-12)
+
+
+def test_a_lag_is_the_same_wherever_it_is_sought_from():
+    rng = np.random.default_rng(0)
+    w = np.repeat(rng.uniform(-10, 10, 200), 30)
+    dt = rng.uniform(0.005, 0.05, w.size)
+    end, _ = lag(w, dt, 0.8, 0.1)
+    again, _ = lag(w, dt, 0.8, 0.1, near=lag(w, dt, 0.1, 0.0)[0])
+    assert again == pytest.approx(end, abs=1e-7)
+
+
+def test_a_rotor_that_coasts_from_its_rate_loses_it_as_one_over_time():
+    """n' = -q n^2 has n = n0 / (1 + q n0 t): after 15 s of 8 V, as after a hold of a sweep."""
+    since = np.array([0.0, 0.1, 1.0, 15.0])
+    found = lagged(np.zeros(4), np.full(4, -8.0), since, 0.26, 0.0)
+    assert found == pytest.approx(-8.0 / (1 + 0.26 * 8.0 * since), abs=1e-12)
+
+
+@pytest.mark.parametrize("nearly", [0.0, 1e-300, 1e-160, -1e-160, 1e-12])
+def test_rounding_of_a_command_of_nothing_brakes_no_rotor(nearly):
+    w, dt = np.array([6.0, nearly, nearly]), np.array([3.0, 1.0, 2.0])
+    end, mean = lag(w, dt, 0.26, 0.0, start=-1.0)
+    coasting = lag(np.array([6.0, 0.0, 0.0]), dt, 0.26, 0.0, start=-1.0)
+    assert end == pytest.approx(coasting[0], abs=1e-9)
+    assert mean == pytest.approx(coasting[1], abs=1e-9)
+    assert lag(-w, dt, 0.26, 0.0, start=1.0)[0] == pytest.approx(-end, abs=1e-12)
+
+
+@pytest.mark.parametrize(("quadratic", "linear"), ROTORS)
+def test_a_rotor_turns_round_when_its_equation_says(quadratic, linear):
+    w, n = np.array([3.0, -8.0, 0.5]), np.array([-7.0, 0.4, -6.0])
+    for one, begin, found in zip(w, n, to_rest(w, n, quadratic, linear), strict=True):
+        solved = solve_ivp(
+            lambda t, y, v=one: equation(quadratic, linear)(y, v), (0.0, 2 * found), [begin], rtol=1e-10, atol=1e-12,
+            events=lambda t, y: y[0],
+        )  # fmt: skip
+        assert solved.t_events[0][0] == pytest.approx(found, rel=1e-6)
+
+
+def test_lag_ends_at_its_command_and_stays_at_rest():
+    w = np.full(50, 6.0)
+    assert lag(w, np.full(50, 1.0), 2.0, 0.0)[1][-1] == pytest.approx(6.0)
+    assert lag(np.zeros(50), np.full(50, 1.0), 2.0, 0.0)[1].tolist() == [0.0] * 50
