@@ -31,7 +31,7 @@ class Exponent:
     physics: ClassVar[str] = "thrust does not grow with the square"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
-    traits: ClassVar[Traits] = Traits(revealed_by="levels over the whole range, evenly in thrust")
+    traits: ClassVar[Traits] = Traits(refers=True, revealed_by="levels over the whole range, evenly in thrust")
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:

@@ -56,6 +56,7 @@ class Heating:
     covariates: ClassVar[tuple[str, ...]] = ("time",)
     traits: ClassVar[Traits] = Traits(
         moving=True,
+        refers=True,
         seen_by=THERMOMETER,
         proxy=POWER,
         shown_over="time",
@@ -135,6 +136,7 @@ class MeasuredHeating:
     covariates: ClassVar[tuple[str, ...]] = (THERMOMETER, "time")
     traits: ClassVar[Traits] = Traits(
         moving=True,
+        refers=True,
         seen_by=THERMOMETER,
         shown_over="time",
         shown_as="gain",

@@ -35,6 +35,7 @@ class SupplySag:
     needs: ClassVar[tuple[str, ...]] = ("bus_voltage",)
     covariates: ClassVar[tuple[str, ...]] = ("bus_voltage",)
     traits: ClassVar[Traits] = Traits(
+        refers=True,
         seen_by="bus_voltage",
         shown_over="bus_voltage",
         shown_as="gain",
@@ -75,6 +76,7 @@ class Buffered:
     needs: ClassVar[tuple[str, ...]] = ("bus_voltage",)
     covariates: ClassVar[tuple[str, ...]] = ("bus_voltage",)
     traits: ClassVar[Traits] = Traits(
+        refers=True,
         seen_by="bus_voltage",
         shown_over="bus_voltage",
         shown_as="gain",
@@ -121,6 +123,7 @@ class Discharge:
     covariates: ClassVar[tuple[str, ...]] = ("time",)
     traits: ClassVar[Traits] = Traits(
         moving=True,
+        refers=True,
         seen_by="bus_voltage",
         proxy=Proxy("bus_voltage", UNKNOWN, "the energy drawn so far, |V|^3 over time,"),
         shown_over="bus_voltage",
@@ -167,6 +170,7 @@ class Loaded:
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     traits: ClassVar[Traits] = Traits(
         moving=True,
+        refers=True,
         seen_by="bus_voltage",
         proxy=Proxy("bus_voltage", UNKNOWN, "the power drawn, |V|^3,"),
         shown_over="bus_voltage",

@@ -21,6 +21,7 @@ from rig.link.live_runs import Run
 from rig.link.sockets import Peer, connect
 from rig.operate.run import start_controller
 from sim_devices.wires.ports import ask
+from tests.reliability.live_campaign import CAMPAIGN
 
 PROJECT = Path(__file__).parents[2]
 WATCHDOG = 0.5
@@ -33,31 +34,6 @@ NOT_BEGUN = "the run did not get where the test begins"
 """Begins the message of a test that could not try its promise: the Makefile begins that test once more."""
 SLACK = 0.03
 """s of scheduling noise allowed on a loaded two-core machine."""
-
-CAMPAIGN = """
-[campaign]
-name = "reliability"
-bench = "bench.toml"
-thrusters = {thrusters}
-output = "out"
-unattended = {unattended}
-expected_C = 0.5
-prove_watchdog = {prove}
-
-[tare]
-duration = 1.0
-max_std_error = 0.2
-max_drift = 1.0
-
-[plan]
-kind = "levels"
-voltages = [10.0, -10.0, 6.0, -6.0]
-slew = 24.0
-zero_every = 2
-[plan.dwell]
-kind = "fixed"
-duration = {dwell}
-"""
 NOT_PROVED = """
 [overrides]
 "campaign.prove_watchdog" = "a test of something else"

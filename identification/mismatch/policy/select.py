@@ -294,8 +294,5 @@ RIVAL_REFIT_LIKENESS = Threshold(
 RATE_ROWS = Count(
     20,
     unit="rows",
-    reason=(
-        "A measured rate is a response of its own only where every run has more rows of it than that: fewer "
-        "determine neither its noise nor its scale."
-    ),
+    reason="With fewer rows of it in a run a rate is no response of its own: neither its noise nor scale is known.",
 )

@@ -30,8 +30,6 @@ FORMS_SHARE = 1e-3
 """Of what the term gains: a rival that loses no more does the same, and the rest may be a form that suits the term."""
 SMALL_TERM = 0.05
 """Of what the largest term gains: one that gains less may be a repair."""
-REFERS = frozenset({"exponent", "supply_sag", "heating"})
-"""Effects that refer C to a voltage, a supply or a temperature: it moves with that, and nothing has changed."""
 FIRST_LIKENESS = 0.7
 """From which the rival that is most alike of all is refitted in any case: of a few trials none need be near."""
 MOST_REFITS = 7
@@ -157,7 +155,7 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
 def constant_moved(fitted: Fit, data: Data) -> float:
     """What a model costs in which C is not that of the twin: as much as its chi-square would rise if C had to be, at
     most a parameter more. 0 without a twin, and where a term says what C refers to."""
-    if data.constant_before is None or any(term.id in REFERS for term in fitted.model.terms):
+    if data.constant_before is None or any(term.traits.refers for term in fitted.model.terms):
         return 0.0
     before, unsure = data.constant_before
     both = float(np.hypot(fitted.std[0], unsure))
