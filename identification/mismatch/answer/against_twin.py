@@ -11,6 +11,7 @@ import numpy as np
 from identification.estimation.tails import normal_sf
 from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
+from identification.mismatch.answer.report_assembly import constant_of
 from identification.mismatch.compare.saved_model_baseline import terms_of
 from identification.mismatch.diagnosis import Finding
 from identification.mismatch.estimate.estimate import Estimate
@@ -18,6 +19,7 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.name.naming import Named
 from identification.mismatch.value import Value
+from identification.physics.rotation_coupling import RotationCoupling
 from identification.recording import Recording
 from identification.twin import Alternative, Source, Twin, TwinNoise, names_of
 
@@ -41,10 +43,9 @@ def with_twin(
     if before is None:
         return draft
     known = before.origin
-    C = draft.model["C"]
     findings = tuple(_relative(f, before, known) for f in draft.findings)
-    changed = changed_constant(before, estimate, known, C.unit)
-    if changed is not None and (findings or beside) and abs(C.value / before.C - 1) < policy.answer.CONSTANT_MOVED:
+    changed = changed_constant(before, estimate, data, known, draft.model["C"].unit)
+    if changed is not None and (findings or beside) and _little(changed):
         draft = replace(draft, notes=(*draft.notes, f"{changed.statement} Part of what was found may be in it."))
     elif changed is not None:
         findings = (*findings, changed)
@@ -86,9 +87,21 @@ def given_values(twin: Twin) -> dict[str, Value]:
     }
 
 
-def changed_constant(twin: Twin, estimate: Estimate, known: str, unit: str) -> Finding | None:
+def _little(changed: Finding) -> bool:
+    now, was = changed.parameters["C"].value, changed.parameters["before"].value
+    return abs(now / was - 1) < policy.answer.CONSTANT_MOVED
+
+
+def _own_constant(twin: Twin, estimate: Estimate, data: Data) -> tuple[float, float]:
+    """C and its standard error, of the voltage of which the twin's is: where only the later model follows the measured
+    rate, of the one that the rotor makes that rate of."""
+    coupled = any(isinstance(term.term, RotationCoupling) for term in twin.terms)
+    return (estimate.fit.theta.C, float(estimate.fit.std[0])) if coupled else constant_of(estimate.fit, data)
+
+
+def changed_constant(twin: Twin, estimate: Estimate, data: Data, known: str, unit: str) -> Finding | None:
     """The thrust constant is no longer the twin's, at CHANGED_CONSTANT_FALSE_ALARM, and the change pays for itself."""
-    value, std = estimate.fit.theta.C, float(estimate.fit.std[0])
+    value, std = _own_constant(twin, estimate, data)
     was, was_std = twin.C, float(np.sqrt(twin.covariance[0][0]))
     both = float(np.hypot(std, was_std))
     if not isfinite(both) or both <= 0:

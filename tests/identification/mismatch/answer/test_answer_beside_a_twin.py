@@ -150,9 +150,9 @@ def test_a_twin_holds_the_fit(fitted):
 def test_a_constant_that_moved_is_a_finding_with_its_sigmas(fitted):
     runs, data, estimate = fitted
     before = replace(twin_of(estimate, data, runs, None), origin="the twin T")
-    assert changed_constant(before, estimate, "the twin T", "N/V^2") is None
+    assert changed_constant(before, estimate, data, "the twin T", "N/V^2") is None
     moved = replace(before, C=0.9 * before.C)
-    found = changed_constant(moved, estimate, "the twin T", "N/V^2")
+    found = changed_constant(moved, estimate, data, "the twin T", "N/V^2")
     both = np.hypot(estimate.fit.std[0], np.sqrt(before.covariance[0][0]))
     z = 0.1 * before.C / both
     assert f"{z:.0f} sigma" in found.statement
@@ -160,7 +160,7 @@ def test_a_constant_that_moved_is_a_finding_with_its_sigmas(fitted):
     assert found.parameters["before"].value == pytest.approx(0.9 * before.C)
     now = estimate.fit
     unknown = replace(now, free=np.zeros_like(now.free), jacobian=np.empty((now.residual.size, 0)))
-    assert changed_constant(moved, replace(estimate, fit=unknown), "", "") is None, "an error that nobody knows"
+    assert changed_constant(moved, replace(estimate, fit=unknown), data, "", "") is None, "an error that nobody knows"
 
 
 def test_against_a_twin_its_terms_are_in_the_model_and_the_same_effect_comes_on_top(fitted):

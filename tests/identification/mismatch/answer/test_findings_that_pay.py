@@ -49,4 +49,4 @@ def test_a_thrust_constant_must_pay_as_well_as_be_rare(sigmas, told_so):
     twin = replace(twin_of(estimate, data, [short()], None), covariance=((0.0,),))
     moved = replace(twin, C=twin.C - sigmas * float(estimate.fit.std[0]))
     assert policy.answer.CHANGED_CONSTANT_FALSE_ALARM > 0.007
-    assert (changed_constant(moved, estimate, "the twin", "N/V^2") is not None) == told_so
+    assert (changed_constant(moved, estimate, data, "the twin", "N/V^2") is not None) == told_so
