@@ -22,6 +22,7 @@ class RotationCoupling:
     covariates: ClassVar[tuple[str, ...]] = ("rotation_rate",)
     traits: ClassVar[Traits] = Traits(
         moving=True,
+        follows_rate="share",
         shown_over="rotation_rate",
         told_by=(("rotation_rate", "the measured rotation rate"),),
         revealed_by="the same command at another load or supply, the rotation rate measured",

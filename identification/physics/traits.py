@@ -96,6 +96,8 @@ class Traits:
     """Where an ordinary effect does as well, that is named, and this one stated as its rival."""
     flow: bool = False
     """Water that never moves shows nothing of it."""
+    follows_rate: str = ""
+    """The parameter that is the share in which thrust follows the measured rate instead of the driver."""
     refers: bool = False
     """It refers C to a voltage, a supply or a temperature: C moves with that, and nothing has changed."""
     neighbour: bool = False

@@ -22,6 +22,7 @@ from rig.campaign.shapes import require, require_above_zero, require_not_negativ
 from rig.design.noise import Known, read_noise
 from rig.design.optimal_levels import DRIFT, Ask
 from rig.errors import ConfigError, PlanError
+from rig.safety.watchdog_proof import PROOFS_OF_A_RUN
 from rig.sequence.steady import LEAST_SAMPLES
 from rig.sequence.ticks import proof_settings
 
@@ -183,7 +184,8 @@ def _places(options: Options) -> tuple[BenchConfig, Template, float, float]:
     )
     wanted = options.max_voltage or min(top, allowed)
     require(wanted <= allowed, f"--max-voltage is {wanted:g} V, but {bench.path} allows at most {allowed:g} V")
-    proof = proof_settings(bench, template.slew).expected if template.prove_watchdog else 0.0
+    once = proof_settings(bench, template.slew).expected
+    proof = PROOFS_OF_A_RUN * once if template.prove_watchdog else 0.0
     return bench, template, proof, wanted
 
 

@@ -18,6 +18,7 @@ from rig.campaign.loading import load_campaign
 from rig.campaign.plan import Duration, FixedDwell, Step
 from rig.campaign.shapes import Levels
 from rig.errors import ConfigError, PlanError
+from rig.safety.watchdog_proof import PROOFS_OF_A_RUN
 from rig.sequence.sequencer import settings_for
 from rig.sequence.steady import LEAST_SAMPLES
 
@@ -53,7 +54,7 @@ def check_campaign(path: Path) -> CheckReport:
     thrust = _require_thrust(campaign, force)
     _require_samples(campaign, force)
     proof = settings_for(campaign, "").proof
-    proving = Duration(2 * proof.expected, 2 * proof.worst) if proof else Duration(0.0, 0.0)
+    proving = Duration(PROOFS_OF_A_RUN * proof.expected, PROOFS_OF_A_RUN * proof.worst) if proof else Duration(0.0, 0.0)
     plan, runs = campaign.plan.duration(), len(campaign.thrusters)
     run = Duration(plan.expected + proving.expected, plan.worst + proving.worst + campaign.bench.coast_time)
     total = Duration(runs * run.expected, runs * (run.worst + campaign.bench.mount.timeout))

@@ -20,6 +20,8 @@ SPIN_TIME = (1.3, 2.5)
 propeller must turn."""
 QUIET_TIME = 0.3
 """s of command 0 after the proof in which the motor must not move."""
+PROOFS_OF_A_RUN = 2
+"""Before the first step, and at its first rest."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -19,7 +19,6 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.name.naming import Named
 from identification.mismatch.value import Value
-from identification.physics.rotation_coupling import RotationCoupling
 from identification.recording import Recording
 from identification.twin import Alternative, Source, Twin, TwinNoise, names_of
 
@@ -95,7 +94,7 @@ def _little(changed: Finding) -> bool:
 def _own_constant(twin: Twin, estimate: Estimate, data: Data) -> tuple[float, float]:
     """C and its standard error, of the voltage of which the twin's is: where only the later model follows the measured
     rate, of the one that the rotor makes that rate of."""
-    coupled = any(isinstance(term.term, RotationCoupling) for term in twin.terms)
+    coupled = any(each.term.traits.follows_rate for each in twin.terms)
     return (estimate.fit.theta.C, float(estimate.fit.std[0])) if coupled else constant_of(estimate.fit, data)
 
 

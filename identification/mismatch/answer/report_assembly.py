@@ -18,7 +18,6 @@ from identification.mismatch.name.named_term import NamedTerm
 from identification.mismatch.select.rounds import T
 from identification.mismatch.select.stepwise import F, RivalTerm
 from identification.mismatch.value import QUANTILE, Value, of_shape
-from identification.physics.rotation_coupling import RotationCoupling
 from identification.physics.term import Term
 
 Intervals = Mapping[Term, tuple[Interval, ...]]
@@ -51,14 +50,16 @@ def constant_of(fitted: Fit, data: Data) -> tuple[float, float]:
     what the rate is per driver as it was recorded; with n = k x that is x (1 + s (k / k_0 - 1)).
     """
     C, at = fitted.theta.C, fitted.layout
-    followed = [term for term in fitted.model.terms if isinstance(term, RotationCoupling)]
+    followed = [term for term in fitted.model.terms if term.traits.follows_rate]
     known = [h.rate_per_driver for h in data.histories if h.rate is not None]
     if not followed or not data.with_rate or not known:
         return C, float(fitted.std[at.C])
-    share, more = fitted.values[followed[0]][0], fitted.theta.k / known[0] - 1
+    (term, *_) = followed
+    place = at.parameter(term, term.traits.follows_rate, data.scale)
+    share, more = float(fitted.theta.vector[place]), fitted.theta.k / known[0] - 1
     driven = 1 + share * more
     slopes = np.zeros(at.size)
-    slopes[at.C], slopes[at.of(followed[0]).start] = driven**2, 2 * C * driven * more
+    slopes[at.C], slopes[place] = driven**2, 2 * C * driven * more
     slopes[at.k] = 2 * C * driven * share / known[0]
     return C * driven**2, float(np.sqrt(slopes @ np.nan_to_num(fitted.cov) @ slopes))
 
