@@ -1,9 +1,11 @@
-"""The fitted model as a twin, and the answer against an earlier one: given terms, and a changed thrust constant."""
+"""The fitted model as a twin, and the answer against an earlier one: given terms, a changed thrust constant, and which
+findings are new: what the twin's own recordings have too is none, what they could not show is said.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isfinite
 
 import numpy as np
@@ -12,6 +14,7 @@ from identification.estimation.tails import normal_sf
 from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.answer.report_assembly import constant_of
+from identification.mismatch.compare.earlier_recordings import Novelty
 from identification.mismatch.compare.saved_model_baseline import terms_of
 from identification.mismatch.diagnosis import Finding
 from identification.mismatch.estimate.estimate import Estimate
@@ -19,8 +22,15 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.name.naming import Named
 from identification.mismatch.value import Value
+from identification.physics.term import Term
 from identification.recording import Recording
 from identification.twin import Alternative, Source, Twin, TwinNoise, names_of
+
+SAYS = {
+    "changed": "That is new: the recordings behind {} speak against it.",
+    "not shown before": "Whether that is new cannot be told: the recordings behind {} could not have shown it.",
+}
+NOT_NEW = "Not new, for it suits the recordings behind {} as well (chi-square of both {:+.3g} if it was there then): {}"
 
 
 def with_twin(
@@ -192,3 +202,31 @@ def _covariance(estimate: Estimate, data: Data, before: Twin | None) -> tuple[tu
             elif c is not None and d is not None:
                 out[i, j] = old[c, d]
     return tuple(tuple(map(float, row)) for row in out)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class ToldNew:
+    """What is told of the findings."""
+
+    findings: tuple[Finding, ...]
+    """Without those that are not new."""
+    not_new: tuple[str, ...]
+    """The statements of those."""
+    notes: tuple[str, ...]
+
+
+def told_new(findings: Mapping[Term, Finding], novelties: Mapping[Term, Novelty], twin: Twin | None) -> ToldNew:
+    """Each with whether it is new, where that was asked."""
+    new, not_new, notes = [], [], []
+    origin = "the twin" if twin is None else twin.origin
+    for term, finding in findings.items():
+        novelty = novelties.get(term)
+        if novelty is None:
+            new.append(finding)
+        elif novelty.since == "there before":
+            not_new.append(finding.statement)
+            notes.append(NOT_NEW.format(origin, novelty.loss, finding.statement))
+        else:
+            statement = f"{finding.statement} {SAYS[novelty.since].format(origin)}"
+            new.append(replace(finding, statement=statement, since=novelty.since))
+    return ToldNew(tuple(new), tuple(not_new), tuple(notes))

@@ -8,11 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.answer.against_twin import with_twin
+from identification.mismatch.answer.against_twin import told_new, with_twin
 from identification.mismatch.answer.averaged_constant import averaged
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.answer.fault_findings import with_channels
-from identification.mismatch.answer.novelty import told_new
 from identification.mismatch.answer.periodic_findings import with_lines
 from identification.mismatch.answer.proxies import proxies
 from identification.mismatch.answer.remainder import remainder_of

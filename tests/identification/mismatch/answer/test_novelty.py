@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from identification.mismatch.answer.novelty import told_new
+from identification.mismatch.answer.against_twin import told_new
 from identification.mismatch.compare.earlier_recordings import Novelty
 from tests.identification.mismatch.answer.answered import BAND, UNEVEN, finding
 
