@@ -8,7 +8,7 @@ from typing import Literal
 
 from rig.campaign.config import CampaignConfig
 from rig.link.front_end_messages import Check, LogLine, Point, Progress, Reading, Snapshot, State
-from rig.sequence.ticks import Output
+from rig.sequence.ticks import Output, settings_for
 
 LOG_LINES = 500
 """Newest log lines that travel with every snapshot."""
@@ -40,10 +40,14 @@ class Status:
     """s, when the controller began."""
     sequence: int = 0
     run_expected: float = field(init=False)
-    """s of one run by plan; reckoned once, a long plan has thousands of steps."""
+    """s of one run by plan, with the watchdog's proof at its rest; reckoned once, a long plan has thousands of steps."""
+    proof_expected: float = field(init=False)
+    """s of one proof of the watchdog; the first run of a campaign has one more."""
 
     def __post_init__(self) -> None:
-        self.run_expected = self.campaign.plan.duration().expected
+        proof = settings_for(self.campaign, "").proof
+        self.proof_expected = proof.expected if proof else 0.0
+        self.run_expected = self.campaign.plan.duration().expected + self.proof_expected
 
     @property
     def thruster(self) -> str:
@@ -86,7 +90,8 @@ class Status:
         out = self.output
         elapsed = now - self.started
         left = len(self.thrusters) - self.run - (1 if out else 0)
-        eta = (out.remaining if out else 0.0) + max(left, 0) * self.run_expected
+        first = self.proof_expected if self.run == 0 else 0.0
+        eta = (out.remaining if out else first) + max(left, 0) * self.run_expected
         if self.state == "done":
             eta = 0.0
         return Progress(

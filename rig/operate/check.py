@@ -30,7 +30,7 @@ class CheckReport:
     campaign: CampaignConfig
     steps: tuple[Step, ...]
     run: Duration
-    """One thruster, watchdog proof included."""
+    """The first thruster, both proofs of the watchdog included; every later one has one of them."""
     total: Duration
     """All thrusters; `worst` adds the longest mounting."""
     peak_voltage: float
@@ -54,10 +54,15 @@ def check_campaign(path: Path) -> CheckReport:
     thrust = _require_thrust(campaign, force)
     _require_samples(campaign, force)
     proof = settings_for(campaign, "").proof
-    proving = Duration(PROOFS_OF_A_RUN * proof.expected, PROOFS_OF_A_RUN * proof.worst) if proof else Duration(0.0, 0.0)
+    once = Duration(proof.expected, proof.worst) if proof else Duration(0.0, 0.0)
     plan, runs = campaign.plan.duration(), len(campaign.thrusters)
-    run = Duration(plan.expected + proving.expected, plan.worst + proving.worst + campaign.bench.coast_time)
-    total = Duration(runs * run.expected, runs * (run.worst + campaign.bench.mount.timeout))
+    later = Duration(plan.expected + once.expected, plan.worst + once.worst + campaign.bench.coast_time)
+    again = PROOFS_OF_A_RUN - 1
+    run = Duration(later.expected + again * once.expected, later.worst + again * once.worst)
+    total = Duration(
+        run.expected + (runs - 1) * later.expected,
+        run.worst + (runs - 1) * later.worst + runs * campaign.bench.mount.timeout,
+    )
     return CheckReport(campaign, tuple(campaign.plan), run, total, campaign.plan.peak(), thrust, overridden)
 
 

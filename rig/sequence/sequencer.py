@@ -48,7 +48,7 @@ class Sequencer:
         self._taring = Taring(0.0, 0.0, settings.tare, settings.estimator)
         self._tare: float | None = None
         self._proof: Proof | None = None
-        self._prove_before = settings.proofs_before
+        self._prove_before = settings.proofs_before(step.phase for step in self._steps)
         self._time_to_zero: float | None = None
         self._stop = Stop(0.0, settings.rest_rate, settings.coast_time)
         self._outcome: Outcome = "running"
@@ -260,10 +260,10 @@ class Sequencer:
 
     def _output(self, time: float) -> Output:
         step, elapsed = self._steps[self._position], time - self._since
-        expected, after = step.expected, self._after[self._position]
-        if self._state == "proving" and self._settings.proof:
-            expected, after = self._settings.proof.expected, expected + after
-        over = self._state in ("stopping", "run_done")
+        once = self._settings.proof.expected if self._settings.proof else 0.0
+        expected, after = step.expected, self._after[self._position] + once * len(self._prove_before)
+        if self._state == "proving":
+            expected, after = once, expected + after - once
         return Output(
             volts=None if self._silent else self._command,
             state=self._state,
@@ -271,7 +271,7 @@ class Sequencer:
             steps=len(self._steps),
             step_elapsed=elapsed,
             step_expected=expected,
-            remaining=0.0 if over else max(expected - elapsed, 0.0) + after,
+            remaining=0.0 if self._outcome != "running" else max(expected - elapsed, 0.0) + after,
             release=self._release,
             points=tuple(self._journal.points),
             rows=tuple(self._journal.rows),

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 from identification.recording import Step as StepRow
 from identification.steady_state.steady import SteadyMonitor
 from rig.campaign.config import BenchConfig, CampaignConfig
-from rig.campaign.plan import SteadyDwell, TareConfig
+from rig.campaign.plan import Phase, SteadyDwell, TareConfig
 from rig.link.front_end_messages import LogLine, Point, Request, State
 from rig.safety.guard import MIN_LATENESS, Trip
 from rig.safety.watchdog_proof import ProofSettings
@@ -45,12 +45,10 @@ class Settings:
     estimator: Callable[[], SteadyEstimator] = SteadyMonitor
     """Makes an empty estimator."""
 
-    @property
-    def proofs_before(self) -> tuple[str, ...]:
-        """Before what the watchdog is proved: the start of the run, then its first rest: it may break meanwhile."""
-        if self.proof is None:
-            return ()
-        return ("rest",) if self.proved else ("start", "rest")
+    def proofs_before(self, phases: Iterable[Phase]) -> tuple[str, ...]:
+        """Before what the watchdog is proved in a run of steps of these `phases`: its start, then its first rest, if it
+        has one: it may break meanwhile."""
+        return () if self.proof is None else ("start",) * (not self.proved) + ("rest",) * ("rest" in phases)
 
 
 @dataclass(frozen=True, slots=True)

@@ -43,7 +43,19 @@ def test_time_to_zero_is_in_the_run_and_its_rows():
     silence = [i for i, o in enumerate(ran.outputs) if o.volts is None]
     assert ran.outputs[silence[-1] + 1].volts == 0.0  # the first command after the lapse
     assert ran.outputs[0].state == "proving"
-    assert ran.outputs[0].remaining == pytest.approx(SHORT.duration().expected + PROOF.expected)
+    assert ran.outputs[0].remaining == pytest.approx(SHORT.duration().expected + 2 * PROOF.expected)
+    between = next(output for output in ran.outputs if output.state == "tare")
+    assert between.remaining == pytest.approx(SHORT.duration().expected + PROOF.expected), "the one at the first rest"
+
+
+def test_time_that_is_left_counts_a_proof_once_and_not_after_it():
+    ran = run(SHORT, SETTINGS)
+    last = max(i for i, output in enumerate(ran.outputs) if output.state == "proving")
+    after = ran.outputs[last + 1]
+    steps = tuple(SHORT)
+    assert after.state == "rest"
+    assert after.remaining == pytest.approx(sum(step.expected for step in steps[after.step :]))
+    assert len([o for o in ran.outputs if o.state == "proving" and o.step_elapsed == 0.0]) == 2
 
 
 @pytest.mark.parametrize("watchdog", [1.6, 1e9])
