@@ -40,7 +40,7 @@ class Status:
     """s, when the controller began."""
     sequence: int = 0
     run_expected: float = field(init=False)
-    """s of one run by plan, with the watchdog's proof at its rest; reckoned once, a long plan has thousands of steps."""
+    """s of one run by plan, the proof at its rest included; reckoned once, a long plan has thousands of steps."""
     proof_expected: float = field(init=False)
     """s of one proof of the watchdog; the first run of a campaign has one more."""
 
