@@ -3,13 +3,17 @@
 #   make test   every check and every test
 # and one that takes a night (make prove-short: minutes):
 #   make prove  the blind proof of the diagnosis, resumable, with its report in build/prove
+# and one that takes half an hour on a machine that does nothing else:
+#   make reliability  the 35 promises of docs/reliability.md, measured as often as they say
 PYTHON ?= python3
 VENV := .venv
 # one case each: some effects at each strength, the same taken out of the catalogue, some that are in none, lies, noise
 SHORT := */asymmetry */dead_band */heating */motor_lag */zero_offset outside fault pair/any/0 pair/any/1 field/2_effects difference/nothing/0 bench/nothing/0 bench/plain:dead_band/0 clean/*/0 clean/*/1
 BIN := $(VENV)/bin
+MEASURED := $(CURDIR)/build/reliability.jsonl
+TESTING := THRUSTER_RIG_CI=1 THRUSTER_RIG_MEASURED=$(MEASURED)
 
-.PHONY: demo test check lint types imports wheel prove prove-short clean
+.PHONY: demo test check lint types imports wheel reliability prove prove-short clean
 
 $(VENV)/.demo: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
@@ -38,9 +42,14 @@ check: lint types imports
 
 test: $(VENV)/.test
 	$(MAKE) --no-print-directory --output-sync -j 2 types wheel lint imports
-	THRUSTER_RIG_CI=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m "not alone" --cov --cov-report= --durations=15
-	THRUSTER_RIG_CI=1 $(BIN)/python -m pytest -n 2 --dist worksteal -m alone --reruns 3 --only-rerun 'did not get where the test begins' --cov --cov-append --cov-report=term:skip-covered --durations=15
+	rm -f $(MEASURED)
+	$(TESTING) $(BIN)/python -m pytest -n 2 --dist worksteal -m "not alone" --cov --cov-report= --durations=15
+	$(TESTING) $(BIN)/python -m pytest -n 2 --dist worksteal -m alone --reruns 3 --only-rerun 'did not get where the test begins' --cov --cov-append --cov-report=term:skip-covered --durations=15
 	$(BIN)/python tests/coverage_floor.py
+	$(BIN)/python benchmarks/controller/reliability.py --collect
+
+reliability: $(VENV)/.test
+	$(BIN)/python benchmarks/controller/reliability.py
 
 wheel: $(VENV)/.test
 	rm -rf build/wheel && mkdir -p build

@@ -1,8 +1,7 @@
-"""Each promise leaves its measured number in build/reliability.json, which the README quotes."""
+"""Live tests: a metronome beside them tells whether the machine kept time."""
 
 from __future__ import annotations
 
-import os
 import time
 from collections.abc import Callable, Generator, Iterator
 from pathlib import Path
@@ -12,10 +11,8 @@ import pytest
 
 from tests.reliability.live import NOT_BEGUN
 from tests.reliability.metronome import longest, metronome, stalled
-from tests.reliability.numbers_measured import keep
 
 HERE = Path(__file__).parent
-RESULTS = HERE.parents[1] / "build" / "reliability.json"
 LATE_WAKES = pytest.StashKey[Path]()
 TRIPS = 0.1
 """s: from two of these in a row on a run ends tripped, as it should (a loop 0.25 s late, a sample 0.2 s old)."""
@@ -26,24 +23,6 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if HERE in item.path.parents:
             item.add_marker(pytest.mark.alone)
-
-
-@pytest.fixture(scope="session")
-def measured(tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, dict[str, float | str]]]:
-    numbers: dict[str, dict[str, float | str]] = {}
-    yield numbers
-    own = tmp_path_factory.getbasetemp()
-    keep(numbers, (own.parent if "PYTEST_XDIST_WORKER" in os.environ else own) / "reliability.json", RESULTS)
-
-
-@pytest.fixture
-def report(measured: dict[str, dict[str, float | str]]) -> Callable[[str, float, str], None]:
-    """Note a measured number under its name."""
-
-    def note(name: str, value: float, unit: str) -> None:
-        measured[name] = {"value": round(value, 4), "unit": unit}
-
-    return note
 
 
 @pytest.fixture(scope="session", autouse=True)

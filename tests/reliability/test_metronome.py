@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import json
-
 import pytest
 
 from tests.reliability.live import NOT_BEGUN
 from tests.reliability.metronome import longest, stalled
-from tests.reliability.numbers_measured import keep
 
 
 @pytest.fixture
@@ -35,11 +32,3 @@ def test_prompt(prompt):
         prompt(0.4, 0.1, 990_000_000)
     with pytest.raises(AssertionError, match=r"assert 0\.15 <= 0\.1"):
         prompt(0.15, 0.1, 2_000_000_000)
-
-
-def test_numbers_of_two_processes_are_kept_together(tmp_path):
-    """Each worker of pytest-xdist leaves its own; those of an earlier session go."""
-    (tmp_path / "results.json").write_text('{"old": {}}')
-    for number in ({"a": {"value": 1.0}}, {"b": {"value": 2.0}, "c": {"value": 3.0}}):
-        keep(number, tmp_path / "session.json", tmp_path / "results.json")
-    assert list(json.loads((tmp_path / "results.json").read_text())) == ["a", "b", "c"]
