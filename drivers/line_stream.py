@@ -2,7 +2,8 @@
 
 There is no manual behind this one: the bench file describes the line by a regular expression with named groups
 `value` (a decimal number) or `raw` (integer counts), optionally both, `unit` (must never change) and `t` (device time).
-The recorded value is `scale * reading + offset`, where the reading is `value`, or `raw` when there is no `value`.
+The recorded value is `scale * reading + offset`, where the reading is `value`, or `raw` when there is no `value`; with
+a `threshold` it is 1 where that is above it, and 0.
 """
 
 from __future__ import annotations
@@ -94,6 +95,8 @@ class Options:
     """Unit of the recorded value per unit (or count) of the reading."""
     offset: float = 0.0
     """In the unit of the recorded value."""
+    threshold: float | None = None
+    """Recorded is 1 above it and 0 elsewhere, in the place of the value: an analogue input of a contact."""
     start: str = ""
     """Text sent after opening, with CR LF; empty: nothing."""
     stop: str = ""
@@ -136,6 +139,8 @@ class Options:
         check_low_pass("line_stream", self.low_pass, self.delay)
         if not math.isfinite(self.scale) or self.scale == 0.0 or not math.isfinite(self.offset):
             raise ValueError(f"line_stream scale must be finite and not 0, offset finite: {self.scale}, {self.offset}")
+        if self.threshold is not None and not math.isfinite(self.threshold):
+            raise ValueError(f"line_stream threshold must be finite, not {self.threshold}")
 
 
 class LineStream:
@@ -157,9 +162,10 @@ class LineStream:
         calibration = {
             "formula": "value = scale * reading + offset", "scale": options.scale, "offset": options.offset,
             "gain_std": options.gain_std,
-        }  # fmt: skip
+        } | ({} if options.threshold is None else {"threshold": options.threshold})  # fmt: skip
         on_the_line = line_time(options.baud, options.framing, options.line_characters)
-        quantum = abs(options.scale) if "raw" in self._groups and "value" not in self._groups else None
+        counted = "raw" in self._groups and "value" not in self._groups and options.threshold is None
+        quantum = abs(options.scale) if counted else None
         channels = [
             Channel(
                 options.quantity or "value", options.quantity, options.unit, noise_std=options.noise_std,
@@ -229,7 +235,8 @@ class LineStream:
         self._unit = first.unit
 
     def _values(self, reading: Reading) -> tuple[float, ...]:
-        values = [self._options.scale * reading.value + self._options.offset]
+        value, threshold = self._options.scale * reading.value + self._options.offset, self._options.threshold
+        values = [value if threshold is None else float(value > threshold)]
         if "raw" in self._groups:
             values.append(math.nan if reading.raw is None else float(reading.raw))
         if "t" in self._groups:

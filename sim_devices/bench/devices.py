@@ -8,6 +8,7 @@ from datetime import datetime
 import numpy as np
 
 from sim_devices.bench.settings import DeviceOptions
+from sim_devices.instruments.button import Button, ButtonOptions
 from sim_devices.instruments.keller import Keller, KellerOptions
 from sim_devices.instruments.line_sender import LineOptions, LineSender
 from sim_devices.instruments.mt_sics import MtSics
@@ -37,6 +38,8 @@ def serial_device(
             return MtSics(options, read)
         case LineOptions():
             return LineSender(options, read)
+        case ButtonOptions():
+            return Button(options)
         case NortekOptions():
             std = world.settings.noise.get("flow_speed", Noise()).white
             cross = Normals(cross_rng)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from sim_devices.instruments.button import ButtonOptions
 from sim_devices.instruments.keller import KellerOptions
 from sim_devices.instruments.line_sender import LineOptions
 from sim_devices.instruments.mt_sics_options import MtSicsOptions
@@ -17,10 +18,11 @@ from sim_devices.tables import WorldError, build, check_known
 from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin
 
-DeviceOptions = MtSicsOptions | LineOptions | NortekOptions | KellerOptions | VescOptions
+DeviceOptions = MtSicsOptions | LineOptions | ButtonOptions | NortekOptions | KellerOptions | VescOptions
 KINDS: dict[str, type[DeviceOptions]] = {
     "mt_sics": MtSicsOptions,
     "line": LineOptions,
+    "button": ButtonOptions,
     "nortek": NortekOptions,
     "keller": KellerOptions,
     "vesc": VescOptions,

@@ -103,3 +103,19 @@ def test_a_low_pass_whose_delay_is_not_told_is_refused():
     assert line_stream.Options(**told, delay=0.004, low_pass=0.003).low_pass == 0.003
     with pytest.raises(ValueError, match=r"low_pass must be between 0 and its delay \(0.001 s\).*add it to delay"):
         line_stream.Options(**told, delay=0.001, low_pass=0.003)
+
+
+def test_a_contact_at_an_analogue_input_is_one_or_zero():
+    """24 V is a closed contact, 0 V an open one; open is pressed."""
+    with Peer(quiet) as peer:
+        options = stream_options(peer.port, r"(?P<value>[-.\d]+)", scale=-1.0, threshold=-12.0)
+        device = line_stream.LineStream("button", options)
+        peer.streaming = b"23.9\n12.0\n11.9\n0\n"
+        device.open()
+        peer.streaming = None
+        samples = collect(device, 4)
+        first = [sample.values for sample in samples].index((1.0,)) % 4
+        assert [sample.values[0] for sample in samples[first - 2 : first + 2]] == [0.0, 0.0, 1.0, 1.0]
+        device.close()
+    with pytest.raises(ValueError, match="threshold must be finite"):
+        stream_options(threshold=float("nan"))
