@@ -29,15 +29,23 @@ class Overrun(LinkError):
 class Peer:
     """The other end of a connected socket. Selectable; owns the socket."""
 
-    def __init__(self, connection: socket.socket, name: str, bound: int = BOUND) -> None:
-        """`name` is what messages call the other side; `bound` in bytes limits what waits to be sent."""
+    def __init__(
+        self,
+        connection: socket.socket,
+        name: str,
+        bound: int = BOUND,
+        longest: int = MAX_FRAME,
+        at_once: int = READ_AT_ONCE,
+    ) -> None:
+        """`name` is what messages call the other side. Limits in bytes: `bound` of what waits to be sent, `longest` of
+        a message that comes, `at_once` of what one `receive` takes."""
         connection.setblocking(False)
         self.name = name
         self.closed = False
         """True once `receive` met the end of file: the other side is gone, and all that it sent has been delivered."""
         self._deaf = False
         self._socket = connection
-        self._bound = bound
+        self._bound, self._longest, self._at_once = bound, longest, at_once
         self._outgoing = bytearray()
         self._incoming = bytearray()
 
@@ -91,10 +99,10 @@ class Peer:
         start = 0
         while len(self._incoming) - start >= HEADER.size:
             length, kind = HEADER.unpack_from(self._incoming, start)
-            if length > MAX_FRAME or kind not in KINDS:
+            if length > self._longest or kind not in KINDS:
                 raise LinkError(
                     f"{self.name} sent a frame header of kind {kind}, {length} bytes: "
-                    "not a rig process, or out of step; close the link"
+                    f"not a rig process, out of step, or longer than {self._longest} bytes; close the link"
                 )
             end = start + HEADER.size + length
             if len(self._incoming) < end:
@@ -106,9 +114,9 @@ class Peer:
 
     def _fill(self) -> None:
         taken = 0
-        while not self.closed and taken < READ_AT_ONCE:
+        while not self.closed and taken < self._at_once:
             try:
-                data = self._socket.recv(2**18)
+                data = self._socket.recv(min(2**18, self._at_once))
             except BlockingIOError:
                 return
             except ConnectionResetError:
@@ -174,15 +182,23 @@ def _remove_dead(path: Path) -> None:
     raise LinkError(f"another process already listens on {path}; stop it, or use its console")
 
 
-def accept(listener: socket.socket, name: str, bound: int = BOUND) -> Peer | None:
-    """The next waiting front end, or None."""
+NOT_NOW: Final = (
+    errno.EAGAIN, errno.EWOULDBLOCK, errno.ECONNABORTED, errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM,
+)  # fmt: skip
+"""Nobody waits, or this process has no room for one more: accept(2). Neither ends a run."""
+
+
+def accept(
+    listener: socket.socket, name: str, bound: int = BOUND, longest: int = MAX_FRAME, at_once: int = READ_AT_ONCE
+) -> Peer | None:
+    """The next waiting front end, or None; the limits are those of `Peer`."""
     try:
         connection, _ = listener.accept()
     except OSError as error:
-        if error.errno in (errno.EAGAIN, errno.EWOULDBLOCK, errno.ECONNABORTED):
+        if error.errno in NOT_NOW:
             return None
         raise
-    return Peer(connection, name, bound)
+    return Peer(connection, name, bound, longest, at_once)
 
 
 def connect(path: Path, name: str, timeout: float = 2.0) -> Peer:
