@@ -32,6 +32,8 @@ from drivers.ports.wire import Wire
 from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream
 
 GROUPS = frozenset(("value", "raw", "unit", "t"))
+MOST_COUNTS = 2**53
+"""Whole numbers up to here are exact as the float64 that a sample is; no converter counts further."""
 
 
 class Reading(NamedTuple):
@@ -69,9 +71,10 @@ class Decoder:
             raw = None if groups.get("raw") is None else int(groups["raw"])
             value = float(groups["value"]) if groups.get("value") is not None else float("nan" if raw is None else raw)
             t = float(groups["t"]) if groups.get("t") is not None else math.nan
-        except ValueError:
+        except (ValueError, OverflowError):
             return Unreadable(line)
-        return Reading(value, raw, groups.get("unit"), t) if math.isfinite(value) else Unreadable(line)
+        believable = math.isfinite(value) and not math.isinf(t) and (raw is None or abs(raw) <= MOST_COUNTS)
+        return Reading(value, raw, groups.get("unit"), t) if believable else Unreadable(line)
 
 
 @dataclass(frozen=True, slots=True)

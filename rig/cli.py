@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import click
 
 from rig.errors import RigError
+from rig.visible_text import visible_output
 
 if TYPE_CHECKING:
     from rig.operate.virtual_time import World
@@ -91,6 +92,11 @@ def rig() -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; what is the input's fault is one sentence on stderr and status 2."""
+    with visible_output():
+        return _main(arguments)
+
+
+def _main(arguments: list[str] | None) -> int:
     try:
         result = rig.main(arguments, prog_name="rig", standalone_mode=False)
     except RigError as error:

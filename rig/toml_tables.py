@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from typing import Any, TypeVar, get_type_hints
+from typing import Any, Final, TypeVar, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
 from rig.errors import ConfigError, PlanError
+from rig.regular_file import read
 
+MOST_BYTES: Final = 2**20
+"""Of a TOML file; the longest bench here has 5 kB, a designed campaign some 20."""
+MOST_DEPTH: Final = 16
+LONG_KEY: Final = re.compile(
+    r"""(?:^|[\[{,])[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')(?:[ \t]*+\.[ \t]*+(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+'))"""
+    f"{{{MOST_DEPTH}}}",
+    re.MULTILINE,
+)
+"""tomllib takes a time that grows as the square of the parts of a key."""
 T = TypeVar("T")
 Table = Mapping[str, Any]
 
@@ -20,15 +31,38 @@ Table = Mapping[str, Any]
 def read_toml(path: Path, what: str) -> tuple[str, dict[str, Any]]:
     """Text and content of a TOML file; `what` names it in the error (`bench file`)."""
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read(path, what, MOST_BYTES, ConfigError).decode("utf-8")
     except FileNotFoundError:
         raise ConfigError(f"{path}: there is no such {what}; give the path of one") from None
-    except (OSError, UnicodeDecodeError) as error:
+    except UnicodeDecodeError as error:
         raise ConfigError(f"{path}: this {what} can't be read: {error}") from None
+    return text, parsed(text.replace("\r\n", "\n"), path)
+
+
+def parsed(text: str, path: Path | str) -> dict[str, Any]:
+    """TOML of a bounded depth whose numbers are those that TOML knows. Raises ConfigError."""
+    if LONG_KEY.search(text):
+        raise ConfigError(f"{path}: a key has more than {MOST_DEPTH} parts; nothing here is so deep: shorten it")
     try:
-        return text, tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
+        content = tomllib.loads(text)
+    except ValueError as error:  # beside what is no TOML: a number of more digits than Python reads
         raise ConfigError(f"{path}: not valid TOML: {error}") from None
+    except RecursionError:
+        raise ConfigError(f"{path}: arrays or tables are nested too deeply; {MOST_DEPTH} levels are allowed") from None
+    _require_bounded(content, path, "")
+    return content
+
+
+def _require_bounded(value: Any, path: Path | str, key: str, depth: int = 0) -> None:
+    if depth > MOST_DEPTH:
+        raise ConfigError(f"{path}: {key[:60]} is nested more than {MOST_DEPTH} levels deep; nothing here needs that")
+    if isinstance(value, int) and not -(2**63) <= value < 2**63:
+        raise ConfigError(
+            f"{path}: {key} is a number of {value.bit_length()} bits; TOML knows 64: is it a typing error?"
+        )
+    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    for name, item in items:
+        _require_bounded(item, path, joined(key, name) if isinstance(name, str) else f"{key}[{name}]", depth + 1)
 
 
 def joined(prefix: str, key: str) -> str:

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from rig.visible_text import console
+
 if TYPE_CHECKING:
     from rig.blind.design import Job
 
@@ -18,21 +20,20 @@ EVERY = 25
 @contextmanager
 def shown(count: int) -> Iterator[Callable[[Job], None]]:
     """A progress bar on a terminal, a line now and then elsewhere."""
-    from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-    console = Console(stderr=True)
+    screen = console(stderr=True)
     done = 0
 
     def tell(job: Job) -> None:
         nonlocal done
         done += 1
-        if console.is_terminal:
+        if screen.is_terminal:
             bar.update(task, advance=1, description=job.id)
         elif done % EVERY == 0 or done == count:
             click.echo(f"{done} of {count} cases", err=True)
 
     columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bar:
+    with Progress(*columns, console=screen, disable=not screen.is_terminal) as bar:
         task = bar.add_task("the world wakes", total=count)
         yield tell

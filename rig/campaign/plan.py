@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
 from rig.campaign.shapes import (
+    MOST_MOVES,
     Hold,
     Move,
     Shape,
@@ -135,6 +136,10 @@ class TareConfig:
         require(self.attempts >= 1, f"attempts must be at least 1, but is {self.attempts}")
 
 
+LONGEST_RUN = 30 * 86_400.0
+"""s expected: what takes longer was meant otherwise."""
+
+
 @dataclass(frozen=True, slots=True)
 class Plan:
     """A shape with its pacing. Iterating yields the steps of one run: tare, ramps and measurements, zero returns, zero.
@@ -161,7 +166,12 @@ class Plan:
         require(self.zero_every >= 0, f"zero_every must be at least 0 (0: no zero returns), but is {self.zero_every}")
         require_not_negative("rest", self.rest, "s")
         require_not_negative("coast_time", self.coast_time, "s")
-        for move in (move for unit in self.shape.units(1) for move in unit):
+        moves = tuple(move for unit in self.shape.units(1) for move in unit)
+        require(
+            len(moves) * self.repeats <= MOST_MOVES,
+            f"{len(moves)} levels, sweeps or sines, {self.repeats} times over: at most {MOST_MOVES}, lower repeats",
+        )
+        for move in moves:
             require(
                 steepest(move) <= self.slew * (1 + 1e-9),  # slack: float arithmetic only
                 f"{_said(move)} needs {steepest(move):.3g} V/s, but the plan's slew is {self.slew:g} V/s: "
@@ -173,6 +183,11 @@ class Plan:
                     f"dwell.settle ({self.dwell.settle:g} s) must be shorter than each of durations, but one is "
                     f"{move.duration:g} s",
                 )
+
+        seconds = self.duration().expected
+        require(
+            seconds <= LONGEST_RUN, f"a run would take {seconds:.3g} s, and {LONGEST_RUN:g} s are allowed: shorten it"
+        )
 
     def __iter__(self) -> Iterator[Step]:
         return (replace(step, index=index) for index, step in enumerate(self._sequence()))

@@ -12,6 +12,10 @@ import numpy as np
 
 from rig.errors import PlanError
 
+MOST_MOVES = 10_000
+"""Of one run; of 10 s each they take a day."""
+MOST_CYCLES = 1_000_000
+
 
 def require(passed: bool, sentence: str) -> None:
     """Raise PlanError with `sentence` unless `passed`."""
@@ -66,6 +70,7 @@ def _ladder(lowest: float | None, highest: float, levels: int) -> tuple[float, .
     """`levels` equal steps up to `highest` V, from `lowest` (default `highest / levels`)."""
     require_above_zero("max", highest, "V")
     require(levels >= 1, f"levels must be at least 1, but is {levels}: a plan without levels measures nothing")
+    require(levels <= MOST_MOVES, f"levels must be at most {MOST_MOVES}, but is {levels}")
     first = highest / levels if lowest is None else lowest
     require_above_zero("min", first, "V")
     require(first <= highest, f"min ({first:g} V) must not exceed max ({highest:g} V)")
@@ -188,6 +193,7 @@ class Sine:
         for frequency in self.frequencies:
             require_above_zero("frequencies", frequency, "Hz")
         require(self.cycles >= 1, f"cycles must be at least 1, but is {self.cycles}")
+        require(self.cycles <= MOST_CYCLES, f"cycles must be at most {MOST_CYCLES}, but is {self.cycles}")
         require(isfinite(self.offset), f"offset must be a finite number in V, but is {self.offset:g}")
 
     def units(self, repeats: int) -> Iterator[Unit]:

@@ -12,6 +12,8 @@ from time import monotonic
 from types import FrameType
 from typing import TextIO
 
+from rig.visible_text import unfiltered, visible
+
 ENDED_AT_ONCE = 130
 """Exit status of what Ctrl+C ended: 128 + SIGINT."""
 LEAST_WIDTH = 40
@@ -54,14 +56,14 @@ class Watching:
     def _show(self, what: str) -> None:
         if self._out is not None:
             wide = max(shutil.get_terminal_size().columns - 1, LEAST_WIDTH)
-            self._out.write(f"\r\x1b[K{f'{self._now() - self._begun:4.0f} s  {what}'[:wide]}")
+            self._out.write(f"\r\x1b[K{visible(f'{self._now() - self._begun:4.0f} s  {what}')[:wide]}")
             self._out.flush()
 
 
 @contextmanager
 def observed(*, shown: bool) -> Iterator[Watching]:
     """What watches a diagnosis while Ctrl+C is its; `shown`: on standard error, where that is a terminal."""
-    watching = Watching(sys.stderr if shown and sys.stderr.isatty() else None)
+    watching = Watching(unfiltered(sys.stderr) if shown and sys.stderr.isatty() else None)
     if threading.current_thread() is not threading.main_thread():  # signals are another's
         yield watching
         return

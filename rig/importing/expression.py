@@ -19,6 +19,10 @@ BINARY: Final[Mapping[type[ast.operator], Callable[[Any, Any], Any]]] = {
     ast.Div: np.divide,
 }
 UNARY: Final[Mapping[type[ast.unaryop], Callable[[Any], Any]]] = {ast.USub: operator.neg, ast.UAdd: operator.pos}
+LONGEST: Final = 400
+MOST_BRACKETS: Final = 40
+MOST: Final = 1e30
+"""No number of a conversion is larger, and whole ones stay floats whatever is done with them."""
 FUNCTIONS: Final[Mapping[str, Callable[[Any], Any]]] = {"abs": np.abs, "sign": np.sign}
 
 
@@ -45,15 +49,20 @@ def evaluate(text: str, values: Mapping[str, Floats | float]) -> Floats:
 
 
 def _parsed(text: str) -> ast.expr:
+    if len(text) > LONGEST or text.count("(") > MOST_BRACKETS:
+        raise ConfigError(
+            f"expression {text[:40]!r}...: {len(text)} letters; at most {LONGEST} and {MOST_BRACKETS} brackets are read"
+        )
     try:
         return ast.parse(text, mode="eval").body
-    except SyntaxError as error:
-        raise ConfigError(f"expression {text!r}: {error.msg}; write for example `(pwm - 1500) / 400`") from error
+    except (SyntaxError, ValueError) as error:
+        reason = error.msg if isinstance(error, SyntaxError) else error
+        raise ConfigError(f"expression {text!r}: {reason}; write for example `(pwm - 1500) / 400`") from error
 
 
 def _check(node: ast.expr, text: str, found: dict[str, None]) -> None:
     match node:
-        case ast.Constant(value=int() | float()) if not isinstance(node.value, bool):
+        case ast.Constant(value=int() | float() as number) if not isinstance(number, bool) and abs(number) < MOST:
             pass
         case ast.Name(id=name):
             found[name] = None
@@ -73,8 +82,8 @@ def _check(node: ast.expr, text: str, found: dict[str, None]) -> None:
 
 def _value(node: ast.expr, values: Mapping[str, Floats | float]) -> Any:
     match node:
-        case ast.Constant(value=number):
-            return number
+        case ast.Constant(value=int() | float() as number):
+            return float(number)
         case ast.Name(id=name):
             return values[name]
         case ast.BinOp(left=left, op=op, right=right):

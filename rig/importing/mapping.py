@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
-import tomllib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
@@ -19,6 +18,8 @@ from rig.errors import ConfigError
 from rig.importing.expression import names_in
 from rig.importing.reading.row_filter import parse
 from rig.importing.units import FROM_HEADER, conversion, factor_to_si, seconds
+from rig.regular_file import read
+from rig.toml_tables import MOST_BYTES, parsed
 
 ColumnRef = str | int
 """Name in the header, or number counted from 1."""
@@ -150,16 +151,16 @@ def read_map(name: str) -> ImportMap:
     """A shipped map by name, or a file by path. Raises ConfigError that names file and key."""
     known = shipped()
     path = known.get(name, Path(name))
-    if not path.is_file():
+    try:
+        text = read(path, "map", MOST_BYTES, ConfigError).decode("utf-8")
+    except FileNotFoundError:
         near = difflib.get_close_matches(name, known, 1)
         hint = f"did you mean {near[0]}?" if near else "`rig import --list` shows those that are shipped"
-        raise ConfigError(f"{name} is neither a shipped map nor a file; {hint}")
-    text = path.read_text(encoding="utf-8")
-    try:
-        content = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: {error}") from error
-    return build_map(content, text, path.name)
+        raise ConfigError(f"{name} is neither a shipped map nor a file; {hint}") from None
+    except UnicodeDecodeError as error:
+        raise ConfigError(f"{path}: this map can't be read: {error}") from None
+    text = text.replace("\r\n", "\n")
+    return build_map(parsed(text, path), text, path.name)
 
 
 def build_map(content: Mapping[str, Any], text: str, where: str) -> ImportMap:

@@ -16,6 +16,19 @@ TRACE_ROWS = 12_000
 CLIENT_BOUND = 8 * 2**20
 """Bytes that may wait for a front end that does not read before it is dropped."""
 MAX_CLIENTS = 8
+LONGEST_REQUEST = 8192
+"""Bytes: a note of 500 letters, each of them twelve in JSON, and to spare. Who sends more is dropped."""
+READ_PER_TICK = 4096
+"""Bytes taken from one front end by one `poll`; the rest waits in its own process."""
+ACCEPTED_PER_TICK = 16
+PASSED_PER_TICK = 10
+"""Requests that one `poll` passes on, a stop before all others: no person asks for more in a period of the loop."""
+FLOOD = 100
+"""Messages of one front end in one second: a key that is held down repeats 30 times, leases are two. Above: dropped."""
+SILENCE = 30.0
+"""s after which a front end that says nothing is dropped: all of ours renew a lease twice a second."""
+OVERDUE = 3.0
+"""s of silence after which a front end gives way where there is no room for another: a lease lasts 2 s."""
 
 TraceRow = tuple[float, float, float]
 
@@ -24,6 +37,20 @@ TraceRow = tuple[float, float, float]
 class Client:
     peer: Peer
     unsent: list[TraceRow]
+    heard: float
+    """s, of the latest message; at first of its arrival."""
+    since: float
+    """s, where the second began in which `count` messages came."""
+    count: int = 0
+
+    def floods(self, messages: int, now: float) -> bool:
+        """Whether these are too many for the second in which they came."""
+        if now - self.since >= 1.0:
+            self.since, self.count = now, 0
+        self.count += messages
+        if messages:
+            self.heard = now
+        return self.count > FLOOD
 
 
 @dataclass
@@ -38,12 +65,13 @@ class Clients:
     an attended campaign needs one."""
 
     def poll(self, now: float) -> list[Request]:
-        """Accept who waits, take all requests; leases are renewed here and not passed on."""
-        self._accept()
+        """Accept who waits, take all requests; leases are renewed here and not passed on. Who floods, sends what is no
+        request, or has been silent for long is dropped, alone."""
+        self._accept(now)
         requests: list[Request] = []
         for client in list(self.connected):
             requests += self._take(client, now)
-        return requests
+        return requests if len(requests) <= PASSED_PER_TICK else _most_urgent(requests)
 
     def lease_age(self, now: float) -> float:
         """Seconds since any front end said that somebody attends; 0 before the first ever did."""
@@ -76,12 +104,23 @@ class Clients:
         self.listener.close()
         remove(Path(path))
 
-    def _accept(self) -> None:
-        while (peer := accept(self.listener, "front end", CLIENT_BOUND)) is not None:
-            if len(self.connected) >= MAX_CLIENTS:
+    def _accept(self, now: float) -> None:
+        for _ in range(ACCEPTED_PER_TICK):
+            peer = accept(self.listener, "front end", CLIENT_BOUND, LONGEST_REQUEST, READ_PER_TICK)
+            if peer is None:
+                return
+            if self._has_room(now):
+                self.connected.append(Client(peer, list(self.trace), heard=now, since=now))
+            else:
                 peer.close()
-                continue
-            self.connected.append(Client(peer, list(self.trace)))
+
+    def _has_room(self, now: float) -> bool:
+        """Where there is none, whoever has been silent the longest makes some: `rig stop` must get through."""
+        if len(self.connected) >= MAX_CLIENTS:
+            silent = min(self.connected, key=lambda client: client.heard)
+            if now - silent.heard > OVERDUE:
+                self._drop(silent)
+        return len(self.connected) < MAX_CLIENTS
 
     def _take(self, client: Client, now: float) -> list[Request]:
         try:
@@ -91,6 +130,7 @@ class Clients:
             self._drop(client)
             return []
         requests: list[Request] = []
+        floods = client.floods(len(messages), now)
         for message in messages:
             if not isinstance(message, Request):
                 self._drop(client)
@@ -99,10 +139,16 @@ class Clients:
                 self.last_lease = now
             if message.kind != "lease":
                 requests.append(message)
-        if client.peer.closed:
+        if client.peer.closed or floods or now - client.heard > SILENCE:
             self._drop(client)
         return requests
 
     def _drop(self, client: Client) -> None:
         client.peer.close()
         self.connected.remove(client)
+
+
+def _most_urgent(requests: list[Request]) -> list[Request]:
+    """One stop, then the first of the others."""
+    stops = [request for request in requests if request.kind == "stop"]
+    return [*stops[:1], *(request for request in requests if request.kind != "stop")][:PASSED_PER_TICK]

@@ -1,8 +1,4 @@
-"""Local sockets between the processes: framed messages, never blocking; end of file = the other side is gone.
-
-A frame is `<u32 length of the payload> <u8 kind> <payload>`, little-endian. Every message but `Rows` is JSON of its
-dataclass. `Rows` is binary: u16 stream, u32 n, int64 t_ns[n], float64 values[n * channels], row-major.
-"""
+"""Local sockets between the processes: framed messages, never blocking; end of file = the other side is gone."""
 
 from __future__ import annotations
 
@@ -11,47 +7,13 @@ import errno
 import hashlib
 import os
 import socket
-import struct
 import tempfile
 from pathlib import Path
-from typing import Any, Final
-
-import numpy as np
-from pydantic import ConfigDict, TypeAdapter, ValidationError, with_config
-from pydantic_core import to_json
+from typing import Final
 
 from rig.errors import LinkError
-from rig.link.front_end_messages import Request, Snapshot
-from rig.link.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Ready, Rows, StepRow
-from rig.link.watch_messages import Mismatch, Watched
+from rig.link.framing import HEADER, KINDS, MAX_FRAME, Message, decode, encode
 
-ToRecorder = Open | Rows | StepRow | EventRow | Close
-Message = Snapshot | Request | ToRecorder | Ready | Ack | Closed | Failed | Watched | Mismatch
-
-KINDS: Final[dict[int, type[Any]]] = {
-    1: Snapshot,
-    2: Request,
-    16: Open,
-    17: StepRow,
-    18: EventRow,
-    19: Close,
-    24: Ready,
-    25: Ack,
-    26: Closed,
-    27: Failed,
-    32: Rows,
-    40: Watched,
-    48: Mismatch,
-}
-NUMBERS: Final = {message: number for number, message in KINDS.items()}
-ADAPTERS: Final[dict[int, TypeAdapter[Any]]] = {
-    number: TypeAdapter(message) for number, message in KINDS.items() if message is not Rows
-}
-SNAPSHOTS: Final = TypeAdapter(with_config(ConfigDict(ser_json_inf_nan="constants"))(Snapshot))
-HEADER: Final = struct.Struct("<IB")
-ROWS_HEADER: Final = struct.Struct("<HI")
-MAX_FRAME: Final = 64 * 2**20
-"""Bytes; a longer frame means that the two sides are out of step."""
 BOUND: Final = 64 * 2**20
 """Bytes that wait for a slow reader before `Overrun`: a minute of five streams at 1 kHz."""
 MAX_PATH: Final = 107
@@ -64,70 +26,26 @@ class Overrun(LinkError):
     """The other side reads slower than we write: nothing was dropped, and nothing more fits."""
 
 
-def encode(message: Message) -> bytes:
-    """One message as a whole frame."""
-    kind = NUMBERS[type(message)]
-    match message:
-        case Rows():
-            payload = _encode_rows(message)
-        case Snapshot():  # ten a second and long: a compiled serializer takes a third of the time of `to_json`
-            payload = SNAPSHOTS.dump_json(message, warnings=False)
-        case _:
-            payload = to_json(message, inf_nan_mode="constants")
-    if len(payload) > MAX_FRAME:
-        raise LinkError(
-            f"a {KINDS[kind].__name__} of {len(payload)} bytes exceeds the {MAX_FRAME} bytes of a frame; split it"
-        )
-    return HEADER.pack(len(payload), kind) + payload
-
-
-def decode(kind: int, payload: bytes) -> Message:
-    """The message in a frame. Raises LinkError that says what came."""
-    if kind not in KINDS:
-        raise LinkError(f"a frame of unknown kind {kind} with {len(payload)} bytes came; known are {sorted(KINDS)}")
-    if KINDS[kind] is Rows:
-        return _decode_rows(payload)
-    try:
-        message: Message = ADAPTERS[kind].validate_json(payload)
-    except ValidationError as error:
-        raise LinkError(
-            f"a malformed {KINDS[kind].__name__} came: {payload[:80]!r} ({error.error_count()} errors)"
-        ) from error
-    return message
-
-
-def _encode_rows(rows: Rows) -> bytes:
-    t_ns = np.ascontiguousarray(rows.t_ns, dtype="<i8")
-    values = np.ascontiguousarray(rows.values, dtype="<f8")
-    if values.ndim != 2 or values.shape[0] != t_ns.size:
-        raise ValueError(f"rows of stream {rows.stream}: {t_ns.size} times, but values of shape {values.shape}")
-    return ROWS_HEADER.pack(rows.stream, t_ns.size) + t_ns.tobytes() + values.tobytes()
-
-
-def _decode_rows(payload: bytes) -> Rows:
-    if len(payload) < ROWS_HEADER.size:
-        raise LinkError(f"a Rows frame of {len(payload)} bytes came; its header alone has {ROWS_HEADER.size}")
-    stream, n = ROWS_HEADER.unpack_from(payload)
-    body = len(payload) - ROWS_HEADER.size
-    if n == 0 or body < 8 * n or body % (8 * n):
-        raise LinkError(f"a Rows frame for stream {stream} came with {n} rows in {body} bytes, which do not divide")
-    t_ns = np.frombuffer(payload, "<i8", n, ROWS_HEADER.size).astype(np.int64, copy=False)
-    values = np.frombuffer(payload, "<f8", offset=ROWS_HEADER.size + 8 * n).astype(np.float64, copy=False)
-    return Rows(stream, t_ns, values.reshape(n, -1))
-
-
 class Peer:
     """The other end of a connected socket. Selectable; owns the socket."""
 
-    def __init__(self, connection: socket.socket, name: str, bound: int = BOUND) -> None:
-        """`name` is what messages call the other side; `bound` in bytes limits what waits to be sent."""
+    def __init__(
+        self,
+        connection: socket.socket,
+        name: str,
+        bound: int = BOUND,
+        longest: int = MAX_FRAME,
+        at_once: int = READ_AT_ONCE,
+    ) -> None:
+        """`name` is what messages call the other side. Limits in bytes: `bound` of what waits to be sent, `longest` of
+        a message that comes, `at_once` of what one `receive` takes."""
         connection.setblocking(False)
         self.name = name
         self.closed = False
         """True once `receive` met the end of file: the other side is gone, and all that it sent has been delivered."""
         self._deaf = False
         self._socket = connection
-        self._bound = bound
+        self._bound, self._longest, self._at_once = bound, longest, at_once
         self._outgoing = bytearray()
         self._incoming = bytearray()
 
@@ -181,10 +99,10 @@ class Peer:
         start = 0
         while len(self._incoming) - start >= HEADER.size:
             length, kind = HEADER.unpack_from(self._incoming, start)
-            if length > MAX_FRAME or kind not in KINDS:
+            if length > self._longest or kind not in KINDS:
                 raise LinkError(
                     f"{self.name} sent a frame header of kind {kind}, {length} bytes: "
-                    "not a rig process, or out of step; close the link"
+                    f"not a rig process, out of step, or longer than {self._longest} bytes; close the link"
                 )
             end = start + HEADER.size + length
             if len(self._incoming) < end:
@@ -196,9 +114,9 @@ class Peer:
 
     def _fill(self) -> None:
         taken = 0
-        while not self.closed and taken < READ_AT_ONCE:
+        while not self.closed and taken < self._at_once:
             try:
-                data = self._socket.recv(2**18)
+                data = self._socket.recv(min(2**18, self._at_once))
             except BlockingIOError:
                 return
             except ConnectionResetError:
@@ -264,15 +182,23 @@ def _remove_dead(path: Path) -> None:
     raise LinkError(f"another process already listens on {path}; stop it, or use its console")
 
 
-def accept(listener: socket.socket, name: str, bound: int = BOUND) -> Peer | None:
-    """The next waiting front end, or None."""
+NOT_NOW: Final = (
+    errno.EAGAIN, errno.EWOULDBLOCK, errno.ECONNABORTED, errno.EMFILE, errno.ENFILE, errno.ENOBUFS, errno.ENOMEM,
+)  # fmt: skip
+"""Nobody waits, or this process has no room for one more: accept(2). Neither ends a run."""
+
+
+def accept(
+    listener: socket.socket, name: str, bound: int = BOUND, longest: int = MAX_FRAME, at_once: int = READ_AT_ONCE
+) -> Peer | None:
+    """The next waiting front end, or None; the limits are those of `Peer`."""
     try:
         connection, _ = listener.accept()
     except OSError as error:
-        if error.errno in (errno.EAGAIN, errno.EWOULDBLOCK, errno.ECONNABORTED):
+        if error.errno in NOT_NOW:
             return None
         raise
-    return Peer(connection, name, bound)
+    return Peer(connection, name, bound, longest, at_once)
 
 
 def connect(path: Path, name: str, timeout: float = 2.0) -> Peer:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,7 @@ from rig.errors import ConfigError, PlanError
 from rig.safety.watchdog_proof import PROOFS_OF_A_RUN
 from rig.sequence.sequencer import settings_for
 from rig.sequence.steady import LEAST_SAMPLES
+from rig.visible_text import console
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,12 +169,14 @@ def _require_samples(campaign: CampaignConfig, force: Instrument) -> None:
 
 
 def _clock(seconds: float) -> str:
+    if not math.isfinite(seconds):
+        return "for ever"
     minutes, rest = divmod(round(seconds), 60)
     hours, minutes = divmod(minutes, 60)
     return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
 
 
-def print_report(report: CheckReport, console: Console) -> None:
+def print_report(report: CheckReport, screen: Console) -> None:
     """Steps, durations, peaks."""
     campaign = report.campaign
     table = Table("step", "phase", "from V", "to V", "expected s", "at most s", title=f"{campaign.name}: one run")
@@ -181,26 +185,26 @@ def print_report(report: CheckReport, console: Console) -> None:
         start = step.from_voltage if step.phase == "ramp" else step.voltage
         times = (f"{step.expected:.1f}", f"{step.max_duration:.1f}")
         table.add_row(str(step.index), step.phase, f"{start:.2f}", to, *times)
-    console.print(table)
-    console.print(f"bench          {campaign.bench.name}", markup=False)
-    console.print(f"thrusters      {', '.join(campaign.thrusters)}", markup=False)
+    screen.print(table)
+    screen.print(f"bench          {campaign.bench.name}")
+    screen.print(f"thrusters      {', '.join(campaign.thrusters)}")
     if campaign.flow_speed is not None:
-        console.print(f"flow speed     {campaign.flow_speed:g} m/s, to be set by hand; the preflight compares")
-    console.print(f"one run        {_clock(report.run.expected)} expected, {_clock(report.run.worst)} at worst")
-    console.print(f"campaign       {_clock(report.total.expected)} expected, {_clock(report.total.worst)} at worst")
-    console.print(f"peak voltage   {report.peak_voltage:g} V")
+        screen.print(f"flow speed     {campaign.flow_speed:g} m/s, to be set by hand; the preflight compares")
+    screen.print(f"one run        {_clock(report.run.expected)} expected, {_clock(report.run.worst)} at worst")
+    screen.print(f"campaign       {_clock(report.total.expected)} expected, {_clock(report.total.worst)} at worst")
+    screen.print(f"peak voltage   {report.peak_voltage:g} V")
     if report.peak_thrust is None:
-        console.print("peak thrust    not checked: the campaign gives no expected_C")
+        screen.print("peak thrust    not checked: the campaign gives no expected_C")
     else:
-        console.print(f"peak thrust    {report.peak_thrust:.4g} N expected, from expected_C")
+        screen.print(f"peak thrust    {report.peak_thrust:.4g} N expected, from expected_C")
     for each in report.overridden:
-        console.print(f"OVERRIDE       {each.told}", markup=False)
-    console.print("The campaign may run. Nothing was opened.")
+        screen.print(f"OVERRIDE       {each.told}")
+    screen.print("The campaign may run. Nothing was opened.")
 
 
 @click.command("check")
 @click.argument("campaign", type=click.Path(path_type=Path))
 def check_command(campaign: Path) -> int:
     """Check CAMPAIGN and its bench without opening a port: steps, durations, peaks, and every limit."""
-    print_report(check_campaign(campaign), Console())
+    print_report(check_campaign(campaign), console())
     return 0

@@ -14,6 +14,7 @@ from rich.progress import Progress as Bar
 from rich.style import Style
 
 from rig.link.front_end_messages import LogLine, Point, Progress, Snapshot, State
+from rig.visible_text import console as visible_console
 
 STYLES: Final = {
     "info": Style(),
@@ -30,7 +31,7 @@ MEASURING: Final[tuple[State, ...]] = ("proving", "tare", "ramp", "hold", "rest"
 class Narration:
     """Writes to `console`; remembers what it has told."""
 
-    console: Console = field(default_factory=lambda: Console(stderr=True))
+    console: Console = field(default_factory=lambda: visible_console(stderr=True))
     told: int = 0
     """Log lines written so far, by the controller's count."""
     before: Snapshot | None = None

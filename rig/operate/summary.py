@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import click
-from rich.console import Console
 from rich.table import Table
 
 from identification.thruster.thrust import ThrustFit
 from identification.thruster.thrust_report import misfit
 from rig.errors import RecordingError
 from rig.fit.command import Answer, answer_json, fit_files
+from rig.visible_text import console
 
 FIT_FILE = "fits.json"
 WIDTH = 80
@@ -35,10 +35,10 @@ def print_summary(recordings: Sequence[Path], folder: Path) -> None:
         except RecordingError as error:
             click.echo(f"no fit: {error}")
     if answers:
-        console = Console()
-        console.width = max(console.width, WIDTH)
+        screen = console()
+        screen.width = max(screen.width, WIDTH)
         click.echo("thrust = C V|V| + tare; C in N/V^2, n points, tare and RMSE in N")
-        console.print(table(answers))
+        screen.print(table(answers))
         for answer, path in told:
             if wrong := misfit(answer.fit):
                 click.echo(f"{answer.fit.thruster or '?'}: {wrong}; next: rig diagnose {path}")

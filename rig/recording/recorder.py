@@ -22,8 +22,9 @@ from pathlib import Path
 from rig.errors import RecordingError, RigError
 from rig.hdf5.layout import FLUSH_PERIOD
 from rig.hdf5.write import RecordingFile
+from rig.link.framing import Message
 from rig.link.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Ready, Rows, StepRow
-from rig.link.sockets import Message, Peer
+from rig.link.sockets import Peer
 
 ABANDONED = "controller process ended without closing the recording"
 FAREWELL = 2.0

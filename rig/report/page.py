@@ -22,6 +22,7 @@ from typing import Literal
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
 
 from rig.report.style import PALETTE, WIDE, Plot, svg
+from rig.visible_text import visible
 
 HERE = Path(__file__).parent
 Tone = Literal["", "good", "doubt", "bad"]
@@ -139,7 +140,8 @@ def html(page: Page) -> str:
         return re.sub(r'( id="|href="#|url\(#)', lambda found: found[1] + prefix, text)
 
     style = (HERE / "page.css").read_text(encoding="utf-8")
-    return _template().render(page=page, palette=PALETTE, style=style, drawn=drawn, program=program()) + "\n"
+    text = _template().render(page=page, palette=PALETTE, style=style, drawn=drawn, program=program())
+    return visible(text) + "\n"
 
 
 def write(page: Page, path: Path) -> None:

@@ -20,6 +20,7 @@ from rig.link.live_runs import Run, lock_bench, register
 from rig.link.sockets import socket_path
 from rig.stages.campaign import SOCKET_NAME, open_session, run
 from rig.stages.session import Session
+from rig.visible_text import visible
 
 
 def main(campaign_path: str, folder_path: str, *thrusters: str) -> int:
@@ -39,7 +40,7 @@ def main(campaign_path: str, folder_path: str, *thrusters: str) -> int:
             finally:
                 announcement.unlink(missing_ok=True)
     except RigError as error:
-        sys.stderr.write(f"rig: {error}\n")
+        sys.stderr.write(visible(f"rig: {error}\n"))
         return 2
     return 0
 

@@ -20,8 +20,9 @@ import numpy as np
 from identification.recording import Floats
 from identification.watching import Alarm, Settings, Watch
 from rig.errors import LinkError, RigError, TwinError
+from rig.link.framing import Message
 from rig.link.recorder_messages import Failed, Rows
-from rig.link.sockets import Message, Peer
+from rig.link.sockets import Peer
 from rig.link.watch_messages import Mismatch, Watched
 
 NICE = 10

@@ -119,3 +119,21 @@ def test_a_contact_at_an_analogue_input_is_one_or_zero():
         device.close()
     with pytest.raises(ValueError, match="threshold must be finite"):
         stream_options(threshold=float("nan"))
+
+
+@pytest.mark.parametrize("number", ["9" * 310, "-" + "9" * 310, "9" * 5000, "9" * 17, "1e400", "inf", "nan", "1e308"])
+def test_numbers_that_no_instrument_means_are_unreadable(number):
+    for pattern, line in (
+        (r"(?P<value>\S+)", number),
+        (r"(?P<raw>\S+)", number),
+        (r"(?P<value>1\.5) (?P<raw>\S+)", f"1.5 {number}"),
+        (r"(?P<value>1\.5) (?P<t>\S+)", f"1.5 {number}"),
+    ):
+        (record,) = line_stream.Decoder(pattern).feed(line.encode() + b"\n")
+        if isinstance(record, line_stream.Reading):  # a value of any size, a device's time that it does not know
+            assert record.raw is None
+            assert math.isfinite(record.value)
+            assert not math.isinf(record.t)
+            assert number in ("9" * 17, "nan", "1e308")
+        else:
+            assert record.line.startswith(line.encode()[:20])

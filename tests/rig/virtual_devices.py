@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 
 from drivers.errors import LinkError
 from drivers.protocols import Channel, LinkHealth, Sample, Stream, Watchdog
+from rig.link.framing import Message
 from rig.link.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Ready, Rows, StepRow
-from rig.link.sockets import Message, Peer
+from rig.link.sockets import Peer
 
 LAG = 0.05
 """s, of the propeller."""

@@ -86,7 +86,7 @@ def checks_table(checks: tuple[Check, ...]) -> Table:
     table.add_column(ratio=1)
     for check in sorted(checks, key=lambda check: TROUBLE_FIRST.index(check.verdict)):
         word, style = CHECK_WORDS[check.verdict]
-        table.add_row(Text(word, style), Text(check.name, "bold"), check.text)
+        table.add_row(Text(word, style), Text(check.name, "bold"), Text(check.text))
     return table
 
 
@@ -98,7 +98,7 @@ def results_table(points: Mapping[str, tuple[Point, ...]]) -> Table:
     for heading in ("C [N/V²]", "scatter", "[%]", "rest [N]", "holds", "not steady", "left out"):
         table.add_column(heading, justify="right", no_wrap=True)
     for thruster, held in points.items():
-        table.add_row(thruster or "?", *_result(held))
+        table.add_row(Text(thruster or "?"), *_result(held))
     return table
 
 

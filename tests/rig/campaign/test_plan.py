@@ -142,3 +142,20 @@ def test_sine_command_keeps_its_slew():
     t = np.linspace(0, wave.max_duration, 10_001)
     command = wave.voltage + wave.amplitude * np.sin(2 * np.pi * wave.frequency * t)
     assert np.abs(np.diff(command) / np.diff(t)).max() <= 10.0
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        lambda: Plan(Staircase(6.0, 10**9), DWELL, 10.0),
+        lambda: Plan(RandomOrder(6.0, 10**12, seed=1), DWELL, 10.0),
+        lambda: Plan(Levels((1.0, 2.0)), DWELL, 10.0, repeats=10**15),
+        lambda: Plan(Sine(1.0, (0.1,), 10**18), DWELL, 10.0),
+        lambda: Plan(Levels((1.0,), (1e300,)), DWELL, 10.0),
+        lambda: Plan(Ramp(1.0, 1e-300), DWELL, 10.0),
+    ],
+    ids=range(6),
+)
+def test_what_would_never_end_is_refused_before_it_is_spread_out(made):
+    with pytest.raises(PlanError, match=r"at most|are allowed"):
+        made()

@@ -50,3 +50,25 @@ def test_anything_else_is_refused(text):
 def test_what_is_no_expression_is_refused():
     with pytest.raises(ConfigError, match=r"write for example `\(pwm - 1500\) / 400`"):
         names_in("a +")
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "-" * 10**6 + "1",
+        "(" * 1000 + "1" + ")" * 1000,
+        "9" * 5000,
+        "9" * 400 + " + a",
+        "1e999 * a",
+        "9" * 31 + "*a",
+        "a\0",
+    ],
+    ids=range(7),
+)
+def test_depth_and_digits_are_bounded(text):
+    with pytest.raises(ConfigError, match="expression"):
+        names_in(text)
+
+
+def test_whole_numbers_do_not_grow():
+    assert evaluate(" * ".join(["9" * 29] * 12), {}).tolist() != evaluate("1", {}).tolist()

@@ -96,7 +96,7 @@ def test_every_shipped_map_is_sound_and_says_what_it_is():
 
 def test_a_map_that_is_not_toml_is_named(tmp_path):
     (tmp_path / "m.toml").write_text("about = \n")
-    with pytest.raises(ConfigError, match=r"m\.toml: Invalid value"):
+    with pytest.raises(ConfigError, match=r"m\.toml: not valid TOML: Invalid value"):
         read_map(str(tmp_path / "m.toml"))
 
 

@@ -1,10 +1,11 @@
 """Front ends over a real socket: leases, requests, who is dropped, and what a late one is given."""
 
+import resource
 from contextlib import contextmanager
 
 import pytest
 
-from rig.link.clients import MAX_CLIENTS, Clients
+from rig.link.clients import FLOOD, MAX_CLIENTS, OVERDUE, PASSED_PER_TICK, SILENCE, Clients
 from rig.link.front_end_messages import Request, Snapshot
 from rig.link.recorder_messages import Ready
 from rig.link.sockets import connect, listen
@@ -121,3 +122,79 @@ def test_closing_takes_the_socket_file_away(tmp_path):
         assert peer.closed
         with pytest.raises(Exception, match="does not answer"):
             connect(tmp_path / "s.sock", "the controller")
+
+
+def test_a_note_of_ten_megabytes_costs_only_its_sender(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        loud, other = front(), front()
+        loud.send(Request("note", "x" * 10_000_000))
+        other.send(Request("note", "y"))
+        texts = []
+        for tick in range(20):
+            texts += [request.text for request in clients.poll(0.02 * tick)]
+            loud.flush()
+        assert texts == ["y"]
+        assert len(clients.connected) == 1
+        clients.publish(snapshot())
+        assert len(other.receive()) == 1
+
+
+def test_a_note_of_500_letters_of_any_script_arrives(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        front().send(Request("note", "\U0001f527" * 500))
+        heard = [request.text for tick in range(3) for request in clients.poll(0.02 * tick)]
+        assert heard == ["\U0001f527" * 500]
+
+
+def test_who_floods_is_dropped_and_a_stop_comes_through(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        flood, other = front(), front()
+        for number in range(5000):
+            flood.send(Request("note", str(number)))
+        other.send(Request("stop", "now"))
+        found = clients.poll(0.0)
+        assert found[0] == Request("stop", "now")
+        assert len(found) == PASSED_PER_TICK
+        for tick in range(1, 5):
+            clients.poll(0.02 * tick)
+        assert len(clients.connected) == 1
+        for _ in range(FLOOD):
+            other.send(Request("lease"))
+        clients.poll(2.0)
+        assert len(clients.connected) == 1, "as many in a second as a person may cause"
+
+
+def test_who_says_nothing_makes_room_at_once_and_is_dropped_later(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        for _ in range(MAX_CLIENTS):
+            front()
+        clients.poll(0.0)
+        late = front()
+        late.send(Request("stop", "rig stop"))
+        assert [request.kind for request in clients.poll(OVERDUE + 0.1)] == ["stop"]
+        assert len(clients.connected) == MAX_CLIENTS
+        for when in range(10, int(SILENCE) + 10, 5):
+            late.send(Request("lease"))
+            clients.poll(float(when))
+        assert len(clients.connected) == 1
+
+
+def test_half_a_message_is_silence(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        front()._socket.sendall(b"\x10\x00\x00\x00\x02{")
+        clients.poll(0.0)
+        clients.poll(SILENCE + 1.0)
+        assert clients.connected == []
+
+
+def test_no_descriptor_left_is_no_end_of_a_run(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        front()
+        soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+        resource.setrlimit(resource.RLIMIT_NOFILE, (0, hard))
+        try:
+            assert clients.poll(0.0) == []
+        finally:
+            resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
+        clients.poll(0.1)
+        assert len(clients.connected) == 1

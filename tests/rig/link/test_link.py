@@ -14,9 +14,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rig.errors import LinkError
+from rig.link.framing import encode
 from rig.link.front_end_messages import Check, Point, Request, Snapshot
 from rig.link.recorder_messages import Ack, ChannelSpec, EventRow, Open, Rows, StreamSpec
-from rig.link.sockets import MAX_PATH, Overrun, Peer, accept, connect, encode, listen, pair, remove, socket_path
+from rig.link.sockets import MAX_PATH, Overrun, Peer, accept, connect, listen, pair, remove, socket_path
 
 
 def two_peers(bound=2**20):
