@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Set
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
@@ -21,6 +21,8 @@ from rig.campaign.shapes import (
 )
 
 Phase = Literal["tare", "ramp", "hold", "rest", "sine", "free"]
+TARE_AGAIN = -2
+"""Index of the tare that a run which goes on begins with: it is no step of the plan."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +55,11 @@ class Step:
     def expected(self) -> float:
         """Seconds this step takes by plan. A hold until steady: half way between its bounds; a tare: one attempt."""
         return (self.min_duration + self.max_duration) / 2 if self.phase == "hold" else self.min_duration
+
+    @property
+    def measures(self) -> bool:
+        """Whether the thrust in it is what the run is for; a tare is not."""
+        return self.phase in ("hold", "sine") or self.swept
 
     @property
     def peak(self) -> float:
@@ -231,6 +238,17 @@ class Plan:
     def _tare_step(self) -> Step:
         return Step(0, "tare", 0.0, self.tare.duration, self.tare.duration * self.tare.attempts)
 
+    def after(self, done: Set[int]) -> tuple[Step, ...]:
+        """The steps of a run of which those with the indices `done` were measured before: a tare, then what is left.
+
+        All steps when nothing is done; none when nothing is left. To a level that the left out steps went to, the
+        sequencer goes by a ramp of its own.
+        """
+        left = tuple(step for step in self if step.index not in done)
+        if not done or not left or left[0].phase == "tare":
+            return left
+        return (replace(self._tare_step(), index=TARE_AGAIN), *left)
+
     def duration(self) -> Duration:
         """Expected and worst duration of one run in s, without the watchdog proof."""
         steps = tuple(self)
@@ -260,6 +278,15 @@ def _said(move: Move) -> str:
             return f"a sine of {amplitude:g} V at {frequency:g} Hz"
         case _:
             return f"a sweep at {steepest(move):g} V/s"
+
+
+def places(steps: tuple[Step, ...]) -> tuple[int, ...]:
+    """Where in its plan each step stands; a tare that is none of its steps stands where the one after it does.
+
+    >>> places((Step(TARE_AGAIN, "tare", 0.0, 1.0, 1.0), Step(7, "hold", 4.0, 1.0, 1.0)))
+    (7, 7)
+    """
+    return tuple(next((s.index for s in steps[k:] if s.index >= 0), 0) for k in range(len(steps)))
 
 
 def require_steps(steps: tuple[Step, ...], max_voltage: float) -> None:

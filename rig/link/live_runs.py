@@ -7,12 +7,13 @@ import hashlib
 import json
 import os
 import tempfile
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from operator import itemgetter
 from pathlib import Path
 from typing import IO
 
 from rig.errors import LinkError
+from rig.link.processes import alive, started
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,8 @@ class Run:
     folder: str
     campaign: str
     bench: str
+    started: str = ""
+    """When the process was started, as `rig.link.processes.started` tells it: numbers are given again."""
 
 
 def _private_folder() -> Path:
@@ -41,20 +44,24 @@ def register(run: Run) -> Path:
     """Announce a run; the caller removes the returned file at its end."""
     path = _private_folder() / f"run-{run.pid}.json"
     draft = path.with_suffix(".draft")  # whoever looks meanwhile sees the whole file or none
-    draft.write_text(json.dumps(asdict(run)), encoding="utf-8")
+    told = replace(run, started=run.started or started(run.pid))
+    draft.write_text(json.dumps(asdict(told)), encoding="utf-8")
     draft.replace(path)
     return path
 
 
 def live_runs() -> list[Run]:
-    """Runs whose controller process still exists; files of dead ones are removed."""
+    """Runs whose controller process still runs; files of others are removed: a process that has ended, though its
+    parent may not have taken note of that, and another one that was given its number."""
     found = []
     for path in _private_folder().glob("run-*.json"):
         try:
             run, since = Run(**json.loads(path.read_text(encoding="utf-8"))), path.stat().st_mtime
         except (FileNotFoundError, ValueError, TypeError):
             continue  # it ended just now, or its file is of another version
-        if _alive(run.pid):
+        if not isinstance(run.pid, int):
+            continue
+        if alive(run.pid, run.started):
             found.append((since, run))
         else:
             path.unlink(missing_ok=True)
@@ -93,13 +100,3 @@ def lock_bench(bench: Path) -> IO[str]:
     file.write(f"process {os.getpid()}")
     file.flush()
     return file
-
-
-def _alive(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except ProcessLookupError:
-        return False
-    except PermissionError:
-        return True
-    return True

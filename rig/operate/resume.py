@@ -1,67 +1,119 @@
-"""rig resume: go on with a campaign whose run was cut, at the first thruster whose run did not end completed.
+"""rig resume: go on with a campaign that was cut, at the first step that is not measured.
 
-What is believed is campaign.jsonl. The cut run is repeated from its first tare into a file of its own.
+campaign.jsonl says which files the campaign has; what is measured they say themselves. A file that was cut stays as it
+is: the rest of its run goes into a further one, which begins with a tare.
 """
 
 from __future__ import annotations
 
 import difflib
 import sys
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import click
 
 from rig.campaign.config import CampaignConfig
 from rig.errors import ConfigError, LinkError, RecordingError, RigError
-from rig.link.live_runs import live_runs
+from rig.link.live_runs import live_runs, lock_bench
+from rig.operate.measured import Measured, measured, recording_of
 from rig.operate.run import console_screen, follow, progress_bar, require_mountable, start_controller
-from rig.recording.ledger import Fact, file_facts, finished_runs, read
+from rig.recording.ledger import FILE_NAME, Fact, Ledger, file_facts, finished_runs, read
 
 
 @dataclass(frozen=True, slots=True)
 class Remainder:
     """What is left of a campaign."""
 
-    campaign: Path
-    """Its file."""
     finished: tuple[str, ...]
     thrusters: tuple[str, ...]
     """Still to be measured, in the order of the campaign."""
+    begun: Mapping[str, Measured] = field(default_factory=dict)
+    """Of thrusters, finished or not, of which a run that was cut has measured something."""
 
 
 @click.command("resume")
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--headless", is_flag=True, help="A progress bar instead of the console.")
 def resume_command(folder: Path, headless: bool) -> int:
-    """Go on with the campaign in FOLDER at the first thruster that is not finished."""
+    """Go on with the campaign in FOLDER at the first step that is not measured."""
     folder = folder.resolve()
     if any(Path(run.folder) == folder for run in live_runs()):
         raise LinkError(f"the run in {folder} is still going on; look at it with `rig console {folder}`")
     from rig.operate.check import check_campaign  # a second of scipy that `rig --help` does not need
 
     facts = read(folder)
-    rest = remainder(facts, folder)
-    config = check_campaign(rest.campaign).campaign
+    config = check_campaign(Path(_begun(facts, folder)["campaign_file"])).campaign
     require_unchanged(facts, config)
-    require_mountable(config, rest.thrusters, headless=headless)
     if not headless and not sys.stdout.isatty():
         raise RigError("rig resume opens the console, which needs a terminal; use --headless where there is none")
-    click.echo(f"finished: {', '.join(rest.finished) or 'none'}; to do: {', '.join(rest.thrusters)}")
+    with lock_bench(config.bench.path):  # nobody else measures on it or resumes while the files are looked through
+        rest = remainder(facts, folder, config)
+        require_mountable(config, rest.thrusters, headless=headless)
+        keep(rest, folder)
+    click.echo(told(rest, config))
     front = progress_bar(start=True) if headless else console_screen()
-    run, _process = start_controller(rest.campaign, folder, rest.thrusters)
+    run, _process = start_controller(config.path, folder, rest.thrusters)
     return follow(run, front)
 
 
-def remainder(facts: Sequence[Fact], folder: Path) -> Remainder:
-    """What the ledger leaves to do. Raises RecordingError when that is nothing."""
-    begun = _begun(facts, folder)
-    finished = finished_runs(facts)
-    rest = tuple(thruster for thruster in begun["thrusters"] if thruster not in finished)
+def remainder(facts: Sequence[Fact], folder: Path, config: CampaignConfig) -> Remainder:
+    """What is left to do. Raises RecordingError when that is nothing, and for files that are not as the ledger says."""
+    completed, begun = finished_runs(facts), dict[str, Measured]()
+    finished = []
+    for thruster in _thrusters(facts, folder, config):
+        if thruster in completed:
+            for run in _runs(facts, thruster):
+                recording_of(run, facts, folder)
+        else:
+            begun[thruster] = measured(facts, folder, thruster, config.plan)
+        if thruster in completed or not config.plan.after(begun[thruster].steps):
+            finished.append(thruster)
+    rest = tuple(thruster for thruster in _begun(facts, folder)["thrusters"] if thruster not in finished)
     if not rest:
-        raise RecordingError(f"{folder}: nothing to resume, every thruster's run is completed")
-    return Remainder(Path(begun["campaign_file"]), tuple(finished), rest)
+        raise RecordingError(f"{folder}: nothing to resume, every step of every thruster is measured")
+    return Remainder(tuple(finished), rest, {name: found for name, found in begun.items() if found.steps})
+
+
+def keep(rest: Remainder, folder: Path) -> None:
+    """Tell the ledger what was found measured: the controller goes on behind it, and so does who reads it later."""
+    ledger = Ledger.open(folder, at_once=True)
+    for thruster, found in rest.begun.items():
+        ledger.write(
+            "kept", thruster=thruster, recordings=list(found.recordings), continues=found.continues,
+            steps=sorted(found.steps),
+        )  # fmt: skip
+    ledger.close()
+    if ledger.error:
+        raise RecordingError(f"what was found measured can't be kept: {ledger.error}")
+
+
+def told(rest: Remainder, config: CampaignConfig) -> str:
+    """One line for the operator."""
+    to_do = []
+    for thruster in rest.thrusters:
+        steps = [step for step in config.plan.after(rest.begun.get(thruster, Measured()).steps) if step.index >= 0]
+        cut = thruster in rest.begun
+        to_do.append(f"{thruster} from step {steps[0].index + 1} ({steps[0].phase}) on" if cut else thruster)
+    return f"finished: {', '.join(rest.finished) or 'none'}; to do: {', '.join(to_do)}"
+
+
+def _runs(facts: Sequence[Fact], thruster: str) -> list[Fact]:
+    return [fact for fact in facts if fact["fact"] == "run_start" and fact["thruster"] == thruster]
+
+
+def _thrusters(facts: Sequence[Fact], folder: Path, config: CampaignConfig) -> list[str]:
+    """Those that the campaign was begun with. Raises RecordingError for one that is none of its own."""
+    thrusters: list[str] = _begun(facts, folder)["thrusters"]
+    named = [*thrusters, *(fact["thruster"] for fact in facts if "thruster" in fact)]
+    strange = next((name for name in named if name not in config.thrusters), None)
+    if strange is not None:
+        raise RecordingError(
+            f"{folder / FILE_NAME} names the thruster {strange[:60]!r}, which is not in {config.path}; it has "
+            f"{', '.join(config.thrusters)}; the ledger was edited: put the original back, or begin anew"
+        )
+    return thrusters
 
 
 def require_unchanged(facts: Sequence[Fact], campaign: CampaignConfig) -> None:

@@ -69,15 +69,19 @@ def assembled(
     recorder: RecorderLink,
     clock: Clock,
     before: tuple[Fact, ...] = (),
+    thrusters: tuple[str, ...] = (),
 ) -> Session:
-    """The session of a campaign on a bench and a clock that are given; nobody watches, nothing is opened yet."""
+    """The session of a campaign on a bench and a clock that are given; nobody watches, nothing is opened yet.
+
+    `thrusters`: those that are to be measured; none: all of the campaign.
+    """
     with ExitStack() as undo:
         log = LineWriter((folder / LOG_NAME).open("ab"), sync=False)
         undo.callback(log.close)
         clients = Clients(listen(socket_path(folder, SOCKET_NAME)))
         undo.callback(clients.close)
-        parts = (bench, recorder, Ledger.open(folder), log, clients, clock)
-        session = begin(campaign, folder, (), parts, before)
+        parts = (bench, recorder, Ledger.open(folder, at_once=True), log, clients, clock)
+        session = begin(campaign, folder, thrusters, parts, before)
         undo.pop_all()
     return session
 

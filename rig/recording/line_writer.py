@@ -17,22 +17,35 @@ CLOSE_TIMEOUT = 5.0
 class LineWriter:
     """Owns the file. `error` says why lines are lost, once they are; what comes after that is not written."""
 
-    def __init__(self, file: IO[bytes], *, sync: bool) -> None:
-        """`sync`: fsync after each line."""
+    def __init__(self, file: IO[bytes], *, sync: bool, at_once: bool = False) -> None:
+        """`sync`: fsync after each line. `at_once`: `write` writes, and there is no thread."""
         self.error = ""
         self._file = file
         self._sync = sync
+        self._at_once = at_once
         self._waiting: Queue[bytes | None] = Queue(CAPACITY)
         # a daemon: a disk that never answers must not keep the process alive
         self._thread = threading.Thread(target=self._run, name=f"write {file.name}", daemon=True)
-        self._thread.start()
+        if not at_once:
+            self._thread.start()
+
+    @property
+    def settled(self) -> bool:
+        """Everything that was handed over is written, or will never be."""
+        return bool(self.error) or not self._waiting.unfinished_tasks
 
     def write(self, line: str) -> None:
-        """Hand over one line, without its end. Never blocks, never raises."""
-        self._put(line.encode() + b"\n")
+        """Hand over one line, without its end. Never raises, and never blocks but where it writes at once."""
+        if self._at_once:
+            self._keep(line.encode() + b"\n")
+        else:
+            self._put(line.encode() + b"\n")
 
     def close(self) -> None:
         """Wait until all is written, then let the file go; a disk that is stuck is left alone after a while."""
+        if self._at_once:
+            self._let_go()
+            return
         with contextlib.suppress(Full):
             self._waiting.put(None, timeout=CLOSE_TIMEOUT)
         self._thread.join(CLOSE_TIMEOUT)
@@ -46,11 +59,19 @@ class LineWriter:
     def _run(self) -> None:
         try:
             while (line := self._waiting.get()) is not None:
-                if not self.error:
-                    self._store(line)
+                self._keep(line)
+                self._waiting.task_done()
+            self._waiting.task_done()
         finally:
-            with contextlib.suppress(OSError):  # what it still held is lost, and `error` says why
-                self._file.close()
+            self._let_go()
+
+    def _let_go(self) -> None:
+        with contextlib.suppress(OSError):  # what it still held is lost, and `error` says why
+            self._file.close()
+
+    def _keep(self, line: bytes) -> None:
+        if not self.error:
+            self._store(line)
 
     def _store(self, line: bytes) -> None:
         try:

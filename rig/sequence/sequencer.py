@@ -11,7 +11,7 @@ from itertools import accumulate
 from math import copysign, isfinite, pi, sin
 from types import MappingProxyType
 
-from rig.campaign.plan import Step, require_steps
+from rig.campaign.plan import Step, places, require_steps
 from rig.link.front_end_messages import Request, State
 from rig.safety.stopping import Stop, is_rest, turning
 from rig.safety.watchdog_proof import Proof, Refused
@@ -33,6 +33,7 @@ class Sequencer:
         self._steps = tuple(steps)
         self._settings = settings
         require_steps(self._steps, settings.max_voltage)
+        self._numbers = places(self._steps)
         self._after = tuple(accumulate((s.expected for s in reversed(self._steps)), initial=0.0))[-2::-1]
         self._state: State = "tare"
         self._position = 0
@@ -53,8 +54,7 @@ class Sequencer:
         self._stop = Stop(0.0, settings.rest_rate, settings.coast_time)
         self._outcome: Outcome = "running"
         self._cause = ""
-        self._trip_told = False
-        self._release = False
+        self._trip_told = self._release = False
         self._stop_confirmed: bool | None = None
         self._journal = Journal()
 
@@ -99,14 +99,16 @@ class Sequencer:
             case "pause" if self._state != "paused":
                 self._end_row(time, cut=True)
                 self._zero(time, "paused")
-                self._journal.say(time, "info", f"paused in step {self._position}: command 0 V")
+                self._journal.say(time, "info", f"paused in step {self._numbers[self._position]}: command 0 V")
             case "resume" if self._state == "paused":
                 self._end_row(time)
-                self._journal.say(time, "info", f"resumed: step {self._position} is retaken")
+                self._journal.say(time, "info", f"resumed: step {self._numbers[self._position]} is retaken")
                 self._dt = 0.0  # 0 V once more: also a pause that was resumed in the same tick sends it
                 self._begin(time)
             case "skip" if self._state in ("hold", "sine", "free"):
-                self._journal.say(time, "info", f"step {self._position} ended early on request, its data are kept")
+                self._journal.say(
+                    time, "info", f"step {self._numbers[self._position]} ended early on request, its data are kept"
+                )
                 self._finish_step(time)
             case "pause" | "resume" | "skip":
                 self._journal.say(time, "warning", f"{request.kind} ignored: it means nothing in state {self._state}")
@@ -267,8 +269,8 @@ class Sequencer:
         return Output(
             volts=None if self._silent else self._command,
             state=self._state,
-            step=self._position,
-            steps=len(self._steps),
+            step=self._numbers[self._position],
+            steps=self._numbers[-1] + 1,
             step_elapsed=elapsed,
             step_expected=expected,
             remaining=0.0 if self._outcome != "running" else max(expected - elapsed, 0.0) + after,

@@ -16,7 +16,7 @@ from rig.control.loop import IDLE
 from rig.errors import RigError
 from rig.link.clients import Clients
 from rig.link.sockets import listen, socket_path
-from rig.recording.ledger import FILE_NAME, Ledger, finished_runs, read
+from rig.recording.ledger import FILE_NAME, Ledger, read, recordings_before
 from rig.recording.line_writer import LineWriter
 from rig.recording.recorder_link import RecorderLink
 from rig.stages.arming import connect, preflight
@@ -43,7 +43,7 @@ def open_session(campaign: CampaignConfig, folder: Path, thrusters: tuple[str, .
     parts = (build(campaign.bench), recorder, ledger, own_log, clients, MonotonicClock())
     session = begin(campaign, folder, thrusters, parts, before, watch)
     session.loop.host = host_clocks
-    session.status.files.extend(finished_runs(before).values())
+    session.status.files.extend(recordings_before(before, folder))
     return session
 
 

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Set
 from dataclasses import replace
 
-from rig.campaign.plan import Step
+from rig.campaign.plan import TARE_AGAIN, Step
 from rig.control.loop import Decision, Inputs
 from rig.link.recorder_messages import Outcome, StepRow
-from rig.recording.ledger import attempts
+from rig.recording.ledger import Fact, attempts, kept_steps
 from rig.recording.recorder_link import recording_path
 from rig.safety.thrust_rest import ThrustRest
 from rig.sequence.sequencer import Sequencer
@@ -26,8 +26,11 @@ def measure(session: Session) -> None:
     session.measured.clear()
     path = recording_path(session.folder, thruster)
     attempt = attempts(session.before, thruster) + 1
-    t0_ns = loop.clock.now_ns()
-    request = opening(session.campaign, session.bench, thruster, path, t0_ns, session.stamp(), attempt)
+    kept = kept_steps(session.before, thruster)
+    session.kept = frozenset(kept["steps"] if kept else ())
+    t0_ns, stamp = loop.clock.now_ns(), session.stamp()
+    continues = kept["continues"] if kept else ""
+    request = opening(session.campaign, session.bench, thruster, path, t0_ns, stamp, attempt, continues)
     session.recorder.open(request, loop.now)
     loop.clients.clear_trace()
     loop.thrust_rest = ThrustRest()
@@ -36,12 +39,28 @@ def measure(session: Session) -> None:
     status.files.append(str(path))
     session.wait_for_recorder(lambda: session.recorder.ready, f"open {path}")
     session.event_log.begin(t0_ns)
+    steps = session.campaign.plan.after(session.kept)
     if attempt > 1:
-        session.say("info", f"attempt {attempt} of {thruster}: the run is repeated from its first tare")
-    session.ledger.write("run_start", thruster=thruster, recording=str(path), recording_t0_ns=t0_ns, attempt=attempt)
-    settings = settings_for(session.campaign, thruster)
-    settings = replace(settings, proved=session.proved)
-    _close(session, sequence(session, Sequencer(session.campaign.plan, settings), t0_ns))
+        session.say("info", f"attempt {attempt} of {thruster}: {_where(steps, kept)}")
+    session.ledger.write(
+        "run_start", thruster=thruster, recording=str(path), recording_t0_ns=t0_ns, attempt=attempt,
+        recording_id=stamp.recording_id,
+    )  # fmt: skip
+    # nothing is measured into a file that the ledger may never name
+    session.wait_holding(lambda: session.ledger.settled, f"{session.ledger.path} to take that the run begins")
+    settings = replace(settings_for(session.campaign, thruster), proved=session.proved)
+    _close(session, sequence(session, Sequencer(steps, settings), t0_ns))
+
+
+def _where(steps: tuple[Step, ...], kept: Fact | None) -> str:
+    """Where a run that was cut goes on."""
+    first = next((step for step in steps if step.index >= 0), None)
+    if kept is None or first is None:
+        return "the run is repeated from its first tare"
+    return (
+        f"it goes on at step {first.index + 1} ({first.phase}) after a tare; the steps before are in "
+        f"{', '.join(kept['recordings'])}"
+    )
 
 
 def sequence(session: Session, sequencer: Sequencer, t0_ns: int) -> Output:
@@ -49,7 +68,7 @@ def sequence(session: Session, sequencer: Sequencer, t0_ns: int) -> Output:
     loop, status = session.loop, session.status
     begun = loop.now
     begun_ns = round(begun * 1e9)
-    tares = frozenset(step.index for step in session.campaign.plan if step.phase == "tare")
+    tares = frozenset(step.index for step in session.campaign.plan if step.phase == "tare") | {TARE_AGAIN}
 
     def decide(inputs: Inputs) -> Decision:
         since_begun = inputs.now - begun
@@ -124,7 +143,8 @@ def judged(session: Session, output: Output) -> tuple[Outcome, str]:
     """Outcome and cause of a run that is over. Completed is only what measured every step and came to rest."""
     if output.outcome in ("aborted", "tripped"):
         return output.outcome, output.cause
-    missing = missing_steps(session.campaign.plan, session.measured, {point.step for point in session.status.points})
+    plan = [step for step in session.campaign.plan if step.index not in session.kept]
+    missing = missing_steps(plan, session.measured, {point.step for point in session.status.points})
     if missing:
         return "aborted", f"the plan is not measured whole: step {missing[0].index} ({missing[0].phase}) has no data"
     if not output.stop_confirmed:
@@ -139,10 +159,9 @@ def missing_steps(plan: Iterable[Step], measured: Set[tuple[int, str]], points: 
     leaves the one before in use: that it was tried is enough.
     """
     steps = list(plan)
-    first = next((step.index for step in steps if step.phase == "tare"), None)
 
     def ran(step: Step) -> bool:
-        tried = step.phase == "tare" and step.index != first and (step.index, "free") in measured
+        tried = step.phase == "tare" and step.index > 0 and (step.index, "free") in measured
         return tried or (step.index, step.phase) in measured
 
     return [

@@ -41,16 +41,29 @@ def fresh_stamp() -> Stamp:
 
 
 def opening(
-    campaign: CampaignConfig, bench: Bench, thruster: str, path: Path, t0_ns: int, stamp: Stamp, attempt: int = 1
+    campaign: CampaignConfig,
+    bench: Bench,
+    thruster: str,
+    path: Path,
+    t0_ns: int,
+    stamp: Stamp,
+    attempt: int = 1,
+    continues: str = "",
 ) -> Open:
-    """The Open message of one run; `attempt` counts the runs of that thruster in this campaign, from 1."""
+    """The Open message of one run; `attempt` counts the runs of that thruster in this campaign, from 1.
+
+    `continues`: id of the recording whose run it goes on with; empty: it is a whole one.
+    """
     streams = [
         stream_spec(stream, bench.identities.get(device, ""), device == bench.config.force)
         for device, stream in bench.streams()
     ]
     streams.append(StreamSpec(COMMAND_STREAM, "rig", (COMMAND_CHANNEL,)))
     size = expected_bytes((stream for _, stream in bench.streams()), campaign)
-    return Open(str(path), t0_ns, tuple(streams), _attributes(campaign, thruster, stamp, attempt), size)
+    attributes = _attributes(campaign, thruster, stamp, attempt)
+    if continues:
+        attributes["continues"] = continues
+    return Open(str(path), t0_ns, tuple(streams), attributes, size)
 
 
 def stream_spec(stream: Stream, device_id: str, primary: bool) -> StreamSpec:

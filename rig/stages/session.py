@@ -28,7 +28,7 @@ from rig.stages.recording_header import Stamp, fresh_stamp
 from rig.watch.watch_link import WatchLink
 
 RECORDER_WAIT = 20.0
-"""s for the recorder to open or close a file."""
+"""s for the recorder to open or close a file, and for the disk to take that a run begins."""
 
 PASSING = ("stale", "late", "rate")
 """Trips that end nothing while nothing is driven: the machine paused during a mount. A run's own ticks judge anew."""
@@ -64,6 +64,8 @@ class Session:
     """This run is; False once it was said why it is not."""
     measured: set[tuple[int, str]] = field(default_factory=set)
     """(index, phase) of the steps of this run that were run to their end."""
+    kept: frozenset[int] = frozenset()
+    """Indices of the steps of this run that earlier recordings hold: it goes on after a cut."""
     stamp: Callable[[], Stamp] = fresh_stamp
     """Of the next recording."""
 
@@ -96,6 +98,10 @@ class Session:
 
     def wait_for_recorder(self, done: Callable[[], bool], what: str) -> None:
         """The same for the recorder; a request that comes meanwhile is kept for the next stage, a stop among them."""
+        self.wait_holding(done, f"the recorder to {what}")
+
+    def wait_holding(self, done: Callable[[], bool], what: str) -> None:
+        """Tick until `done`; a request that comes meanwhile is kept for the next stage, a stop among them."""
         end = self.loop.now + RECORDER_WAIT
         held: list[Request] = []
         while not done():
@@ -103,7 +109,7 @@ class Session:
             if self.recorder.failed and not done():
                 raise LinkError(f"recorder: {self.recorder.failed}")
             if self.loop.now > end:
-                raise LinkError(f"waited {RECORDER_WAIT:g} s for the recorder to {what}; it did not happen")
+                raise LinkError(f"waited {RECORDER_WAIT:g} s for {what}; it did not happen")
         self.loop.signals.extendleft(reversed(held))
 
     def rest(self) -> None:

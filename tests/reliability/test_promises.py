@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import signal
@@ -93,10 +94,10 @@ def test_kill_9_at_random_instants(tmp_path, report, prompt):
 
 
 def test_resume_after_kill_9_gives_what_an_uninterrupted_campaign_gives(tmp_path):
-    """Promise 22."""
+    """Promise 22; in virtual time, with many kills: tests/rig/operate/test_kill_and_resume.py."""
     with live_bench(tmp_path) as bench:
         front = attach(bench.start(thrusters=("T1", "T3"), dwell=0.6))
-        front.begin(lambda s: s.thruster == "T3" and s.state == "hold", timeout=60.0)
+        front.begin(lambda s: s.thruster == "T3" and s.state == "hold" and len(s.points) == 2, timeout=60.0)
         os.kill(bench.runs[0].pid, signal.SIGKILL)
         front.peer.close()
         bench.controllers[0].wait(15)
@@ -105,16 +106,17 @@ def test_resume_after_kill_9_gives_what_an_uninterrupted_campaign_gives(tmp_path
         words = [sys.executable, "-c", "from rig.cli import entry; entry()", "resume", str(folder), "--headless"]
         resumed = subprocess.run(words, cwd=PROJECT, capture_output=True, text=True, timeout=80, check=False)
         assert resumed.returncode == 0, resumed.stderr
-        assert "finished: T1; to do: T3" in resumed.stdout
+        assert "finished: T1; to do: T3 from step" in resumed.stdout
         ends = [fact for fact in read(folder) if fact["fact"] == "run_end"]
         assert [(end["thruster"], end["outcome"]) for end in ends] == [("T1", "completed"), ("T3", "completed")]
-        first, second = (load(Path(end["recording"])) for end in ends)
-        assert [(s.index, s.phase) for s in first.steps] == [(s.index, s.phase) for s in second.steps]
         assert Path(ends[1]["recording"]).name == "T3-2.h5"
-        assert any("attempt 2 of T3" in event.text for event in second.events)
-        assert load(folder / "T3.h5").outcome == "aborted", "the cut one is kept"
-        fits = (folder / "fits.json").read_text()
-        assert [name for name in ("T1", "T3") if f'"{name}"' in fits] == ["T1", "T3"], "one table over both parts"
+        whole, cut, rest = (load(folder / name) for name in ("T1.h5", "T3.h5", "T3-2.h5"))
+        assert any("attempt 2 of T3: it goes on at step" in event.text for event in rest.events)
+        assert (cut.outcome, rest.attributes["continues"]) == ("aborted", cut.recording_id), "the cut one is kept"
+        holds = [(s.index, s.command_voltage) for s in whole.steps if s.phase == "hold"]
+        assert [(s.index, s.command_voltage) for s in (*cut.steps, *rest.steps) if s.phase == "hold"] == holds
+        (answer,) = [one for one in json.loads((folder / "fits.json").read_text())["fits"] if one["thruster"] == "T3"]
+        assert answer["recordings"] == [cut.recording_id, rest.recording_id], "one fit over both parts"
         again = subprocess.run(words, cwd=PROJECT, capture_output=True, text=True, timeout=30, check=False)
         assert again.returncode == 2
         assert "nothing to resume" in again.stderr

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from rig.campaign.plan import FixedDwell, Plan, TareConfig
+from rig.campaign.plan import TARE_AGAIN, FixedDwell, Plan, TareConfig
 from rig.campaign.shapes import Ramp, Sine
 from rig.link.front_end_messages import Request
 from rig.link.recorder_messages import Close, Open
@@ -134,6 +134,36 @@ def test_resumed_run_counts_its_attempts(tmp_path):
         assert "attempt 2 of T1" in world.texts
         assert next(fact["fact"] for fact in read(tmp_path)) == "resume"
         assert (tmp_path / FILE_NAME).exists()
+
+
+def test_resumed_run_goes_on_at_its_first_step_that_is_not_measured(tmp_path):
+    """Promise 22: a proof and a tare come first, then the steps that are left, each under its own index."""
+    left = HOLDS[1]
+    kept = {"fact": "kept", "thruster": "T1", "recordings": ["T1.h5"], "continues": "id-1", "steps": list(range(left))}
+    before = ({"fact": "start", "identities": {}}, {"fact": "run_start", "thruster": "T1"}, kept)
+    with virtual(tmp_path, before=before, prove_watchdog=True) as world:
+        seen = play(world)
+        assert outcome(world) == ("completed", "")
+        assert world.recorder.of(Open)[0].attributes["continues"] == "id-1"
+        rows = [(row.index, row.phase) for row in world.recorder.steps]
+        proofs = [(-1, "free")] * 2
+        plan = [(step.index, step.phase) for step in PLAN]
+        assert rows[:3] == [proofs[0], (TARE_AGAIN, "tare"), (left, "ramp")]
+        assert [row for row in rows[3:-1] if row not in proofs and row[1] != "ramp"] == [
+            row for row in plan[left:] if row[1] != "ramp"
+        ]
+        assert f"attempt 2 of T1: it goes on at step {left + 1} (hold) after a tare" in world.texts
+        assert [point.step for point in world.session.status.points] == [left]
+        shown = [s.progress for s in seen if s.state == "hold"]
+        assert {(each.step, each.steps) for each in shown} == {(left, len(plan))}, "as people count them"
+
+
+def test_run_that_lacks_a_step_of_its_rest_is_not_completed(tmp_path):
+    kept = {"fact": "kept", "thruster": "T1", "recordings": ["T1.h5"], "continues": "id-1", "steps": [0, 1, 2]}
+    before = ({"fact": "start", "identities": {}}, {"fact": "run_start", "thruster": "T1"}, kept)
+    with virtual(tmp_path, before=before) as world:
+        play(world, [("hold", -6.0, lambda: world.session.loop.signals.append(Request("skip")))])
+        assert f"step {HOLDS[1]} (hold) has no data" in outcome(world)[1]
 
 
 def test_signal_at_any_instant_is_a_request(tmp_path):
