@@ -135,6 +135,11 @@ def _check(case: str, found: dict[str, Row], work: Callable[[], Row], only: Sequ
             raise ValueError(f"{case}, {setting}: by itself it says {answer}, but {found[setting]} where it branched")
 
 
+def _yielding() -> None:
+    """To whatever else this machine does."""
+    os.nice(max(NICE - os.nice(0), 0))
+
+
 def run(asked: argparse.Namespace, versions: Sequence[str]) -> None:
     """What is not in the file yet; with `check` whatever there is, and nothing is put there."""
     wanted = {AT_VALUE, *(setting.id for setting in settings(asked.only))}
@@ -143,7 +148,7 @@ def run(asked: argparse.Namespace, versions: Sequence[str]) -> None:
     pending = [case for case in cases()[: asked.cases] if case not in there]
     asked.out.parent.mkdir(parents=True, exist_ok=True)
     root, begun = asked.out.with_suffix(".check" if asked.check else ""), time.monotonic()
-    with ProcessPoolExecutor(asked.jobs, initializer=os.nice, initargs=(NICE,)) as pool:
+    with ProcessPoolExecutor(asked.jobs, initializer=_yielding) as pool:
         jobs = {pool.submit(judged, case, asked.only, root, check=asked.check): case for case in pending}
         for number, job in enumerate(as_completed(jobs), 1):
             try:
