@@ -66,18 +66,21 @@ def at(value: Any, setting: str) -> Any:
 
 def lift(act: Callable[..., Any], *given: Any, **named: Any) -> Any:
     """What `act` makes of several values: several, or the one that all make."""
-    settings = [] if HERE.branch else sorted({*open_settings(given), *open_settings(named)})
+    if HERE.branch:
+        return act(*at(given, ""), **at(named, ""))
+    settings = sorted({*open_settings(given), *open_settings(named)})
     try:
         base = act(*at(given, ""), **at(named, ""))
     except Exception as error:
-        _branch(settings)  # what fails here need not fail there
-        if HERE.branch and not isinstance(error, TimeoutError):
+        if not isinstance(error, TimeoutError) and _branch(settings):  # what fails here need not fail there
             return act(*at(given, ""), **at(named, ""))
         raise
+    if HERE.branch:  # branched within, where the values of the parent had been put in
+        return act(*at(given, ""), **at(named, ""))
     others = {}
     for setting in settings:
         try:
-            value = act(*at(given, setting), **at(named, setting))
+            value = _put_in(setting, act, given, named)
         except TimeoutError:
             raise
         except Exception:  # noqa: BLE001  # it is raised again where it belongs
@@ -87,6 +90,15 @@ def lift(act: Callable[..., Any], *given: Any, **named: Any) -> Any:
         if not _same(value, base):
             others[setting] = value
     return Varied(base, others) if others else base
+
+
+def _put_in(setting: str, act: Callable[..., Any], given: Any, named: Any) -> Any:
+    """What `act` makes of the values of one setting: within it whatever is read is of that setting, and none forks."""
+    HERE.branch = setting
+    try:
+        return act(*at(given, ""), **at(named, ""))
+    finally:
+        HERE.branch = ""
 
 
 def settled(value: Any) -> Any:
