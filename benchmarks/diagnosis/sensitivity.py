@@ -7,7 +7,7 @@
 Each of the thresholds of sensitivity_settings.py is put at half and at double, one at a time, and every case of a fixed
 set (sensitivity_set.py) is answered as in the blind proof: `python -m sim_devices conceal` makes recordings and seals
 the truth, `rig.blind.answering.answered` diagnoses, `rig.blind.scoring` puts both side by side. All settings of a case
-are answered by one diagnosis that branches where a threshold first turns a decision (branching.py): some five times the
+are answered by one diagnosis that branches where a threshold first turns a decision (branching.py): some six times the
 work of one, and not forty. `--check` answers at each setting by a diagnosis of its own, and ends where anything that is
 told differs; nothing is stored.
 
