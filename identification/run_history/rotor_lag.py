@@ -177,9 +177,7 @@ def _onwards(hold: _Hold, before: Floats, quadratic: float) -> _Onwards:
     return _Onwards(sign, gap, hold.kept, hold.time, bend)
 
 
-def _beyond_rest(
-    hold: _Hold, before: Floats, against: NDArray[np.intp], braked: _Braked, quadratic: float
-) -> _Onwards:
+def _beyond_rest(hold: _Hold, before: Floats, against: NDArray[np.intp], braked: _Braked, quadratic: float) -> _Onwards:
     """Where some were `braked` first, at the rows `against`."""
     begin, kept, time = before.copy(), hold.kept.copy(), hold.time.copy()
     begin[against] = braked.end
