@@ -52,6 +52,8 @@ def lag_ends(
 
 def lagged(w: Floats, before: Floats, since: Floats, quadratic: float, linear: float) -> Floats:
     """Rate `since` s after it was `before`, w held since then; (k,)."""
+    if quadratic == 0:
+        return np.asarray(w + (before - w) * np.exp(-linear * since), dtype=np.float64)
     return _ends(_hold(w, since, quadratic, linear), before, quadratic, linear).end
 
 
