@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dtbtrs, ztbtrs
@@ -10,6 +12,8 @@ from identification.recording import Floats
 
 LEAST_MOVE = 1e-12
 """Share of the largest value: means over intervals of a level differ by rounding."""
+MOSTLY = 0.3
+"""Of the intervals: where more reach beyond their neighbour, a delay is a long one."""
 
 
 def recursion(keep: Floats, push: Floats, start: float) -> Floats:
@@ -50,22 +54,87 @@ def integral(value: Floats, edges: Floats, at: Floats) -> Floats:
     return out
 
 
-def delayed(
-    value: Floats, edges: Floats, delay: float, places: tuple[NDArray[np.intp], Floats] | None = None
-) -> Floats:
-    """Means over each interval of value(t - delay). `places`: of `edges - delay`, where they are known."""
+@dataclass(frozen=True, eq=False, slots=True)
+class ShortDelay:
+    """Of M intervals what each looks back at, or ahead; held constant outside.
+
+    Of most intervals it leaves a part, and takes one of the interval beside it: the delay is shorter than both.
+    """
+
+    back: bool
+    """Whether at what was before."""
+    share: Floats
+    """(M-1,) of each that is its neighbour's, negative ahead: of all but the first, or but the last."""
+    far: NDArray[np.intp]
+    """(k,) intervals that reach beyond their neighbour."""
+    begin: NDArray[np.intp]
+    """(k,) of each of those its first among the parts."""
+    part: NDArray[np.intp]
+    """(e,) intervals that they look at."""
+    weight: Floats
+    """(e,) of each in the mean."""
+
+    def of(self, value: Floats) -> Floats:
+        """(M,) means of what is `value` (M,) in the intervals."""
+        out = value.copy()
+        moved = value[1:] - value[:-1]
+        moved *= self.share
+        if self.back:
+            out[1:] -= moved
+        else:
+            out[:-1] -= moved
+        if self.far.size:
+            out[self.far] = np.add.reduceat(value[self.part] * self.weight, self.begin)
+        return out
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class LongDelay:
+    """The same of one that is longer than most intervals, by the integral over all before."""
+
+    dt: Floats
+    """(M,) s."""
+    places: tuple[NDArray[np.intp], Floats]
+    """Of the edges."""
+
+    def of(self, value: Floats) -> Floats:
+        return np.asarray(np.diff(integral_at(value, self.dt, self.places)) / self.dt, dtype=np.float64)
+
+
+Delay = ShortDelay | LongDelay
+
+
+def delay_of(edges: Floats, delay: float) -> Delay:
+    """By `delay` s; below 0 it looks ahead. `edges` (M+1,) s.
+
+    >>> delay_of(np.array([0.0, 1.0, 2.0, 4.0]), 0.5).of(np.array([0.0, 4.0, 8.0])).tolist()
+    [0.0, 2.0, 7.0]
+    """
     dt = edges[1:] - edges[:-1]
-    if abs(delay) > float(dt.min()):
-        known = places or places_of(edges, edges - delay)
-        return np.asarray(np.diff(integral_at(value, dt, known)) / dt, dtype=np.float64)
-    # of each interval only a part beside its edge is the neighbour's
-    out = value.copy()
-    rise = value[1:] - value[:-1]
-    if delay > 0:
-        out[1:] -= rise * (delay / dt[1:])
+    size, back = abs(delay), delay > 0
+    reaches = size > dt
+    if back:
+        reaches[1:] |= size > dt[:-1]
     else:
-        out[:-1] -= rise * (delay / dt[:-1])
-    return out
+        reaches[:-1] |= size > dt[1:]
+    far = np.flatnonzero(reaches)
+    if far.size > MOSTLY * dt.size:
+        return LongDelay(dt, places_of(edges, edges - delay))
+    share = delay / (dt[1:] if back else dt[:-1])
+    first, after_first = places_of(edges, edges[far] - delay)
+    last, after_last = places_of(edges, edges[far + 1] - delay)
+    many = last - first + 1
+    begin = np.cumsum(many) - many
+    part = np.arange(int(many.sum())) + np.repeat(first - begin, many)
+    weight = dt[part]
+    weight[begin] -= after_first
+    weight[begin + many - 1] += after_last - dt[last]
+    return ShortDelay(back, share, far, begin, part, weight / np.repeat(dt[far], many))
+
+
+def delayed(value: Floats, edges: Floats, delay: float) -> Floats:
+    """(M,) means over each interval of value(t - delay)."""
+    return delay_of(edges, delay).of(value)
 
 
 def places_of(edges: Floats, at: Floats) -> tuple[NDArray[np.intp], Floats]:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from identification.recording import Floats
 from identification.run_history.converter import Places
-from identification.run_history.filters import delayed, places_of
+from identification.run_history.filters import Delay, delay_of
 from identification.run_history.history import History, Samples
 from identification.run_history.least_recently_used import LeastRecentlyUsed
 from identification.run_history.rate_gap import RateGap, rate_gap
@@ -34,7 +34,7 @@ MOST_FOLLOWERS = 48
 MOST_REFERENCES = 24
 """Rotors from whose rates those of similar ones are sought."""
 MOST_DELAYS = 8
-"""Delays of which the places between the edges are known: that of a fit, and of its slope."""
+"""Delays of which is known what each interval looks at: that of a fit, and of its slope."""
 REFERENCES = 8.0
 """Of them to a factor e in each coefficient."""
 
@@ -49,7 +49,7 @@ class RememberedRun:
         self.lately = LeastRecentlyUsed[Floats](MOST_LATELY)
         self._followers = LeastRecentlyUsed[Floats](MOST_FOLLOWERS)
         self._references = LeastRecentlyUsed[Floats](MOST_REFERENCES)
-        self._delays = LeastRecentlyUsed[tuple[NDArray[np.intp], Floats]](MOST_DELAYS)
+        self._delays = LeastRecentlyUsed[Delay](MOST_DELAYS)
         self._since: dict[Channel, tuple[float, tuple[NDArray[np.intp], Floats]]] = {}
 
     @cached_property
@@ -103,7 +103,7 @@ class RememberedRun:
     def delayed(self, value: Floats, delay: float) -> Floats:
         """(M,) means over each interval of `value` (M,) `delay` s before."""
         edges = self.history.edges
-        return delayed(value, edges, delay, self._delays(delay, lambda: places_of(edges, edges - delay)))
+        return self._delays(delay, lambda: delay_of(edges, delay)).of(value)
 
     def converted(self, value: Floats) -> Floats:
         """(M,) what the converter makes of `value` (M,) at the samples of each interval."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.recording import Floats
 from identification.run_history.filters import lowpass, recursion
@@ -34,8 +35,9 @@ def lag(
     """
     if quadratic == 0:
         return lowpass(w, dt, 1 / linear, start)
-    end = lag_ends(w, dt, quadratic, linear, start, near)
-    return end, _followed(w, np.concatenate([[start], end[:-1]]), dt, quadratic, linear).turned / dt
+    hold = _hold(w, dt, quadratic, linear)
+    end = _lag_ends(hold, quadratic, linear, start, near)
+    return end, _turned(hold, np.concatenate([[start], end[:-1]]), quadratic, linear) / dt
 
 
 def lag_ends(
@@ -45,23 +47,30 @@ def lag_ends(
     if quadratic == 0:
         keep = np.exp(-linear * dt)
         return recursion(keep, (1 - keep) * w, start)
+    return _lag_ends(_hold(w, dt, quadratic, linear), quadratic, linear, start, near)
+
+
+def lagged(w: Floats, before: Floats, since: Floats, quadratic: float, linear: float) -> Floats:
+    """Rate `since` s after it was `before`, w held since then; (k,)."""
+    if quadratic == 0:
+        return np.asarray(w + (before - w) * np.exp(-linear * since), dtype=np.float64)
+    return _ends(_hold(w, since, quadratic, linear), before, quadratic, linear).end
+
+
+def _lag_ends(hold: _Hold, quadratic: float, linear: float, start: float, near: Floats | None) -> Floats:
+    w = hold.w
     size = float(np.max(np.abs(w), initial=abs(start))) or 1.0
     end = w if near is None else near
     before = np.empty_like(w)
     before[0] = start
     for _ in range(LAG_STEPS):
         before[1:] = end[:-1]
-        found = _followed(w, before, dt, quadratic, linear)
+        found = _ends(hold, before, quadratic, linear)
         move = recursion(found.slope, found.end - end, 0.0)
         end = np.clip(end + move, -size, size)
         if float(np.max(np.abs(move))) < LAG_CLOSE * size:
             break
     return end
-
-
-def lagged(w: Floats, before: Floats, since: Floats, quadratic: float, linear: float) -> Floats:
-    """Rate `since` s after it was `before`, w held since then; any one shape."""
-    return _followed(w, before, since, quadratic, linear).end
 
 
 def follow_rate(w: Floats, n: Floats, quadratic: float, linear: float) -> Floats:
@@ -84,64 +93,133 @@ def to_rest(w: Floats, n: Floats, quadratic: float, linear: float) -> Floats:
     return np.where(reach > LEAST, angle / np.maximum(turn, 1e-300), beyond)
 
 
-class _Followed(NamedTuple):
-    """Of a time in which w is held, (M,) each."""
+class _Hold(NamedTuple):
+    """What of a time in which w is held does not depend on how fast the rotor turned before; (M,) each."""
+
+    w: Floats
+    t: Floats
+    rest: NDArray[np.intp]
+    """(k,) where it is asked to stand."""
+    sign: Floats
+    aim: Floats
+    rate: Floats
+    """1/s, of the linear part."""
+    kept: Floats
+    """Of a gap to w, by the linear part."""
+    time: Floats
+    """s that a gap would have to last for its integral, by the linear part."""
+
+
+class _Ends(NamedTuple):
+    """Of such times, and of the rates before them; (M,) each."""
 
     end: Floats
     slope: Floats
     """Of the end over the beginning."""
-    turned: Floats
-    """Integral of the rate."""
 
 
-def _followed(w: Floats, before: Floats, t: Floats, quadratic: float, linear: float) -> _Followed:
-    against = np.flatnonzero(w * before < 0)
-    if not against.size:
-        return _onwards(w, before, t, quadratic, linear)
-    begin, left = before.copy(), np.array(t, dtype=np.float64)
-    first = _against(w[against], before[against], left[against], quadratic, linear)
-    begin[against], left[against] = first.end, left[against] - first.spent
-    then = _onwards(w, begin, left, quadratic, linear)
-    then.turned[against] += first.turned
-    pull = quadratic * (w * np.abs(w) - before * np.abs(before)) + linear * (w - before)
-    now = quadratic * (w * np.abs(w) - then.end * np.abs(then.end)) + linear * (w - then.end)
-    then.slope[against] = now[against] / pull[against]
-    return then
+class _Onwards(NamedTuple):
+    """What is left of a time when the rotor turns as it is asked, or stands, or is asked to stand; (M,) each."""
+
+    sign: Floats
+    gap: Floats
+    """By size, from w."""
+    kept: Floats
+    time: Floats
+    bend: Floats
 
 
-def _onwards(w: Floats, before: Floats, t: Floats, quadratic: float, linear: float) -> _Followed:
-    """Of rotors that turn as they are asked, or stand, or are asked to stand."""
-    sign = np.where(w < 0, -1.0, 1.0)
-    sign[(w == 0) & (before < 0)] = -1.0
-    aim, gap = np.abs(w), before * sign
-    gap -= aim
+def _hold(w: Floats, t: Floats, quadratic: float, linear: float) -> _Hold:
+    aim = np.abs(w)
     rate = 2 * quadratic * aim
     rate += linear
+    return _Hold(w, t, np.flatnonzero(aim == 0), np.where(w < 0, -1.0, 1.0), aim, rate, *_kept(rate, t))
+
+
+def _kept(rate: Floats, t: Floats) -> tuple[Floats, Floats]:
     share = rate * t
     lost = -np.expm1(-share)
-    kept = 1 - lost
-    time = np.where(share > LEAST, lost / np.maximum(rate, 1e-300), t)
-    bend = quadratic * gap * time
-    beside = 1 / (1 + bend)
-    left = gap * kept * beside
-    near = np.abs(bend) < LEAST
-    turned = gap * time * np.where(near, 1.0, np.log1p(bend) / np.where(near, 1.0, bend))
-    turned += aim * t
-    return _Followed(sign * (aim + left), kept * beside**2, sign * turned)
+    return 1 - lost, np.where(share > LEAST, lost / np.maximum(rate, 1e-300), t)
+
+
+def _ends(hold: _Hold, before: Floats, quadratic: float, linear: float) -> _Ends:
+    against = np.flatnonzero(hold.w * before < 0)
+    if not against.size:
+        return _end(hold, _onwards(hold, before, quadratic))
+    w, then = hold.w[against], before[against]
+    braked = _braked(w, then, hold.t[against], quadratic, linear)
+    found = _end(hold, _beyond_rest(hold, before, against, braked, quadratic))
+    pull, now = (quadratic * (w * np.abs(w) - n * np.abs(n)) + linear * (w - n) for n in (then, found.end[against]))
+    found.slope[against] = now / pull
+    return found
+
+
+def _turned(hold: _Hold, before: Floats, quadratic: float, linear: float) -> Floats:
+    """(M,) integral of the rate."""
+    against = np.flatnonzero(hold.w * before < 0)
+    if not against.size:
+        return _integral(hold, _onwards(hold, before, quadratic), hold.t)
+    w, then, left = hold.w[against], before[against], hold.t.copy()
+    braked = _braked(w, then, left[against], quadratic, linear)
+    left[against] -= braked.spent
+    turned = _integral(hold, _beyond_rest(hold, before, against, braked, quadratic), left)
+    turned[against] += _turned_against(w, then, braked, quadratic, linear)
+    return turned
+
+
+def _onwards(hold: _Hold, before: Floats, quadratic: float) -> _Onwards:
+    sign = hold.sign
+    if hold.rest.size:
+        sign = sign.copy()
+        sign[hold.rest] = np.where(before[hold.rest] < 0, -1.0, 1.0)
+    gap = before * sign
+    gap -= hold.aim
+    bend = quadratic * gap
+    bend *= hold.time
+    return _Onwards(sign, gap, hold.kept, hold.time, bend)
+
+
+def _beyond_rest(hold: _Hold, before: Floats, against: NDArray[np.intp], braked: _Braked, quadratic: float) -> _Onwards:
+    """Where some were `braked` first, at the rows `against`."""
+    begin, kept, time = before.copy(), hold.kept.copy(), hold.time.copy()
+    begin[against] = braked.end
+    kept[against], time[against] = _kept(hold.rate[against], hold.t[against] - braked.spent)
+    return _onwards(hold._replace(kept=kept, time=time), begin, quadratic)
+
+
+def _end(hold: _Hold, left: _Onwards) -> _Ends:
+    beside = 1 / (1 + left.bend)
+    slope = left.kept * beside
+    end = left.gap * slope
+    end += hold.aim
+    end *= left.sign
+    slope *= beside
+    return _Ends(end, slope)
+
+
+def _integral(hold: _Hold, left: _Onwards, t: Floats) -> Floats:
+    near = np.abs(left.bend) < LEAST
+    turned = left.gap * left.time
+    turned *= np.where(near, 1.0, np.log1p(left.bend) / np.where(near, 1.0, left.bend))
+    turned += hold.aim * t
+    turned *= left.sign
+    return turned
 
 
 class _Braked(NamedTuple):
-    """Of rotors that turn against what they are asked, as far as rest."""
+    """Of rotors that turn against what they are asked, as far as rest; (k,) each."""
 
     end: Floats
     spent: Floats
     """s, of the time that there was."""
-    turned: Floats
+    shrink: Floats
+    angle: Floats
+    swing: Floats
 
 
-def _against(w: Floats, before: Floats, t: Floats, quadratic: float, linear: float) -> _Braked:
+def _braked(w: Floats, before: Floats, t: Floats, quadratic: float, linear: float) -> _Braked:
     """By size m against w: m' = -(quadratic m^2 + linear m + pull)."""
-    sign, aim, size = np.sign(before), np.abs(w), np.abs(before)
+    aim, size = np.abs(w), np.abs(before)
     pull = quadratic * aim**2 + linear * aim
     rest = to_rest(w, before, quadratic, linear)
     spent = np.minimum(t, rest)
@@ -154,9 +232,15 @@ def _against(w: Floats, before: Floats, t: Floats, quadratic: float, linear: flo
     shrink = 1 + (quadratic * size + 0.5 * linear) * time
     end = np.maximum((size * (1 - 0.5 * linear * time) - pull * time) / shrink, 0.0)
     end = np.where(t < rest, end, 0.0)
+    return _Braked(np.sign(before) * end, spent, shrink, angle, swing)
+
+
+def _turned_against(w: Floats, before: Floats, braked: _Braked, quadratic: float, linear: float) -> Floats:
+    """(k,) integral of the rate as far as rest."""
+    aim, size, spent = np.abs(w), np.abs(before), braked.spent
     if quadratic * float(np.max(size)) < BARELY * linear:  # the logarithm would be one of 1
         turned = (size + aim) * -np.expm1(-linear * spent) / linear - aim * spent
     else:
-        cosine = np.where(swing > 0, np.cos(angle), np.cosh(np.minimum(angle, 700.0)))
-        turned = (np.log(cosine * shrink) - 0.5 * linear * spent) / quadratic
-    return _Braked(sign * end, spent, sign * turned)
+        cosine = np.where(braked.swing > 0, np.cos(braked.angle), np.cosh(np.minimum(braked.angle, 700.0)))
+        turned = (np.log(cosine * braked.shrink) - 0.5 * linear * spent) / quadratic
+    return np.sign(before) * turned

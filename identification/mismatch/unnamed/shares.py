@@ -16,7 +16,7 @@ from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.name.named_term import GRAVE, Attained
 from identification.mismatch.name.naming import Named
 from identification.mismatch.validate.held_out import Score
-from identification.mismatch.validate.train_test_split import TrainTestSplit, better
+from identification.mismatch.validate.train_test_split import TrainTestSplit, better, refitted_without
 from identification.physics.term import Term
 
 
@@ -122,6 +122,8 @@ def _possible(named: Named) -> bool:
 
 def _fitted(split: TrainTestSplit, now: Fit, without: Sequence[Term]) -> Fit:
     there = [t for t in without if t in now.model.terms]
+    if now is split.estimate.fit and len(there) == 1:
+        return refitted_without(split, there[0])
     return fit(*now.less(*there), split.data, split.estimate.weights) if there else now
 
 

@@ -13,7 +13,7 @@ from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.select.baseline import baseline
 from identification.mismatch.validate.held_out import Score
-from identification.mismatch.validate.train_test_split import TrainTestSplit, better, train_test_split
+from identification.mismatch.validate.train_test_split import TrainTestSplit, better, refitted_without, train_test_split
 from identification.physics.term import Term
 from identification.run_history.history import History
 
@@ -35,7 +35,7 @@ def without_each(split: TrainTestSplit, terms: Collection[Term], *, same_run: bo
     """
     estimate, now = split.estimate, split.judge(split.estimate.fit)
     asked = [t for t in estimate.fit.model.terms if t in terms and (same_run or not t.traits.own_clock)]
-    return WithoutEach(now, {t: split.judge(fit(*estimate.fit.less(t), split.data, estimate.weights)) for t in asked})
+    return WithoutEach(now, {t: split.judge(refitted_without(split, t)) for t in asked})
 
 
 def worse_predicted(scores: WithoutEach, *, same_run: bool) -> tuple[Term, ...]:

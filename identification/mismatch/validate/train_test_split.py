@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, forces
-from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import weights
 from identification.mismatch.validate.held_out import Score, blocks, judge_blocks, judge_runs, refitted
+from identification.physics.term import Term
 from identification.run_history.history import History
 
 Judge = Callable[[Fit], Score]
@@ -37,6 +38,17 @@ def train_test_split(after: Estimate, data: Data, others: Sequence[History]) -> 
     w = weights(part, after.noise, forces(begin.model, begin.theta, part), after.rate_noise)
     estimate = Estimate(begin, after.noise, after.rate_noise, w, part.thrust_rows)
     return TrainTestSplit(part, judge_blocks(estimate, data, keep), estimate)
+
+
+def refitted_without(split: TrainTestSplit, term: Term) -> Fit:
+    """The model without one of its terms, fitted to the same part; once for all who ask."""
+    now, data = split.estimate.fit, split.data
+
+    def made() -> Fit:
+        return fit(*now.less(term), data, split.estimate.weights)
+
+    found: Fit = data.predictor.once(("refitted without", term), made, split.estimate, data)
+    return found
 
 
 def better(new: Score, old: Score, parameters: int) -> bool:
