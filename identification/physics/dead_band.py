@@ -26,12 +26,17 @@ class DeadBand:
     physics: ClassVar[str] = "below a voltage the rotor does not turn"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
-    traits: ClassVar[Traits] = Traits(revealed_by="fine levels close to zero, of both signs")
+    traits: ClassVar[Traits] = Traits(spread=True, revealed_by="fine levels close to zero, of both signs")
     form: Literal["shrink", "jump"] = "shrink"
+    edge: float = EDGE
+    """Of the largest command: over which a jump is spread."""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         known = Parameter("half_width", scale.driver_unit, 0.0, 0.6 * scale.driver, 0.0)
-        return (replace(known, jumps=True, blur=EDGE * scale.driver) if self.form == "jump" else known,)
+        return (replace(known, jumps=True, blur=self.edge * scale.driver) if self.form == "jump" else known,)
+
+    def sharp(self) -> DeadBand:
+        return replace(self, edge=LEAST_MOVE) if self.form == "jump" else self
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         # what one jump changes is not what another does, unless they are near
@@ -49,7 +54,7 @@ class DeadBand:
         # a command that moves within an interval passes the threshold in a part of it; its variance tells how far
         moved = np.sqrt(12 * np.abs(now.history.excess))
         if self.form == "jump":
-            edge = np.maximum(EDGE * now.scale.driver, moved)
+            edge = np.maximum(self.edge * now.scale.driver, moved)
             out: Floats = value * np.clip((np.abs(value) - theta[0]) / edge + 0.5, 0.0, 1.0) if theta[0] > 0 else value
             return out
         half = 0.5 * np.maximum(LEAST_MOVE * now.scale.driver, moved)

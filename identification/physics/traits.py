@@ -68,6 +68,13 @@ class LimitsReading(Protocol):
         """N, where the cell begins to show less."""
 
 
+class SpreadJump(Protocol):
+    """A term that jumps at a threshold, spread so that a fit can follow where it lies."""
+
+    def sharp(self) -> Any:
+        """The term as physics has it, for a threshold that is not sought but known."""
+
+
 @dataclass(frozen=True, slots=True)
 class Traits:
     """Of one effect in one form. Most have none."""
@@ -82,6 +89,8 @@ class Traits:
     """No instant, place or scale is looked for: it pays for itself alone."""
     from_data: bool = False
     """Some of its trials are where the data point to: it pays for all its parameters in full."""
+    spread: bool = False
+    """SpreadJump: a level within the blur of its threshold is taken half for one beyond it."""
     delay: str = ""
     """The parameter that is a delay of the reading: such a term takes the place of the nuisance shift of clocks."""
     instant: str = ""

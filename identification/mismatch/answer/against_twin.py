@@ -18,6 +18,7 @@ from identification.mismatch.compare.earlier_recordings import Novelty
 from identification.mismatch.compare.saved_model_baseline import terms_of
 from identification.mismatch.diagnosis import Finding
 from identification.mismatch.estimate.estimate import Estimate
+from identification.mismatch.estimate.stairs import covariance
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.name.naming import Named
@@ -179,7 +180,7 @@ def _interval(recordings: Sequence[Recording]) -> float:
 def _covariance(estimate: Estimate, data: Data, before: Twin | None) -> tuple[tuple[float, ...], ...]:
     """Of C and every term's parameters: fitted ones from the fit, given ones as the twin had them."""
     fitted = estimate.fit
-    full = np.nan_to_num(fitted.cov)
+    full = covariance(fitted, data, estimate.weights)
     every = list(range(fitted.layout.size))
     place = {id(term): every[fitted.layout.of(term)] for term in fitted.model.terms}
     old = np.zeros((1, 1)) if before is None else np.array(before.covariance)

@@ -15,9 +15,10 @@ from typing import Literal
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.compare.saved_model_baseline import given, lasting, starting, terms_of
+from identification.mismatch.compare.saved_model_baseline import lasting, starting, terms_of
 from identification.mismatch.estimate.estimate import Estimate, forces, refresh
 from identification.mismatch.estimate.fitting import Fit, fit
+from identification.mismatch.estimate.stairs import covariance
 from identification.mismatch.faults import stage as faults
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Given, Model, acting, extended, reduced
@@ -97,7 +98,7 @@ def fitted_again(twin: Twin, before: Sequence[Recording]) -> Earlier | Refusal:
     if isinstance(sound, Refusal):
         return sound
     data, theta = start(sound.histories)
-    known = given(twin)
+    known = tuple(Given(t.term, t.values, t.scale) for t in twin.terms)
     free = [g for g, t in zip(known, twin.terms, strict=True) if t.flexible is None and _once(g.term, known)]
     model, theta = Model((), tuple(g for g in known if g not in free)), replace(theta, C=twin.C)
     for g in free:
@@ -147,7 +148,7 @@ def _wanted(earlier: Earlier, later: Later, term: Term, own: Term) -> tuple[floa
     """Where the later run wants a term of the twin, without what was found of that effect."""
     now = later.found
     model, theta = reduced(now.fit.model, now.fit.theta, {term, own} & set(now.fit.model.terms))
-    others = tuple(g for g in model.given if g.term != own)
+    others = tuple(g for g in model.given if (g.term.id, g.term.form) != (own.id, own.form))
     begin = earlier.fit.values[own]
     bigger, theta = extended(replace(model, given=others), theta, own, begin)
     return fit(bigger, theta, later.data, now.weights).values[own]
@@ -156,20 +157,19 @@ def _wanted(earlier: Earlier, later: Later, term: Term, own: Term) -> tuple[floa
 def _as_twin(earlier: Earlier, fitted: Fit) -> Twin:
     """The model fitted to the earlier recordings, with what they leave uncertain of it."""
     terms = terms_of(fitted, earlier.data)
-    cov, at = np.nan_to_num(fitted.cov), fitted.layout
+    cov, at = covariance(fitted, earlier.data, earlier.weights), fitted.layout
     place = [0]
     for term, values, _ in acting(fitted.model, fitted.theta, earlier.data.scale):
         mine = any(values is own for own in fitted.theta.terms)
         place += list(range(at.of(term).start, at.of(term).stop)) if mine else [-1] * len(values)
     which = np.array(place)
     known = np.where((which[:, None] < 0) | (which < 0), 0.0, cov[np.ix_(which, which)])
-    covariance = tuple(map(tuple, known.tolist()))
     return replace(
         earlier.twin,
         C=fitted.theta.C,
         terms=terms,
         names=names_of(terms),
-        covariance=covariance,
+        covariance=tuple(map(tuple, known.tolist())),
         alternatives=(),
     )
 

@@ -5,8 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from math import sqrt
+from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtri
 
 from identification.flexible_terms.flexible import Flexible
 from identification.mismatch import policy
@@ -15,15 +18,26 @@ from identification.mismatch.model.data import Data, PriorPredictionFactor
 from identification.mismatch.model.model import Given, Model, acting
 from identification.mismatch.model.parameters import Theta
 from identification.physics.catalogue import CATALOGUE
+from identification.physics.traits import SpreadJump
 from identification.recording import Floats, Recording
 from identification.twin import Twin, TwinTerm, names_of
 
 PROBE = 0.1
 """Standard deviations by which a parameter is moved for the slope of the prediction."""
+STAIRS = ndtri((np.arange(8) + 0.5) / 8)
+"""Standard deviations by which one is moved at which the prediction jumps: as many equally likely places of it."""
 
 
 def given(twin: Twin) -> tuple[Given, ...]:
-    return tuple(Given(t.term, t.values, t.scale) for t in twin.terms)
+    return _given(twin.terms)
+
+
+def _given(terms: Sequence[TwinTerm]) -> tuple[Given, ...]:
+    """A threshold that is known is sharp: what is spread for a fit turns the rotor half at a level beside it."""
+    return tuple(
+        Given(cast(SpreadJump, t.term).sharp() if t.known and t.term.traits.spread else t.term, t.values, t.scale)
+        for t in terms
+    )
 
 
 def terms_of(fitted: Fit, data: Data) -> tuple[TwinTerm, ...]:
@@ -79,12 +93,13 @@ def lasting(twin: Twin, recordings: Sequence[Recording]) -> Twin:
 def prior_factor(twin: Twin, data: Data, theta: Theta) -> PriorPredictionFactor | None:
     """How the prediction may be off, each direction one standard deviation long.
 
-    Along each principal axis of the terms' covariance; towards what each other textbook form would have said; and in
-    proportion to what each term does. C is fitted anew in each diagnosis, so its own uncertainty is not in it.
+    Along each principal axis of the terms' covariance; to where else a threshold or an instant may lie; towards what
+    each other textbook form would have said; and in proportion to what each term does. C is fitted anew in each
+    diagnosis, so its own uncertainty is not in it.
     """
     base = raw(Model((), given(twin)), theta, data, with_rate=data.with_rate)
-    moves = [*_along_axes(twin, theta, data, base), *_towards_forms(twin, theta, data, base)]
-    moves += _in_proportion(twin, theta, data, base)
+    moves = [*_along_axes(twin, theta, data, base), *_past_stairs(twin, theta, data, base)]
+    moves += [*_towards_forms(twin, theta, data, base), *_in_proportion(twin, theta, data, base)]
     if not moves:
         return None
     thrust = tuple(np.column_stack(columns) for columns in zip(*(move[0] for move in moves), strict=True))
@@ -101,12 +116,29 @@ def _along_axes(twin: Twin, theta: Theta, data: Data, base: Predicted) -> list[P
     if not covariance.size:
         return []
     std = np.sqrt(np.diag(covariance))
-    moving = std > 0
+    moving = (std > 0) & ~_jumping(twin)
     values, axes = np.linalg.eigh(covariance[np.ix_(moving, moving)] / np.outer(std[moving], std[moving]))
     root = np.zeros((std.size, values.size))
     root[moving] = std[moving, None] * axes * np.sqrt(np.maximum(values, 0.0))
     models = [Model((), given(_moved(twin, PROBE * axis))) for axis in root.T]
     return [_change(model, theta, data, base, 1 / PROBE) for model in models]
+
+
+def _jumping(twin: Twin) -> NDArray[np.bool_]:
+    """(q,) at which parameters of the terms the prediction jumps."""
+    return np.array([p.jumps for t in twin.terms for p in t.term.parameters(t.scale)], dtype=bool)
+
+
+def _past_stairs(twin: Twin, theta: Theta, data: Data, base: Predicted) -> list[Predicted]:
+    """No slope leads from one stair to the next: the prediction at places of the parameter, in the mean of them."""
+    std = np.sqrt(np.diag(np.array(twin.covariance)))[1:]
+    out = []
+    for j in np.flatnonzero(_jumping(twin) & (std > 0)):
+        for far in STAIRS:
+            moved = np.zeros(std.size)
+            moved[j] = far * std[j]
+            out.append(_change(Model((), given(_moved(twin, moved))), theta, data, base, 1 / sqrt(len(STAIRS))))
+    return out
 
 
 def _towards_forms(twin: Twin, theta: Theta, data: Data, base: Predicted) -> list[Predicted]:
@@ -115,7 +147,7 @@ def _towards_forms(twin: Twin, theta: Theta, data: Data, base: Predicted) -> lis
     for other in twin.alternatives:
         most = policy.compare.FORM_ERROR_SIGMA + policy.compare.FORM_ERROR * sqrt(max(other.gain, 0.0))
         far = min(1.0, most / sqrt(max(other.loss, 1e-12)))
-        model = Model((), tuple(Given(t.term, t.values, t.scale) for t in other.terms))
+        model = Model((), _given(other.terms))
         out.append(_change(model, replace(theta, C=theta.C * other.C / twin.C), data, base, far))
     return out
 

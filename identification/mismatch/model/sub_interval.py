@@ -60,10 +60,12 @@ def _ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: f
 
 def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, late: float) -> Floats:
     """(M,) rate at its samples, in units of the driver, of a rotor whose mean rates are `x` (M,), read `late` s after;
-    the rotor alone passes ticks on."""
+    the rotor alone passes ticks on. A rate is read so well that a rotor on its way between two steps, however far they
+    are apart, is bent within an interval."""
     history = run.history
     passed = Passed(_rotor(model, theta, scale.driver), delay=late if _is_late(late, history) else 0.0)
-    known = _remembered(run, "rate", passed) if _changes(passed, history) else history.rate_lead
+    bent = passed.rotor is not None and history.ticks is not None
+    known = _remembered(run, "rate", passed) if bent or _changes(passed, history) else history.rate_lead
     share, shift = passed_on(model, theta, history), theta.rate_shift
     gain = 1.0 if history.ticks is None else rotor_gain(model, theta, run, scale)
 

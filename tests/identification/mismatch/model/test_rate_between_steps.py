@@ -1,0 +1,85 @@
+"""The rate of a rotor on its way between two steps seconds apart, beside its own closed form at every sample."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from identification.mismatch.estimate.fitting import raw
+from identification.mismatch.model.model import Given, Model
+from identification.mismatch.model.parameters import Theta
+from identification.physics.dead_band import DeadBand
+from identification.physics.motor_lag import MotorLag
+from identification.recording import Channel, Recording
+from tests.identification.mismatch.small import data_of
+
+PER_DRIVER = 1.8
+"""rev/s per volt."""
+SPACING = 0.0071
+"""s between samples: 141 a second."""
+TAU = 0.09
+LEVELS = (0.0, 9.0, -10.5, 4.0, 0.3, 10.0)
+HOLD = 3.0
+"""s."""
+
+
+def first_order(n, w, since):
+    return w + (n - w) * np.exp(-since / TAU)
+
+
+def by_torque(n, w, since):
+    """n' = (w|w| - n|n|) / (2 TAU w_max), in steps of 20 us."""
+    order = np.argsort(since)
+    out, at = np.empty(since.size), 0.0
+    for k in order:
+        while at < since[k]:
+            dt = min(2e-5, since[k] - at)
+            push = (w * abs(w) - n * abs(n)) / (2 * TAU * max(map(abs, LEVELS)))
+            half = n + 0.5 * dt * push
+            n += dt * (w * abs(w) - half * abs(half)) / (2 * TAU * max(map(abs, LEVELS)))
+            at += dt
+        out[k] = n
+    return out
+
+
+def stepped(way):
+    start = HOLD * np.arange(len(LEVELS))
+    t = np.arange(0.0041, HOLD * len(LEVELS), SPACING)
+    which = np.searchsorted(start, t, side="right") - 1
+    n = np.zeros(t.size)
+    begin = LEVELS[0]
+    for i, level in enumerate(LEVELS):
+        mine = which == i
+        found = way(begin, level, np.append(t[mine] - start[i], HOLD))
+        n[mine], begin = found[:-1], found[-1]
+    channels = (
+        Channel("command_voltage", "command", "command_voltage", "V", start, np.array(LEVELS)),
+        Channel("thrust", "cell", "thrust", "N", t, 0.2 * n * np.abs(n)),
+        Channel("rotation_rate", "drive", "rotation_rate", "rev/s", t, PER_DRIVER * n),
+    )
+    return data_of([Recording("stepped", "T1", channels)])[0]
+
+
+@pytest.mark.parametrize(("form", "way"), [("first_order", first_order), ("quadratic", by_torque)])
+def test_rows_of_the_rate_are_means_at_its_samples(form, way):
+    """A straight line through means was off by 0.07 rev/s, ten times the noise of a good tachometer."""
+    data = stepped(way)
+    h = data.histories[0]
+    lag = MotorLag(form)
+    for model, theta in (
+        (Model((lag,)), Theta(0.2, ((TAU,),), (0.0,), k=PER_DRIVER)),
+        (Model((), (Given(lag, (TAU,), data.scale),)), Theta(0.2, (), (0.0,), k=PER_DRIVER)),
+    ):
+        _, told = raw(model, theta, data, with_rate=True)
+        assert np.max(np.abs(told[0] - h.rates)) < 1e-3
+
+
+def test_what_the_band_swallows_bends_nothing():
+    """Of 0.3 V nothing reaches the rotor beside a dead band of 0.4 V, nor does the way there count."""
+    data = stepped(first_order)
+    given = tuple(Given(t, v, data.scale) for t, v in ((DeadBand("jump"), (0.4,)), (MotorLag("first_order"), (TAU,))))
+    _, told = raw(Model((), given), Theta(0.2, (), (0.0,), k=PER_DRIVER), data, with_rate=True)
+    at = data.histories[0].rate_sampled[data.histories[0].rate_rows]
+    low = (at > 4 * HOLD + 1.5) & (at < 5 * HOLD)
+    assert low.any()
+    assert np.max(np.abs(told[0][low])) < 1e-4
