@@ -92,7 +92,11 @@ def _in_place(
     weights: Weights,
     slopes: tuple[Floats, NDArray[np.bool_]],
 ) -> Start | None:
-    """None where `other` cannot be had in any amount. `slopes`: of the rest of the model, and of which values."""
+    """None where `other` cannot be had in any amount. `slopes`: of the rest of the model, and of which values.
+
+    The rest follows by its slopes where that leaves less, else it stays: the step is long where two are nearly one
+    curve, as a delay and a lag on a sine beside an inflow, and ends far off.
+    """
     rest, theta = now.less(term)
     bigger, begun = extended(rest, theta, other, values)
     effect = weights.whiten(*change_of((rest, theta), (now.model, now.theta), data, weights))
@@ -104,11 +108,17 @@ def _in_place(
     steps = _followed(np.column_stack([columns, change / size]), effect)
     moved = theta.vector
     moved[free] += steps[:-1]
+    followed = _begun((rest, theta.with_vector(moved)), other, values, steps[-1] / size, data)
+    alone = _begun((rest, theta), other, values, float(effect @ change) / size**2, data)
+    return min(followed, alone, key=lambda start: _left(start, data, weights))
+
+
+def _begun(rest: Start, other: Term, values: tuple[float, ...], share: float, data: Data) -> Start:
+    """The `rest` with `other`, of whose amount in a trial's `values` there is a `share`, all within bounds."""
     first = other.parameters(data.scale)[0]
     assert first.neutral is not None
-    amount = first.neutral + steps[-1] / size * (values[0] - first.neutral)
-    begin = (float(np.clip(amount, first.low, first.high)), *values[1:])
-    bigger, start = extended(rest, theta.with_vector(moved), other, begin)
+    amount = first.neutral + share * (values[0] - first.neutral)
+    bigger, start = extended(*rest, other, (float(np.clip(amount, first.low, first.high)), *values[1:]))
     low, high, _ = bounds_of(bigger, data, start)
     return bigger, start.with_vector(np.clip(start.vector, low, high))
 
