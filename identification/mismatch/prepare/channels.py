@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch import policy
+from identification.mismatch.prepare.first_reading import first_reading
 from identification.mismatch.prepare.grid import Held
 from identification.recording import Channel, Floats, Recording
 
@@ -26,7 +27,8 @@ def followed(channel: Channel, at: Floats) -> Floats | None:
         return None
     time, value = channel.time[good], channel.value[good]
     if channel.quantity in CALMED:
-        value = _calmest(value, (1, *REACHES), channel.acquisition.quantum or 0.0)[0]
+        first = value[0] if channel.quantity != "motor_temperature" else first_reading(channel)[0]
+        value = np.concatenate([[first], _calmest(value, (1, *REACHES), channel.acquisition.quantum or 0.0)[0][1:]])
     out: Floats = np.interp(at, time, value)
     return out
 

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from identification.mismatch import policy
 from identification.mismatch.prepare.channels import followed, is_coarse, jumps, neighbour_at, supply, torque
+from identification.mismatch.prepare.first_reading import first_reading
 from identification.mismatch.prepare.grid import Held, distinct, edges_of
 from identification.mismatch.prepare.quantum import quantum_of
 from identification.recording import Channel, Floats, Recording
@@ -218,6 +219,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         sample_thrust=force[inside],
         rate_time=turning_time,
         rate=rate,
+        begun_error=first_reading(recording.first_of("motor_temperature"))[1],
         rate_count=rate_count,
         rate_sampled=rate_sampled,
         others=others,

@@ -16,7 +16,7 @@ from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.select.limits.clipping import contradiction
-from identification.physics.term import Term
+from identification.physics.term import Scale, Term
 from identification.recording import Floats
 
 Start = tuple[Model, Theta]
@@ -52,9 +52,25 @@ def best_forms(fitted: Fit, terms: Sequence[Term], data: Data, weights: Weights,
     """
     for term in fitted.model.terms:
         for other in terms:
-            if other.id == term.id and other != term and other not in fitted.model.terms:
+            if other.id == term.id and other not in fitted.model.terms and may_replace(term, other, fitted.model):
                 fitted = _better_form(fitted, term, other, data, weights, noise)
     return fitted
+
+
+def may_replace(term: Term, other: Term, model: Model) -> bool:
+    """Whether `other` is one that may stand where `term` does: a closer form does for forms of its effect only."""
+    if not other.traits.closer:
+        return True
+    return other.id == term.id and not any(t.traits.winding for t in model.terms)
+
+
+def beginnings(term: Term, values: tuple[float, ...], other: Term, scale: Scale) -> tuple[tuple[float, ...], ...]:
+    """Trials of `other` in the place of `term` at its `values`: a closer form begins at these, if it has them all."""
+    trials, many = other.trials(scale), len(values)
+    names = [[p.name for p in each.parameters(scale)] for each in (term, other)]
+    if not other.traits.closer or names[1][:many] != names[0]:
+        return trials
+    return tuple(dict.fromkeys((*values, *trial[many:]) for trial in trials))
 
 
 def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights, noise: Noise) -> Fit:
@@ -66,7 +82,8 @@ def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights
     own = now.layout.of(term)
     kept = np.array([j < own.start or j >= own.stop for j in range(now.free.size)])
     slopes = now.jacobian[:, kept[now.free]], now.free[kept]
-    starts = [_in_place(now, term, other, values, data, weights, slopes) for values in other.trials(data.scale)]
+    trials = beginnings(term, now.values[term], other, data.scale)
+    starts = [_in_place(now, term, other, values, data, weights, slopes) for values in trials]
     possible = [start for start in starts if start is not None]
     if not possible:
         return now
