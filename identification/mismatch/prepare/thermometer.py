@@ -6,7 +6,7 @@ temperature does when the load steps, and is told as an effect that follows a st
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -34,15 +34,19 @@ def warmed(
 ) -> tuple[dict[str, Floats], float]:
     """`others` with the motor's temperature as it was, and the standard error of the first in K; 0 without any."""
     thermometer = recording.first_of(THERMOMETER)
-    found = warmth(thermometer, edges, driven) if thermometer is not None and THERMOMETER in others else None
+    if thermometer is None or THERMOMETER not in others:
+        return dict(others), 0.0
+    current = others.get("current")
+    loads = [driven] if current is None else [driven, np.sqrt(np.abs(np.nan_to_num(current)))]
+    found = warmth(thermometer, edges, loads)
     return (dict(others), 0.0) if found is None else ({**others, THERMOMETER: found[0]}, found[1])
 
 
-def warmth(channel: Channel, edges: Floats, driven: Floats) -> tuple[Floats, float] | None:
+def warmth(channel: Channel, edges: Floats, loads: Sequence[Floats]) -> tuple[Floats, float] | None:
     """(M,) the temperature in the intervals, in the channel's unit, and the standard error of the first of them.
 
-    Of the `driven` voltage's powers, low-passed with one time constant, of a decay from what was there before, and of
-    what these leave, where it is more than noise. None without two samples.
+    Of the powers of one of the `loads`, which go as the voltage, low-passed with one time constant, of a decay from
+    what was there before, and of what these leave, where it is plainly more than noise. None without two samples.
     """
     good = np.isfinite(channel.value)
     time, value, middle = channel.time[good], channel.value[good], 0.5 * (edges[1:] + edges[:-1])
@@ -52,13 +56,13 @@ def warmth(channel: Channel, edges: Floats, driven: Floats) -> tuple[Floats, flo
     noise, step = noise_of(value), channel.acquisition.quantum or 0.0
     if value.size < 4 * (len(POWERS) + 2) or not noise:
         return plain, float(np.hypot(noise, step / np.sqrt(12.0)))
-    columns, theta = _by_load(time, value, edges, driven)
+    columns, theta, _ = min((_by_load(time, value, edges, load) for load in loads), key=lambda found: found[2])
     H = _at(time, middle, columns)
     rest = value - H @ theta
     unsure = noise**2 * columns[0] @ np.linalg.pinv(H.T @ H) @ columns[0] + step**2 / 12
     out: Floats = columns @ theta
     smooth, missed = calmest(rest, (1, *REACHES), step)
-    if missed > (1 - policy.prepare.SUPPLY_REST_TOLD) * float(np.mean(rest**2)):
+    if missed > (1 - 1 / np.sqrt(rest.size)) * float(np.mean(rest**2)):
         return out, float(np.sqrt(unsure))
     smooth[0], error = first_reading(time, rest)
     return out + np.interp(middle, time, smooth), float(np.sqrt(unsure + error**2))
@@ -76,8 +80,9 @@ def first_reading(time: Floats, value: Floats) -> tuple[float, float]:
     return found[max(len(found) - 2, 0)] if found else (float(value[0]), noise)
 
 
-def _by_load(time: Floats, value: Floats, edges: Floats, driven: Floats) -> tuple[Floats, Floats]:
-    """(M, p) columns in the intervals, and how much there is of each (p,), of the time constant that leaves least."""
+def _by_load(time: Floats, value: Floats, edges: Floats, driven: Floats) -> tuple[Floats, Floats, float]:
+    """(M, p) columns in the intervals, how much there is of each (p,), and the sum of squares left, of the time
+    constant that leaves least."""
     middle, dt = 0.5 * (edges[1:] + edges[:-1]), np.diff(edges)
     load = np.abs(driven) / (float(np.max(np.abs(driven))) or 1.0)
 
@@ -92,8 +97,7 @@ def _by_load(time: Floats, value: Floats, edges: Floats, driven: Floats) -> tupl
     coarse = np.geomspace(FASTEST, slowest, TIMES)
     near = min(coarse.tolist(), key=lambda tau: of(tau)[2])
     ratio = coarse[1] / coarse[0]
-    columns, theta, _ = min((of(tau) for tau in np.geomspace(near / ratio, near * ratio, TIMES)), key=lambda it: it[2])
-    return columns, theta
+    return min((of(tau) for tau in np.geomspace(near / ratio, near * ratio, TIMES)), key=lambda found: found[2])
 
 
 def _at(time: Floats, middle: Floats, columns: Floats) -> Floats:
