@@ -24,13 +24,14 @@ TYPICAL_LOSS = 0.15
 (logarithmically). How the loss by hot copper grows with the level depends on it."""
 
 
-def cold_motor(known: float | None, driver: float) -> tuple[float, float]:
-    """W in 1/(unit of the driver) by the model, or the typical one; and the cold rate at the largest `driver`.
+def cold_motor(known: float | None, driver: float, share: float = TYPICAL_LOSS) -> tuple[float, float]:
+    """W in 1/(unit of the driver) by the model, or that which takes `share` of the largest `driver`; and the cold rate
+    there.
 
     Where the model says nothing of the winding, rates are in units of what the cold motor makes of the command.
     """
     if known is None:
-        return TYPICAL_LOSS / ((1 - TYPICAL_LOSS) * driver), driver
+        return share / ((1 - share) * driver), driver
     return known, float(2 * driver / (1 + np.sqrt(1 + 4 * known * driver)))
 
 

@@ -53,6 +53,8 @@ class Scale:
     """N, the largest |neighbour_thrust| of all runs."""
     cold: float = 0.0
     """K, the lowest motor_temperature that a run began with."""
+    cold_error: float = 0.0
+    """K, its standard error."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -100,6 +100,8 @@ class History:
     rotation_rate, neighbour_thrust."""
     coarse: frozenset[str] = frozenset()
     """Of these what was read in so few steps that the steps hide how it moves."""
+    begun_error: float = 0.0
+    """K, standard error of the motor temperature that the run began with."""
     rate_per_driver: float = 1.0
     """rev/s per unit of the driver, where both are steady; of no use without a rate."""
     spacing: float = 1.0

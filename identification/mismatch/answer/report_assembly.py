@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from math import isfinite
 from typing import Any
 
@@ -18,6 +19,7 @@ from identification.mismatch.name.named_term import NamedTerm
 from identification.mismatch.select.rounds import T
 from identification.mismatch.select.stepwise import F, RivalTerm
 from identification.mismatch.value import QUANTILE, Value, of_shape
+from identification.physics.heating import THERMOMETER
 from identification.physics.term import Term
 
 Intervals = Mapping[Term, tuple[Interval, ...]]
@@ -44,11 +46,29 @@ def values_of(fitted: Fit, data: Data, known: Intervals | None = None) -> dict[s
 
 
 def constant_of(fitted: Fit, data: Data) -> tuple[float, float]:
-    """C and its standard error, of the driver that the rotor makes a rate of.
+    """C and its standard error, of the driver that the rotor makes a rate of, and of the motor as cold as it began.
 
     Where thrust follows the measured rate n in a share s, the model's own C is of the driver (1 - s) x + s n / k_0, k_0
     what the rate is per driver as it was recorded; with n = k x that is x (1 + s (k / k_0 - 1)).
     """
+    C, std = _of_driver(fitted, data)
+    return C, float(np.hypot(std, _by_cold(fitted, data)))
+
+
+def _by_cold(fitted: Fit, data: Data) -> float:
+    """How uncertain C is because the temperature is that it refers to: by what it would follow of the prediction."""
+    error = data.scale.cold_error
+    if not error or not any(THERMOMETER in term.needs for term in fitted.model.terms):
+        return 0.0
+    warmer = replace(data, scale=replace(data.scale, cold=data.scale.cold + error))
+    (now, _), (then, _) = (raw(fitted.model, fitted.theta, each, with_rate=False) for each in (data, warmer))
+    forces = [f - tare for f, tare in zip(now, fitted.theta.tares, strict=True)]
+    moved = sum(float(f @ (g - h)) for f, g, h in zip(forces, then, now, strict=True))
+    return abs(fitted.theta.C * moved) / sum(float(f @ f) for f in forces)
+
+
+def _of_driver(fitted: Fit, data: Data) -> tuple[float, float]:
+    """The same at the temperature that the thermometer began with."""
     C, at = fitted.theta.C, fitted.layout
     followed = [term for term in fitted.model.terms if term.traits.follows_rate]
     known = [h.rate_per_driver for h in data.histories if h.rate is not None]

@@ -16,8 +16,9 @@ from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.prepare.preparing import DRIVERS
 from identification.mismatch.select.covariates import Covariate
+from identification.mismatch.select.exchange.static_pairs import STATIC
 from identification.mismatch.select.family_wise import lengths
-from identification.mismatch.select.forward_selection import STATIC, Selected
+from identification.mismatch.select.forward_selection import Selected
 from identification.mismatch.value import Where
 from identification.recording import Floats
 

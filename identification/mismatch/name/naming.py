@@ -19,8 +19,9 @@ from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.name.named_term import Check, NamedTerm, named_term, part_check
 from identification.mismatch.prepare.preparing import DRIVERS
+from identification.mismatch.select.exchange.static_pairs import STATIC, static_curve
 from identification.mismatch.select.family_wise import orthogonal_basis
-from identification.mismatch.select.forward_selection import STATIC, SwapTest, Thruster, static_curve
+from identification.mismatch.select.forward_selection import SwapTest, Thruster
 from identification.mismatch.select.likeliest_trials import alternatives
 from identification.mismatch.select.limits.clipping import contradiction
 from identification.mismatch.select.stepwise import stands

@@ -26,7 +26,7 @@ def followed(channel: Channel, at: Floats) -> Floats | None:
         return None
     time, value = channel.time[good], channel.value[good]
     if channel.quantity in CALMED:
-        value = _calmest(value, (1, *REACHES), channel.acquisition.quantum or 0.0)[0]
+        value = calmest(value, (1, *REACHES), channel.acquisition.quantum or 0.0)[0]
     out: Floats = np.interp(at, time, value)
     return out
 
@@ -40,7 +40,7 @@ def jumps(value: Floats, quantum: float = 0.0) -> NDArray[np.bool_]:
     return step > max(policy.prepare.CHANNEL_JUMP_SIGMA * noise, least)
 
 
-def _calmest(
+def calmest(
     value: Floats, reaches: Sequence[int], quantum: float, apart: NDArray[np.bool_] | None = None
 ) -> tuple[Floats, float]:
     """`_calm` with the reach whose windows miss their samples least."""
@@ -102,7 +102,7 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     by_load: Floats = columns(driven, charge)[:, kept] @ theta
     apart = np.abs(np.diff(then)) > policy.prepare.COMMAND_STEP * size
     step = channel.acquisition.quantum or 0.0
-    smooth, missed = _calmest(rest, REACHES, step, apart)
+    smooth, missed = calmest(rest, REACHES, step, apart)
     if float(np.mean(smooth**2)) <= step**2 / 12:  # a staircase that a meter makes of what the load does
         return by_load
     if missed > (1 - policy.prepare.SUPPLY_REST_TOLD) * float(np.mean(rest**2)):

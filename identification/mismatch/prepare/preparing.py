@@ -11,6 +11,7 @@ from identification.mismatch import policy
 from identification.mismatch.prepare.channels import followed, is_coarse, jumps, neighbour_at, supply, torque
 from identification.mismatch.prepare.grid import Held, distinct, edges_of
 from identification.mismatch.prepare.quantum import quantum_of
+from identification.mismatch.prepare.thermometer import warmed
 from identification.recording import Channel, Floats, Recording
 from identification.run_history.converter import Converter
 from identification.run_history.history import CHANGED, History
@@ -189,7 +190,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
     mean[torn], count[torn] = np.nan, 0
     within = _within(time, force, edges, mean)
     driven = held.mean(edges)
-    others = _explaining(recording, driver, held, edges, driven)
+    others, begun_error = warmed(recording, edges, driven, _explaining(recording, driver, held, edges, driven))
     inside = (time >= edges[0]) & (time < edges[-1])
     rate = rate_count = rate_sampled = None
     turning_time = np.empty(0)
@@ -218,6 +219,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         sample_thrust=force[inside],
         rate_time=turning_time,
         rate=rate,
+        begun_error=begun_error,
         rate_count=rate_count,
         rate_sampled=rate_sampled,
         others=others,

@@ -40,7 +40,7 @@ def scale_of(runs: Sequence[RememberedRun], C: float) -> Scale:
         bus=_largest(histories, "bus_voltage"),
         current=max((_lasting_current(h) for h in histories if "current" in h.others), default=0.0),
         neighbour=_largest(histories, "neighbour_thrust"),
-        cold=min((_begun(h) for h in histories if THERMOMETER in h.others), default=0.0),
+        **_coldest(histories),
     )
 
 
@@ -56,6 +56,13 @@ def _lasting_current(history: History) -> float:
     order = np.argsort(size)
     until = np.cumsum(history.dt[order])
     return float(size[order][np.searchsorted(until, (1 - STARTING_SHARE) * until[-1])])
+
+
+def _coldest(histories: Sequence[History]) -> dict[str, float]:
+    """K, the lowest that a run began with, and its standard error."""
+    begun = [(_begun(h), h.begun_error) for h in histories if THERMOMETER in h.others]
+    cold, error = min(begun, default=(0.0, 0.0))
+    return {"cold": cold, "cold_error": error}
 
 
 def _begun(history: History) -> float:

@@ -19,6 +19,7 @@ from identification.mismatch.observer import UNWATCHED, Observer
 from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
 from identification.mismatch.select.exchange.nearby_start import best_forms
 from identification.mismatch.select.exchange.rivals import one_for_two, one_less, swaps
+from identification.mismatch.select.exchange.static_pairs import static_curve, two_for_two
 from identification.mismatch.select.hidden import hidden
 from identification.mismatch.select.limits.clipping import contradiction
 from identification.mismatch.select.rounds import Candidate, Round, Unhidden
@@ -39,8 +40,6 @@ CANDIDATES = 5
 MOST_MORE = 3
 """Terms of a round that are fitted beside CANDIDATES: those whose trials say little of what a fit would find."""
 NOT_ALL = "whether more is left out"
-STATIC = ("command_voltage", "thrust")
-"""Coordinates of the static curve."""
 
 
 def available(data: Data, without: Collection[str] = ()) -> tuple[Term, ...]:
@@ -91,13 +90,6 @@ class Selected:
     """How each term stands against its rivals, where that is known."""
     undone: tuple[str, ...] = ()
     """What was not asked, as clauses, because the search was interrupted."""
-
-
-def static_curve(term: Term, *, measured: bool) -> str:
-    """On which static curve a term is a shape; none: "". A measured rate makes two of one, V to n and n to thrust."""
-    if not set(term.covariates) <= set(STATIC):
-        return ""
-    return "rate" if measured and term.stage in ("command", "rotor") else "thrust"
 
 
 def search(
@@ -162,7 +154,7 @@ class Thruster:
         data, inside = self.data, estimate.fit.model.terms
         ids = {t.id for t in inside}
         shapes = Counter(static_curve(t, measured=data.with_rate) for t in inside)
-        left = [t for t in self.terms if t.id not in ids]
+        left = [t for t in self.terms if t.id not in ids and not t.traits.closer]
         left = [
             t
             for t in left
@@ -237,7 +229,11 @@ class Thruster:
     ) -> tuple[float, Fit] | None:
         self.watch.trying("one term in the place of two")
         best = one_less(estimate, self.data, self.terms, best)
-        return one_for_two(estimate, self.data, self.terms, standing, best)
+        best = one_for_two(estimate, self.data, self.terms, standing, best)
+        if best is not None:
+            return best
+        self.watch.trying("two terms of a static curve in the place of two")
+        return two_for_two(estimate, self.data, self.terms)
 
 
 def _told(terms: Collection[Term]) -> str:

@@ -17,7 +17,8 @@ from identification.mismatch.locate.stage import Located
 from identification.mismatch.model.data import Data
 from identification.mismatch.name.named_term import Check, restated
 from identification.mismatch.name.naming import Named
-from identification.mismatch.select.forward_selection import STATIC, Selected
+from identification.mismatch.select.exchange.static_pairs import STATIC
+from identification.mismatch.select.forward_selection import Selected
 from identification.mismatch.unnamed.confirmed import not_standing
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared

@@ -132,11 +132,14 @@ def _heating(p: Table, told: Told) -> Table:
     What copper costs is the catalogue's at the largest current where a current was recorded, which noise makes larger.
     """
     measured, form = told.form.startswith("measured_"), told.form.removeprefix("measured_")
+    own = form == "own_winding"
+    form = "winding" if own else form
     if form != {"both": "winding_and_magnet"}.get(p["form"], p["form"]):
         return {}
     late, truth = {"magnet_time_constant": p["time_constant"]}, told.truth
     if form == "winding":
-        return _copper(p, truth, measured=measured)
+        drop = _per_volt(p["resistance"], truth) * truth["scale"]["voltage"]
+        return {**_copper(p, truth, measured=measured), **({"cold_loss": drop / (1.0 + drop)} if own else {})}
     if form == "magnet":
         apart = not _of("winding_resistance", truth)
         return (late | ({"flux_loss_per_kelvin": p["magnet"]} if apart else {})) if measured else {}

@@ -10,6 +10,7 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, change_of
 from identification.mismatch.model.data import Data
+from identification.mismatch.select.exchange.nearby_start import beginnings, may_replace
 from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.screening import directions
 from identification.physics.term import Term
@@ -37,7 +38,8 @@ def alike(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
 def _alike(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> Alike:
     now = estimate.fit
     inside = {t.id for t in now.model.terms} - {term.id}
-    found = directions(less, data, estimate.weights, [t for t in terms if t.id not in inside and t != term])
+    others = [t for t in terms if t.id not in inside and t != term and may_replace(term, t, now.model)]
+    found = directions(less, data, estimate.weights, others)
     change = _effect(now, term, data, estimate)
     basis = orthogonal_basis(less.jacobian)
     change = change - basis @ (basis.T @ change)
@@ -51,7 +53,9 @@ def _alike(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequenc
     for j, other in enumerate(found.terms):
         if other not in best or rho[j] > best[other][0]:
             best[other] = (float(rho[j]), mirrored(other, found.values[j], data) if against[j] else found.values[j])
-    return best | {other: (1.0, now.values[term]) for other in best if _same_limit(other, term, data)}
+    closer = {t: beginnings(term, now.values[term], t, data.scale)[0] for t in best if t.traits.closer}
+    limits = {other: now.values[term] for other in best if _same_limit(other, term, data)}
+    return best | {other: (1.0, values) for other, values in (closer | limits).items()}
 
 
 def _same_limit(other: Term, term: Term, data: Data) -> bool:

@@ -16,7 +16,7 @@ from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.select.limits.clipping import contradiction
-from identification.physics.term import Term
+from identification.physics.term import Scale, Term
 from identification.recording import Floats
 
 Start = tuple[Model, Theta]
@@ -52,9 +52,25 @@ def best_forms(fitted: Fit, terms: Sequence[Term], data: Data, weights: Weights,
     """
     for term in fitted.model.terms:
         for other in terms:
-            if other.id == term.id and other != term and other not in fitted.model.terms:
+            if other.id == term.id and other not in fitted.model.terms and may_replace(term, other, fitted.model):
                 fitted = _better_form(fitted, term, other, data, weights, noise)
     return fitted
+
+
+def may_replace(term: Term, other: Term, model: Model) -> bool:
+    """Whether `other` is one that may stand where `term` does: a closer form does for forms of its effect only."""
+    if not other.traits.closer:
+        return True
+    return other.id == term.id and not any(t.traits.winding for t in model.terms)
+
+
+def beginnings(term: Term, values: tuple[float, ...], other: Term, scale: Scale) -> tuple[tuple[float, ...], ...]:
+    """Trials of `other` in the place of `term` at its `values`: a closer form begins at these, if it has them all."""
+    trials, many = other.trials(scale), len(values)
+    names = [[p.name for p in each.parameters(scale)] for each in (term, other)]
+    if not other.traits.closer or names[1][:many] != names[0]:
+        return trials
+    return tuple(dict.fromkeys((*values, *trial[many:]) for trial in trials))
 
 
 def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights, noise: Noise) -> Fit:
@@ -66,7 +82,8 @@ def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights
     own = now.layout.of(term)
     kept = np.array([j < own.start or j >= own.stop for j in range(now.free.size)])
     slopes = now.jacobian[:, kept[now.free]], now.free[kept]
-    starts = [_in_place(now, term, other, values, data, weights, slopes) for values in other.trials(data.scale)]
+    trials = beginnings(term, now.values[term], other, data.scale)
+    starts = [_in_place(now, term, other, values, data, weights, slopes) for values in trials]
     possible = [start for start in starts if start is not None]
     if not possible:
         return now
@@ -92,7 +109,11 @@ def _in_place(
     weights: Weights,
     slopes: tuple[Floats, NDArray[np.bool_]],
 ) -> Start | None:
-    """None where `other` cannot be had in any amount. `slopes`: of the rest of the model, and of which values."""
+    """None where `other` cannot be had in any amount. `slopes`: of the rest of the model, and of which values.
+
+    The rest follows by its slopes where that leaves less, else it stays: the step is long where two are nearly one
+    curve, as a delay and a lag on a sine beside an inflow, and ends far off.
+    """
     rest, theta = now.less(term)
     bigger, begun = extended(rest, theta, other, values)
     effect = weights.whiten(*change_of((rest, theta), (now.model, now.theta), data, weights))
@@ -104,11 +125,17 @@ def _in_place(
     steps = _followed(np.column_stack([columns, change / size]), effect)
     moved = theta.vector
     moved[free] += steps[:-1]
+    followed = _begun((rest, theta.with_vector(moved)), other, values, steps[-1] / size, data)
+    alone = _begun((rest, theta), other, values, float(effect @ change) / size**2, data)
+    return min(followed, alone, key=lambda start: _left(start, data, weights))
+
+
+def _begun(rest: Start, other: Term, values: tuple[float, ...], share: float, data: Data) -> Start:
+    """The `rest` with `other`, of whose amount in a trial's `values` there is a `share`, all within bounds."""
     first = other.parameters(data.scale)[0]
     assert first.neutral is not None
-    amount = first.neutral + steps[-1] / size * (values[0] - first.neutral)
-    begin = (float(np.clip(amount, first.low, first.high)), *values[1:])
-    bigger, start = extended(rest, theta.with_vector(moved), other, begin)
+    amount = first.neutral + share * (values[0] - first.neutral)
+    bigger, start = extended(*rest, other, (float(np.clip(amount, first.low, first.high)), *values[1:]))
     low, high, _ = bounds_of(bigger, data, start)
     return bigger, start.with_vector(np.clip(start.vector, low, high))
 

@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.select.baseline import baseline, level_error_factor, raw_directions
 from identification.mismatch.select.covariates import covariates, hats
-from identification.mismatch.select.forward_selection import available, static_curve
+from identification.mismatch.select.exchange.static_pairs import static_curve
+from identification.mismatch.select.forward_selection import available
 from identification.mismatch.select.limits.flatness import noise_goes_on
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.dead_band import DeadBand
