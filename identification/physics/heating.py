@@ -8,12 +8,11 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.hot_motor import TYPICAL_LOSS, cold_motor, copper_at_full, hot_rate, weaker_at_full
-from identification.physics.term import KELVIN, Parameter, Scale, Stage, TermContext
+from identification.physics.term import KELVIN, THERMOMETER, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
 
-THERMOMETER = "motor_temperature"
 MOST_PER_KELVIN = 1.0
 """1/K. Copper has 0.004, of which thrust loses a fourth; a thermometer outside sees only a part of their rise."""
 MOST_FLUX = 0.3

@@ -16,6 +16,8 @@ from identification.run_history.history import History
 from identification.run_history.remembered import RememberedRun
 
 Stage = Literal["command", "rotor", "hydro", "stand", "cell"]
+THERMOMETER = "motor_temperature"
+"""The channel of the motor's temperature."""
 KELVIN = 273.15
 """At 0 degC."""
 STAGES: tuple[Stage, ...] = ("command", "rotor", "hydro", "stand", "cell")

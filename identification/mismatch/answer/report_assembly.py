@@ -19,8 +19,7 @@ from identification.mismatch.name.named_term import NamedTerm
 from identification.mismatch.select.rounds import T
 from identification.mismatch.select.stepwise import F, RivalTerm
 from identification.mismatch.value import QUANTILE, Value, of_shape
-from identification.physics.heating import THERMOMETER
-from identification.physics.term import Term
+from identification.physics.term import THERMOMETER, Term
 
 Intervals = Mapping[Term, tuple[Interval, ...]]
 

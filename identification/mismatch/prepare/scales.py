@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.physics.term import KELVIN, Scale
+from identification.physics.term import KELVIN, THERMOMETER, Scale
 from identification.run_history.history import History
 from identification.run_history.remembered import RememberedRun
 
@@ -16,8 +16,6 @@ MANY_SAMPLES = 100
 
 STARTING_SHARE = 0.01
 """Of a run: what a current does for so short a time warms nothing."""
-
-THERMOMETER = "motor_temperature"
 
 
 def scale_of(runs: Sequence[RememberedRun], C: float) -> Scale:
