@@ -66,7 +66,7 @@ def heat_of(values: Mapping[str, float], form: str, k: float, driver: float, win
     rise = _PLAIN.heating * (_PLAIN.drag * k**2 * motor.current() / _PLAIN.torque_acceleration) ** 2
     ohm = _PLAIN.torque_acceleration / (_PLAIN.drag * k**2)
     copper = {"resistance": motor.w * ohm, "copper": motor.copper / motor.w / rise} if motor.w > 0.0 else {}
-    if form == "winding":
+    if form in ("winding", "own_winding"):
         return {**copper, "form": "winding"}
     magnets = {"magnet": motor.m / rise, "time_constant": values["magnet_time_constant"]}
     return {**copper, **magnets, "form": "both" if copper else "magnet"}
@@ -75,7 +75,8 @@ def heat_of(values: Mapping[str, float], form: str, k: float, driver: float, win
 def _motor(values: Mapping[str, float], form: str, driver: float, winding: float | None) -> HotMotor:
     """Magnets alone are of a motor whose winding takes next to nothing."""
     if winding is None:
-        w = 0.0 if form == "magnet" else TYPICAL_SHARE / ((1.0 - TYPICAL_SHARE) * driver)
+        share = values.get("cold_loss", TYPICAL_SHARE)
+        w = 0.0 if form == "magnet" else share / ((1.0 - share) * driver)
         cold = driver
     else:
         w, cold = winding, 2.0 * driver / (1.0 + sqrt(1.0 + 4.0 * winding * driver))

@@ -119,8 +119,8 @@ def forward(
     rng: np.random.Generator,
     known: Collection[frozenset[T]] = (),
 ) -> tuple[S, tuple[Round[T, Judged], ...], bool]:
-    """Larger models, of `most` terms, while something passes, none of those that are `known`; how it went, and whether
-    it came to its end: one that is interrupted has the model of its last round."""
+    """Larger models, of `most` terms and one that noise had hidden, while something passes, none of those that are
+    `known`; how it went, and whether it came to its end: one that is interrupted has the model of its last round."""
     rounds: list[Round[T, Judged]] = []
     seen = {frozenset(state.fit.values), *known}
     while True:
@@ -148,7 +148,7 @@ def _round(
     full = len(inside) >= most
     found = [] if full else system.additions(state, judged)
     told, larger = None, _reformed(system, _lasting(system, state, found, seen), seen)
-    if larger is None and not full and (hidden := system.unhidden(state, judged)) is not None:
+    if larger is None and len(inside) <= most and (hidden := system.unhidden(state, judged)) is not None:
         beside = pruned(system, hidden[1])
         if frozenset(beside.fit.values) not in seen:
             told, larger = hidden[0], beside

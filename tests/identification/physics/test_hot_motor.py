@@ -100,6 +100,21 @@ def test_by_the_thermometer():
     assert both[85] < 12 < both[-1] < later[-1], "the copper at once, the magnets later"
 
 
+def test_what_the_cold_winding_takes_decides_how_the_loss_grows_where_no_other_term_says_it():
+    """Of 12 V a tenth or a third: as much is lost at full, and at a tenth of it the more the more the winding takes."""
+    own = term("heating", "own_winding")
+    m, known = moment(held(12.0), S), replace(moment(held(12.0), S), winding=0.03)
+    full = {share: own.apply(np.full(2400, 12.0), m, (0.1, 40.0, share)) for share in (0.1, 0.33)}
+    assert [(x[-1] / 12) ** 2 for x in full.values()] == pytest.approx([0.9, 0.9])
+    heated = replace(m, run=moment(held(12.0, current=np.ones(2400)), S).run)
+    low = [1 - (own.apply(np.full(2400, 1.2), heated, (0.1, 40.0, s))[-1] / 1.2) ** 2 for s in (0.1, 0.33)]
+    assert low[1] > 1.2 * low[0]
+    typical = term("heating", "winding").apply(np.full(2400, 12.0), m, (0.1, 40.0))
+    assert own.apply(np.full(2400, 12.0), m, (0.1, 40.0, 0.15)) == pytest.approx(typical)
+    told = [own.apply(np.full(2400, 9.0), known, (0.1, 40.0, share)) for share in (0.1, 0.33)]
+    assert told[0] == pytest.approx(told[1]), "what the model's winding takes is known"
+
+
 def test_what_is_said_of_it_names_what_is_hot():
     heating = term("heating", "winding_and_magnet")
     said = heating.statement((0.05, 60.0, 0.02, 100.0), S)

@@ -135,3 +135,13 @@ def test_a_limit_is_the_same_wherever_the_noise_comes_in_and_a_soft_one_is_none(
     soft = sealed(load_cell_saturation={"limit": 40.0, "form": "soft"})
     assert true_values("load_cell_saturation", form, soft) == {}
     assert true_values("load_cell_saturation", "knee", sealed(load_cell_saturation={"limit": 40.0})) == {}
+
+
+def test_what_the_cold_winding_takes_is_that_of_the_world():
+    """V = e + w e^2 at the largest command, at which the drive makes up for the cold drop: e is the command."""
+    winding = {"form": "winding", "resistance": 0.6, "time_constant": 50.0}
+    w = 0.6 * AMPERES / TOP**2
+    for form in ("own_winding", "measured_own_winding"):
+        assert true_values("heating", form, sealed(heating=winding))["cold_loss"] == pytest.approx(
+            w * TOP / (1 + w * TOP)
+        )

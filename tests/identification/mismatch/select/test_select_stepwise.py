@@ -149,6 +149,10 @@ def test_what_hides_is_asked_for_where_nothing_else_lasts():
     last, rounds, _ = forward(system, system.state(), 9, RNG)
     assert list(last.fit.values) == [A, D]
     assert [one.hidden is not None for one in rounds] == [False, True, False]
+    full, _, _ = forward(system, system.state(), 1, RNG)
+    assert list(full.fit.values) == [A, D], "though the model is full"
+    two = Columns(4 * wave(0) + 5 * wave(1) + 5 * wave(2), {A: wave(1), C: wave(2), D: wave(0)}, hidden=D)
+    assert list(forward(two, two.state(A, C), 1, RNG)[0].fit.values) == [A, C]
     weak = Columns(1 * wave(0) + 5 * wave(1), {A: wave(1), D: wave(0)}, hidden=D)
     assert list(forward(weak, weak.state(), 9, RNG)[0].fit.values) == [A], "pruned again: the model was there before"
 

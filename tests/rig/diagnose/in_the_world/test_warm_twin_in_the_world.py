@@ -13,6 +13,7 @@ from tests.rig.diagnose.in_the_world.acted_twins import acted, entry, file_of, t
 
 WARM = [
     ([entry("heating", "winding", 0.1, 20.0)], -0.1),
+    ([entry("heating", "own_winding", 0.1, 20.0, 0.33)], -0.1),
     ([entry("heating", "magnet", 0.03, 20.0, 30.0)], 0.97**-2 - 1.0),
     ([entry("heating", "winding_and_magnet", 0.08, 20.0, 0.03, 30.0)], None),
     ([entry("winding_resistance", "", 0.02), entry("heating", "winding", 0.1, 20.0)], -0.1),
