@@ -41,6 +41,9 @@ COMMANDS: Final = {
     "console": Entry("rig.operate.run:console_command", "Attach to a run that is going on."),
     "stop": Entry("rig.operate.run:stop_command", "Stop a run that is going on: zero volts now, close the recording."),
     "design": Entry("rig.design.command:design_command", "Best levels, order and dwells for the time in the tunnel."),
+    "calibrate": Entry(
+        "rig.fit.load_cell:calibrate_command", "Scale, offset and uncertainty of a load cell from known weights."
+    ),
     "fit": Entry("rig.fit.command:fit_command", "Fit tau = C V|V| to recordings."),
     "diagnose": Entry(
         "rig.diagnose.command:diagnose_command", "Find, name and model the physics that C V|V| leaves out."

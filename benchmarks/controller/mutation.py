@@ -1,6 +1,6 @@
 """Would a test notice? Mutants of what stops a motor, each run against the tests of its room.
 
-    python benchmarks/controller/mutation.py [guard|proof|sequencer|loop|arming ...] [--only LINE]
+    python benchmarks/controller/mutation.py [guard|proof|sequencer|loop|arming ...] [--only LINE ...]
 
 A mutant is the module with one change: a comparison moved or turned, an operator exchanged, a number one larger, a
 condition turned or left out, a statement left out, a return without its value. Texts, type annotations and decorators
@@ -20,7 +20,7 @@ import os
 import signal
 import sys
 import types
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -29,7 +29,7 @@ LIMIT = 120
 """s"""
 STAGES = ("test_campaign_failures.py", "test_campaign.py", "test_campaign_stops.py", "test_arming.py")
 TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
-    "guard": ("rig/safety/guard.py", ("tests/rig/safety/test_guard.py", "tests/rig/control/test_loop.py")),
+    "guard": ("rig/safety/guard.py", ("tests/rig/safety/test_guard_edges.py", "tests/rig/safety/test_guard.py")),
     "proof": ("rig/safety/watchdog_proof.py", ("tests/rig/sequence/test_sequencer_proof.py",)),
     "sequencer": ("rig/sequence/sequencer.py", ("tests/rig/sequence",)),
     "loop": ("rig/control/loop.py", ("tests/rig/control", "tests/rig/stages/test_campaign_failures.py")),
@@ -174,7 +174,7 @@ def survives(module: str, source: str, tests: tuple[str, ...]) -> bool:
     return os.waitpid(child, 0)[1] == 0
 
 
-def tried(name: str, only: int | None) -> tuple[int, int]:
+def tried(name: str, only: Sequence[int]) -> tuple[int, int]:
     """Mutants made and killed."""
     module, tests = TARGETS[name]
     source = (PROJECT / module).read_text(encoding="utf-8")
@@ -184,7 +184,7 @@ def tried(name: str, only: int | None) -> tuple[int, int]:
     made = killed = 0
     lines = source.splitlines()
     for mutant in mutants(source):
-        if only is not None and mutant.line != only:
+        if only and mutant.line not in only:
             continue
         made += 1
         if survives(module, mutant.source, there):
@@ -198,7 +198,7 @@ def tried(name: str, only: int | None) -> tuple[int, int]:
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="|".join(TARGETS))
-    parser.add_argument("--only", type=int, help="the mutants of one line")
+    parser.add_argument("--only", type=int, nargs="+", default=(), help="the mutants of these lines")
     asked = parser.parse_args()
     os.chdir(PROJECT)
     sys.path.insert(0, str(PROJECT))

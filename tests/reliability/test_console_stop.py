@@ -3,6 +3,7 @@ kill or a dropped line does to the motor, by the bench's truth log."""
 
 from __future__ import annotations
 
+import os
 import select
 import signal
 import subprocess
@@ -16,6 +17,8 @@ import pytest
 from rig.hdf5 import load
 from rig.link.live_runs import Run
 from tests.reliability.live import LiveBench, at_rest, live_bench, zero_after
+from tests.reliability.measured import FULL
+from tests.reliability.test_motor_stops import recorder_pid
 from tests.rig.console.terminal import Terminal, on_terminal
 
 pytestmark = [pytest.mark.reliability, pytest.mark.timeout(90)]
@@ -58,17 +61,53 @@ def leave(process: subprocess.Popen[bytes], terminal: Terminal) -> None:
         select.select([], [], [], 0.3)
 
 
-@pytest.mark.parametrize("key", [F9, CTRL_C, b"n" + CTRL_C], ids=["F9", "Ctrl+C", "Ctrl+C in a note"])
-def test_stop_key_to_command_0(tmp_path, report, prompt, request, key):
+@contextmanager
+def slow_disk(run: Run, slow: bool) -> Iterator[None]:
+    """Where `slow`, the recorder stands still as in a flush that blocks, and goes on afterwards."""
+    recorder = recorder_pid(run.pid)
+    if slow:
+        os.kill(recorder, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(recorder, signal.SIGCONT)
+
+
+PLACES = {
+    "1": b"1",
+    "2": b"2",
+    "3": b"3",
+    "4": b"4",
+    "5": b"5",
+    "a note": b"n",
+    "the leave dialog": b"d",
+    "at once": b"n",
+}
+PRESSES = (
+    [(place, slow, key) for place in PLACES for slow in (False, True) for key in (F9, CTRL_C) for _ in range(3)]
+    if FULL
+    else [("1", False, F9), ("2", False, CTRL_C), ("at once", False, CTRL_C), ("the leave dialog", True, F9)]
+)
+"""Where the key is pressed: a page by its number, a focused text field, a modal dialog, in one write with the key that
+opens the text field; whether the disk is slow meanwhile."""
+
+
+@pytest.mark.parametrize(("place", "slow", "key"), PRESSES)
+def test_stop_key_to_command_0(tmp_path, report, prompt, place, slow, key):
     with live_bench(tmp_path) as bench:
         run = bench.start(unattended=False, dwell=20.0)
         with at_console(bench, run) as (process, terminal):
-            pressed = time.monotonic_ns()
-            terminal.press(key)
+            if place != "at once":
+                terminal.press(PLACES[place])
+                select.select([], [], [], 0.3)
+            with slow_disk(run, slow):
+                pressed = time.monotonic_ns()
+                terminal.press((PLACES[place] if place == "at once" else b"") + key)
+                bench.until_held(0.0, 0.3)
             terminal.until(b"ABORTED")
             leave(process, terminal)
         latency = zero_after(bench.truth(), pressed)
-        report(f"stop key of a console on a terminal ({request.node.callspec.id}) to command 0", latency, "s")
+        report("stop key of a console to command 0" + (", disk slow" if slow else ""), latency, "s")
         prompt(latency, 0.13, pressed)
         assert ended(bench, run) == ("aborted", "stopped by console")
         assert process.returncode == 1
