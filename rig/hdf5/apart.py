@@ -7,6 +7,7 @@ that costs.
 
 from __future__ import annotations
 
+import faulthandler
 import gc
 import math
 import mmap
@@ -73,6 +74,7 @@ def open_no_more() -> None:
 def _child(work: Callable[[], object], answer: int, seconds: int, memory: int) -> NoReturn:
     status = 1
     try:
+        faulthandler.disable()  # the parent says how this ended
         gc.disable()  # it would touch, and so copy, all that the parent has
         signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is the parent's to stop
         signal.signal(signal.SIGTERM, signal.SIG_DFL)
@@ -113,7 +115,9 @@ def _result(found: tuple[str, Any]) -> Any:
     if how == "refused" and isinstance(what, RigError):
         raise what
     if how == "memory":
-        raise RecordingError("more memory is needed to read the recording than its size justifies: h5repack -f NONE")
+        raise RecordingError(
+            "more memory is needed to read the recording than its size justifies; unpack it: h5repack -f NONE IN OUT"
+        )
     raise RuntimeError(f"reading a recording failed:\n{what}")
 
 

@@ -49,6 +49,8 @@ def _load(path: Path, rows: int | None) -> Recording:
     try:
         with file:
             return _recording(file, path, opened_as, rows)
+    except MemoryError:  # `apart` says what that means
+        raise
     except DAMAGE as error:
         raise RecordingError(f"{path} is damaged: {error}") from error
 

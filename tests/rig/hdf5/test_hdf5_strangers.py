@@ -11,7 +11,7 @@ import pytest
 
 from rig.errors import RecordingError
 from rig.hdf5 import is_hdf5, load, recording_id_of, recover
-from rig.hdf5.apart import MEMORY, apart, open_no_more
+from rig.hdf5.apart import apart, open_no_more
 
 
 def made(path, rows=100):
@@ -69,13 +69,8 @@ def bomb(path, rows):
 def test_what_is_packed_a_thousandfold_takes_no_more_memory_than_the_file_justifies(tmp_path):
     path = bomb(tmp_path / "r.h5", 12 * 2**20)
     assert path.stat().st_size < 2**20
-    try:
-        recording = load(path)
-    except RecordingError as error:
-        assert "memory" in str(error) or "justif" in str(error)
-    else:
-        assert sum(channel.value.nbytes for channel in recording.channels) < MEMORY
-        assert any("left out, for it can't be read" in event.text for event in recording.events)
+    with pytest.raises(RecordingError, match="more memory is needed to read the recording than its size justifies"):
+        load(path)
 
 
 def test_tables_of_any_declared_size_are_left_out(tmp_path):
