@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.recording import Channel, Floats
 from rig.errors import RecordingError
-from rig.hdf5.load import open_for_reading
-from rig.hdf5.members import numeric_columns
+from rig.hdf5.members import DAMAGE, members, numeric_columns
+from rig.hdf5.opening import open_for_reading
 
 BLOCK = 65_536
 """Rows read at a time: 0.5 MB per column, and one h5py call costs little beside it."""
@@ -30,15 +32,22 @@ class LongChannel:
         self._missing = self._value.attrs.get("missing_value")
 
     def values(self, start: int, stop: int) -> Floats:
-        raw = self._value[start:stop]
+        raw = self._read(self._value, start, stop)
         out: Floats = raw.astype(np.float64, copy=False)
         if self._missing is not None:
             out[raw == self._missing] = np.nan
         return out
 
+    def _read(self, column: h5py.Dataset, start: int, stop: int) -> NDArray[Any]:
+        try:
+            rows: NDArray[Any] = column[start:stop]
+        except DAMAGE as error:
+            raise RecordingError(f"{column.name} can't be read from row {start} on: {error}") from error
+        return rows
+
     def times(self, start: int, stop: int, latest: float = -np.inf) -> tuple[Floats, Floats]:
         """Times, not before each other nor before `latest`; and as they are in the file."""
-        found: Floats = self._time[start:stop].astype(np.float64, copy=False)
+        found: Floats = self._read(self._time, start, stop).astype(np.float64, copy=False)
         rising: Floats = np.maximum.accumulate(np.where(np.isfinite(found), found, -np.inf))
         return np.maximum(rising, latest), found
 
@@ -88,12 +97,17 @@ class LongChannel:
         return Channel(facts.name, facts.stream, facts.quantity, facts.unit, time[known], value[known])
 
 
+def _has(group: object, name: str) -> bool:
+    return isinstance(group, h5py.Group) and {"time", name} <= set(numeric_columns(group))
+
+
 @contextmanager
 def long_channels(path: Path, *facts: Channel) -> Iterator[tuple[LongChannel, ...]]:
     """Channels of a recording, open for reading. Raises RecordingError."""
     file, _ = open_for_reading(path)
     with file:
-        missing = [f"{c.stream}/{c.name}" for c in facts if f"streams/{c.stream}/{c.name}" not in file]
+        streams = dict(members(file["streams"]))
+        missing = [f"{c.stream}/{c.name}" for c in facts if not _has(streams.get(c.stream), c.name)]
         if missing:
             raise RecordingError(f"{path} has no channel {', '.join(missing)}")
         yield tuple(LongChannel(file[f"streams/{channel.stream}"], channel) for channel in facts)

@@ -14,9 +14,10 @@ from numpy.typing import NDArray
 
 from identification.recording import QUANTITY_UNITS, Acquisition, Channel, Event, Recording, Step
 from rig.errors import RecordingError
-from rig.hdf5.layout import FORMAT, FORMAT_VERSION, text_of
-from rig.hdf5.members import DAMAGE, attributes, members, numeric_columns
-from rig.hdf5.unclosed import open_unclosed
+from rig.hdf5.apart import apart, open_no_more
+from rig.hdf5.layout import text_of
+from rig.hdf5.members import DAMAGE, attributes, member, members, numeric_columns, table
+from rig.hdf5.opening import number, open_for_reading, require_file
 
 UNIT_SPELLINGS: Final = {"Nm": "N.m", "N m": "N.m", "N·m": "N.m", "°C": "degC", "m/s2": "m/s^2", "m/s²": "m/s^2"}
 """Spellings of the format's units that other programs use."""
@@ -38,59 +39,33 @@ def load(path: str | Path, rows: int | None = None) -> Recording:
     should be (rows of different lengths, unknown units) is added to `events` as warnings.
     """
     path = Path(path)
+    require_file(path)
+    return apart(lambda: _load(path, rows), path)
+
+
+def _load(path: Path, rows: int | None) -> Recording:
     file, opened_as = open_for_reading(path)
+    open_no_more()
     try:
         with file:
             return _recording(file, path, opened_as, rows)
+    except MemoryError:  # `apart` says what that means
+        raise
     except DAMAGE as error:
         raise RecordingError(f"{path} is damaged: {error}") from error
 
 
 def recording_id_of(path: Path) -> str:
     """The id alone; empty where the file has none. Raises RecordingError."""
+    require_file(path)
+    return apart(lambda: _id_of(path), path)
+
+
+def _id_of(path: Path) -> str:
     file, _ = open_for_reading(path)
+    open_no_more()
     with file:
         return text_of(file.attrs.get("recording_id", ""))
-
-
-def is_hdf5(path: Path) -> bool:
-    """Whether a file is HDF5, whatever its name."""
-    return bool(h5py.is_hdf5(path))
-
-
-def open_for_reading(path: Path) -> tuple[h5py.File, str]:
-    """The open file and `plain` or `swmr`; its format has been checked. Raises RecordingError."""
-    if not path.is_file():
-        raise RecordingError(f"{path} is not there; give the path of a recording (*.h5)")
-    if not h5py.is_hdf5(path):
-        raise RecordingError(f"{path} is not an HDF5 file; `rig import` makes recordings of tables and logs")
-    try:
-        file, opened_as = h5py.File(path, "r"), "plain"
-    except OSError as error:
-        file, opened_as = open_unclosed(path, error), "swmr"
-    try:
-        _check_format(file, path)
-    except RecordingError:
-        file.close()
-        raise
-    except DAMAGE as error:
-        file.close()
-        raise RecordingError(f"{path} is damaged: {error}") from error
-    return file, opened_as
-
-
-def _check_format(file: h5py.File, path: Path) -> None:
-    found = text_of(file.attrs.get("format", ""))
-    if found != FORMAT:
-        raise RecordingError(f"{path} is HDF5, but its attribute `format` is {found!r} where {FORMAT!r} is expected")
-    version = _number(file.attrs.get("format_version", 1))
-    if version is None or version > FORMAT_VERSION:
-        raise RecordingError(
-            f"{path} is a recording of format_version {text_of(file.attrs['format_version'])}; this program reads "
-            f"up to {FORMAT_VERSION}; install a later thruster-rig"
-        )
-    if not isinstance(file.get("streams"), h5py.Group):
-        raise RecordingError(f"{path} says it is a recording, but has no group /streams")
 
 
 def _recording(file: h5py.File, path: Path, opened_as: str, rows: int | None) -> Recording:
@@ -116,7 +91,7 @@ def _recording(file: h5py.File, path: Path, opened_as: str, rows: int | None) ->
         events=(*events, *warnings),
         kind=str(root.get("kind", "tunnel")),
         created=str(root.get("created", "")),
-        water_density=_number(root.get("water_density")),
+        water_density=number(root.get("water_density")),
         source=path.name,
         attributes=_rest(root) | {"opened_as": opened_as, "streams": {n: _facts(g) for n, g in streams.items()}},
         **_end(file, root),
@@ -125,14 +100,14 @@ def _recording(file: h5py.File, path: Path, opened_as: str, rows: int | None) ->
 
 def _end(file: h5py.File, root: Mapping[str, object]) -> dict[str, Any]:
     """`complete`, `outcome` and `cause`: /end is believed before the root attributes."""
-    end = file.get("end")
-    end = end if isinstance(end, h5py.Group) else {}
+    end = member(file, "end")
 
     def fact(name: str, absent: object) -> Any:
-        return end[name][()] if name in end else root.get(name, absent)
+        found = table(end, name) if isinstance(end, h5py.Group) else None
+        return found[()] if found is not None and found.size == 1 else root.get(name, absent)
 
     return {
-        "complete": bool(_number(fact("complete", False))),
+        "complete": bool(number(fact("complete", False))),
         "outcome": text_of(fact("outcome", "")),
         "cause": text_of(fact("cause", "")),
     }
@@ -203,9 +178,9 @@ def _channel(
         unit=unit,
         time=time[good],
         value=value[good],
-        noise_std=_number(facts.get("noise_std")),
-        range_min=_number(facts.get("range_min")),
-        range_max=_number(facts.get("range_max")),
+        noise_std=number(facts.get("noise_std")),
+        range_min=number(facts.get("range_min")),
+        range_max=number(facts.get("range_max")),
         calibration=_calibration(text_of(facts.get("calibration", ""))),
         thruster=text_of(facts.get("thruster", "")) or None,
         axis=text_of(facts.get("axis", "")) or None,
@@ -216,10 +191,10 @@ def _channel(
 
 def _acquisition(channel: Mapping[str, Any], stream: Mapping[str, Any]) -> Acquisition:
     """What is said of it; a time or a step that is negative or not finite says nothing."""
-    said = {key: _number(channel.get(key)) for key in ("delay", "delay_std", "window", "low_pass", "quantum", "hold")}
-    said |= {key: _number(stream.get(key)) for key in ("period", "clock_drift_std")}
+    said = {key: number(channel.get(key)) for key in ("delay", "delay_std", "window", "low_pass", "quantum", "hold")}
+    said |= {key: number(stream.get(key)) for key in ("period", "clock_drift_std")}
     said["period"] = said["period"] or None  # a clock that does not tick is none
-    said["quantum"] = said["quantum"] or _number(channel.get("resolution"))  # as it was called at first
+    said["quantum"] = said["quantum"] or number(channel.get("resolution"))  # as it was called at first
     known = {key: value for key, value in said.items() if value is not None and np.isfinite(value) and value >= 0}
     how, rounding = (text_of(channel.get(key, "")) for key in ("filter", "rounding"))
     return Acquisition(**known, filter=how, rounding=rounding)
@@ -246,7 +221,7 @@ def _calibration(text: str) -> dict[str, object]:
         return {}
     try:
         content = json.loads(text)
-    except json.JSONDecodeError:
+    except (ValueError, RecursionError):
         return {"text": text}
     return content if isinstance(content, dict) else {"value": content}
 
@@ -262,12 +237,12 @@ def _events(file: h5py.File, findings: Findings) -> tuple[Event, ...]:
 
 
 def _table(file: h5py.File, name: str, fields: tuple[str, ...], findings: Findings) -> list[tuple[Any, ...]]:
-    item = dict(members(file)).get(name)
+    item = table(file, name)
     if item is None:
         if name in file:
             findings.texts.append(f"/{name} can't be read: left out")
         return []
-    if not isinstance(item, h5py.Dataset) or not set(fields) <= set(item.dtype.names or ()):
+    if not set(fields) <= set(item.dtype.names or ()):
         findings.texts.append(f"/{name} is not a table with the fields {', '.join(fields)}: left out")
         return []
     try:
@@ -278,17 +253,12 @@ def _table(file: h5py.File, name: str, fields: tuple[str, ...], findings: Findin
     return list(zip(*(rows[field].tolist() for field in fields), strict=True))
 
 
-def _number(value: Any) -> float | None:
-    """A finite number of whatever HDF5 holds; None for anything else."""
-    try:
-        number = float(np.asarray(value).reshape(-1)[0]) if value is not None else np.nan
-    except (TypeError, ValueError, IndexError):
-        return None
-    return number if np.isfinite(number) else None
-
-
 def _plain(value: Any) -> Any:
-    """An attribute as str, bool, int, float or list."""
+    """An attribute as str, bool, int, float or list; what HDF5 has beside these as a text that says what it is."""
     if isinstance(value, bytes) or (isinstance(value, np.ndarray) and value.dtype.kind in "SO" and value.size == 1):
         return text_of(value)
-    return value.tolist() if isinstance(value, np.ndarray | np.generic) else value
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return value if isinstance(value, str | bool | int | float) else text_of(value)

@@ -4,27 +4,42 @@ lies in the file itself.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any, Final
 
 import h5py
 
-DAMAGE: Final = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError)
+DAMAGE: Final = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
 """What h5py raises for a piece of a file that is torn or makes no sense."""
 MOST_DEFLATED: Final = 1100
 """Times; zlib packs at most 1032 to 1 (zlib Technical Details)."""
+MOST_SPARSE: Final = 64
+"""Times; a column is made longer before its rows are written, and a disk that is full keeps them out."""
+LARGEST_CHUNK: Final = 2**26
+"""Bytes that a file may make HDF5 take at once, whatever its own size."""
 
 
 def members(group: h5py.Group) -> Iterator[tuple[str, Any]]:
-    """(name, object) of a group. What can't be opened, or stands in another file, is left out."""
+    """(name, object) of a group. What can't be opened, or only points to another place or file, is left out."""
     for name in list(group):
-        try:
-            if isinstance(group.get(name, getlink=True), h5py.ExternalLink):
-                continue
-            item = group[name]
-        except DAMAGE:
-            continue
-        yield name, item
+        item = member(group, name)
+        if item is not None:
+            yield name, item
+
+
+def member(group: h5py.Group, name: str) -> Any:
+    """One object of a group; None where there is none, it can't be opened, or it only points somewhere."""
+    try:
+        return group[name] if isinstance(group.get(name, getlink=True), h5py.HardLink) else None
+    except DAMAGE:
+        return None
+
+
+def table(group: h5py.Group, name: str) -> h5py.Dataset | None:
+    """A dataset of any type and shape whose values are in this file; None where there is no such."""
+    item = member(group, name)
+    return item if isinstance(item, h5py.Dataset) and _is_justified(item) else None
 
 
 def numeric_columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
@@ -33,12 +48,24 @@ def numeric_columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
 
 
 def _is_column(item: h5py.Dataset) -> bool:
-    """Also: its values are in this file, which is long enough to hold them."""
     try:
-        if item.ndim != 1 or item.dtype.kind not in "iufb" or item.external:
+        return item.ndim == 1 and item.dtype.kind in "iufb" and _is_justified(item)
+    except DAMAGE:
+        return False
+
+
+def _is_justified(item: h5py.Dataset) -> bool:
+    """Whether its values are in this file, which is long enough to hold them."""
+    try:
+        if item.external or item.is_virtual:
             return False
-        stored = int(item.id.get_storage_size())
-        return bool(item.size * item.dtype.itemsize <= stored * (MOST_DEFLATED if item.chunks else 1))
+        stored = min(int(item.id.get_storage_size()), item.file.id.get_filesize())
+        packed = item.id.get_create_plist().get_nfilters() > 0
+        chunk = math.prod(item.chunks or (0,)) * item.dtype.itemsize
+        return bool(
+            item.size * item.dtype.itemsize <= stored * (MOST_DEFLATED if packed else MOST_SPARSE) + chunk
+            and chunk <= max(LARGEST_CHUNK, item.file.id.get_filesize())
+        )
     except DAMAGE:
         return False
 

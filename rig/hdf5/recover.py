@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rig.errors import RecordingError
+from rig.hdf5.apart import apart, open_no_more
 from rig.hdf5.layout import CAUSE_BYTES, EVENT_TYPE, FLUSH_PERIOD, OUTCOME_BYTES, fixed, text_of
-from rig.hdf5.load import open_for_reading
-from rig.hdf5.members import DAMAGE, attributes, members, numeric_columns
+from rig.hdf5.members import DAMAGE, attributes, members, numeric_columns, table
+from rig.hdf5.opening import open_for_reading, require_file
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,20 +39,30 @@ def recover(path: str | Path, out: str | Path) -> tuple[Loss, ...]:
     path, out = Path(path), Path(out)
     if out.exists():
         raise RecordingError(f"{out} exists; a recording is never overwritten: give another name")
+    require_file(path)
+    part = out.with_name(out.name + ".part")
+    try:
+        losses = apart(lambda: _recover(path, part), path)
+    except RecordingError:
+        part.unlink(missing_ok=True)
+        raise
+    part.rename(out)
+    return losses
+
+
+def _recover(path: Path, part: Path) -> tuple[Loss, ...]:
     source, opened_as = open_for_reading(path)
     with source:
         if opened_as == "plain":
             raise RecordingError(f"{path} opens as it is; there is nothing to recover")
-        part = out.with_name(out.name + ".part")
         lost: list[str] = []
         try:
             with h5py.File(part, "w") as target:
+                open_no_more()
                 losses = _copy(source, target, lost)
                 _mark(source, target, path, [*lost, *(sentence(loss) for loss in losses)])
         except DAMAGE as error:
-            part.unlink(missing_ok=True)
             raise RecordingError(f"{path} is damaged beyond recovery: {error}") from error
-        part.rename(out)
     return losses
 
 
@@ -66,7 +78,8 @@ def _copy(source: h5py.File, target: h5py.File, lost: list[str]) -> tuple[Loss, 
             lost.append(f"/{name} can't be read: {error}")
     streams = target.create_group("streams", track_order=True)
     _copy_attributes(source["streams"], streams, lost)
-    return tuple(_copy_stream(name, item, streams, lost) for name, item in members(source["streams"]) if len(item))
+    groups = [(name, item) for name, item in members(source["streams"]) if isinstance(item, h5py.Group) and len(item)]
+    return tuple(_copy_stream(name, group, streams, lost) for name, group in groups)
 
 
 def _copy_stream(name: str, source: h5py.Group, streams: h5py.Group, lost: list[str]) -> Loss:
@@ -89,8 +102,9 @@ def _copy_stream(name: str, source: h5py.Group, streams: h5py.Group, lost: list[
 def _unflushed(columns: dict[str, h5py.Dataset], n: int) -> int:
     if "time" not in columns or n < 2:
         return 0
-    first, last = columns["time"][0], columns["time"][n - 1]
-    return int(np.ceil(2 * FLUSH_PERIOD * (n - 1) / (last - first))) if last > first else 0
+    first, last = (float(columns["time"][row]) for row in (0, n - 1))
+    rows = 2 * FLUSH_PERIOD * (n - 1) / (last - first) if last > first else 0.0
+    return math.ceil(rows) if math.isfinite(rows) else 0
 
 
 def _copy_attributes(source: Any, target: Any, lost: list[str]) -> None:
@@ -106,18 +120,23 @@ def _mark(source: h5py.File, target: h5py.File, path: Path, lost: list[str]) -> 
         target.attrs["outcome"] = fixed("aborted", OUTCOME_BYTES)
     sentences = [cause, *lost]
     if "events" in source:
-        old = _old_events(source["events"], sentences)
+        events = table(source, "events")
+        old = _old_events(events, sentences)
         new = np.zeros(len(sentences), dtype=old.dtype)
         new["time"] = _latest(target)
         new["level"] = b"warning"
         new["text"] = [text.encode() for text in sentences]
-        table = target.create_dataset("events", data=np.concatenate([old, new]))
-        _copy_attributes(source["events"], table, [])
+        made = target.create_dataset("events", data=np.concatenate([old, new]))
+        if events is not None:
+            _copy_attributes(events, made, [])
 
 
-def _old_events(table: h5py.Dataset, sentences: list[str]) -> NDArray[Any]:
+def _old_events(events: h5py.Dataset | None, sentences: list[str]) -> NDArray[Any]:
+    if events is None:
+        sentences.append("/events can't be read")
+        return np.zeros(0, EVENT_TYPE)
     try:
-        rows: NDArray[Any] = table[()]
+        rows: NDArray[Any] = events[()]
     except DAMAGE as error:
         sentences.append(f"/events can't be read: {error}")
         return np.zeros(0, EVENT_TYPE)

@@ -1,0 +1,175 @@
+"""Reading what a stranger made in a process of its own: whatever HDF5 does with it, this one goes on.
+
+The child is a fork, so nothing is imported again, and its answer comes back in shared memory. Its time, its memory and
+what it may write are limited by the size of the file; once the file is open it can open no other. Decision 14 has what
+that costs.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import gc
+import math
+import mmap
+import os
+import pickle
+import resource
+import select
+import signal
+import struct
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Final, NoReturn, TypeVar
+
+from rig.errors import RecordingError, RigError
+
+T = TypeVar("T")
+
+MEMORY: Final = 256 * 2**20
+"""Bytes that reading any file may take,"""
+MEMORY_PER_BYTE: Final = 32
+"""and for each of its bytes: numbers of four bytes become eight, each has a time of its own, and both are masked."""
+SECONDS: Final = 5
+"""Of a processor that reading any file may take,"""
+BYTES_PER_SECOND: Final = 5 * 2**20
+"""and as many again for so many of its bytes: packed ones, on a slow machine."""
+PATIENCE: Final = 12
+"""By the clock as many times longer: a disk, a network or a busy machine."""
+SIZES: Final = struct.Struct("<Q")
+ALIGNED: Final = 64
+"""Bytes to whose multiples the arrays begin."""
+
+
+def apart(work: Callable[[], T], path: Path) -> T:
+    """What `work` returns, done in a child that may not use more than the file at `path` justifies.
+
+    Raises what `work` raises, and RecordingError where it needed too much or died.
+    """
+    size = path.stat().st_size
+    seconds = SECONDS + math.ceil(size / BYTES_PER_SECOND)
+    memory = MEMORY + MEMORY_PER_BYTE * size
+    answer = os.memfd_create("recording", os.MFD_CLOEXEC)
+    try:
+        child = os.fork()
+        if child == 0:
+            _child(work, answer, seconds, memory)
+        status = _awaited(child, seconds * PATIENCE)
+        if status != 0:
+            raise RecordingError(f"{path} is damaged, or was made to harm: {_reason(status, seconds, memory)}")
+        with suppress(struct.error):  # nothing was written
+            found: T = _result(_unpacked(answer))
+            return found
+        raise RecordingError(f"{path} is damaged: reading it ended without an answer")
+    finally:
+        os.close(answer)
+
+
+def open_no_more() -> None:
+    """From here on this process opens no file: neither one that a link names nor one that holds values."""
+    resource.setrlimit(resource.RLIMIT_NOFILE, (0, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+
+
+def _child(work: Callable[[], object], answer: int, seconds: int, memory: int) -> NoReturn:
+    status = 1
+    try:
+        faulthandler.disable()  # the parent says how this ended
+        gc.disable()  # it would touch, and so copy, all that the parent has
+        signal.signal(signal.SIGINT, signal.SIG_IGN)  # it is the parent's to stop
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        _limit(resource.RLIMIT_CORE, 0)
+        _limit(resource.RLIMIT_CPU, seconds)
+        _limit(resource.RLIMIT_AS, memory + _address_space())
+        _limit(resource.RLIMIT_FSIZE, memory)
+        _write(answer, _attempt(work))
+        status = 0
+    finally:
+        os._exit(status)
+
+
+def _limit(what: int, most: int) -> None:
+    hard = resource.getrlimit(what)[1]
+    resource.setrlimit(what, (most if hard == resource.RLIM_INFINITY else min(most, hard), hard))
+
+
+def _address_space() -> int:
+    return int(Path("/proc/self/statm").read_text(encoding="ascii").split()[0]) * mmap.PAGESIZE
+
+
+def _attempt(work: Callable[[], object]) -> tuple[str, object]:
+    try:
+        return "done", work()
+    except RigError as error:
+        return "refused", error
+    except MemoryError:
+        return "memory", None
+    except Exception:  # noqa: BLE001 - the top of a process; a fault of this program, which the parent raises
+        return "failed", traceback.format_exc()
+
+
+def _result(found: tuple[str, Any]) -> Any:
+    how, what = found
+    if how == "done":
+        return what
+    if how == "refused" and isinstance(what, RigError):
+        raise what
+    if how == "memory":
+        raise RecordingError(
+            "more memory is needed to read the recording than its size justifies; unpack it: h5repack -f NONE IN OUT"
+        )
+    raise RuntimeError(f"reading a recording failed:\n{what}")
+
+
+def _write(answer: int, result: tuple[str, object]) -> None:
+    """Number of arrays, the pickle and the arrays, each behind its length."""
+    arrays: list[pickle.PickleBuffer] = []
+    pickled = pickle.dumps(result, protocol=5, buffer_callback=arrays.append)
+    pieces = [memoryview(pickled), *(array.raw() for array in arrays)]
+    with open(answer, "wb", closefd=False) as file:
+        file.write(SIZES.pack(len(arrays)))
+        for piece in pieces:
+            file.write(SIZES.pack(piece.nbytes))
+            file.seek(-file.tell() % ALIGNED, os.SEEK_CUR)
+            file.write(piece.cast("B"))
+        file.truncate()
+
+
+def _unpacked(answer: int) -> tuple[str, Any]:
+    """Arrays that can't be written, all in one piece of memory. Raises struct.error if nothing was answered."""
+    with open(answer, "rb", closefd=False) as file:
+        file.seek(0)
+        view = memoryview(file.read())
+    (count,) = SIZES.unpack_from(view)
+    at, pieces = SIZES.size, []
+    for _ in range(count + 1):
+        (length,) = SIZES.unpack_from(view, at)
+        at += SIZES.size
+        at += -at % ALIGNED
+        pieces.append(view[at : at + length])
+        at += length
+    found: tuple[str, Any] = pickle.loads(pieces[0], buffers=pieces[1:])  # noqa: S301 - of our own child
+    return found
+
+
+def _awaited(child: int, seconds: float) -> int:
+    """Exit status, negative for a signal. However this is left, the child has ended."""
+    descriptor = os.pidfd_open(child)
+    try:
+        poll = select.poll()
+        poll.register(descriptor, select.POLLIN)
+        poll.poll(seconds * 1000)
+    finally:
+        os.close(descriptor)
+        with suppress(ProcessLookupError):
+            os.kill(child, signal.SIGKILL)  # one that has ended is not hurt: it waits to be asked how
+        _, status = os.waitpid(child, 0)
+    return os.waitstatus_to_exitcode(status)
+
+
+def _reason(status: int, seconds: int, memory: int) -> str:
+    if status in (-signal.SIGXCPU, -signal.SIGKILL):
+        return f"reading it takes more than {seconds} s, or more memory than there is"
+    if status == -signal.SIGXFSZ:
+        return f"what it says it holds takes more than {memory // 2**20} MiB, which its size does not justify"
+    return f"HDF5 ended with {signal.Signals(-status).name if status < 0 else f'status {status}'}"
