@@ -18,7 +18,7 @@ from rig.console.feed import Feed
 from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
 from rig.console.parting import Parting, begin, refused, settled
 from rig.console.plots import FitPlot, ResidualPlot, TimePlot
-from rig.console.view_model.keys import key_line, page_of
+from rig.console.view_model.keys import device_gone, key_line, page_of
 from rig.console.view_model.view import View, absorb
 from rig.errors import LinkError
 from rig.link.front_end_messages import Request, RequestKind
@@ -45,7 +45,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
         Binding("ctrl+q", "leave", "leave", priority=True),
         Binding("f5", "go", "start"),
         Binding("p", "ask('pause')", "pause"),
-        Binding("r", "ask('resume')", "resume"),
+        Binding("r", "again", "resume, retry"),
         Binding("k", "ask('skip')", "skip"),
         Binding("n", "note", "note"),
         Binding("d", "leave", "detach"),
@@ -176,6 +176,15 @@ class ConsoleApp(App[None], inherit_bindings=False):
             self.action_ask(waits_for[state])
         else:
             self.notify("F5 starts a run; the controller waits for no start now.", severity="warning")
+
+    def action_again(self) -> None:
+        """R: in the preflight one device that is not there is tried once more, later a pause ends."""
+        snapshot = self.state.snapshot
+        gone = device_gone(snapshot) if snapshot is not None and snapshot.state == "preflight" else ""
+        if gone:
+            self.action_ask("retry", gone)
+        else:
+            self.action_ask("resume")
 
     def action_view(self, name: str) -> None:
         self.chosen = name

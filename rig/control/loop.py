@@ -172,6 +172,10 @@ class Loop:
             if sample.stream == stream and sample.t_ns >= since_ns
         )
 
+    def begin_link(self) -> None:
+        """The motor's link was opened, before anything may turn: what an earlier one refused is over."""
+        self._command_error = ""
+
     def begin_recording(self, t0_ns: int) -> None:
         self.recording_since_ns, self._recorded_command = t0_ns, None
         self.motor_watch.begin_run()

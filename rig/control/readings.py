@@ -112,6 +112,17 @@ class Readings:
             return None
         return (len(times) - 1) / ((times[-1] - times[0]) * 1e-9)
 
+    def age(self, stream: str, now: float) -> float:
+        """Seconds since its last row; 0 before the first."""
+        sample = self.latest.get(stream)
+        return 0.0 if sample is None else now - sample.t_ns * 1e-9
+
+    def forget(self, streams: Iterable[str]) -> None:
+        """Their device is opened anew: its rate is counted from here."""
+        for stream in streams:
+            self.latest.pop(stream, None)
+            self.arrivals.pop(stream, None)
+
     def view(self, now: float) -> tuple[Reading, ...]:
         """Every channel that has a quantity or a limit; `now` in s."""
         return tuple(self._reading(guarded, now) for guarded in self.shown.values())

@@ -31,10 +31,11 @@ class Loss:
     """At most so many more had come after the last flush, by the stream's own mean rate; no file has them."""
 
 
-def recover(path: str | Path, out: str | Path) -> tuple[Loss, ...]:
+def recover(path: str | Path, out: str | Path, end: tuple[str, str] = ("aborted", "")) -> tuple[Loss, ...]:
     """Copy a recording that was not closed in order into a plain file `out`, a new one. Raises RecordingError.
 
     The writer must have ended. The copy keeps id, steps, events and everything unknown; it stays `complete = false`.
+    `end`: outcome and cause, where somebody else knows how the run ended.
     """
     path, out = Path(path), Path(out)
     if out.exists():
@@ -60,7 +61,7 @@ def _recover(path: Path, part: Path) -> tuple[Loss, ...]:
             with h5py.File(part, "w") as target:
                 open_no_more()
                 losses = _copy(source, target, lost)
-                _mark(source, target, path, [*lost, *(sentence(loss) for loss in losses)])
+                _mark(source, target, path, end, [*lost, *(sentence(loss) for loss in losses)])
         except DAMAGE as error:
             raise RecordingError(f"{path} is damaged beyond recovery: {error}") from error
     return losses
@@ -112,12 +113,14 @@ def _copy_attributes(source: Any, target: Any, lost: list[str]) -> None:
         target.attrs.create(name, value, dtype=source.attrs.get_id(name).dtype)
 
 
-def _mark(source: h5py.File, target: h5py.File, path: Path, lost: list[str]) -> None:
-    cause = f"recovered from {path.name}, which was not closed in order"
+def _mark(source: h5py.File, target: h5py.File, path: Path, end: tuple[str, str], lost: list[str]) -> None:
+    recovered = f"recovered from {path.name}, which was not closed in order"
+    outcome, why = end
+    cause = f"{why}; {recovered}" if why else recovered
     if "end" in target and text_of(target["end/outcome"][()]) == "running":
-        target["end/outcome"][...] = fixed("aborted", OUTCOME_BYTES)
+        target["end/outcome"][...] = fixed(outcome, OUTCOME_BYTES)
         target["end/cause"][...] = fixed(cause, CAUSE_BYTES)
-        target.attrs["outcome"] = fixed("aborted", OUTCOME_BYTES)
+        target.attrs["outcome"] = fixed(outcome, OUTCOME_BYTES)
     sentences = [cause, *lost]
     if "events" in source:
         events = table(source, "events")

@@ -138,6 +138,7 @@ class Snapshot:
 
 RequestKind = Literal[
     "start",  # begin the first run (preflight passed)
+    "retry",  # try once more to open the device of that name (preflight); "": all that are not there
     "mounted",  # the thruster asked for is on the bench
     "stop",  # zero now, end the campaign, close the file
     "pause",

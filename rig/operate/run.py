@@ -24,10 +24,14 @@ from rig.operate.headless import Headless, check_alive, operator_terminal
 if TYPE_CHECKING:
     from rig.campaign.config import CampaignConfig
 
-START_TIMEOUT = 15.0
-"""s for a controller process to open its socket (imports included)."""
+START_TIMEOUT = 120.0
+"""s for a controller process to open its socket, imports included: half a minute on a machine that is busy."""
+START_NEWS = 5.0
+"""s after which, and then again and again, it is said that it still starts."""
 END_TIMEOUT = 15.0
 """s for a controller process to close its files and end after `done`."""
+STARTS = "the controller process is started at"
+"""Begins the first line of its log, so that the log of one that never comes up is not empty."""
 SOCKET_NAME = "controller.sock"
 LOG_NAME = "controller.log"
 
@@ -122,6 +126,8 @@ def campaign_folder(output: Path, name: str) -> Path:
 def start_controller(campaign: Path, folder: Path, thrusters: Sequence[str]) -> tuple[Run, subprocess.Popen[bytes]]:
     """Start the controller process in a session of its own; returns once it listens. It outlives us if it may."""
     with (folder / LOG_NAME).open("ab") as log:
+        log.write(f"{STARTS} {datetime.now().astimezone():%Y-%m-%d %H:%M:%S}\n".encode())
+        log.flush()
         process = subprocess.Popen(
             [sys.executable, "-m", "rig.stages.controller", str(campaign.resolve()), str(folder), *thrusters],
             stdin=subprocess.DEVNULL,
@@ -130,16 +136,24 @@ def start_controller(campaign: Path, folder: Path, thrusters: Sequence[str]) -> 
             start_new_session=True,
         )
     try:
-        return _listening(process, folder), process
+        return listening(process, folder), process
     except BaseException:  # Ctrl+C while it starts: nobody would ever attach to it
         process.terminate()
         raise
 
 
-def _listening(process: subprocess.Popen[bytes], folder: Path) -> Run:
-    """The run, once its controller has announced it."""
-    deadline = time.monotonic() + START_TIMEOUT
-    while time.monotonic() < deadline:
+def listening(process: subprocess.Popen[bytes], folder: Path, news: float = START_NEWS) -> Run:
+    """The run, once its controller has announced it; a machine that is slow is told about every `news` s."""
+    begun = time.monotonic()
+    told = 0
+    while (taken := time.monotonic() - begun) < START_TIMEOUT:
+        if taken > (told + 1) * news:
+            told += 1
+            click.echo(
+                f"rig: the controller (process {process.pid}) still starts, {taken:.0f} s so far: the machine is slow "
+                f"or busy; it is waited for {START_TIMEOUT:g} s, Ctrl+C ends it",
+                err=True,
+            )
         run = next((run for run in live_runs() if run.pid == process.pid), None)
         if run is not None:
             return run
@@ -148,7 +162,10 @@ def _listening(process: subprocess.Popen[bytes], folder: Path) -> Run:
         except subprocess.TimeoutExpired:
             continue
         raise LinkError(f"the controller ended at once: {_last_words(folder)}")
-    raise LinkError(f"the controller did not open its socket within {START_TIMEOUT:g} s; see {folder / LOG_NAME}")
+    raise LinkError(
+        f"the controller did not open its socket within {START_TIMEOUT:g} s and was ended; its last words: "
+        f"{_last_words(folder)}"
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -231,4 +248,4 @@ def _exists(pid: int) -> bool:
 
 def _last_words(folder: Path) -> str:
     lines = (folder / LOG_NAME).read_text(encoding="utf-8", errors="replace").strip().splitlines()
-    return lines[-1].removeprefix("rig: ") if lines else "it said nothing"
+    return lines[-1].removeprefix("rig: ") if lines and not lines[-1].startswith(STARTS) else "it said nothing"

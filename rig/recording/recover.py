@@ -6,6 +6,9 @@ from pathlib import Path
 
 import click
 
+from rig.errors import RecordingError
+from rig.recording.ledger import FILE_NAME, read
+
 
 @click.command("recover", help="Copy a recording that was not closed in order into a plain file; FILE is not changed.")
 @click.argument("file", type=click.Path(path_type=Path))
@@ -16,7 +19,20 @@ def recover_command(file: Path, output: Path | None) -> None:
     from rig.hdf5.recover import sentence
 
     out = output or file.with_name(f"{file.stem}-recovered.h5")
-    losses = recover(file, out)
+    losses = recover(file, out, end_of(file))
     for loss in losses:
         click.echo(sentence(loss))
     click.echo(f"{out}: {sum(loss.kept for loss in losses)} rows in {len(losses)} streams")
+
+
+def end_of(file: Path) -> tuple[str, str]:
+    """Outcome and cause of the run that a recording is of, by the ledger beside it: a recorder that was killed could
+    not write them down, and the controller did. Of a run that no ledger knows the end of: aborted, and no cause."""
+    try:
+        facts = read(file.parent) if (file.parent / FILE_NAME).exists() else []
+    except RecordingError as error:
+        click.echo(f"how the run ended is not taken from its ledger: {error}", err=True)
+        facts = []
+    ends = [fact for fact in facts if fact["fact"] == "run_end" and Path(fact["recording"]).name == file.name]
+    outcome, cause = (ends[-1]["outcome"], ends[-1]["cause"]) if ends else ("aborted", "")
+    return (outcome, cause) if outcome in ("aborted", "tripped") else ("aborted", cause)

@@ -1,4 +1,4 @@
-"""The stages before a propeller may turn: open the devices, judge the bench until the operator starts it."""
+"""Before a propeller may turn: open the devices, judge the bench until the operator starts it."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 from rig.campaign.disarmed import disarmed
 from rig.control.event_log import Level
 from rig.control.readings import Readings
-from rig.errors import DeviceError, LinkError
 from rig.link.front_end_messages import Check
 from rig.recording.ledger import file_facts
-from rig.stages.preflight import all_checks, armed_checks, consistency_check, device_checks, flow_check
+from rig.stages.connecting import Links
+from rig.stages.preflight import all_checks, armed_checks, consistency_check, flow_check
 from rig.stages.session import Session, Stopped
 
 SETTLE_ROWS = 5
@@ -24,69 +24,51 @@ UNSEEN = 60.0
 """s for which a campaign that nobody has started waits without any front end: it holds the bench."""
 
 
-def connect(session: Session) -> None:
-    """Open the devices one by one, and say how it went; a device that fails ends the campaign here."""
-    failures: dict[str, str] = {}
-    names = tuple(session.bench.instruments)
-    for name in names:
-        session.status.checks = device_checks(session.bench.identities, failures, names)
-        session.turn()
-        try:
-            session.say("info", f"{name}: {session.bench.open_device(name)}", of_bench=True)
-        except (LinkError, DeviceError) as error:
-            failures[name] = str(error)
-            session.say("error", str(error))
-        if name == session.campaign.bench.motor and name not in failures:
-            session.motor = session.bench.motor
-    session.status.checks = device_checks(session.bench.identities, failures, names)
-    if failures:
-        session.turn()
-        raise DeviceError(next(iter(failures.values())))
-    _require_same_devices(session)
-
-
-def _require_same_devices(session: Session) -> None:
-    """A resumed campaign goes on with the devices it began with (docs/reliability.md, promise 23)."""
-    begun: dict[str, str] = next((fact["identities"] for fact in session.before if fact["fact"] == "start"), {})
-    for name, identity in session.bench.identities.items():
-        if begun.get(name, identity) != identity:
-            raise DeviceError(
-                f"{name} is {identity}, but the campaign was begun with {begun[name]}: put that back, or begin anew"
-            )
-
-
 def preflight(session: Session) -> None:
-    """Judge the bench until the operator starts it; the checks go on while he looks."""
+    """Open the devices, then judge the bench until the operator starts it; the checks go on while he looks.
+
+    A device that does not open, or is lost, is tried again and again: nothing has begun, and the folder stays this one.
+    """
+    links = Links(session)
+    links.open_all()
     streams = [stream for _, stream in session.bench.streams()]
-    devices, armed = list(session.status.checks), armed_checks(disarmed(session.campaign, streams))
-    armed.append(consistency_check(session.loop.motor_watch.consistency))
+    armed = armed_checks(disarmed(session.campaign, streams))
     flow = Flow(session.campaign.flow_speed, session.loop.now + FLOW_PATIENCE)
-    session.turn_for(SETTLE_ROWS * max(stream.period_s for stream in streams))
-    started, seen = False, session.loop.now
-    while not started:
+    if not links.failures:
+        session.turn_for(SETTLE_ROWS * max(stream.period_s for stream in streams))
+    seen = session.loop.now
+    while True:
         requests = session.turn()
         session.status.state = "preflight"
         seen = session.loop.now if session.loop.clients.connected else seen
         if session.loop.now - seen > UNSEEN:
             raise Stopped("aborted", f"nobody started the campaign, and no front end was there for {UNSEEN:g} s")
-        checks = armed + all_checks(
-            session.campaign.bench,
-            session.loop.readings,
-            session.bench.motor.watchdog,
-            session.loop.now,
-            proving=session.campaign.prove_watchdog,
-        )
-        checks += flow.checks(session.loop.readings, session.loop.now)
-        session.status.checks = devices + checks
-        failed = [check for check in checks if check.verdict in ("failed", "waiting")]
+        links.look(requests)
+        checks = [*armed, *_bench_checks(session, links), *flow.checks(session.loop.readings, session.loop.now)]
+        session.status.checks = [*links.checks, *checks]
         if any(request.kind == "start" for request in requests):
-            started = not failed
-            if failed:
-                session.say("warning", f"not started: {failed[0].name}: {failed[0].text}")
+            against = [check for check in session.status.checks if check.verdict in ("failed", "waiting")]
+            if not against:
+                break
+            session.say("warning", f"not started: {against[0].name}: {against[0].text}")
     for check in checks:
         level: Level = "warning" if check.verdict == "warning" else "info"
         session.say(level, f"preflight: {check.name}: {check.text}", of_bench=True)
     _start(session)
+
+
+def _bench_checks(session: Session, links: Links) -> list[Check]:
+    """What the devices send; nothing of those that are not there, whose own line says so."""
+    gone = {s.name for name in links.failures for s in session.bench.instruments[name].streams}
+    checks = all_checks(
+        session.campaign.bench,
+        session.loop.readings,
+        session.bench.motor.watchdog,
+        session.loop.now,
+        proving=session.campaign.prove_watchdog,
+        without=gone,
+    )
+    return [consistency_check(session.loop.motor_watch.consistency), *checks]
 
 
 @dataclass

@@ -1,4 +1,4 @@
-"""One campaign on an open bench: connect, preflight, then mount and measure each thruster; ends with the motor at rest.
+"""One campaign on an open bench: preflight, then mount and measure each thruster; ends with the motor at rest.
 
 Stages run one after another; each is a loop of ticks. Whatever happens, the last thing done to the motor is 0 V and
 release.
@@ -19,7 +19,7 @@ from rig.link.sockets import listen, socket_path
 from rig.recording.ledger import FILE_NAME, Ledger, read, recordings_before
 from rig.recording.line_writer import LineWriter
 from rig.recording.recorder_link import RecorderLink
-from rig.stages.arming import connect, preflight
+from rig.stages.arming import preflight
 from rig.stages.measuring import measure
 from rig.stages.mounting import mount
 from rig.stages.session import Session, Stopped, begin
@@ -76,7 +76,6 @@ def run(session: Session) -> None:
 
 def stages(session: Session) -> None:
     """Raises Stopped or RigError for everything that ends a campaign early."""
-    connect(session)
     preflight(session)
     for index in range(len(session.status.thrusters)):
         session.status.run = index

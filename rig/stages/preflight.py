@@ -18,6 +18,8 @@ Verdict = Literal["waiting", "passed", "warning", "failed"]
 
 RATE_TOLERANCE = 0.25
 """Relative difference between a stream's real and nominal rate that is still taken as healthy."""
+OLD, OLD_PERIODS = 0.5, 5
+"""s and sample periods, whichever is longer, since the last row of a stream that still counts as coming."""
 FLOW_TOLERANCE = 0.1
 """Of the speed that the campaign is meant for: measured flow that is farther off is told, from FLOW_TOO_FAR times that
 on the campaign is not begun."""
@@ -39,12 +41,14 @@ def device_checks(identities: Mapping[str, str], failures: Mapping[str, str], na
     return checks
 
 
-def rate_check(stream: Stream, rate: float | None) -> Check:
-    """Does the stream come as fast as it should?"""
+def rate_check(stream: Stream, rate: float | None, age: float = 0.0) -> Check:
+    """Does the stream come as fast as it should? `age`: s since its last row."""
     nominal = 1.0 / stream.period_s
     name = f"{stream.name} rate"
     if rate is None:
         return Check(name, "failed", f"no samples came; {nominal:.3g}/s are expected")
+    if age > max(OLD, OLD_PERIODS * stream.period_s):
+        return Check(name, "failed", f"nothing came for {age:.1f} s; {nominal:.3g}/s are expected")
     if not SLOWEST <= rate / nominal <= FASTEST:
         text = f"{rate:.3g}/s of {nominal:.3g}/s: a run would be stopped for it; correct the device or the bench file"
         return Check(name, "failed", text)
@@ -144,11 +148,18 @@ def consistency_check(watch: ConsistencyWatch) -> Check:
 
 
 def all_checks(
-    config: BenchConfig, readings: Readings, watchdog: Watchdog, now: float, *, proving: bool
+    config: BenchConfig,
+    readings: Readings,
+    watchdog: Watchdog,
+    now: float,
+    *,
+    proving: bool,
+    without: Collection[str] = (),
 ) -> list[Check]:
-    """Everything that is judged once the devices are open."""
-    view = readings.view(now)
-    checks = [rate_check(stream, readings.rate(name)) for name, stream in readings.streams.items()]
+    """Everything that is judged once the devices are open; nothing of the streams of those that are not."""
+    view = [reading for reading in readings.view(now) if readings.place[reading.channel][0] not in without]
+    there = [stream for name, stream in readings.streams.items() if name not in without]
+    checks = [rate_check(stream, readings.rate(stream.name), readings.age(stream.name, now)) for stream in there]
     checks.append(watchdog_check(watchdog, config.watchdog_limit, proving=proving))
     checks.append(rest_check(view, config.rest_rate))
     stop_input = stop_input_check(view)

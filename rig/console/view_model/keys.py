@@ -5,6 +5,7 @@ from __future__ import annotations
 from rich.text import Text
 
 from rig.console.view_model.view import View
+from rig.link.front_end_messages import Snapshot
 
 VIEW_KEYS = (("1", "main"), ("2", "V|V|"), ("3", "time"), ("4", "log"), ("5", "table"))
 
@@ -25,6 +26,13 @@ def key_line(view: View) -> Text:
     return text
 
 
+def device_gone(snapshot: Snapshot) -> str:
+    """The first device whose row is red; empty: they are all there. Devices are the rows before those of their streams,
+    and streams are named after them."""
+    devices = {reading.channel.partition(".")[0] for reading in snapshot.readings}
+    return next((c.name for c in snapshot.checks if c.verdict == "failed" and c.name in devices), "")
+
+
 def _doing(view: View) -> tuple[tuple[str, str], ...]:
     snapshot = view.snapshot
     if not view.connected or (snapshot is not None and snapshot.state == "done"):
@@ -33,7 +41,8 @@ def _doing(view: View) -> tuple[tuple[str, str], ...]:
     if snapshot is None or snapshot.state in ("connecting", "stopping", "run_done"):
         return leave
     if snapshot.state == "preflight":
-        return (("F5", "start"), *leave)
+        gone = device_gone(snapshot)
+        return (*((("r", f"retry {gone}"),) if gone else ()), ("F5", "start"), *leave)
     if snapshot.state == "mount":
         return (("F5", "mounted"), *leave) if snapshot.mounted_by_hand else leave
     if snapshot.state == "paused":

@@ -14,10 +14,10 @@ from rig.console.session import exit_status
 from rig.console.view_model import wording
 from rig.console.view_model.alarms import alarm
 from rig.console.view_model.axes import reach, thin, ticks
-from rig.console.view_model.keys import key_line
+from rig.console.view_model.keys import device_gone, key_line
 from rig.console.view_model.running_fit import in_words, running_fit, v_abs_v
 from rig.console.view_model.view import TRACE_KEPT, View, absorb
-from rig.link.front_end_messages import Reading
+from rig.link.front_end_messages import Check, Reading
 from tests.rig.console.feeds import C, campaign, points, running, snapshot
 
 
@@ -185,3 +185,13 @@ def test_points_that_a_square_law_does_not_fit_are_flagged_when_the_sweep_is_ove
     assert "next: rig diagnose" in told.text
     fine = absorb(View(), running("done", outcome="completed", stop_confirmed=True, points=held), 10.0)
     assert alarm(replace(fine, connected=True, now=10.0)).severity == "info"
+
+
+def test_a_device_that_is_gone_is_offered_to_be_tried_again():
+    here = snapshot("preflight")
+    device = here.readings[0].channel.partition(".")[0]
+    red = replace(here, checks=(*here.checks, Check(device, "failed", "it was pulled")))
+    assert device_gone(here) == ""
+    assert device_gone(red) == device
+    assert f" r retry {device}" in key_line(absorb(View(), red, 0.0)).plain
+    assert " retry" not in key_line(absorb(View(), here, 0.0)).plain

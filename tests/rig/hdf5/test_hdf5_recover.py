@@ -9,6 +9,9 @@ from click.testing import CliRunner
 
 from rig.errors import RecordingError
 from rig.hdf5 import load
+from rig.hdf5.write import RecordingFile
+from rig.link.recorder_messages import ChannelSpec, Rows, StreamSpec
+from rig.recording.ledger import Ledger
 from rig.recording.recover import recover_command
 
 
@@ -63,6 +66,33 @@ def test_a_file_whose_closing_was_cut_off_keeps_its_outcome(tmp_path):
     CliRunner().invoke(recover_command, [str(path), "-o", str(out)], catch_exceptions=False)
     recording = load(out)
     assert (recording.complete, recording.outcome) == (True, "completed")
+
+
+def test_cause_of_a_recorder_that_was_killed_is_taken_from_the_ledger(tmp_path):
+    streams = (StreamSpec("cell", "theirs", (ChannelSpec("thrust", "thrust", "N"),)),)
+    live, path, out = tmp_path / "live", tmp_path / "T9-2.h5", tmp_path / "o.h5"
+    file = RecordingFile(live, {"thruster": "T9"}, streams, 0)
+    file.add_rows(Rows(0, np.arange(3) * 10**8, np.ones((3, 1))))
+    file.flush()
+    shutil.copy(live, path)
+    file.close("aborted", "a test", 1.0)
+    ledger = Ledger.open(tmp_path, at_once=True)
+    end = {"thruster": "T9", "outcome": "tripped", "sha256": "", "time_to_zero_s": None}
+    ledger.write("run_end", **end, cause="of another file", recording="/there/T9.h5")
+    ledger.write("run_end", **end, cause="recorder: the recorder process has ended", recording="/there/T9-2.h5")
+    ledger.close()
+    CliRunner().invoke(recover_command, [str(path), "-o", str(out)], catch_exceptions=False)
+    recording = load(out)
+    assert (recording.complete, recording.outcome) == (False, "tripped")
+    assert load(path).cause == ""
+    told = "recorder: the recorder process has ended; recovered from T9-2.h5, which was not closed in order"
+    assert recording.cause == told
+    assert any(event.text == told for event in recording.events)
+    (tmp_path / "campaign.jsonl").write_text("hello\n")
+    out.unlink()
+    said = CliRunner().invoke(recover_command, [str(path), "-o", str(out)], catch_exceptions=False)
+    assert "how the run ended is not taken from its ledger" in said.output
+    assert load(out).cause == "recovered from T9-2.h5, which was not closed in order"
 
 
 def test_what_is_no_recording_is_not_recovered(tmp_path):

@@ -117,13 +117,6 @@ def test_notes_detaching_and_spoilt_frames_are_in_the_records(tmp_path):
         assert any("2 frames were lost" in text for text in texts)
 
 
-def test_resumed_campaign_goes_on_with_the_same_devices_only(tmp_path):
-    before = ({"fact": "start", "identities": {"motor": "virtual motor 9"}},)
-    with virtual(tmp_path, before=before) as world:
-        play(world)
-        assert "motor is virtual motor 1, but the campaign was begun with virtual motor 9" in outcome(world)[1]
-
-
 def test_resumed_run_counts_its_attempts(tmp_path):
     before = ({"fact": "start", "identities": {}}, {"fact": "run_start", "thruster": "T1"})
     with virtual(tmp_path, before=before) as world:

@@ -166,14 +166,6 @@ def test_operator_mounts(tmp_path):
         assert "put T1 on the bench" in world.texts
 
 
-def test_device_that_does_not_open(tmp_path):
-    with virtual(tmp_path) as world:
-        world.cell.refuses = "load_cell: no cable"
-        play(world)
-        assert outcome(world) == ("aborted", "load_cell: no cable")
-        assert {check.verdict for check in world.session.status.checks} == {"failed", "passed"}
-
-
 @pytest.mark.parametrize(("timeout", "text"), [(None, "off or unknown"), (3.0, "longer than this bench's limit")])
 def test_watchdog_that_is_off_or_too_long_is_not_started(tmp_path, timeout, text):
     """Promise 9."""
