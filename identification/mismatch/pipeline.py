@@ -125,7 +125,7 @@ def traced(
     news = told_lines(cleaned.lines, baseline)
     experiment = None if selected.undone else next_experiment.run(now, data, completed.earned, news, limits)
     later = Later(recordings, data, completed.after)
-    asked = [] if selected.undone else [n.term for n in completed.earned]
+    asked = [] if selected.undone else [*(n.term for n in completed.earned), *completed.nameless]
     novel, unasked = put_to_earlier(whole, before, later, asked)
     undone = (*selected.undone, *((NO_LINES,) if first.undone else ()))
     notes = (*interrupted(undone), *sound.notes, *unpredicted, *unasked)

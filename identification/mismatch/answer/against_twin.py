@@ -4,7 +4,7 @@ findings are new: what the twin's own recordings have too is none, what they cou
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 
@@ -22,6 +22,7 @@ from identification.mismatch.estimate.stairs import covariance
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.name.naming import Named
+from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Value
 from identification.physics.term import Term
 from identification.recording import Recording
@@ -31,6 +32,7 @@ SAYS = {
     "changed": "That is new: the recordings behind {} speak against it.",
     "not shown before": "Whether that is new cannot be told: the recordings behind {} could not have shown it.",
 }
+PART_OF_IT = "Part of what was found, or is left, may be in it."
 NOT_NEW = "Not new, for it suits the recordings behind {} as well (chi-square of both {:+.3g} if it was there then): {}"
 
 
@@ -46,7 +48,8 @@ def with_twin(
 ) -> Draft:
     """The draft with its twin; against an earlier twin the terms given are in the model, and a change is told.
 
-    `named`: the terms of the model with their other forms; `beside`: whether something was found that is not new.
+    `named`: the terms of the model with their other forms; `beside`: whether something was found that is not new, or
+    is left without a name.
     """
     twin = twin_of(estimate, data, recordings, before)
     draft = replace(draft, twin=replace(twin, alternatives=_alternatives(estimate, data, named)))
@@ -56,7 +59,7 @@ def with_twin(
     findings = tuple(_relative(f, before, known) for f in draft.findings)
     changed = changed_constant(before, estimate, data, known, draft.model["C"].unit)
     if changed is not None and (findings or beside) and _little(changed):
-        draft = replace(draft, notes=(*draft.notes, f"{changed.statement} Part of what was found may be in it."))
+        draft = replace(draft, notes=(*draft.notes, f"{changed.statement} {PART_OF_IT}"))
     elif changed is not None:
         findings = (*findings, changed)
     was = given_values(before)
@@ -207,17 +210,25 @@ def _covariance(estimate: Estimate, data: Data, before: Twin | None) -> tuple[tu
 
 @dataclass(frozen=True, eq=False, slots=True)
 class ToldNew:
-    """What is told of the findings."""
+    """What is told of the findings, and of what no name carries."""
 
     findings: tuple[Finding, ...]
     """Without those that are not new."""
     not_new: tuple[str, ...]
     """The statements of those."""
     notes: tuple[str, ...]
+    left: Remainder | None = None
+    """What no name carries; None where nothing is left, or was left then too."""
 
 
-def told_new(findings: Mapping[Term, Finding], novelties: Mapping[Term, Novelty], twin: Twin | None) -> ToldNew:
-    """Each with whether it is new, where that was asked."""
+def told_new(
+    findings: Mapping[Term, Finding],
+    novelties: Mapping[Term, Novelty],
+    twin: Twin | None,
+    left: Remainder | None = None,
+    nameless: Collection[Term] = (),
+) -> ToldNew:
+    """Each with whether it is new, where that was asked; `nameless`: the terms that model what is `left`."""
     new, not_new, notes = [], [], []
     origin = "the twin" if twin is None else twin.origin
     for term, finding in findings.items():
@@ -230,4 +241,17 @@ def told_new(findings: Mapping[Term, Finding], novelties: Mapping[Term, Novelty]
         else:
             statement = f"{finding.statement} {SAYS[novelty.since].format(origin)}"
             new.append(replace(finding, statement=statement, since=novelty.since))
-    return ToldNew(tuple(new), tuple(not_new), tuple(notes))
+    whole = _together([novelties[term] for term in nameless if term in novelties], len(nameless))
+    if left is not None and whole is not None:
+        if whole.since == "there before":
+            not_new.append(left.statement)
+            notes.append(NOT_NEW.format(origin, whole.loss, left.statement))
+            left = None
+        else:
+            left = replace(left, statement=f"{left.statement} {SAYS[whole.since].format(origin)}")
+    return ToldNew(tuple(new), tuple(not_new), tuple(notes), left)
+
+
+def _together(asked: Sequence[Novelty], of: int) -> Novelty | None:
+    """Of terms that are told as one: the newest; None where not all of them were asked."""
+    return max(asked, key=lambda each: each.loss) if asked and len(asked) == of else None

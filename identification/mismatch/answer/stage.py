@@ -102,10 +102,10 @@ def _answered(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
     remainder = remainder_of(completed, data, case.unseen)
     flexible = completed.flexible
     quiet = located.estimate.noise
-    new = told_new(_findings(completed, data), found.novelties, case.baseline)
+    new = told_new(_findings(completed, data), found.novelties, case.baseline, remainder, completed.nameless)
     held = with_held(score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None), flexible)
     model = values_of(after.fit, data, completed.intervals)
-    model["C"], beside = averaged(model["C"], located.estimate.fit, data, completed.earned)
+    model["C"], moved = averaged(model["C"], located.estimate.fit, data, completed.earned)
     draft = Draft(
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
@@ -113,18 +113,19 @@ def _answered(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
         findings=new.findings,
         model_terms=tuple(t.id for t in after.fit.model.terms),
         model=model,
-        notes=beside,
+        notes=moved,
     )
     ids = tuple(r.recording_id for r in case.recordings)
     draft = with_channels(draft, case.sound.faults, ids)
-    draft = with_twin(draft, after, data, case.recordings, case.baseline, completed.earned, beside=bool(new.not_new))
+    beside = bool(new.not_new) or completed.open_ended
+    draft = with_twin(draft, after, data, case.recordings, case.baseline, completed.earned, beside=beside)
     draft = with_lines(draft, case.lines, train.before, case.baseline, ids)
     stands_in = proxies(after.fit.model, draft.findings, case.recordings, case.sound.histories)
     n, p = after.fit.residual.size, int(after.fit.free.sum())
     return Diagnosis(
         recordings=ids,
         thruster=case.recordings[0].thruster,
-        answer=decided(draft.findings, remainder, found.experiment, held, draft.mismatch),
+        answer=decided(draft.findings, new.left, found.experiment, held, draft.mismatch),
         baseline_model=draft.baseline_model,
         baseline=draft.baseline,
         mismatch=draft.mismatch,

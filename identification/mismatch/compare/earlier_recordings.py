@@ -73,8 +73,14 @@ def put_to_earlier(
     earlier = fitted_again(twin, before)
     if isinstance(earlier, Refusal):
         return {}, (f"Whether what was found is new was not asked: behind {twin.origin} are {earlier.reason}.",)
+    held = set.intersection(*(set(h.others) for h in earlier.data.histories))
+    notes = [
+        f"Whether {term.id} is new was not asked: behind {twin.origin} no {' and '.join(lacking)} was recorded."
+        for term in asked
+        if (lacking := sorted(set(term.needs) - held))
+    ]
     new = earlier.fit.chi2 + _chi2_of(later, _as_twin(earlier, earlier.fit))
-    return {term: _judged(earlier, later, term, new) for term in asked}, ()
+    return {t: _judged(earlier, later, t, new) for t in asked if held.issuperset(t.needs)}, tuple(notes)
 
 
 def _judged(earlier: Earlier, later: Later, term: Term, new: float) -> Novelty:

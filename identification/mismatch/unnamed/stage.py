@@ -53,6 +53,12 @@ class Completed:
     left: ResidualStructure
     """What `bare` leaves, where that shows the place better."""
 
+    @property
+    def nameless(self) -> tuple[Term, ...]:
+        """Terms of the final model that have no name, but for what is of one run's own time."""
+        named = {n.term for n in self.earned}
+        return tuple(t for t in self.after.fit.model.terms if t not in named and "time" not in t.covariates)
+
 
 def run(
     selected: Selected, located: Located, validated: Validated, unseen: Sequence[History], rng: np.random.Generator

@@ -2,9 +2,16 @@
 
 from __future__ import annotations
 
-from identification.mismatch.answer.against_twin import told_new
+from dataclasses import replace
+
+import pytest
+
+from identification.flexible_terms.flexible import Flexible
+from identification.mismatch.answer.against_twin import changed_constant, told_new, twin_of, with_twin
 from identification.mismatch.compare.earlier_recordings import Novelty
-from tests.identification.mismatch.answer.answered import BAND, UNEVEN, finding
+from tests.identification.mismatch.answer.answered import BAND, LEFT, UNEVEN, draft, finding
+
+SHAPE = Flexible("command_voltage", "V", (-5.0, 0.0, 5.0), (1,), ("force",))
 
 
 def test_what_is_not_new_is_no_finding_and_what_may_be_says_so():
@@ -24,3 +31,44 @@ def test_what_is_new_says_so_and_what_nobody_asked_stays_as_it_is():
     says = " That is new: the recordings behind the twin speak against it."
     assert [f.statement for f in told.findings] == [found[BAND].statement + says, found[UNEVEN].statement]
     assert (told.not_new, told.notes) == ((), ())
+
+
+def test_what_has_no_name_and_was_there_before_is_not_left():
+    told = told_new({}, {SHAPE: Novelty("there before", -20.0)}, None, LEFT, [SHAPE])
+    assert told.left is None
+    assert told.not_new == (LEFT.statement,)
+    assert "chi-square of both -20" in told.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("novelty", "says"),
+    [(Novelty("changed", 40.0), "speak against it."), (Novelty("not shown before", 1.0), "could not have shown it.")],
+)
+def test_what_has_no_name_says_whether_it_is_new(novelty, says):
+    both = {SHAPE: novelty, BAND: Novelty("there before", -20.0)}
+    told = told_new({}, both, None, LEFT, [SHAPE, BAND])
+    assert (told.left.where, told.left.p_value) == (LEFT.where, LEFT.p_value)
+    assert told.left.statement.startswith(LEFT.statement)
+    assert told.left.statement.endswith(says)
+    assert (told.not_new, told.notes) == ((), ())
+
+
+def test_of_terms_without_a_name_all_must_have_been_asked():
+    """One over the run's own time is not, nor is anything where no term models what is left."""
+    assert told_new({}, {SHAPE: Novelty("there before", -20.0)}, None, LEFT, [SHAPE, UNEVEN]).left is LEFT
+    assert told_new({}, {}, None, LEFT, []).left is LEFT
+
+
+def test_a_little_of_the_constant_beside_what_is_left_is_a_note(fitted):
+    """A free shape that multiplies the thrust has a part of C."""
+    runs, data, estimate = fitted
+    now = twin_of(estimate, data, runs, None)
+    before = replace(now, C=0.99 * now.C, covariance=tuple(tuple(1e-6 * v for v in row) for row in now.covariance))
+    before = replace(before, covariance=((1e-12, *before.covariance[0][1:]), *before.covariance[1:]))
+    sure = replace(estimate, fit=replace(estimate.fit, jacobian=100 * estimate.fit.jacobian))
+    assert changed_constant(before, sure, data, "", "N/V^2") is not None
+    alone = with_twin(draft(), sure, data, runs, before)
+    assert [f.effect for f in alone.findings] == ["thrust_constant"]
+    beside = with_twin(draft(), sure, data, runs, before, beside=True)
+    assert beside.findings == ()
+    assert "is left, may be in it" in beside.notes[0]

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.flexible_terms.flexible import Flexible
 from identification.mismatch.answer.against_twin import twin_of
 from identification.mismatch.compare.earlier_recordings import Later, put_to_earlier
 from identification.mismatch.compare.saved_model_baseline import starting
@@ -15,6 +16,7 @@ from identification.mismatch.model.model import extended
 from identification.physics.asymmetry import Asymmetry
 from identification.physics.command_saturation import CommandSaturation
 from identification.physics.dead_band import DeadBand
+from identification.physics.heating import MeasuredHeating
 from identification.recording import Channel
 from tests.identification.diagnosed_runs import TOP, dead_band
 from tests.identification.mismatch.small import data_of, known_noise, short
@@ -101,3 +103,31 @@ def test_nobody_is_asked_without_recordings_or_terms():
     told, notes = put_to_earlier(twin, [first, other], later, [UNEVEN])
     assert told == {}
     assert "several thrusters" in notes[0]
+
+
+SHAPE = Flexible("command_voltage", "V", (-6.0, -3.0, 0.0, 3.0, 6.0), (2,), ("force",), 1)
+"""Of what a dead band takes, well enough."""
+
+
+def test_a_shape_without_a_name_may_have_been_there_before_and_may_be_new():
+    second = short(change=uneven, volts=dead_band(0.9), seed=1)
+    begin = (0.1, 0.1, -0.1, -0.1)
+    was = asked(short(change=uneven, volts=dead_band(0.9)), second, SHAPE, begin)
+    assert (was.since, was.loss < -50.0) == ("there before", True)
+    new = asked(short(change=uneven), second, SHAPE, begin)
+    assert (new.since, new.loss > 50.0) == ("changed", True)
+
+
+def test_what_looks_at_a_channel_that_was_not_recorded_then_is_not_asked():
+    first, second = short(), short(seed=1)
+    data, estimate = known_noise({UNEVEN: (0.99,)}, [first])
+    twin = twin_of(estimate, data, [first], None)
+    command, thrust = second.channels
+    warm = Channel("motor_temperature", "drive", "motor_temperature", "K", thrust.time, 300.0 + 0.1 * thrust.time)
+    second = replace(second, channels=(command, thrust, warm))
+    term = MeasuredHeating("measured_winding")
+    data, theta, model = starting(twin)(*data_of([second]))
+    found = refresh(*extended(model, theta, term, (1e-4,)), data, None, None)
+    told, notes = put_to_earlier(twin, [first], Later([second], data, found), [term])
+    assert told == {}
+    assert notes == ("Whether heating is new was not asked: behind the twin no motor_temperature was recorded.",)
