@@ -7,6 +7,7 @@ hold of seconds is one step, as an interval of milliseconds is: a slope at the m
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -89,8 +90,19 @@ def to_rest(w: Floats, n: Floats, quadratic: float, linear: float) -> Floats:
     swing = quadratic * (quadratic * size**2 + linear * size) - 0.25 * linear**2
     turn = np.sqrt(np.abs(swing))
     reach = turn * beyond
-    angle = np.where(swing > 0, np.arctan(reach), np.arctanh(np.minimum(reach, 1 - 1e-15)))
+    angle = _either(swing, np.arctan, lambda x: np.arctanh(np.minimum(x, 1 - 1e-15)), reach)
     return np.where(reach > LEAST, angle / np.maximum(turn, 1e-300), beyond)
+
+
+def _either(
+    swing: Floats, circular: Callable[[Floats], Floats], hyperbolic: Callable[[Floats], Floats], at: Floats
+) -> Floats:
+    """What solves the equation of one that swings through rest, or of one that its linear brake alone would stop."""
+    swings = swing > 0
+    if swings.all():
+        return circular(at)
+    out: Floats = np.where(swings, circular(at), hyperbolic(at)) if swings.any() else hyperbolic(at)
+    return out
 
 
 class _Hold(NamedTuple):
@@ -227,7 +239,7 @@ def _braked(w: Floats, before: Floats, t: Floats, quadratic: float, linear: floa
     turn = np.sqrt(np.abs(swing))
     angle = turn * spent
     small = angle < LEAST
-    tangent = np.where(swing > 0, np.tan(angle), np.tanh(angle))
+    tangent = _either(swing, np.tan, np.tanh, angle)
     time = np.where(small, spent, tangent / np.where(small, 1.0, turn))
     shrink = 1 + (quadratic * size + 0.5 * linear) * time
     end = np.maximum((size * (1 - 0.5 * linear * time) - pull * time) / shrink, 0.0)
@@ -241,6 +253,6 @@ def _turned_against(w: Floats, before: Floats, braked: _Braked, quadratic: float
     if quadratic * float(np.max(size)) < BARELY * linear:  # the logarithm would be one of 1
         turned = (size + aim) * -np.expm1(-linear * spent) / linear - aim * spent
     else:
-        cosine = np.where(braked.swing > 0, np.cos(braked.angle), np.cosh(np.minimum(braked.angle, 700.0)))
+        cosine = _either(braked.swing, np.cos, lambda x: np.cosh(np.minimum(x, 700.0)), braked.angle)
         turned = (np.log(cosine * braked.shrink) - 0.5 * linear * spent) / quadratic
     return np.sign(before) * turned

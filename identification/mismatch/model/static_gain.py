@@ -7,7 +7,6 @@ Dynamics of a few ticks (a lag, a ring, a delay) and limits have answers of thei
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.mismatch.model.model import Model, acting
 from identification.mismatch.model.parameters import Theta
@@ -56,7 +55,7 @@ def _static(model: Model, theta: Theta, scale: Scale) -> Acting:
 
 def _rotor_gain(terms: Acting, theta: Theta, run: RememberedRun) -> Floats:
     driver = run.history.driver
-    moved = driver * (1 + SMALL * _alternating(driver.size))
+    moved = driver * _alternating(driver.size)
     old, new = driver, moved
     for term, values, sizes in terms:
         old, new = (term.apply(value, TermContext(run, sizes, theta.C, 0.0, value), values) for value in (old, new))
@@ -64,7 +63,7 @@ def _rotor_gain(terms: Acting, theta: Theta, run: RememberedRun) -> Floats:
 
 
 def _thrust_gain(terms: Acting, theta: Theta, run: RememberedRun, x: Floats, tare: float) -> Floats:
-    moved = x * (1 + SMALL * _alternating(x.size))
+    moved = x * _alternating(x.size)
     old, new = (theta.C * rate * np.abs(rate) for rate in (x, moved))
     change = new - old
     for term, values, sizes in terms:
@@ -75,8 +74,11 @@ def _thrust_gain(terms: Acting, theta: Theta, run: RememberedRun, x: Floats, tar
     return _ratio(new - old, change)
 
 
-def _alternating(size: int) -> NDArray[np.int64]:
-    return 1 - 2 * (np.arange(size) % 2)
+def _alternating(size: int) -> Floats:
+    """Factors of a small change, up and down."""
+    out = np.full(size, 1 + SMALL)
+    out[1::2] = 1 - SMALL
+    return out
 
 
 def _ratio(new: Floats, old: Floats) -> Floats:
