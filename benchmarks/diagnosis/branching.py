@@ -25,7 +25,16 @@ from identification.mismatch.policy.record.every import ROOMS
 
 PURE = ("allowed", "chi2_isf", "noncentral_chi2_sf", "p_of_largest", "part_check")
 """Functions of the engine whose result depends on their arguments alone: of several values each is put in by itself."""
-CASTING = ("tails", "screening", "hidden", "stepwise", "family_wise", "residual_structure_test", "named_term")
+CASTING = (
+    "tails",
+    "screening",
+    "hidden",
+    "stepwise",
+    "family_wise",
+    "shape_error",
+    "residual_structure_test",
+    "named_term",
+)
 """Modules in which float(...) of several values is several values; elsewhere it has to know."""
 
 

@@ -22,6 +22,7 @@ import os
 os.environ["OMP_NUM_THREADS"] = os.environ["OPENBLAS_NUM_THREADS"] = "1"
 
 import argparse
+import gc
 import json
 import signal
 import subprocess
@@ -105,6 +106,7 @@ def judged(case: str, only: Sequence[str], root: Path, *, check: bool) -> tuple[
 
     Nothing where no such case could be drawn. Raises ValueError where with `check` a diagnosis says anything else.
     """
+    gc.collect()  # what the last diagnosis leaves is hundreds of megabytes, and every branch would share them
     (job,) = designed(20, [case], DRAW)
     (order,) = job.orders
     store = Store(root / sha256(case.encode()).hexdigest()[:12])
