@@ -39,18 +39,26 @@ class Answered:
     odds: float
     """Of it to the model that is told."""
     instead: str
-    """What has another effect or form in its place, of the model told."""
+    """What has another effect or form in its place, of the model told; empty where that comes beside all of it."""
     place: str
     """The same with that."""
 
 
-def averaged(constant: Value, beside: Fit, data: Data, named: Sequence[Named]) -> tuple[Value, tuple[str, ...]]:
+def averaged(
+    constant: Value,
+    beside: Fit,
+    data: Data,
+    named: Sequence[Named],
+    unclaimed: Sequence[RivalTerm[Term, Fit]] = (),
+) -> tuple[Value, tuple[str, ...]]:
     """C with the interval of the mixture, and what is said of rivals whose C is not within that of the model told.
 
-    `beside`: the fit beside which rivals and other forms of the names stand. The value stays that of the model told.
+    `beside`: the fit beside which rivals and other forms of the names stand, and with one term more each what is
+    `unclaimed`. The value stays that of the model told.
     """
     moved = constant.value - constant_of(beside, data)[0]
-    every = (_answered(moved, data, n, r) for n in named for r in (*n.rivals, *n.forms) if _within_reach(r))
+    known = [(n.term, r) for n in named for r in (*n.rivals, *n.forms) if _within_reach(r)]
+    every = (_answered(moved, data, told, r) for told, r in (*known, *((None, r) for r in unclaimed)))
     others = sorted((each for each in every if each.std > 0), key=lambda each: -each.odds)
     if not others or not constant.std > 0:
         return constant, ()
@@ -60,7 +68,7 @@ def averaged(constant: Value, beside: Fit, data: Data, named: Sequence[Named]) -
     own = constant.interval
     ends = [quantile(values, stds, odds / odds.sum(), p) for p in (BEYOND, 1 - BEYOND)]
     low, high = min(ends[0], own[0]), max(ends[1], own[1])
-    elsewhere = {each.instead: each for each in reversed(others) if not own[0] <= each.value <= own[1]}
+    elsewhere = {each.instead or each.place: each for each in reversed(others) if not own[0] <= each.value <= own[1]}
     told = tuple(_said(each, constant.unit, (low, high)) for each in elsewhere.values())
     if (low, high) == own:
         return constant, told
@@ -89,13 +97,13 @@ def _within_reach(rival: RivalTerm[Term, Fit]) -> bool:
     return rival.bic_loss < policy.select.RIVAL_STATED_BIC
 
 
-def _answered(moved: float, data: Data, named: Named, rival: RivalTerm[Term, Fit]) -> Answered:
+def _answered(moved: float, data: Data, term: Term | None, rival: RivalTerm[Term, Fit]) -> Answered:
     """A rare effect has the odds of meeting one against it, an ordinary one has them for it. `moved`: by how much C of
-    the model told is not that of the fit beside which rivals stand."""
-    rarer = int(rival.term.traits.rare) - int(named.term.traits.rare)
+    the model told is not that of the fit beside which rivals stand. `term`: in whose place it is; None: beside all."""
+    rarer = int(rival.term.traits.rare) - int(term is not None and term.traits.rare)
     loss = max(rival.bic_loss + rarer * policy.select.RARE_TERM_BIC, 0.0)
     value, std = constant_of(rival.fit, data)
-    told, other = _labels(named.term, rival.term)
+    told, other = _labels(term, rival.term) if term is not None else ("", rival.term.id.replace("_", " "))
     return Answered(value + moved, float(np.nan_to_num(std)), float(np.exp(-loss / 2)), told, other)
 
 
@@ -107,7 +115,8 @@ def _labels(term: Term, other: Term) -> tuple[str, str]:
 
 def _said(other: Answered, unit: str, ends: tuple[float, float]) -> str:
     held = "holds both" if ends[0] <= other.value <= ends[1] else "does not reach so far, as that is rarely met"
+    where = f"in the place of {other.instead}" if other.instead else "beside what is told"
     return (
-        f"With {other.place} in the place of {other.instead}, which the recordings do not rule out, C would be "
+        f"With {other.place} {where}, which the recordings do not rule out, C would be "
         f"{other.value:.4g} {unit}: its interval {held}."
     )

@@ -22,6 +22,7 @@ from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment
 from identification.mismatch.faults.stage import Sound
 from identification.mismatch.locate.places import places_of
 from identification.mismatch.locate.stage import Located
+from identification.mismatch.locate.unclaimed import unclaimed
 from identification.mismatch.model.data import Data
 from identification.mismatch.noise.whiteness import whiteness
 from identification.mismatch.periodic.periodic_disturbances import Line
@@ -105,7 +106,8 @@ def _answered(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
     new = told_new(_findings(completed, data), found.novelties, case.baseline, remainder, completed.nameless)
     held = with_held(score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None), flexible)
     model = values_of(after.fit, data, completed.intervals)
-    model["C"], moved = averaged(model["C"], located.estimate.fit, data, completed.earned)
+    near = unclaimed(selected, located)
+    model["C"], moved = averaged(model["C"], located.estimate.fit, data, completed.earned, near)
     draft = Draft(
         baseline_model=f"C {DRIVER_NAMES[data.histories[0].driver_quantity]}",
         baseline=values_of(before.fit, data),
