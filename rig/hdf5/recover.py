@@ -43,7 +43,7 @@ def recover(path: str | Path, out: str | Path, end: tuple[str, str] = ("aborted"
     require_file(path)
     part = out.with_name(out.name + ".part")
     try:
-        losses = apart(lambda: _recover(path, part), path)
+        losses = apart(lambda: _recover(path, part, end), path)
     except RecordingError:
         part.unlink(missing_ok=True)
         raise
@@ -51,7 +51,7 @@ def recover(path: str | Path, out: str | Path, end: tuple[str, str] = ("aborted"
     return losses
 
 
-def _recover(path: Path, part: Path) -> tuple[Loss, ...]:
+def _recover(path: Path, part: Path, end: tuple[str, str]) -> tuple[Loss, ...]:
     source, opened_as = open_for_reading(path)
     with source:
         if opened_as == "plain":
