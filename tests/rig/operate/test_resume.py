@@ -130,7 +130,9 @@ def test_another_file_under_the_name_is_told(tmp_path):
     with pytest.raises(RecordingError, match="its campaign_toml is"):
         remainder([{**start, "campaign_toml": "[campaign] # other"}, run_of("T1", tmp_path)], tmp_path, config)
     path.write_bytes(b"no recording")
-    with pytest.raises(RecordingError, match=r"is not an HDF5 file.*take the lines out of campaign\.jsonl that name it \(2\)"):
+    with pytest.raises(
+        RecordingError, match=r"is not an HDF5 file.*take the lines out of campaign\.jsonl that name it \(2\)"
+    ):
         remainder([start, run_of("T1", tmp_path)], tmp_path, config)
 
 
