@@ -55,7 +55,10 @@ def measured(facts: Sequence[Fact], folder: Path, thruster: str, plan: Plan) -> 
         if fact["fact"] != "run_start" or fact["thruster"] != thruster:
             continue
         path = recording_of(fact, facts, folder)
-        recording = load(path)
+        try:
+            recording = load(path)
+        except RecordingError as error:
+            raise RecordingError(f"{error}; {_without(path, facts)}") from error
         _require_same(recording, path, fact, facts)
         steps = steps_in(recording, plan)
         if any(step.measures for step in plan if step.index in steps):
@@ -69,12 +72,8 @@ def recording_of(run: Fact, facts: Sequence[Fact], folder: Path) -> Path:
     It is looked for in the campaign's folder, wherever that was when the run was begun.
     """
     path = file_inside(folder, Path(run["recording"]).stem, ".h5")
-    lines = [number for number, fact in enumerate(facts, 1) if _names(fact, path.name)]
     if not path.is_file():
-        raise RecordingError(
-            f"{folder / FILE_NAME} names {path.name}, which is not there: put it back; or, if it is lost, take the "
-            f"lines out that name it ({', '.join(map(str, lines))}): its steps are measured again then"
-        )
+        raise RecordingError(f"{folder / FILE_NAME} names {path.name}, which is not there; {_without(path, facts)}")
     _await_closed(path)
     ends = [fact for fact in facts if fact["fact"] == "run_end" and _names(fact, path.name) and fact["sha256"]]
     if ends and sha256_of(path) != ends[-1]["sha256"]:
@@ -119,6 +118,15 @@ def _has_samples(row: StepRow, step: Step, thrust: Channel | None) -> bool:
 def _names(fact: Fact, recording: str) -> bool:
     told = [fact["recording"]] if "recording" in fact else fact.get("recordings", ())
     return any(Path(each).name == recording for each in told)
+
+
+def _without(path: Path, facts: Sequence[Fact]) -> str:
+    """What can be done about a file that is lost."""
+    lines = [str(number) for number, fact in enumerate(facts, 1) if _names(fact, path.name)]
+    return (
+        f"put it back; or, if it is lost, take the lines out of {FILE_NAME} that name it ({', '.join(lines)}): its "
+        "steps are measured again then"
+    )
 
 
 def _require_same(recording: Recording, path: Path, run: Fact, facts: Sequence[Fact]) -> None:

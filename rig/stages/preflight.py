@@ -18,7 +18,7 @@ Verdict = Literal["waiting", "passed", "warning", "failed"]
 
 RATE_TOLERANCE = 0.25
 """Relative difference between a stream's real and nominal rate that is still taken as healthy."""
-OLD, OLD_PERIODS = 0.5, 5
+OLD, OLD_PERIODS = 1.0, 5
 """s and sample periods, whichever is longer, since the last row of a stream that still counts as coming."""
 FLOW_TOLERANCE = 0.1
 """Of the speed that the campaign is meant for: measured flow that is farther off is told, from FLOW_TOO_FAR times that

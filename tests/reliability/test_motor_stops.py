@@ -8,11 +8,13 @@ import time
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
 from rig.hdf5 import load
 from rig.link.front_end_messages import Request
 from rig.link.sockets import connect
 from rig.recording.ledger import read
+from rig.recording.recover import recover_command
 from tests.reliability.live import (
     PATIENCE,
     SLACK,
@@ -121,6 +123,11 @@ def test_kill_9_of_the_recorder(tmp_path, report, prompt):
         thrust = recording.first_of("thrust")
         assert thrust is not None
         assert thrust.time[-1] > rows_flushed_by - 0.6
+        (path,) = (bench.folder / "out").glob("*/T1.h5")
+        CliRunner().invoke(recover_command, [str(path)], catch_exceptions=False)
+        recovered = load(path.with_name("T1-recovered.h5"))
+        assert recovered.outcome == last.outcome
+        assert recovered.cause.startswith(last.cause), "the cause stands in the file too, once it is recovered"
 
 
 def test_front_end_of_an_attended_run_is_gone(tmp_path, report, prompt):

@@ -107,7 +107,7 @@ def test_step_whose_samples_are_lost_is_not_measured(tmp_path):
 def test_file_that_is_not_there_is_told_with_the_lines_that_name_it(tmp_path):
     config, start = begun(tmp_path, "T1", "T2")
     facts = [start, run_of("T1", tmp_path), ended("T1", "completed")]
-    with pytest.raises(RecordingError, match=r"names T1\.h5, which is not there: put it back; .*name it \(2, 3\)"):
+    with pytest.raises(RecordingError, match=r"names T1\.h5, which is not there; put it back; .*name it \(2, 3\)"):
         remainder(facts, tmp_path, config)
 
 
@@ -130,7 +130,9 @@ def test_another_file_under_the_name_is_told(tmp_path):
     with pytest.raises(RecordingError, match="its campaign_toml is"):
         remainder([{**start, "campaign_toml": "[campaign] # other"}, run_of("T1", tmp_path)], tmp_path, config)
     path.write_bytes(b"no recording")
-    with pytest.raises(RecordingError, match="is not an HDF5 file"):
+    with pytest.raises(
+        RecordingError, match=r"is not an HDF5 file.*take the lines out of campaign\.jsonl that name it \(2\)"
+    ):
         remainder([start, run_of("T1", tmp_path)], tmp_path, config)
 
 
