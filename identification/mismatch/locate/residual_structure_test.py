@@ -21,7 +21,7 @@ from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.covariates import Covariate, covariates
 from identification.mismatch.select.family_wise import beside, family_p_value, orthogonal_basis
 from identification.mismatch.select.likeliest_trials import TRIED, jumps
-from identification.mismatch.select.shape_error import allowed_in, corrections
+from identification.mismatch.select.shape_error import allowed_in, corrections, of_twin
 from identification.recording import Floats
 
 
@@ -62,7 +62,7 @@ def residual_structure(
     n = data.size
     basis = orthogonal_basis(fit.jacobian[:n])
     residual = np.clip(fit.residual[:n], -policy.locate.OUTLIER_SIGMA, policy.locate.OUTLIER_SIGMA)
-    changes = corrections(fit, data, Weights(weights.thrust))
+    changes = [*corrections(fit, data, Weights(weights.thrust)), *of_twin(fit, data, Weights(weights.thrust))]
     groups, spans = [], []
     for c in found:
         columns = Weights(weights.thrust).whiten(list(c.columns), [])

@@ -6,12 +6,17 @@ until it is more than this share of the change. Else every real recording would 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, change_of
 from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.recording import Floats
@@ -19,11 +24,24 @@ from identification.recording import Floats
 
 def corrections(fitted: Fit, data: Data, weights: Weights) -> list[Floats]:
     """Whitened (n,) change that each term makes beside what C and the tares can follow; the rate too if it counts."""
+    return _changes([fitted.less(term) for term in fitted.model.terms], fitted, data, weights)
+
+
+def of_twin(fitted: Fit, data: Data, weights: Weights) -> list[Floats]:
+    """The same of each term that a twin gave, as much less as its shape is trusted more than that of one found."""
+    every = fitted.model.given
+    less = [(replace(fitted.model, given=every[:i] + every[i + 1 :]), fitted.theta) for i in range(len(every))]
+    share = policy.compare.TWIN_SHAPE_ERROR / policy.select.SHAPE_ERROR
+    return [share * change for change in _changes(less, fitted, data, weights)]
+
+
+def _changes(less: Sequence[tuple[Model, Theta]], fitted: Fit, data: Data, weights: Weights) -> list[Floats]:
+    """From each of the models in `less` to the one that was fitted."""
     n = fitted.residual.size if weights.rate or weights.ticks else data.size
     basis = orthogonal_basis(fitted.jacobian[:n, ~_of_terms(fitted)])
     out = []
-    for term in fitted.model.terms:
-        change = weights.whiten(*change_of(fitted.less(term), (fitted.model, fitted.theta), data, weights))
+    for other in less:
+        change = weights.whiten(*change_of(other, (fitted.model, fitted.theta), data, weights))
         out.append(change - basis @ (basis.T @ change))
     return out
 
