@@ -16,10 +16,10 @@ from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.name.named_term import NamedTerm
+from identification.mismatch.prepare.scales import THERMOMETER
 from identification.mismatch.select.rounds import T
 from identification.mismatch.select.stepwise import F, RivalTerm
 from identification.mismatch.value import QUANTILE, Value, of_shape
-from identification.physics.heating import THERMOMETER
 from identification.physics.term import Term
 
 Intervals = Mapping[Term, tuple[Interval, ...]]

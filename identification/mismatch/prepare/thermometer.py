@@ -13,7 +13,7 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.prepare.channels import REACHES, calmest, followed
 from identification.mismatch.prepare.measured_driver import noise_of
-from identification.physics.heating import THERMOMETER
+from identification.mismatch.prepare.scales import THERMOMETER
 from identification.recording import Channel, Floats, Recording
 from identification.run_history.filters import lowpass
 
