@@ -89,7 +89,7 @@ def test_proxies_of_rivals_and_of_a_twin_are_told_once():
 
 def test_each_proxy_is_a_form_of_the_catalogue_that_does_without_the_quantity():
     without = [term for term in CATALOGUE if term.traits.proxy is not None]
-    assert len(without) == 11
+    assert len(without) == 12
     assert all(term.traits.proxy.quantity not in term.needs for term in without)
 
 
