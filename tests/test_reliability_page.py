@@ -39,7 +39,7 @@ def test_the_json_has_the_promises_of_the_page() -> None:
         "python benchmarks/controller/reliability.py --publish NUMBER writes both"
     )
     for entry in RESULTS["promises"].values():
-        assert entry.keys() == {"promise", "state", "tests", "measured"}
+        assert entry.keys() == {"promise", "state", "run", "tests", "measured"}
         assert all(each.keys() == {"what", "unit", "count", "median", "worst"} for each in entry["measured"])
 
 

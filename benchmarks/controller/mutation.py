@@ -1,6 +1,6 @@
 """Would a test notice? Mutants of what stops a motor, each run against the tests of its room.
 
-    python benchmarks/controller/mutation.py [guard|proof|sequencer|loop|arming ...] [--only LINE ...]
+    python benchmarks/controller/mutation.py [guard|proof|sequencer|loop|arming ...] [--only LINE ...] [--every N]
 
 A mutant is the module with one change: a comparison moved or turned, an operator exchanged, a number one larger, a
 condition turned or left out, a statement left out, a return without its value. Texts, type annotations and decorators
@@ -27,7 +27,7 @@ from typing import NamedTuple
 PROJECT = Path(__file__).resolve().parents[2]
 LIMIT = 120
 """s"""
-STAGES = ("test_campaign_failures.py", "test_campaign.py", "test_campaign_stops.py", "test_arming.py")
+STAGES = ("test_arming.py", "test_campaign_stops.py", "test_campaign_failures.py")
 TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
     "guard": ("rig/safety/guard.py", ("tests/rig/safety/test_guard_edges.py", "tests/rig/safety/test_guard.py")),
     "proof": ("rig/safety/watchdog_proof.py", ("tests/rig/sequence/test_sequencer_proof.py",)),
@@ -174,7 +174,7 @@ def survives(module: str, source: str, tests: tuple[str, ...]) -> bool:
     return os.waitpid(child, 0)[1] == 0
 
 
-def tried(name: str, only: Sequence[int]) -> tuple[int, int]:
+def tried(name: str, only: Sequence[int], every: int) -> tuple[int, int]:
     """Mutants made and killed."""
     module, tests = TARGETS[name]
     source = (PROJECT / module).read_text(encoding="utf-8")
@@ -183,9 +183,8 @@ def tried(name: str, only: Sequence[int]) -> tuple[int, int]:
         raise SystemExit(f"{module}: its tests fail without any change; mend that first")
     made = killed = 0
     lines = source.splitlines()
-    for mutant in mutants(source):
-        if only and mutant.line not in only:
-            continue
+    wanted = [mutant for mutant in mutants(source) if not only or mutant.line in only]
+    for mutant in wanted[::every]:
         made += 1
         if survives(module, mutant.source, there):
             print(f"  {module}:{mutant.line}: {mutant.what}: {lines[mutant.line - 1].strip()}", flush=True)
@@ -199,12 +198,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", metavar="|".join(TARGETS))
     parser.add_argument("--only", type=int, nargs="+", default=(), help="the mutants of these lines")
+    parser.add_argument("--every", type=int, default=1, help="each so manieth mutant alone")
     asked = parser.parse_args()
     os.chdir(PROJECT)
     sys.path.insert(0, str(PROJECT))
     for heavy in HEAVY:
         importlib.import_module(heavy)
-    found = [tried(name, asked.only) for name in asked.names or TARGETS]
+    found = [tried(name, asked.only, asked.every) for name in asked.names or TARGETS]
     made, killed = (sum(each) for each in zip(*found, strict=True))
     print(f"together: {made} mutants, {killed} killed, {made - killed} survived")
     return 0

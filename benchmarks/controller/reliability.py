@@ -43,7 +43,8 @@ def machine() -> str:
         platform.machine(),
     )
     python = platform.python_version()
-    return f"{os.cpu_count()} processors ({model}), {platform.system()} {platform.release()}, Python {python}"
+    load = f"load {os.getloadavg()[2]:.1f} for the last quarter of an hour"
+    return f"{os.cpu_count()} processors ({model}), {platform.system()} {platform.release()}, Python {python}, {load}"
 
 
 def of_version() -> str:
@@ -66,14 +67,14 @@ def run(wanted: list[Promise], short: bool) -> int:
 def results(page: tuple[Promise, ...], wanted: set[int], before: Path) -> dict[str, Any]:
     """All promises; those that were not asked for as the file `before` has them, when it has."""
     lines = LINES.read_text(encoding="utf-8").splitlines() if LINES.exists() else []
-    found = summed(lines, page)
+    date = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
+    found = summed(lines, page, f"{date}, version {of_version()}, {machine()}")
     known = json.loads(before.read_text(encoding="utf-8"))["promises"] if before.exists() else {}
     for promise in page:
         number = str(promise.number)
         if promise.number not in wanted and number in known:
             kept = {"promise": promise.line, "state": promise.state}
             found[number] = known[number] | kept
-    date = datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")
     return {"date": date, "version": of_version(), "machine": machine(), "promises": found}
 
 

@@ -18,8 +18,10 @@ SHOWN: Final = 3
 TABLE: Final = re.compile(f"{re.escape(BEGIN)}\n.*?{re.escape(END)}", re.DOTALL)
 
 
-def summed(lines: Iterable[str], page: Sequence[Promise]) -> dict[str, dict[str, Any]]:
-    """By number of the promise: its line and state, tests by outcome, count, median and worst of what they measured."""
+def summed(lines: Iterable[str], page: Sequence[Promise], where: str = "") -> dict[str, dict[str, Any]]:
+    """By number of the promise: its line and state, tests by outcome, count, median and worst of what they measured.
+
+    `where`: date, version and machine of it."""
     outcomes: dict[str, list[str]] = defaultdict(list)
     numbers: dict[str, dict[tuple[str, str], list[float]]] = defaultdict(lambda: defaultdict(list))
     for line in lines:
@@ -28,13 +30,14 @@ def summed(lines: Iterable[str], page: Sequence[Promise]) -> dict[str, dict[str,
             outcomes[found["test"]].append(found["outcome"])
         else:
             numbers[found["test"]][found["what"], found["unit"]].append(found["value"])
-    return {str(promise.number): _entry(promise, outcomes, numbers) for promise in page}
+    return {str(promise.number): _entry(promise, outcomes, numbers, where) for promise in page}
 
 
 def _entry(
     promise: Promise,
     outcomes: Mapping[str, list[str]],
     numbers: Mapping[str, Mapping[tuple[str, str], list[float]]],
+    where: str,
 ) -> dict[str, Any]:
     ran = [test for test in outcomes if any(test == each or test.startswith(f"{each}::") for each in promise.tests)]
     ends = [end for test in ran for end in outcomes[test]]
@@ -47,6 +50,7 @@ def _entry(
     return {
         "promise": promise.line,
         "state": promise.state,
+        "run": where if ran else "",
         "tests": {
             "passed": ends.count("passed"),
             "failed": ends.count("failed"),
@@ -59,7 +63,8 @@ def _entry(
 def table(results: Mapping[str, Any]) -> str:
     """The README's rows between their two marks."""
     rows = [f"| {number} | {entry['promise']} | {told(entry)} | {state(entry)} |" for number, entry in _sorted(results)]
-    head = f"Measured {results['date']}, version {results['version']}, on {results['machine']}:"
+    newest = f"{results['date']}, version {results['version']}, {results['machine']}"
+    head = f"Newest figures: {newest}. [The file](docs/reliability.json) says of each when and on what it was measured."
     return "\n".join([BEGIN, head, "", "| | promise | measured | state |", "|---|---|---|---|", *rows, END])
 
 

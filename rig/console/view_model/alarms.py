@@ -31,7 +31,8 @@ def alarm(view: View) -> Alarm:
     if view.stop_failed:
         return Alarm("danger", f"STOP NOT SENT — {view.stop_failed}. Cut the power: hardware emergency stop.")
     if view.condition == "stale":
-        return Alarm("danger", f"NO FRESH DATA for {age(view.silence)} — the figures below are not the present.")
+        sent = f"STOP SENT {age(view.now - view.stop_asked)} ago, no answer. " if view.stop_asked is not None else ""
+        return Alarm("danger", f"{sent}NO FRESH DATA for {age(view.silence)} — the figures below are not the present.")
     if snapshot is None:
         return Alarm("info", "Waiting for the controller's first snapshot.")
     return _running(view, snapshot)

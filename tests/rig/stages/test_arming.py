@@ -1,0 +1,138 @@
+"""What is opened, judged and asked for before a propeller may turn, by itself."""
+
+import pytest
+
+from rig.errors import DeviceError
+from rig.link.front_end_messages import Request
+from rig.recording.ledger import read
+from rig.stages.arming import FLOW_PATIENCE, FLOW_WINDOW, SETTLE_ROWS, UNSEEN, Flow, connect, preflight
+from rig.stages.session import Stopped
+from tests.rig.virtual_bench import virtual
+from tests.rig.virtual_devices import flow_meter
+
+SLOWEST = 0.02
+"""s, period of the slowest stream of the virtual bench."""
+
+
+def ask(world, at, kind="start"):
+    """So many s from now on, as from a front end."""
+    now = world.clock.now_ns() * 1e-9
+    world.clock.at.append((now + at, lambda: world.session.loop.signals.append(Request(kind, "a test"))))
+
+
+def connected(world):
+    connect(world.session)
+    return world.clock.now_ns() * 1e-9
+
+
+def test_every_device_is_opened_and_says_who_it_is(tmp_path):
+    with virtual(tmp_path) as world:
+        connect(world.session)
+        assert [(c.name, c.verdict, c.text) for c in world.session.status.checks] == [
+            ("load_cell", "passed", "virtual cell 2"),
+            ("motor", "passed", "virtual motor 1"),
+        ]
+        assert world.session.motor is world.motor
+        assert "load_cell: virtual cell 2" in world.texts
+
+
+def test_a_device_that_does_not_open_ends_it_after_all_were_tried(tmp_path):
+    with virtual(tmp_path) as world:
+        world.cell.refuses = "load_cell: no such port"
+        with pytest.raises(DeviceError, match="no such port"):
+            connect(world.session)
+        assert [(c.name, c.verdict) for c in world.session.status.checks] == [
+            ("load_cell", "failed"),
+            ("motor", "passed"),
+        ]
+        assert [line.level for line in world.session.status.log if "no such port" in line.text] == ["error"]
+        assert world.motor.sent == [] or {volts for _, volts in world.motor.sent} == {0.0}
+
+
+def test_a_start_is_heard_and_written_down(tmp_path):
+    with virtual(tmp_path) as world:
+        began = connected(world)
+        ask(world, 1.0)
+        preflight(world.session)
+        now = world.clock.now_ns() * 1e-9
+        assert now >= began + max(SETTLE_ROWS * SLOWEST, 1.0)
+        assert (world.session.status.state, world.session.status.outcome) == ("preflight", "running")
+        assert world.session.status.started == pytest.approx(world.session.loop.now)
+        assert "preflight: watchdog: 0.5 s" in world.texts
+        warned = [line for line in world.session.status.log if line.text.startswith("preflight: override")]
+        assert [line.level for line in warned] == ["warning"]
+        passed = [line for line in world.session.status.log if line.text.startswith("preflight: load_cell rate")]
+        assert [line.level for line in passed] == ["info"]
+
+    (fact,) = [fact for fact in read(tmp_path) if fact["fact"] == "start"]
+    assert fact["identities"] == {"load_cell": "virtual cell 2", "motor": "virtual motor 1"}
+
+
+def test_a_failed_check_lets_nothing_start(tmp_path):
+    with virtual(tmp_path) as world:
+        connected(world)
+        world.motor.timeout = None
+        ask(world, 1.0)
+        ask(world, 2.0, "stop")
+        with pytest.raises(Stopped):
+            preflight(world.session)
+        assert "not started: watchdog: " in world.texts
+        assert world.session.status.started is None
+
+
+def test_nobody_starts_and_nobody_looks(tmp_path):
+    with virtual(tmp_path) as world:
+        began = connected(world)
+        with pytest.raises(
+            Stopped, match="nobody started the campaign, and no front end was there for 60 s"
+        ) as stopped:
+            preflight(world.session)
+        assert stopped.value.outcome == "aborted"
+        assert world.clock.now_ns() * 1e-9 - began == pytest.approx(UNSEEN + SETTLE_ROWS * SLOWEST, abs=0.2)
+
+
+def test_somebody_who_looks_may_take_his_time(tmp_path):
+    with virtual(tmp_path) as world:
+        began = connected(world)
+        front = world.front()
+        ask(world, 2 * UNSEEN)
+        preflight(world.session)
+        front.close()
+        assert world.clock.now_ns() * 1e-9 - began == pytest.approx(2 * UNSEEN, abs=0.2)
+
+
+def test_water_that_never_comes_is_a_failure_after_its_patience(tmp_path):
+    meter, told = flow_meter(0.02), []
+    with virtual(tmp_path, inputs=(meter,), flow_speed=0.5) as world:
+        connected(world)
+        front = world.front()
+
+        def look():
+            told.append(
+                [c.verdict for c in world.session.status.checks if c.name == "flow"][-1]
+            )  # the device is called so too
+
+        now = world.clock.now_ns() * 1e-9
+        world.clock.at += [(now + FLOW_PATIENCE - 1.0, look), (now + FLOW_PATIENCE + 1.0, look)]
+        ask(world, FLOW_PATIENCE + 2.0, "stop")
+        with pytest.raises(Stopped):
+            preflight(world.session)
+        front.close()
+    assert told == ["waiting", "failed"]
+
+
+def test_flow_is_the_mean_of_its_last_seconds(tmp_path):
+    meter = flow_meter(0.1)
+    with virtual(tmp_path, inputs=(meter,)) as world:
+        connect(world.session)
+        readings, flow = world.session.loop.readings, Flow(0.5, patient_until=1e9)
+        world.session.turn_for(1.0)
+        first = world.session.loop.now
+        flow.checks(readings, first)
+        meter.value = 0.5
+        world.session.turn_for(FLOW_WINDOW - 0.1)
+        (check,) = flow.checks(readings, first + FLOW_WINDOW - 0.1)
+        assert check.text.startswith("0.3 m/s measured"), "both are within the window"
+        (check,) = flow.checks(readings, first + FLOW_WINDOW + 0.1)
+        assert (check.verdict, check.text[:8]) == ("passed", "0.5 m/s ")
+        assert Flow(None, 0.0).checks(readings, 0.0) == []
