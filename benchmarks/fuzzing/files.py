@@ -107,7 +107,10 @@ def run_tomls(count: int, seed: int, folder: Path) -> list[Tally]:
     campaigns = [path.read_bytes() for path in sorted((ROOT / "campaigns").glob("*.toml"))]
     bench = (ROOT / "benches" / "simulated" / "bench.toml").read_bytes()
     maps = [path.read_bytes() for path in shipped().values()]
-    own = b'[time]\ncolumn = "t"\n[streams.s.channels.thrust]\ncolumn = "F"\nquantity = "thrust"\nunit = "N"\n'
+    own = (
+        b'about = "x"\nthruster = "T1"\n[time]\ncolumn = "t"\n'
+        b'[streams.s.channels.thrust]\ncolumn = "F"\nquantity = "thrust"\nunit = "N"\n'
+    )
     kinds: tuple[tuple[str, list[bytes], Callable[[bytes], list[str]]], ...] = (
         ("campaigns", campaigns, lambda data: _campaign(place, data, bench)),
         ("benches", [bench], lambda data: _campaign(place, campaigns[0], data)),
