@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import shutil
 import signal
 from collections.abc import Callable, Iterator
@@ -106,6 +107,9 @@ def run_tomls(count: int, seed: int, folder: Path) -> list[Tally]:
     (place / "log.csv").write_text("t,V,F\n" + "".join(f"{i / 10},{i // 40},{i * 0.01}\n" for i in range(400)))
     campaigns = [path.read_bytes() for path in sorted((ROOT / "campaigns").glob("*.toml"))]
     bench = (ROOT / "benches" / "simulated" / "bench.toml").read_bytes()
+    (place / "benches" / "ports").mkdir()
+    for port in re.findall(r"ports/(\w+)", bench.decode()):  # `rig check` looks whether they are there
+        (place / "benches" / "ports" / port).touch()
     maps = [path.read_bytes() for path in shipped().values()]
     own = (
         b'about = "x"\nthruster = "T1"\n[time]\ncolumn = "t"\n'
@@ -114,7 +118,7 @@ def run_tomls(count: int, seed: int, folder: Path) -> list[Tally]:
     kinds: tuple[tuple[str, list[bytes], Callable[[bytes], list[str]]], ...] = (
         ("campaigns", campaigns, lambda data: _campaign(place, data, bench)),
         ("benches", [bench], lambda data: _campaign(place, campaigns[0], data)),
-        ("maps", [*maps, own, own, own], lambda data: _map(place, data)),
+        ("maps", [*maps, *[own] * len(maps)], lambda data: _map(place, data)),
     )
     found = []
     for index, (kind, seeds, laid) in enumerate(kinds):

@@ -50,7 +50,7 @@ class Tally:
 def mutant(rng: np.random.Generator, seeds: Sequence[bytes]) -> bytes:
     """One of the seeds with one to four changes."""
     data = bytearray(seeds[int(rng.integers(len(seeds)))])
-    for _ in range(int(rng.integers(1, 5))):
+    for _ in range(min(int(rng.geometric(0.6)), 4)):
         _change(rng, data, seeds)
     return bytes(data)
 
