@@ -33,7 +33,8 @@ INTERNAL_FAULTS = {
     11: "device mismatch", 12: "hot plug out", 14: "weigh module and terminal mismatch", 15: "adjustment needed",
 }  # fmt: skip
 """`S S Error nn(b|t)` (2.1.3.3); b from the electronics, t from the terminal."""
-_NUMBER = re.compile(rb"[+-]?\d+\.?\d*")
+_NUMBER = re.compile(rb"[+-]?\d{1,20}\.?\d{0,20}")
+"""Bounded: 310 digits would be an infinite force; the longest of the manual has ten characters."""
 _REPLY = re.compile(rb"([A-Z@][A-Z0-9]{0,7})(?: ([ABILSD+-]))?(?: (.*))?")
 _ERROR = re.compile(rb"(\d+)[bt]")
 

@@ -26,7 +26,8 @@ LINE_CHARACTERS = 92
 """A `$PNORC1` of a four-beam instrument with CR LF."""
 
 _SENTENCE = re.compile(rb"\$([^$*]*)\*([0-9A-Fa-f]{2})")
-_VELOCITY = re.compile(rb"[+-]?\d+(?:\.\d*)?")
+_VELOCITY = re.compile(rb"[+-]?\d{1,20}(?:\.\d{0,20})?")
+"""Bounded: 310 digits would be an infinite speed."""
 _INVALID = re.compile(rb"-9+(?:\.[09]*)?")
 
 

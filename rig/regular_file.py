@@ -19,7 +19,7 @@ KINDS: Final = {
 
 
 def read(path: Path, what: str, most: int, refusal: type[RigError]) -> bytes:
-    """All of it; what grows meanwhile is cut at `most` bytes. Raises FileNotFoundError; `refusal` for all else.
+    """All of it; what comes while it is read is not in it. Raises FileNotFoundError; `refusal` for all else.
 
     `what` names it in the sentence (`bench file`).
     """
@@ -31,9 +31,10 @@ def read(path: Path, what: str, most: int, refusal: type[RigError]) -> bytes:
     except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
         raise refusal(f"{path}: this {what} can't be read: {getattr(error, 'strerror', None) or error}") from None
     try:
-        _require_regular(os.fstat(descriptor), path, what, most, refusal)
+        found = os.fstat(descriptor)
+        _require_regular(found, path, what, most, refusal)
         with os.fdopen(os.dup(descriptor), "rb") as file:
-            return file.read(most)
+            return file.read(found.st_size)
     except OSError as error:
         raise refusal(f"{path}: this {what} can't be read: {error.strerror}") from None
     finally:

@@ -22,6 +22,10 @@ from rig.importing.reading.foreign_formats import foreign
 from rig.importing.thruster_name import thruster_of
 from rig.importing.timing.two_clocks import ESTIMATED, merged, offset_asked, offset_between
 from rig.link.recorder_messages import Attribute, EventRow, Rows
+from rig.regular_file import read
+
+MOST_BYTES = 2**30
+"""Of a file to import: a day of ten columns at 100 Hz. What is longer is imported in parts."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,8 +85,8 @@ def _refuse_to_overwrite(out: Path) -> None:
 def _read(source: Path, encoding: str = "utf-8") -> bytes:
     """Raises RecordingError for a file that is not there, and for one that is no text: what it is and what to do."""
     try:
-        data = source.read_bytes()
-    except OSError as error:
+        data = read(source, "file to import", MOST_BYTES, RecordingError)
+    except FileNotFoundError as error:
         raise RecordingError(f"{source} can't be read: {error.strerror}") from error
     what = foreign(data, source.name, encoding)
     if what:

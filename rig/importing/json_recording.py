@@ -26,6 +26,8 @@ from rig.link.recorder_messages import Attribute, ChannelSpec, StepRow, StreamSp
 
 FORMAT = "thruster-rig-recording"
 VERSION = 1
+MOST_BYTES = 64 * 2**20
+"""JSON takes some ten times its size while it is read."""
 KINDS = ("tunnel", "bollard", "vehicle")
 FACTS = ("noise_std", "range_min", "range_max", "thruster", "axis", "description")
 """Attributes of a channel that are taken over; `calibration` is an object."""
@@ -41,9 +43,13 @@ class Plain:
 
 def read_plain(data: bytes) -> Plain:
     """Raises RecordingError with one sentence that says where the file is not as the format asks."""
+    if len(data) > MOST_BYTES:
+        raise RecordingError(f"{len(data)} bytes of JSON; at most {MOST_BYTES} are read: write a table, and a map")
     try:
         content = json.loads(data)
-    except (UnicodeDecodeError, json.JSONDecodeError) as error:
+    except RecursionError:
+        raise RecordingError("JSON that is nested too deeply to be a recording") from None
+    except ValueError as error:
         raise RecordingError(f"not JSON: {error}; a table needs --map") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         raise RecordingError(f'JSON without "format": "{FORMAT}"; a table needs --map')
@@ -53,7 +59,7 @@ def read_plain(data: bytes) -> Plain:
         attributes = _attributes(content.get("attributes", {}))
         streams = tuple(_stream(name, found) for name, found in content["streams"].items())
         steps = tuple(_step(i, step) for i, step in enumerate(content.get("steps", ())))
-    except (KeyError, TypeError, AttributeError, ValueError) as error:
+    except (KeyError, TypeError, AttributeError, ValueError, OverflowError) as error:
         raise RecordingError(f"the JSON is not as rig/importing/json_recording.py shows: {error!r}") from None
     rows = sum(stream.time.size for stream in streams)
     notes = ("read from JSON in the words of the recording format", _understood(streams, steps))

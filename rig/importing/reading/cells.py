@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isnan
 
@@ -121,31 +122,42 @@ def read_cells(plan: ImportMap, table: Table, columns: Mapping[str, Column], ref
         frozenset(plan.file.missing),
         plan.file.decimal == ",",
     )
-    wanted, filtered = _wanted(plan, table, refused)
-    times, values = _good_rows(wanted, row_reader, refused)
+    wanted = _Filtered()
+    times, values = _good_rows(_wanted(plan, table, refused, wanted), row_reader, refused)
+    if plan.file.where:
+        refuse_empty(plan.file.where, wanted.kept, len(table.rows))
     by_index = {index: values[:, k] for k, index in enumerate(indices)}
     named = {name: _scaled(by_index[index], factor, columns[name]) for name, (index, factor) in places.items()}
-    return Cells(named, {clock: times[:, k] for k, clock in enumerate(clocks)}, len(values), filtered)
+    return Cells(named, {clock: times[:, k] for k, clock in enumerate(clocks)}, len(values), wanted.left_out)
 
 
-def _wanted(plan: ImportMap, table: Table, refused: Refused) -> tuple[Sequence[tuple[int, Sequence[str]]], int]:
-    """Rows that the map's filter lets through, and the number of those that it does not."""
+@dataclass
+class _Filtered:
+    """What the map's filter did."""
+
+    kept: int = 0
+    left_out: int = 0
+
+
+def _wanted(
+    plan: ImportMap, table: Table, refused: Refused, filtered: _Filtered
+) -> Iterator[tuple[int, Sequence[str]]]:
+    """Rows that the map's filter lets through, one after another; `filtered` counts."""
     if not plan.file.where:
-        return table.rows, 0
+        yield from table.rows
+        return
     wanted, comma = parse(plan.file.where), plan.file.decimal == ","
     places = {name: _filter_place(plan, table, name) for name in columns_of(wanted)}
-    kept, filtered = [], 0
     for line, row in table.rows:
         try:
             passes = row_passes(wanted, row, places, comma)
         except ValueError:
             refused.add("the filter compares a cell with a number that is none", line)
             continue
+        filtered.kept += passes
+        filtered.left_out += not passes
         if passes:
-            kept.append((line, row))
-        filtered += not passes
-    refuse_empty(plan.file.where, len(kept), len(table.rows))
-    return kept, filtered
+            yield line, row
 
 
 def _filter_place(plan: ImportMap, table: Table, name: str) -> int:
@@ -159,9 +171,9 @@ def _filter_place(plan: ImportMap, table: Table, name: str) -> int:
 
 
 def _good_rows(
-    rows: Sequence[tuple[int, Sequence[str]]], row_reader: RowReader, refused: Refused
+    rows: Iterable[tuple[int, Sequence[str]]], row_reader: RowReader, refused: Refused
 ) -> tuple[Floats, Floats]:
-    kept: list[tuple[list[float], list[float]]] = []
+    kept_times, kept_values, count = array("d"), array("d"), 0
     latest = [-np.inf] * len(row_reader.clocks)
     for line, row in rows:
         try:
@@ -173,9 +185,11 @@ def _good_rows(
             refused.add("time runs backwards", line)
             continue
         latest = times
-        kept.append((times, values))
-    time_grid = np.array([times for times, _ in kept], dtype=np.float64).reshape(len(kept), len(row_reader.clocks))
-    value_grid = np.array([values for _, values in kept], dtype=np.float64).reshape(len(kept), len(row_reader.indices))
+        kept_times.extend(times)
+        kept_values.extend(values)
+        count += 1
+    time_grid = np.array(kept_times, dtype=np.float64).reshape(count, len(row_reader.clocks))
+    value_grid = np.array(kept_values, dtype=np.float64).reshape(count, len(row_reader.indices))
     return time_grid, value_grid
 
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import csv
 import difflib
+import re
 import unicodedata
+from array import array
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from typing import Final
 
 from rig.errors import RecordingError
 from rig.importing.mapping import ColumnRef, FileMap, HeaderValue
 
+LINE_END: Final = re.compile("\r\n|[\n\r\v\f\x1c-\x1e\x85\u2028\u2029]")
 FIRST_LINES = 5
 """Line numbers kept per reason."""
 
@@ -36,11 +40,46 @@ class Refused:
         return ", ".join(map(str, self.lines[reason])) + more
 
 
+class Lines:
+    """Some lines of a text, each with its number: where they are, not what they hold, which is many times larger."""
+
+    def __init__(self, text: str, form: FileMap, width: int = 0) -> None:
+        self._text, self._form, self._width = text, form, width
+        self._places = array("q")
+
+    def add(self, number: int, start: int, end: int) -> None:
+        self._places.extend((number, start, end))
+
+    def __len__(self) -> int:
+        return len(self._places) // 3
+
+    def __iter__(self) -> Iterator[tuple[int, Sequence[str]]]:
+        """Line number and cells, without empty ones beyond the width."""
+        for number, start, end in self.places():
+            yield number, _trimmed(split(self._text[start:end], self._form), self._width)
+
+    def places(self, first: int = 0) -> Iterator[tuple[int, int, int]]:
+        """Number, start and end of each line, from the `first` on."""
+        for i in range(3 * first, len(self._places), 3):
+            yield self._places[i], self._places[i + 1], self._places[i + 2]
+
+    def of_width(self, width: int, first: int, refused: Refused) -> Lines:
+        """Those with so many cells, from the `first` on; `refused` is told of the others."""
+        good = Lines(self._text, self._form, width)
+        for number, start, end in self.places(first):
+            cells = len(_trimmed(split(self._text[start:end], self._form), width))
+            if cells == width:
+                good.add(number, start, end)
+            else:
+                refused.add(f"{'fewer' if cells < width else 'more'} than {width} columns", number)
+        return good
+
+
 @dataclass(frozen=True)
 class Table:
     names: tuple[str, ...]
     """Of the header; empty without one."""
-    rows: tuple[tuple[int, Sequence[str]], ...]
+    rows: Lines
     """Line number and cells."""
     above: tuple[Sequence[str], ...]
     """Cells of comment and skipped lines."""
@@ -66,25 +105,30 @@ def read_table(data: bytes, form: FileMap, refused: Refused) -> Table:
     """Rows of the right width. `refused` is told of the others."""
     text, encoding = decode(data, form.encoding)
     above: list[Sequence[str]] = []
-    body: list[tuple[int, Sequence[str]]] = []
-    for number, line in enumerate(text.splitlines(), start=1):
+    body = Lines(text, form, len(text))
+    for number, start, end in _lines(text):
+        line = text[start:end]
         if not line.strip() or any(mark in line for mark in form.ignore):
             continue
-        cells: Sequence[str] = list(split(line, form))
         if number <= form.skip_rows or (form.comment and line.lstrip().startswith(form.comment)):
-            above.append(cells)
+            above.append(list(split(line, form)))
         else:
-            body.append((number, cells))
-    names: tuple[str, ...] = ()
-    if form.header and body:
-        names = tuple(_normal(cell) for cell in _trimmed(body.pop(0)[1], 0))
+            body.add(number, start, end)
+    head = next(iter(body), None) if form.header else None
+    names = tuple(_normal(cell) for cell in _trimmed(head[1], 0)) if head is not None else ()
     width = form.width or len(names) or _usual_width(body)
-    body = [(number, _trimmed(row, width)) for number, row in body]
-    good = tuple((number, cells) for number, cells in body if len(cells) == width)
-    for number, cells in body:
-        if len(cells) != width:
-            refused.add(f"{'fewer' if len(cells) < width else 'more'} than {width} columns", number)
+    good = body.of_width(width, 1 if head is not None else 0, refused)
     return Table(names, good, tuple(above), width, encoding, encoding != form.encoding)
+
+
+def _lines(text: str) -> Iterator[tuple[int, int, int]]:
+    """Number, start and end of each line, as `str.splitlines` cuts them."""
+    start, number = 0, 0
+    for number, found in enumerate(LINE_END.finditer(text), start=1):
+        yield number, start, found.start()
+        start = found.end()
+    if start < len(text):
+        yield number + 1, start, len(text)
 
 
 def _trimmed(cells: Sequence[str], width: int) -> Sequence[str]:
@@ -102,7 +146,7 @@ def split(line: str, form: FileMap) -> Sequence[str]:
     return next(csv.reader([line], delimiter=mark)) if '"' in line else line.split(mark)
 
 
-def _usual_width(body: Sequence[tuple[int, Sequence[str]]]) -> int:
+def _usual_width(body: Lines) -> int:
     counts = Counter(len(cells) for _, cells in body)
     return counts.most_common(1)[0][0] if counts else 0
 
