@@ -29,8 +29,9 @@ LAST_LOOK = 1e-2
 FALL_MET = 0.25
 """Of the fall that slopes foretold: where it was met as closely, they are not asked for anew before the next step."""
 CLOSE = 1e-2
-"""Fall of chi-square at which a fit has ended, or of which the slopes promise less; a difference of 1 is one sigma.
-Where chi-square per row is more than 1, a fit has ended at as much more: a sigma is as much larger."""
+"""Fall of chi-square at which a fit has ended, or of which the slopes promise less; a difference of 1 is one sigma."""
+MISFIT = 1e-2
+"""Of chi-square per row: where it is more than 1, a fit has ended at as much more."""
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -70,12 +71,10 @@ def least_squares(
     damping, fresh, asked = 1e-3, slopes is None, 1
     while asked <= most_steps:
         chi2 = float(residual @ residual)
-        close = closeness(residual)
+        close = CLOSE * max(1.0, MISFIT * chi2 / max(residual.size, 1))
         found = _step(residual_of, at, residual, J, low, high, damping, close, MOST_TRIES if fresh else FEW_TRIES)
         if found is None and fresh:
             break
-        if found is None and hopeless - close < chi2 < hopeless + close:
-            return Minimum(at, residual, J, given_up=True)  # where another fit has been
         if found is None:  # by secants the end is only nearly met
             J, fresh, asked = slopes_of(at), True, asked + 1
             found = _step(residual_of, at, residual, J, low, high, damping, LAST_LOOK * close)
@@ -95,11 +94,6 @@ def least_squares(
         else:
             J, fresh, asked = slopes_of(at), True, asked + 1
     return Minimum(at, residual, J if fresh else slopes_of(at))
-
-
-def closeness(residual: Floats) -> float:
-    """Fall of chi-square at which a fit that leaves `residual` (n,) has ended."""
-    return CLOSE * max(1.0, float(residual @ residual) / max(residual.size, 1))
 
 
 @dataclass(frozen=True, eq=False, slots=True)

@@ -9,13 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.mismatch import policy
-from identification.mismatch.estimate.bounded_least_squares import (
-    MOST_STEPS,
-    Minimum,
-    closeness,
-    least_squares,
-    promised,
-)
+from identification.mismatch.estimate.bounded_least_squares import CLOSE, MOST_STEPS, Minimum, least_squares, promised
 from identification.mismatch.model.at_samples import at_samples
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model, extended, parameters, reduced
@@ -236,7 +230,7 @@ def fit(
         if not float(left @ left) < found.chi2:
             return found
     other = _descended(model, alike, data, weights, most_steps, min(hopeless, found.chi2), found)
-    return other if other.chi2 < found.chi2 - closeness(found.residual) else found
+    return min(found, other, key=lambda each: each.chi2)
 
 
 def _descended(
@@ -270,7 +264,7 @@ def _descended(
     if (
         may[at.rate_shift]
         and not (found.given_up and float(found.residual @ found.residual) > BEYOND_CLOCKS * hopeless)
-        and promised(found, low[may], high[may], still[may]) > closeness(found.residual)
+        and promised(found, low[may], high[may], still[may]) > CLOSE
     ):
         # rows at the edge of a tick stopped the rate's clock, and all others with it
         best = best.with_part(still, descended(best, still).at)

@@ -60,10 +60,9 @@ def test_the_minimum_is_that_of_scipy(curve: Curve, slopes: Curve, low: Floats, 
         return -slopes(p) / 0.05
 
     wanted = oracle(residual, inside, falling, (low, high), xtol=1e-12, ftol=1e-12, gtol=1e-12)
-    misfit = max(1.0, 2 * wanted.cost / TIME.size)  # where ends press, no curve is near: a sigma is as much larger
-    assert found.residual @ found.residual == pytest.approx(2 * wanted.cost, abs=0.01 * misfit)
-    std = np.sqrt(misfit * np.diag(np.linalg.pinv(found.slopes.T @ found.slopes)))
-    assert np.all(np.abs(found.at - wanted.x) < 0.1 * std + 1e-6)
+    assert found.residual @ found.residual == pytest.approx(2 * wanted.cost, abs=0.01)
+    std = np.sqrt(np.diag(np.linalg.pinv(found.slopes.T @ found.slopes)))
+    assert np.all(np.abs(found.at - wanted.x) < 0.05 * std + 1e-6)
     assert np.all((low <= found.at) & (found.at <= high))
     np.testing.assert_array_equal(found.residual, residual(found.at))
 
@@ -93,30 +92,6 @@ def test_a_step_into_what_has_no_value_is_shortened() -> None:
     low, high = np.array([-9.0]), np.array([9.0])
     found = least_squares(residual, lambda p: 500 / np.sqrt(p)[:, None], np.array([4.0]), low, high)
     assert found.at[0] == pytest.approx(0.01, rel=1e-3)
-
-
-def test_where_another_fit_has_been_no_slopes_are_asked_for_at_last() -> None:
-    """From slopes that are not quite its own: it has met what another fit left, or it is looked at once more."""
-    y = decay(np.array([3.0, 1.3, 0.2])) + 0.05 * np.random.default_rng(0).standard_normal(TIME.size)
-    asked: list[Floats] = []
-
-    def residual(p: Floats) -> Floats:
-        return np.asarray((y - decay(p)) / 0.05)
-
-    def slopes(p: Floats) -> Floats:
-        asked.append(p)
-        return decay_slopes(p) / 0.05
-
-    start = np.array([2.9, 1.25, 0.25])
-    begin = decay_slopes(start) / 0.05
-    whole = least_squares(residual, slopes, start, *FREE, slopes=begin)
-    left, before = float(whole.residual @ whole.residual), len(asked)
-    again = least_squares(residual, slopes, start, *FREE, hopeless=left, slopes=begin)
-    assert before > len(asked) - before
-    assert again.given_up
-    assert again.residual @ again.residual == pytest.approx(left, abs=0.01)
-    out_of_reach = least_squares(residual, slopes, start, *FREE, hopeless=left + 5.0, slopes=begin)
-    assert not out_of_reach.given_up
 
 
 def test_what_is_hopeless_ends_early() -> None:
