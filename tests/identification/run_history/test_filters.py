@@ -6,7 +6,16 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.signal import welch
 
 from identification.mismatch.periodic.spectrum import averaged, smoothed
-from identification.run_history.filters import delayed, integral, lowpass, play, reconstructed, recursion
+from identification.run_history.filters import (
+    ShortDelay,
+    delay_of,
+    delayed,
+    integral,
+    lowpass,
+    play,
+    reconstructed,
+    recursion,
+)
 from identification.run_history.rotor_lag import lag
 
 
@@ -88,10 +97,12 @@ def test_smoothed_is_a_gaussian_filter(width):
     np.testing.assert_allclose(smoothed(value, width), gaussian_filter1d(value, width, mode="nearest"), rtol=1e-10)
 
 
-@pytest.mark.parametrize("delay", [-0.02, -0.004, 0.0, 0.004, 0.02, 3.0])
+@pytest.mark.parametrize("delay", [-3.0, -0.02, -0.004, 0.0, 0.004, 0.02, 3.0])
 def test_delayed_is_the_mean_of_what_was_earlier(delay):
     rng = np.random.default_rng(5)
     edges = np.concatenate([[1.0], 1.0 + np.cumsum(rng.uniform(0.005, 0.1, 300))])
     value = rng.normal(size=300)
     expected = np.diff(integral(value, edges, edges - delay)) / np.diff(edges)
     np.testing.assert_allclose(delayed(value, edges, delay), expected, atol=1e-9)
+    few = isinstance(delay_of(edges, delay), ShortDelay)
+    assert few == (abs(delay) < 1.0), "a delay that is shorter than most intervals is not integrated over all of them"
