@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from identification.recording import Channel, Floats
 from rig.errors import RecordingError
-from rig.hdf5.members import DAMAGE, members, numeric_columns
+from rig.hdf5.members import DAMAGE, LARGEST_VALUE, measured, members, numeric_columns
 from rig.hdf5.opening import open_for_reading
 
 BLOCK = 65_536
@@ -32,11 +32,7 @@ class LongChannel:
         self._missing = self._value.attrs.get("missing_value")
 
     def values(self, start: int, stop: int) -> Floats:
-        raw = self._read(self._value, start, stop)
-        out: Floats = raw.astype(np.float64, copy=False)
-        if self._missing is not None:
-            out[raw == self._missing] = np.nan
-        return out
+        return measured(self._read(self._value, start, stop), self._missing)[0]
 
     def _read(self, column: h5py.Dataset, start: int, stop: int) -> NDArray[Any]:
         try:
@@ -48,7 +44,7 @@ class LongChannel:
     def times(self, start: int, stop: int, latest: float = -np.inf) -> tuple[Floats, Floats]:
         """Times, not before each other nor before `latest`; and as they are in the file."""
         found: Floats = self._read(self._time, start, stop).astype(np.float64, copy=False)
-        rising: Floats = np.maximum.accumulate(np.where(np.isfinite(found), found, -np.inf))
+        rising: Floats = np.maximum.accumulate(np.where(np.abs(found) <= LARGEST_VALUE, found, -np.inf))
         return np.maximum(rising, latest), found
 
     def blocks(self) -> Iterator[tuple[Floats, Floats]]:

@@ -16,7 +16,7 @@ from identification.recording import QUANTITY_UNITS, Acquisition, Channel, Event
 from rig.errors import RecordingError
 from rig.hdf5.apart import apart, open_no_more
 from rig.hdf5.layout import text_of
-from rig.hdf5.members import DAMAGE, attributes, member, members, numeric_columns, table
+from rig.hdf5.members import DAMAGE, LARGEST_VALUE, attributes, measured, member, members, numeric_columns, table
 from rig.hdf5.opening import number, open_for_reading, require_file
 
 UNIT_SPELLINGS: Final = {"Nm": "N.m", "N m": "N.m", "N·m": "N.m", "°C": "degC", "m/s2": "m/s^2", "m/s²": "m/s^2"}
@@ -157,8 +157,8 @@ def _channels(stream: str, group: h5py.Group, rows: int | None, findings: Findin
 
 
 def _rising(time: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """True for rows whose time is finite and not before any earlier row."""
-    finite = np.isfinite(time)
+    """True for rows whose time can be one and is not before any earlier row."""
+    finite = np.abs(time) <= LARGEST_VALUE
     return finite & (time >= np.maximum.accumulate(np.where(finite, time, -np.inf)))
 
 
@@ -166,10 +166,9 @@ def _channel(
     stream: str, item: h5py.Dataset, time: NDArray[np.float64], good: NDArray[np.bool_], findings: Findings
 ) -> Channel:
     name, facts = item.name.rsplit("/", 1)[-1], item.attrs
-    raw = item[: len(time)]
-    value = raw.astype(np.float64)
-    if "missing_value" in facts:
-        value[raw == facts["missing_value"]] = np.nan
+    value, damaged = measured(item[: len(time)], facts.get("missing_value"))
+    if damaged:
+        findings.texts.append(f"{stream}/{name}: {damaged} values beyond {LARGEST_VALUE:g} are damaged: left out")
     quantity, unit = _quantity(f"{stream}/{name}", facts, findings)
     return Channel(
         name=name,

@@ -9,6 +9,8 @@ from collections.abc import Iterator
 from typing import Any, Final
 
 import h5py
+import numpy as np
+from numpy.typing import NDArray
 
 DAMAGE: Final = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
 """What h5py raises for a piece of a file that is torn or makes no sense."""
@@ -16,6 +18,8 @@ MOST_DEFLATED: Final = 1100
 """Times; zlib packs at most 1032 to 1 (zlib Technical Details)."""
 MOST_SPARSE: Final = 64
 """Times; a column is made longer before its rows are written, and a disk that is full keeps them out."""
+LARGEST_VALUE: Final = 1e30
+"""In any SI unit; who squares and adds up what is larger gets no numbers."""
 LARGEST_CHUNK: Final = 2**26
 """Bytes that a file may make HDF5 take at once, whatever its own size."""
 
@@ -45,6 +49,16 @@ def table(group: h5py.Group, name: str) -> h5py.Dataset | None:
 def numeric_columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
     """Datasets of a stream that are one-dimensional and numeric, `time` among them."""
     return {name: item for name, item in members(group) if isinstance(item, h5py.Dataset) and _is_column(item)}
+
+
+def measured(raw: NDArray[Any], missing: Any) -> tuple[NDArray[np.float64], int]:
+    """The values of a column, NaN where nothing was measured; and how many were larger than anything is."""
+    value = raw.astype(np.float64)
+    if missing is not None:
+        value[raw == missing] = np.nan
+    damaged = np.isfinite(value) & (np.abs(value) > LARGEST_VALUE)
+    value[damaged | np.isinf(value)] = np.nan
+    return value, int(damaged.sum())
 
 
 def _is_column(item: h5py.Dataset) -> bool:

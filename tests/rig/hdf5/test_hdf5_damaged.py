@@ -8,8 +8,10 @@ import pytest
 
 from rig.errors import RecordingError
 from rig.hdf5 import RecordingFile, load, recover
+from rig.hdf5.blocks import long_channels
 from rig.hdf5.layout import PAGE_BYTES
 from rig.link.recorder_messages import ChannelSpec, EventRow, Rows, StepRow, StreamSpec
+from tests.rig.hdf5.plain_files import plain
 
 pytestmark = pytest.mark.timeout(60)
 STREAMS = tuple(
@@ -152,3 +154,17 @@ def test_what_is_no_file_is_refused_at_once(tmp_path):
     for path in (tmp_path / "fifo.h5", tmp_path, tmp_path / "none.h5"):
         with pytest.raises(RecordingError, match="is not there"):
             load(path)
+
+
+def test_values_larger_than_anything_is_are_no_measurements(tmp_path):
+    path = plain(tmp_path / "r.h5")
+    with h5py.File(path, "r+") as file:
+        file["streams/cell/thrust"][1] = 3e238
+        file["streams/cell/time"][2] = 1e200
+        file["streams/drive/command_voltage"][...] = np.array([0, 1, 2])
+    (cell,) = load(path).all_of("thrust")
+    assert np.isnan(cell.value[1])
+    assert np.array_equal(cell.time, [0.0, 1.0])
+    assert any("cell/thrust: 1 values beyond 1e+30 are damaged" in event.text for event in load(path).events)
+    with long_channels(path, cell) as (found,):
+        assert np.isnan(found.values(0, 2)[1])
