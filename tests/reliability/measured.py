@@ -29,7 +29,7 @@ def report(record_property: Callable[[str, object], None]) -> Callable[[str, flo
     """Note a number that this test measured; the same name again is one more of the same."""
 
     def note(what: str, value: float, unit: str) -> None:
-        record_property("measured", {"what": what, "value": round(value, 6), "unit": unit})
+        record_property("measured", {"what": what, "value": round(float(value), 6), "unit": unit})
 
     return note
 
