@@ -68,6 +68,7 @@ def test_every_term_of_the_catalogue_that_the_world_knows_builds_its_effect():
         ("heating", "measured_winding"),
         ("heating", "measured_magnet"),
         ("heating", "measured_winding_and_magnet"),
+        ("heating", "measured_own_winding"),
         ("supply_sag", ""),
         ("supply_sag", "buffered"),
         ("supply_sag", "discharge"),
