@@ -17,6 +17,9 @@ from identification.thruster.thrust_data import Run, Unusable, prepare
 from identification.thruster.thrust_forms import FORMS, Form, Model
 from identification.thruster.thrust_rows import rows_of
 
+LEAST_ERROR = 1e-30
+"""N; what is smaller has no reciprocal to weigh by, and no load cell reads it."""
+
 
 @dataclass(frozen=True, slots=True)
 class Parameter:
@@ -180,6 +183,16 @@ def _unfit(runs: Sequence[Run], model: Model) -> Unusable | None:
     return None
 
 
+def _without_scatter(runs: Sequence[Run], std_error: Floats | None) -> Unusable | None:
+    """A point without any error among others that have some would have all the weight."""
+    if std_error is None or np.all(std_error > LEAST_ERROR):
+        return None
+    return Unusable(
+        f"recording {', '.join(run.recording_id for run in runs)}: at a level thrust has a standard error of "
+        f"{float(std_error.min()):.3g} N: its samples there stand still or are damaged; leave these rows out"
+    )
+
+
 def fit_runs(runs: Sequence[Run], model: Model = "C V|V|", method: Method = "wls") -> ThrustFit | Unusable:
     """Fit prepared runs of one thruster jointly; see `fit_thrust`."""
     refused = _unfit(runs, model)
@@ -187,6 +200,9 @@ def fit_runs(runs: Sequence[Run], model: Model = "C V|V|", method: Method = "wls
         return refused
     form = FORMS[model, runs[0].voltage_quantity == "rotation_rate"]
     rows, rmse_of = rows_of(runs, form)
+    refused = _without_scatter(runs, rows.std_error)
+    if refused is not None:
+        return refused
     found = estimate(rows, method)
     refused = _not_told(runs, found, form)
     if refused is not None:

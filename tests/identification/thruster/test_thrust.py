@@ -1,11 +1,13 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from identification.estimation.least_squares import Rows, estimate, excess_std
 from identification.recording import Channel, Recording
 from identification.steady_state.pooling import inverse_trigamma, moderate
-from identification.thruster.thrust import ThrustFit, fit_thrust
-from identification.thruster.thrust_data import Unusable, gain_std
+from identification.thruster.thrust import ThrustFit, fit_runs, fit_thrust
+from identification.thruster.thrust_data import Unusable, gain_std, prepare
 from identification.thruster.thrust_report import digits, sentence, table, verdicts
 from tests.identification.thrust_runs import (
     LEVELS,
@@ -153,6 +155,15 @@ def test_what_cannot_be_used_says_why():
         assert isinstance(refused, Unusable)
         assert expected in refused.reason
     assert isinstance(fit_thrust([]), Unusable)
+
+
+def test_a_level_whose_thrust_has_no_scatter_is_refused():
+    run = prepare(staircase(sigma=0.01), "command_voltage")
+    first, *others = run.points.points
+    still = replace(first, thrust=replace(first.thrust, std_error=6.4e-323))
+    refused = fit_runs([replace(run, points=replace(run.points, points=(still, *others)))])
+    assert isinstance(refused, Unusable)
+    assert "its samples there stand still or are damaged" in refused.reason
 
 
 def test_skipped_samples_are_counted_and_said():
