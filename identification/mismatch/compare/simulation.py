@@ -16,8 +16,9 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.periodic.rotor_angle import turned
+from identification.mismatch.prepare.binned import binned
 from identification.mismatch.prepare.channels import neighbour_at
-from identification.mismatch.prepare.preparing import FOLLOWED, Refusal, binned
+from identification.mismatch.prepare.preparing import FOLLOWED, Refusal
 from identification.physics.term import Scale
 from identification.recording import Floats, Recording
 from identification.run_history.filters import within_intervals

@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from identification.mismatch import policy
+from identification.mismatch.prepare.binned import binned, untorn
 from identification.mismatch.prepare.channels import followed, is_coarse, jumps, neighbour_at, supply, torque
 from identification.mismatch.prepare.grid import Held, distinct, edges_of
 from identification.mismatch.prepare.quantum import quantum_of
@@ -145,20 +145,6 @@ def _clear_of_jumps(recording: Recording, time: Floats, force: Floats) -> tuple[
     )
 
 
-def binned(time: Floats, value: Floats, edges: Floats) -> tuple[Floats, NDArray[np.int64], Floats]:
-    """Mean value (NaN where none), number of samples and mean time in each interval."""
-    M = edges.size - 1
-    index = np.searchsorted(edges, time, side="right") - 1
-    inside = (index >= 0) & (index < M)
-    index = index[inside]
-    count = np.bincount(index, minlength=M)
-    some = np.maximum(count, 1)
-    mean = np.where(count > 0, np.bincount(index, weights=value[inside], minlength=M) / some, np.nan)
-    when = np.bincount(index, weights=time[inside], minlength=M) / some
-    middle = 0.5 * (edges[1:] + edges[:-1])
-    return mean, count, np.where(count > 0, when, middle)
-
-
 def _within(time: Floats, value: Floats, edges: Floats, mean: Floats) -> Floats:
     """Sum of squares about the mean of each interval."""
     index = np.searchsorted(edges, time, side="right") - 1
@@ -185,9 +171,7 @@ def _converter(recording: Recording) -> Converter:
 def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, time: Floats, force: Floats) -> History:
     _, whole, _ = binned(time, force, edges)
     time, force = _clear_of_jumps(recording, time, force)
-    mean, count, sampled = binned(time, force, edges)
-    torn = count < 0.5 * whole  # what is left at one end of an interval does not stand for all of it
-    mean[torn], count[torn] = np.nan, 0
+    mean, count, sampled = untorn(binned(time, force, edges), whole)
     within = _within(time, force, edges, mean)
     driven = held.mean(edges)
     others, begun_error = warmed(recording, edges, driven, _explaining(recording, driver, held, edges, driven))
