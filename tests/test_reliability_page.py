@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 import re
 
-from tests.reliability.promises_page import COUNT, PAGE, STATES, TESTS, named, promises
-from tests.reliability.summary import put
+from tests.reliability.page.promises_page import COUNT, PAGE, STATES, TESTS, named, promises
+from tests.reliability.page.summary import put
 
 TEXT = PAGE.read_text(encoding="utf-8")
 PROMISES = promises(TEXT)

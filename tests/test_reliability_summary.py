@@ -4,8 +4,8 @@ import json
 
 import pytest
 
-from tests.reliability.promises_page import Promise
-from tests.reliability.summary import BEGIN, END, put, state, summed, table, told
+from tests.reliability.page.promises_page import Promise
+from tests.reliability.page.summary import BEGIN, END, put, state, summed, table, told
 
 PAGE = (
     Promise(1, "it stops", "shown", ("tests/a.py::test_one", "tests/a.py::test_two")),

@@ -22,9 +22,9 @@ from fnmatch import fnmatch
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from tests.reliability.kill_cells import PHASES, PROCESSES, SIGNALS, Cell, NotBegun
-from tests.reliability.kill_matrix import cell_of, line, told, try_cell
-from tests.reliability.metronome import metronome
+from tests.reliability.kills.kill_cells import PHASES, PROCESSES, SIGNALS, Cell, NotBegun
+from tests.reliability.kills.kill_matrix import cell_of, line, told, try_cell
+from tests.reliability.machine.metronome import metronome
 
 TRIES = 3
 """Of a cell whose phase did not come: on a busy machine a run may end before it."""

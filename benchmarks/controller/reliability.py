@@ -23,9 +23,9 @@ from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
-from tests.reliability.measured import FILE
-from tests.reliability.promises_page import PAGE, Promise, promises
-from tests.reliability.summary import put, summed, told
+from tests.reliability.page.measured import FILE
+from tests.reliability.page.promises_page import PAGE, Promise, promises
+from tests.reliability.page.summary import put, summed, told
 
 PROJECT = Path(__file__).resolve().parents[2]
 LINES = PROJECT / "build" / "reliability.jsonl"

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from tests.reliability.live import NOT_BEGUN
-from tests.reliability.metronome import longest, metronome, stalled
+from tests.reliability.machine.metronome import longest, metronome, stalled
 
 HERE = Path(__file__).parent
 LATE_WAKES = pytest.StashKey[Path]()

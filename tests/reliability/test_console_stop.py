@@ -17,7 +17,7 @@ import pytest
 from rig.hdf5 import load
 from rig.link.live_runs import Run
 from tests.reliability.live import LiveBench, at_rest, live_bench, zero_after
-from tests.reliability.measured import FULL
+from tests.reliability.page.measured import FULL
 from tests.reliability.test_motor_stops import recorder_pid
 from tests.rig.console.terminal import Terminal, on_terminal
 

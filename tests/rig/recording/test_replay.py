@@ -13,7 +13,7 @@ from rig.campaign.loading import load_bench
 from rig.hdf5 import RecordingFile, load
 from rig.link.recorder_messages import ChannelSpec, Rows, StreamSpec
 from tests.rig.stages.byte_bench import recorded
-from tests.rig.stages.lying_bench import files
+from tests.rig.stages.lies.lying_bench import files
 
 DEVICES = ("load_cell", "flow")
 LONG = 100 * 10**9

@@ -17,7 +17,7 @@ from rig.hdf5.unclosed import open_unclosed
 from rig.hdf5.write import RecordingFile
 from rig.link.recorder_messages import ChannelSpec, EventRow, Rows, StepRow, StreamSpec
 from tests.rig.stages.byte_bench import recorded
-from tests.rig.stages.lying_bench import files
+from tests.rig.stages.lies.lying_bench import files
 
 CUT = 1.0
 """s that a power cut may cost (promise 19)."""

@@ -10,7 +10,7 @@ from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
 from sim_devices.instruments.button import ButtonOptions
-from tests.rig.stages.lying_bench import ROOT, files
+from tests.rig.stages.lies.lying_bench import ROOT, files
 
 RATE = 50.0
 """lines/s of the button."""

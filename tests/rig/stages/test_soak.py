@@ -11,9 +11,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.reliability.measured import times
+from tests.reliability.page.measured import times
 from tests.rig.stages.byte_bench import recorded
-from tests.rig.stages.lying_bench import files
+from tests.rig.stages.lies.lying_bench import files
 
 HOURS = float(os.environ.get("THRUSTER_RIG_SOAK", times(1, 240) * 0.1))
 RATE = 92.0

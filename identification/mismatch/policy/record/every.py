@@ -53,7 +53,7 @@ def thresholds() -> Iterator[tuple[str, Threshold | Count]]:
 def overridden(values: Mapping[str, float]) -> Iterator[None]:
     """Thresholds moved to other `values`, by their qualified names, until the block ends.
 
-    For benchmarks/diagnosis/sensitivity.py alone, and for the whole process: another thread's diagnosis sees them too.
+    For benchmarks/sensitivity/sensitivity.py alone, for the whole process: another thread's diagnosis sees them too.
     Raises KeyError for what is no threshold.
     """
     known = dict(thresholds())

@@ -18,7 +18,7 @@ HEAD = """# Every number that decides
 Written by `python -m identification.mismatch.policy.record.page` from `identification/mismatch/policy`, where each
 threshold stands once; a test keeps this page to it. A *threshold* decides what is claimed, doubted, kept, dropped,
 counted as noise or refused; vehicles use those of thrusters beside their own. What depends on a number is asked by
-`python benchmarks/diagnosis/sensitivity.py`, which puts the twenty of the most consequence at half and at double.
+`python benchmarks/sensitivity/sensitivity.py`, which puts the twenty of the most consequence at half and at double.
 """
 ALARMS = """## What can alarm on a clean recording
 

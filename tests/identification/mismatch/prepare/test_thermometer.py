@@ -10,7 +10,7 @@ from identification.mismatch.prepare.thermometer import first_reading, warmth
 from identification.recording import Recording
 from identification.run_history.remembered import RememberedRun
 from tests.identification.diagnosed_runs import TOP, levels, run
-from tests.identification.mismatch.prepare.stepped_recordings import channel
+from tests.identification.mismatch.prepare.preparing.stepped_recordings import channel
 
 NOISE, BEGUN, TAU = 0.2, 18.0, 60.0
 SECONDS = 300.0

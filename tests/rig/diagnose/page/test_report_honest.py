@@ -15,7 +15,7 @@ from rig.diagnose.report.page import diagnosis_page
 from rig.diagnose.text import diagnosis_text
 from rig.report.page import html
 from rig.report.style import svg
-from tests.rig.diagnose.written_answers import LAGS, ODD, answer, lagging
+from tests.rig.diagnose.page.written_answers import LAGS, ODD, answer, lagging
 from tests.rig.report_reading import open_fonts, read
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from identification.mismatch.prepare.preparing import history_of
 from identification.run_history.history import History
-from tests.identification.mismatch.prepare.stepped_recordings import channel, held, stepped
+from tests.identification.mismatch.prepare.preparing.stepped_recordings import channel, held, stepped
 
 
 def test_the_rate_is_a_second_response():

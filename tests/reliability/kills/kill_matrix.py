@@ -15,7 +15,7 @@ from rig.errors import RecordingError, RigError
 from rig.hdf5 import load, recover
 from rig.link.front_end_messages import Request
 from rig.link.sockets import connect
-from tests.reliability.kill_cells import (
+from tests.reliability.kills.kill_cells import (
     ALLOWED,
     PATIENCE,
     PHASES,
@@ -29,7 +29,7 @@ from tests.reliability.kill_cells import (
     strike,
 )
 from tests.reliability.live import TICK, WATCHDOG
-from tests.reliability.metronome import stalled
+from tests.reliability.machine.metronome import stalled
 
 REST = 0.5
 """rev/s"""

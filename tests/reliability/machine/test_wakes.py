@@ -56,7 +56,7 @@ def is_stopped(pid: int) -> bool:
 
 def test_first_frame_after_every_wake_is_zero(tmp_path, report):
     chance, woken = random.Random(19), []
-    command = [sys.executable, "-m", "tests.reliability.waking", str(tmp_path), str(WAKES)]
+    command = [sys.executable, "-m", "tests.reliability.machine.waking", str(tmp_path), str(WAKES)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, cwd=PROJECT) as process:
         frames = Frames(process)
         try:

@@ -1,6 +1,6 @@
 """A process that drives a virtual motor in real time, says every command it sends, and begins anew after each trip.
 
-python -m tests.reliability.waking FOLDER TIMES
+python -m tests.reliability.machine.waking FOLDER TIMES
 """
 
 from __future__ import annotations

@@ -19,7 +19,7 @@ from rig.diagnose.report.page import diagnosis_page, write
 from rig.diagnose.text import diagnosis_text
 from rig.report.page import html
 from rig.report.style import svg
-from tests.rig.diagnose.written_answers import (
+from tests.rig.diagnose.page.written_answers import (
     HIGH,
     HOLD,
     LAGS,

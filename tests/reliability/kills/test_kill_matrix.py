@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tests.reliability.kill_cells import NotBegun
-from tests.reliability.kill_matrix import try_cell
+from tests.reliability.kills.kill_cells import NotBegun
+from tests.reliability.kills.kill_matrix import try_cell
 from tests.reliability.live import NOT_BEGUN
 
 pytestmark = [pytest.mark.reliability, pytest.mark.timeout(180)]

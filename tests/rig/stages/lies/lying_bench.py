@@ -12,7 +12,7 @@ from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 CAMPAIGN = """
 [campaign]
 name = "lies"

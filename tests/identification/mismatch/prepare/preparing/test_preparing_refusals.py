@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 
 from identification.mismatch.prepare.preparing import Refusal, history_of
-from tests.identification.mismatch.prepare.stepped_recordings import CHANGES, COMMAND, channel, held, recording
+from tests.identification.mismatch.prepare.preparing.stepped_recordings import (
+    CHANGES,
+    COMMAND,
+    channel,
+    held,
+    recording,
+)
 
 
 def refused(*channels):

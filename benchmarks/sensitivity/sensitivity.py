@@ -1,8 +1,8 @@
 """What half and double of the thresholds that matter most would change in the answers: works them out.
 
-    python benchmarks/diagnosis/sensitivity.py [--jobs 2] [--out build/sensitivity.jsonl] [--cases N] [--only NAME ...]
-    python benchmarks/diagnosis/sensitivity.py --check --cases N      # each setting from its beginning, too
-    python benchmarks/diagnosis/sensitivity_table.py --page           # what is in the file, into docs/sensitivity.md
+    python benchmarks/sensitivity/sensitivity.py [--jobs 2] [--out FILE] [--cases N] [--only NAME ...]
+    python benchmarks/sensitivity/sensitivity.py --check --cases N      # each setting from its beginning, too
+    python benchmarks/sensitivity/sensitivity_table.py --page           # what is in the file, into docs/sensitivity.md
 
 Each of the thresholds of sensitivity_settings.py is put at half and at double, one at a time, and every case of a fixed
 set (sensitivity_set.py) is answered as in the blind proof: `python -m sim_devices conceal` makes recordings and seals

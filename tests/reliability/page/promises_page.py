@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Final, NamedTuple
 
-TESTS: Final = Path(__file__).parents[1]
+TESTS: Final = Path(__file__).parents[2]
 PAGE: Final = TESTS.parent / "docs" / "reliability.md"
 COUNT: Final = 35
 STATES: Final = ("shown", "in part", "not done")

@@ -1,7 +1,7 @@
-"""The table of a sensitivity run, from what benchmarks/diagnosis/sensitivity.py put into its file.
+"""The table of a sensitivity run, from what benchmarks/sensitivity/sensitivity.py put into its file.
 
-python benchmarks/diagnosis/sensitivity_table.py [--out build/sensitivity.jsonl] [--also VERSION ...]   # prints it
-python benchmarks/diagnosis/sensitivity_table.py --page          # puts it into docs/sensitivity.md
+python benchmarks/sensitivity/sensitivity_table.py [--out build/sensitivity.jsonl] [--also VERSION ...]   # prints it
+python benchmarks/sensitivity/sensitivity_table.py --page          # puts it into docs/sensitivity.md
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from rig.blind.scoring.score import LOCATED, OPEN_CELLS
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "sensitivity.md"
-BEGIN, END = "<!-- by benchmarks/diagnosis/sensitivity_table.py -->", "<!-- end -->"
+BEGIN, END = "<!-- by benchmarks/sensitivity/sensitivity_table.py -->", "<!-- end -->"
 Answers = Mapping[str, Mapping[str, Row]]
 """Case -> setting -> answer."""
 

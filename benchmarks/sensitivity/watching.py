@@ -1,7 +1,7 @@
 """Live watching: delay to the alarm when an effect begins midway, and alarms in clean hours.
 
-    python benchmarks/diagnosis/watching.py changes [CAMPAIGNS [SIGMA]]    # 50, 40: drift, fouling, sag in turn
-    python benchmarks/diagnosis/watching.py clean [HOURS]                  # 20: every kind of noise in turn
+    python benchmarks/sensitivity/watching.py changes [CAMPAIGNS [SIGMA]]    # 50, 40: drift, fouling, sag in turn
+    python benchmarks/sensitivity/watching.py clean [HOURS]                  # 20: every kind of noise in turn
 
 Recordings are concealed ones (sim_devices.concealed): thruster, plan, sampling, noise and channels drawn at random; an
 effect begins between 40 and 60 % of the run, as strong as an oracle sees it at so many sigma over the whole run that

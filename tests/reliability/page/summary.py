@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from statistics import median
 from typing import Any, Final
 
-from tests.reliability.promises_page import Promise
+from tests.reliability.page.promises_page import Promise
 
 BEGIN: Final = "<!-- what `make reliability` measured -->"
 END: Final = "<!-- end of it -->"

@@ -4,7 +4,7 @@ import pytest
 
 from rig.campaign.plan import FixedDwell, Plan
 from rig.link.front_end_messages import Request
-from tests.rig.stages.lying_motor import Telemetry
+from tests.rig.stages.lies.lying_motor import Telemetry
 from tests.rig.stages.played import outcome, play
 from tests.rig.virtual_bench import PLAN, VirtualBench, virtual
 

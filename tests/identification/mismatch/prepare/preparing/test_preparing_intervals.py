@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 
 from identification.mismatch.prepare.preparing import history_of
-from tests.identification.mismatch.prepare.stepped_recordings import CHANGES, COMMAND, channel, held, recording, stepped
+from tests.identification.mismatch.prepare.preparing.stepped_recordings import (
+    CHANGES,
+    COMMAND,
+    channel,
+    held,
+    recording,
+    stepped,
+)
 
 
 def without_noise(rate=50.0):

@@ -6,7 +6,7 @@ import pytest
 
 from sim_devices.instruments.lies import LIES
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT, WIRE_FAULTS
-from tests.rig.stages.lying_bench import FIRST, ROOT, Lie, played
+from tests.rig.stages.lies.lying_bench import FIRST, ROOT, Lie, played
 
 PAGE = (ROOT / "docs" / "lies.md").read_text(encoding="utf-8")
 ROWS = [[cell.strip().strip("`") for cell in line.split("|")[1:-1]] for line in PAGE.splitlines() if line[:3] == "| `"]

@@ -1,7 +1,7 @@
 """Does this machine keep time? A process that only wakes and notes when it was woken late: it has no part in what is
 tested, so what holds it up (a stolen virtual core, a disk that stalls all) is not the product's.
 
-    python -m tests.reliability.metronome FILE
+    python -m tests.reliability.machine.metronome FILE
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Final
 
-PROJECT: Final = Path(__file__).parents[2]
+PROJECT: Final = Path(__file__).parents[3]
 BEAT: Final = 0.005
 """s between wakes."""
 LATE: Final = 0.01
@@ -25,7 +25,7 @@ LATE: Final = 0.01
 def metronome(file: Path) -> Iterator[None]:
     """Run one beside the tests; `stalled` reads its `file`."""
     file.touch()
-    process = subprocess.Popen([sys.executable, "-m", "tests.reliability.metronome", str(file)], cwd=PROJECT)
+    process = subprocess.Popen([sys.executable, "-m", "tests.reliability.machine.metronome", str(file)], cwd=PROJECT)
     try:
         yield
     finally:

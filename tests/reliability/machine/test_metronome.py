@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tests.reliability.live import NOT_BEGUN
-from tests.reliability.metronome import longest, stalled
+from tests.reliability.machine.metronome import longest, stalled
 
 
 @pytest.fixture

@@ -1,6 +1,6 @@
 """The fixed set of concealed cases at which thresholds are moved, anew: sensitivity_cases.txt.
 
-    python benchmarks/diagnosis/sensitivity_set.py
+    python benchmarks/sensitivity/sensitivity_set.py
 
 Of draw 2026-11-24 of the proof, of each lane so many as LANES says, its effects, forms or noises in turn, and of each
 of those the first cases whose diagnosis took at most QUICK s in the proof (benchmarks/proof/scores.jsonl.gz): a case is
