@@ -173,8 +173,7 @@ class Sequencer:
     def _proving(self, tick: Tick) -> bool:
         assert self._proof is not None
         volts, verdict = self._proof.advance(tick.time, tick.rotation)
-        self._silent = volts is None
-        self._command = 0.0 if volts is None else volts
+        self._silent, self._command = volts is None, volts or 0.0
         if verdict is None:
             return False
         if isinstance(verdict, Refused):
@@ -254,8 +253,7 @@ class Sequencer:
         if confirmed is not None:
             self._end_row(tick.time)
             self._stop_confirmed, self._state = confirmed, "run_done"
-            told = turning(tick.rotation, tick.thrust_rest)
-            after = f"{tick.time - self._since:.2f} s after command 0 V: {told}"
+            after = f"{tick.time - self._since:.2f} s after command 0 V: {turning(tick.rotation, tick.thrust_rest)}"
             text = f"at rest {after}" if confirmed else f"STOP NOT CONFIRMED {after}; cut the power"
             self._journal.say(tick.time, "info" if confirmed else "error", text)
         return False
