@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.answer.against_twin import told_new, with_twin
+from identification.mismatch.answer.against_twin import ToldNew, told_new, with_twin
 from identification.mismatch.answer.averaged_constant import averaged
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.answer.fault_findings import with_channels
@@ -16,9 +16,10 @@ from identification.mismatch.answer.periodic_findings import with_lines
 from identification.mismatch.answer.proxies import proxies
 from identification.mismatch.answer.remainder import remainder_of
 from identification.mismatch.answer.report_assembly import curves_of, finding_of, values_of
-from identification.mismatch.answer.verdict import decided
+from identification.mismatch.answer.verdict import decided, refuted
 from identification.mismatch.compare.earlier_recordings import Novelty
-from identification.mismatch.diagnosis import Diagnosis, Finding, NextExperiment, Rmse, Unexplained
+from identification.mismatch.diagnosis import Diagnosis, Finding, HeldOutRmse, NextExperiment, Rmse
+from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.faults.stage import Sound
 from identification.mismatch.locate.places import places_of
 from identification.mismatch.locate.stage import Located
@@ -57,6 +58,11 @@ class Case:
     notes: tuple[str, ...]
     """What was left aside, and what cannot be predicted."""
 
+    @property
+    def ids(self) -> tuple[str, ...]:
+        """Of the recordings."""
+        return tuple(r.recording_id for r in self.recordings)
+
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Found:
@@ -70,29 +76,41 @@ class Found:
     """Of terms found beside a twin, whether its own recordings have them too; empty where nobody asked."""
 
 
-def run(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
-    """The verdict is decided last, from all findings: names, channel faults, a changed constant, lines.
+@dataclass(frozen=True, eq=False, slots=True)
+class Drafted:
+    """All of an answer but its verdict, and what that is decided by."""
 
-    What predicts worse than the baseline, whose own residual shows nothing anywhere, was noise: it is taken back.
+    draft: Draft
+    after: Estimate
+    new: ToldNew
+    train: Rmse
+    held: HeldOutRmse
+    experiment: NextExperiment | None
+
+
+def run(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
+    """The verdict is decided last, and once, from all findings: names, channel faults, a changed constant, lines.
+
+    What predicts worse than the baseline, whose own residual shows nothing anywhere, was noise: it is taken back first.
     """
-    told = _answered(case, found, rng)
-    if not _was_noise(told):
-        return told
+    drafted = _drafted(case, found, rng)
+    if not _followed_noise(drafted):
+        return _told(case, found, drafted)
     tried = " and ".join(dict.fromkeys(n.term.id for n in found.completed.earned))
     before = found.selected.before
     bare = Completed(before, (), {}, (), None, False, before, found.located.left)
-    again = _answered(case, replace(found, completed=bare, experiment=None), rng)
-    return replace(again, notes=(*again.notes, TAKEN_BACK.format(tried)))
+    again = _drafted(case, replace(found, completed=bare, experiment=None), rng)
+    return _told(case, found, again, TAKEN_BACK.format(tried))
 
 
-def _was_noise(found: Diagnosis) -> bool:
-    left = found.answer.remainder if isinstance(found.answer, Unexplained) else None
-    if left is None or not left.unpredictive or found.findings:
+def _followed_noise(drafted: Drafted) -> bool:
+    findings, mismatch = drafted.draft.findings, drafted.draft.mismatch
+    if drafted.new.left is not None or not findings or refuted(findings, drafted.held) != findings:
         return False
-    return all(place.p_value >= policy.locate.RESIDUAL_FALSE_ALARM for place in found.mismatch)
+    return all(place.p_value >= policy.locate.RESIDUAL_FALSE_ALARM for place in mismatch)
 
 
-def _answered(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
+def _drafted(case: Case, found: Found, rng: np.random.Generator) -> Drafted:
     selected, located, completed = found.selected, found.located, found.completed
     data, before, after = selected.data, selected.before, completed.after
     measured = replace(data, histories=case.sound.histories)
@@ -100,10 +118,9 @@ def _answered(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
     train = Rmse(
         rmse(before.fit.model, before.fit.theta, measured, every), rmse(after.fit.model, after.fit.theta, data, every)
     )
-    remainder = remainder_of(completed, data, case.unseen)
-    flexible = completed.flexible
-    quiet = located.estimate.noise
+    remainder, flexible = remainder_of(completed, data, case.unseen), completed.flexible
     new = told_new(_findings(completed, data), found.novelties, case.baseline, remainder, completed.nameless)
+    quiet = located.estimate.noise
     held = with_held(score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None), flexible)
     model = values_of(after.fit, data, completed.intervals)
     near = unclaimed(selected, located)
@@ -117,28 +134,33 @@ def _answered(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
         model=model,
         notes=moved,
     )
-    ids = tuple(r.recording_id for r in case.recordings)
+    ids = case.ids
     draft = with_channels(draft, case.sound.faults, ids)
     beside = bool(new.not_new) or completed.open_ended
     draft = with_twin(draft, after, data, case.recordings, case.baseline, completed.earned, beside=beside)
     draft = with_lines(draft, case.lines, train.before, case.baseline, ids)
-    stands_in = proxies(after.fit.model, draft.findings, case.recordings, case.sound.histories)
-    n, p = after.fit.residual.size, int(after.fit.free.sum())
+    return Drafted(draft, after, new, train, held, found.experiment)
+
+
+def _told(case: Case, found: Found, drafted: Drafted, *taken_back: str) -> Diagnosis:
+    draft, after, new = drafted.draft, drafted.after, drafted.new
+    data, fit = found.selected.data, drafted.after.fit
+    stands_in = proxies(fit.model, draft.findings, case.recordings, case.sound.histories)
     return Diagnosis(
-        recordings=ids,
+        recordings=case.ids,
         thruster=case.recordings[0].thruster,
-        answer=decided(draft.findings, new.left, found.experiment, held, draft.mismatch),
+        answer=decided(draft.findings, new.left, drafted.experiment, drafted.held, draft.mismatch),
         baseline_model=draft.baseline_model,
         baseline=draft.baseline,
         mismatch=draft.mismatch,
         model_terms=draft.model_terms,
         model=draft.model,
-        train=train,
-        heldout=held,
-        chi2_per_dof=after.fit.chi2 / max(n - p, 1),
-        whiteness_p=whiteness(after.fit.residual, [r.size for r in data.rows]),
-        notes=(*draft.notes, *new.notes, *case.notes, *stands_in),
-        curves=curves_of(before, after, data),
+        train=drafted.train,
+        heldout=drafted.held,
+        chi2_per_dof=fit.chi2 / max(fit.residual.size - int(fit.free.sum()), 1),
+        whiteness_p=whiteness(fit.residual, [r.size for r in data.rows]),
+        notes=(*draft.notes, *new.notes, *case.notes, *stands_in, *taken_back),
+        curves=curves_of(found.selected.before, after, data),
         twin=draft.twin,
         not_new=new.not_new,
     )

@@ -41,10 +41,10 @@ def decided(
     """
     if remainder is not None:
         return Unexplained(findings, remainder, experiment)
-    refuted = tuple(f for f in findings if f.effect not in NOT_OF_THE_MODEL) if held.grown else ()
-    if refuted:
-        known = tuple(f for f in findings if f not in refuted)
-        return Unexplained(known, unpredictive(refuted, held, mismatch, unit), experiment)
+    wrong = refuted(findings, held)
+    if wrong:
+        known = tuple(f for f in findings if f not in wrong)
+        return Unexplained(known, unpredictive(wrong, held, mismatch, unit), experiment)
     if not findings:
         return Adequate()
     if any(rival.bic_loss < policy.select.RIVALS_EQUAL_BIC for finding in findings for rival in finding.rivals):
@@ -52,15 +52,20 @@ def decided(
     return Explained(findings)
 
 
+def refuted(findings: tuple[Finding, ...], held: HeldOutRmse) -> tuple[Finding, ...]:
+    """Findings of the model, where it predicts unfitted data worse than the baseline does."""
+    return tuple(f for f in findings if f.effect not in NOT_OF_THE_MODEL) if held.grown else ()
+
+
 def unpredictive(
-    refuted: Sequence[Finding], held: HeldOutRmse, mismatch: Sequence[Mismatch], unit: str = "N"
+    wrong: Sequence[Finding], held: HeldOutRmse, mismatch: Sequence[Mismatch], unit: str = "N"
 ) -> Remainder:
     """What the baseline lacks, and a model of it that describes the runs fitted and predicts no others."""
     place = mismatch[0] if mismatch else Mismatch("thrust", NOWHERE, 1.0, 1.0, "")
-    names = " and ".join(dict.fromkeys(f.effect for f in refuted))
+    names = " and ".join(dict.fromkeys(f.effect for f in wrong))
     says = (
         f"What was found describes the data that were fitted and predicts no others: with {names} the error on data "
         f"that were not fitted grows from {held.before:.4g} to {held.after:.4g} {unit}."
     )
-    resembles = tuple(f"{f.effect}: the error on data that were not fitted grows with it" for f in refuted)
+    resembles = tuple(f"{f.effect}: the error on data that were not fitted grows with it" for f in wrong)
     return Remainder(place.where, place.share, place.p_value, (), says, resembles, unpredictive=True)
