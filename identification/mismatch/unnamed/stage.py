@@ -60,6 +60,33 @@ class Completed:
         return tuple(t for t in self.after.fit.model.terms if t not in named and "time" not in t.covariates)
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Without:
+    """The model without the terms whose names were not earned, which would hide its place, and what it leaves."""
+
+    bare: Estimate
+    left: ResidualStructure
+
+    @property
+    def nothing(self) -> bool:
+        """Whether no more is left than noise leaves."""
+        return self.left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Told:
+    """Names, and what they leave."""
+
+    earned: tuple[Named, ...]
+    unearned: tuple[Named, ...]
+    without: _Without
+
+    @property
+    def nameless(self) -> list[Term]:
+        """Terms whose names were not earned."""
+        return [n.term for n in self.unearned]
+
+
 def run(
     selected: Selected, located: Located, validated: Validated, unseen: Sequence[History], rng: np.random.Generator
 ) -> Completed:
@@ -67,64 +94,79 @@ def run(
 
     After a search that was interrupted no flexible term is looked for.
     """
-    data, before, now = selected.data, selected.before, located.estimate
-    earned, unearned, split = validated.earned, validated.unearned, validated.split
-    open_ended = (located.structured or bool(unearned)) and bool(located.left.groups)
-    bare, left, flexible = now, located.left, None
-    if open_ended and unearned:
-        bare, left = _without(now, data, unearned, rng)
-        nothing = left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM
-        if nothing and not located.structured:  # it was noise that they followed
-            after = refresh(bare.fit.model, bare.fit.theta, data, None, now)
-            return Completed(after, *_with_values(earned, now, after, data, None), (), None, False, after, left)
-        if nothing:
-            bare, left = now, located.left
+    data, now, split = selected.data, located.estimate, validated.split
+    told = _Told(validated.earned, validated.unearned, _Without(now, located.left))
+    open_ended = (located.structured or bool(told.unearned)) and bool(located.left.groups)
+    if open_ended and told.unearned:
+        without = _without(now, data, told.unearned, rng)
+        if without.nothing and not located.structured:
+            return _noise_followed(told.earned, without, now, data)
+        told = told if without.nothing else replace(told, without=without)
+    flexible = None
     if open_ended and not selected.undone:
-        over = foremost_covariate(left, unearned, data)
-        flexible = extend(now, before, data, over, unearned, split, rng)
-        best = min(split.judge(split.estimate.fit).rmse, np.inf if flexible is None else flexible.held)
-        mostly = mostly_right(split, unearned if located.structured else any_curve(unearned), best)
-        if mostly.right:  # back: a free shape is for what they leave
-            earned, unearned = (*earned, *mostly.right), tuple(n for n in unearned if n not in mostly.right)
-            bare, left = _left_by_names(now, data, unearned, (bare, left), rng)
-            flexible = extend(now, before, data, over, unearned, split, rng)
-    if flexible is not None and unearned:
-        again = partial(extend, now, before, data, over, split=split, rng=rng)
-        earned, unearned, flexible = _standing(earned, unearned, flexible, now, split, data, again)
-    if flexible is not None:
-        earned = with_shares(split, earned, [n.term for n in unearned], flexible.held)
-        valued, known = _with_values(earned, now, flexible.estimate, data, flexible)
-        return Completed(flexible.estimate, valued, known, unearned, flexible, open_ended, bare, left)
-    after = predicting(now, split, data, selected.terms, [n.term for n in unearned], unseen)
-    if earned and unearned and not predicts(after, before, data, unseen):
-        refuted = Check("predicts", "predicts better than the baseline", ALONE)
-        after, unearned, earned = before, (*unearned, *(n.asked(refuted) for n in earned)), ()
-        bare, left = _without(now, data, unearned, rng)
-        if left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM:
-            bare, left = now, located.left
-    earned = with_shares(split, earned, [n.term for n in unearned], split.judge(split.estimate.fit).rmse)
-    valued, known = _with_values(earned, now, after, data, None, [n.term for n in unearned])
-    return Completed(after, valued, known, unearned, None, open_ended, bare, left)
+        told, flexible = _shaped(selected, located, told, split, rng)
+    if flexible is None:
+        return _by_names(selected, located, told, split, unseen, rng, open_ended=open_ended)
+    earned = with_shares(split, told.earned, told.nameless, flexible.held)
+    valued, known = _with_values(earned, now, flexible.estimate, data, flexible)
+    bare, left = told.without.bare, told.without.left
+    return Completed(flexible.estimate, valued, known, told.unearned, flexible, open_ended, bare, left)
 
 
-def _without(
-    after: Estimate, data: Data, unearned: Sequence[Named], rng: np.random.Generator
-) -> tuple[Estimate, ResidualStructure]:
-    """The model without the terms whose names were not earned, and what it leaves: they would hide its place."""
-    bare = replace(after, fit=fit(*after.fit.less(*(n.term for n in unearned)), data, after.weights))
-    return bare, residual_structure(bare.fit, data, after.weights, rng)
+def _noise_followed(earned: Sequence[Named], without: _Without, now: Estimate, data: Data) -> Completed:
+    """It was noise that the terms without a name followed: they go."""
+    after = refresh(without.bare.fit.model, without.bare.fit.theta, data, None, now)
+    return Completed(after, *_with_values(earned, now, after, data, None), (), None, False, after, without.left)
 
 
-def _left_by_names(
-    now: Estimate,
-    data: Data,
-    unearned: Sequence[Named],
-    otherwise: tuple[Estimate, ResidualStructure],
+def _shaped(
+    selected: Selected, located: Located, told: _Told, split: TrainTestSplit, rng: np.random.Generator
+) -> tuple[_Told, Extended | None]:
+    """Free shapes of what is left, and the names that stand beside them; no shapes where none predicts better."""
+    data, now = selected.data, located.estimate
+    over = foremost_covariate(told.without.left, told.unearned, data)
+    again = partial(extend, now, selected.before, data, over, split=split, rng=rng)
+    flexible = again(told.unearned)
+    best = min(split.judge(split.estimate.fit).rmse, np.inf if flexible is None else flexible.held)
+    mostly = mostly_right(split, told.unearned if located.structured else any_curve(told.unearned), best)
+    if mostly.right:  # back: a free shape is for what they leave
+        unearned = tuple(n for n in told.unearned if n not in mostly.right)
+        without = _without(now, data, unearned, rng)
+        told = _Told((*told.earned, *mostly.right), unearned, told.without if without.nothing else without)
+        flexible = again(unearned)
+    if flexible is None or not told.unearned:
+        return told, flexible
+    earned, unearned, flexible = _standing(told.earned, told.unearned, flexible, now, split, data, again)
+    return _Told(earned, unearned, told.without), flexible
+
+
+def _by_names(
+    selected: Selected,
+    located: Located,
+    told: _Told,
+    split: TrainTestSplit,
+    unseen: Sequence[History],
     rng: np.random.Generator,
-) -> tuple[Estimate, ResidualStructure]:
-    """The model of the names, and what it leaves; `otherwise` where that shows no place."""
-    bare, left = _without(now, data, unearned, rng)
-    return (bare, left) if left.p_value < policy.locate.RESIDUAL_FALSE_ALARM else otherwise
+    *,
+    open_ended: bool,
+) -> Completed:
+    """The model of the names; that of the baseline where it predicts worse without the terms that have none."""
+    data, before, now = selected.data, selected.before, located.estimate
+    after = predicting(now, split, data, selected.terms, told.nameless, unseen)
+    if told.earned and told.unearned and not predicts(after, before, data, unseen):
+        refuted = Check("predicts", "predicts better than the baseline", ALONE)
+        unearned = (*told.unearned, *(n.asked(refuted) for n in told.earned))
+        without = _without(now, data, unearned, rng)
+        told = _Told((), unearned, _Without(now, located.left) if without.nothing else without)
+        after = before
+    earned = with_shares(split, told.earned, told.nameless, split.judge(split.estimate.fit).rmse)
+    valued, known = _with_values(earned, now, after, data, None, told.nameless)
+    return Completed(after, valued, known, told.unearned, None, open_ended, told.without.bare, told.without.left)
+
+
+def _without(after: Estimate, data: Data, unearned: Sequence[Named], rng: np.random.Generator) -> _Without:
+    bare = replace(after, fit=fit(*after.fit.less(*(n.term for n in unearned)), data, after.weights))
+    return _Without(bare, residual_structure(bare.fit, data, after.weights, rng))
 
 
 def _standing(
