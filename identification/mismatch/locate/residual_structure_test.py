@@ -60,42 +60,69 @@ def residual_structure(
     """Judge the residual of the thrust over every covariate. `pulsing`: pulses that come back are looked for too."""
     found = tuple(looked_at) if looked_at is not None else covariates(fit, data)
     n = data.size
-    basis = orthogonal_basis(fit.jacobian[:n])
     residual = np.clip(fit.residual[:n], -policy.locate.OUTLIER_SIGMA, policy.locate.OUTLIER_SIGMA)
+    left = _Left(fit, data, weights, residual, orthogonal_basis(fit.jacobian[:n]))
     changes = [*corrections(fit, data, Weights(weights.thrust)), *of_twin(fit, data, Weights(weights.thrust))]
-    groups, spans = [], []
-    for c in found:
-        columns = Weights(weights.thrust).whiten(list(c.columns), [])
-        Q = orthogonal_basis(beside(columns, basis))
-        if Q.shape[1] == 0:
-            continue
-        score = Q.T @ residual
-        stat, dof = float(score @ score), Q.shape[1]
-        if weights.ticks and c.quantity == "time_since_step":
-            ticks = fit.residual[fit.residual.size - sum(rows.target.size for rows in data.ticks) :]
-            stat, dof = stat + float(ticks @ ticks), dof + ticks.size
-        extra = allowed_in(changes, Q)
-        p = _tail(stat, dof, extra)
-        groups.append(CovariateTest(c, stat, dof, p, max(stat - dof, 0.0) / max(float(residual @ residual), 1e-300)))
-        spans.append(Q)
-        if c.quantity == "time":
-            groups[-1] = min(groups[-1], _jump(c, fit, residual, data, weights, basis), key=lambda g: g.p_value)
-    pulses = None
-    at = next((i for i, g in enumerate(groups) if g.covariate.quantity == "time"), None)
-    if at is not None and pulsing:
-        others = [
-            (Q, g)
-            for Q, g in zip(spans, groups, strict=True)
-            if g is not groups[at] and g.p_value < policy.locate.PLAIN_STRUCTURE_P
-        ]
-        pulses = _pulses(fit, residual, data, weights, others)
-        if pulses is not None:
-            groups[at] = min(groups[at], _of_pulses(groups[at].covariate, pulses, residual), key=lambda g: g.p_value)
-    order = sorted(range(len(groups)), key=lambda i: (groups[i].p_value, groups[i].dof - groups[i].statistic))
-    if not groups:
+    tried = [each for c in found if (each := _tried(c, left, changes)) is not None]
+    if not tried:
         return ResidualStructure((), 1.0)
+    groups, spans = [group for group, _ in tried], [span for _, span in tried]
+    pulses = _beside_others(left, groups, spans) if pulsing else None
+    if pulses is not None:
+        groups = [_or_pulses(g, pulses, residual) for g in groups]
     p_family = family_p_value([g.p_value for g in groups], spans, residual, rng)
-    return ResidualStructure(tuple(groups[i] for i in order), p_family, pulses)
+    ordered = sorted(groups, key=lambda g: (g.p_value, g.dof - g.statistic))
+    return ResidualStructure(tuple(ordered), p_family, pulses)
+
+
+@dataclass(frozen=True, eq=False, slots=True)
+class _Left:
+    """What a fit leaves, in sigma."""
+
+    fit: Fit
+    data: Data
+    weights: Weights
+    residual: Floats
+    """(n,) Of the thrust, without outliers."""
+    basis: Floats
+    """(n, p) Orthonormal, of what the model's parameters can follow."""
+
+
+def _tried(c: Covariate, left: _Left, changes: list[Floats]) -> tuple[CovariateTest, Floats] | None:
+    """The test of a covariate and the span (n, k) of its columns; None where the model follows all of them."""
+    weights, residual = left.weights, left.residual
+    span = orthogonal_basis(beside(Weights(weights.thrust).whiten(list(c.columns), []), left.basis))
+    if span.shape[1] == 0:
+        return None
+    score = span.T @ residual
+    stat, dof = float(score @ score), span.shape[1]
+    if weights.ticks and c.quantity == "time_since_step":
+        ticks = left.fit.residual[left.fit.residual.size - sum(rows.target.size for rows in left.data.ticks) :]
+        stat, dof = stat + float(ticks @ ticks), dof + ticks.size
+    p = _tail(stat, dof, allowed_in(changes, span))
+    found = CovariateTest(c, stat, dof, p, max(stat - dof, 0.0) / max(float(residual @ residual), 1e-300))
+    if c.quantity == "time":
+        jump = _jump(c, left.fit, residual, left.data, weights, left.basis)
+        found = min(found, jump, key=lambda each: each.p_value)
+    return found, span
+
+
+def _beside_others(left: _Left, groups: Sequence[CovariateTest], spans: Sequence[Floats]) -> Pulses | None:
+    """Pulses over time, beside what is plainly left over the other covariates; None where time is none of them."""
+    if all(g.covariate.quantity != "time" for g in groups):
+        return None
+    others = [
+        (span, g)
+        for span, g in zip(spans, groups, strict=True)
+        if g.covariate.quantity != "time" and g.p_value < policy.locate.PLAIN_STRUCTURE_P
+    ]
+    return _pulses(left.fit, left.residual, left.data, left.weights, others)
+
+
+def _or_pulses(group: CovariateTest, pulses: Pulses, residual: Floats) -> CovariateTest:
+    if group.covariate.quantity != "time":
+        return group
+    return min(group, _of_pulses(group.covariate, pulses, residual), key=lambda g: g.p_value)
 
 
 def _jump(time: Covariate, fit: Fit, residual: Floats, data: Data, weights: Weights, basis: Floats) -> CovariateTest:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.mismatch import policy
 from identification.mismatch.prepare.binned import binned, untorn
@@ -168,6 +170,29 @@ def _converter(recording: Recording) -> Converter:
     return Converter(thrust.acquisition.window or 0.0, thrust.acquisition.low_pass or 0.0)
 
 
+@dataclass(frozen=True, eq=False, slots=True)
+class _Turning:
+    """The rate as it was measured, over the intervals; fields as of History."""
+
+    time: Floats
+    rate: Floats | None
+    count: NDArray[np.int64] | None
+    sampled: Floats | None
+    per_driver: float
+    spacing: float
+
+
+def _turning(recording: Recording, others: Mapping[str, Floats], driven: Floats, edges: Floats) -> _Turning:
+    channel = recording.first_of("rotation_rate")
+    spacing = 0.0 if channel is None or channel.time.size < 2 else float(np.median(np.diff(channel.time)))
+    if channel is None or "rotation_rate" not in others:
+        return _Turning(np.empty(0), None, None, None, 1.0, spacing)
+    good = np.isfinite(channel.value)
+    time = channel.time[good]
+    per_driver = _rate_per_driver(driven, others["rotation_rate"], edges)
+    return _Turning(time, *binned(time, channel.value[good], edges), per_driver, spacing)
+
+
 def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, time: Floats, force: Floats) -> History:
     _, whole, _ = binned(time, force, edges)
     time, force = _clear_of_jumps(recording, time, force)
@@ -176,15 +201,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
     driven = held.mean(edges)
     others, begun_error = warmed(recording, edges, driven, _explaining(recording, driver, held, edges, driven))
     inside = (time >= edges[0]) & (time < edges[-1])
-    rate = rate_count = rate_sampled = None
-    turning_time = np.empty(0)
-    per_driver = 1.0
-    turning = recording.first_of("rotation_rate")
-    if "rotation_rate" in others and turning is not None:
-        good = np.isfinite(turning.value)
-        turning_time = turning.time[good]
-        rate, rate_count, rate_sampled = binned(turning.time[good], turning.value[good], edges)
-        per_driver = _rate_per_driver(driven, others["rotation_rate"], edges)
+    turning = _turning(recording, others, driven, edges)
     history = History(
         recording_id=recording.recording_id,
         driver_quantity=held.quantity,
@@ -201,19 +218,19 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         ticks=(held.time, held.value) if held.stepwise else None,
         sample_time=time[inside],
         sample_thrust=force[inside],
-        rate_time=turning_time,
-        rate=rate,
+        rate_time=turning.time,
+        rate=turning.rate,
         begun_error=begun_error,
-        rate_count=rate_count,
-        rate_sampled=rate_sampled,
+        rate_count=turning.count,
+        rate_sampled=turning.sampled,
         others=others,
         coarse=frozenset(q for q in others if is_coarse(recording.first_of(q), others[q])),
-        rate_per_driver=per_driver,
+        rate_per_driver=turning.per_driver,
         spacing=float(np.median(np.diff(time))),
         jitter=jitter_of(time),
         delay_std=_delay_std(recording, driver),
         converter=_converter(recording),
-        rate_spacing=0.0 if turning is None or turning.time.size < 2 else float(np.median(np.diff(turning.time))),
+        rate_spacing=turning.spacing,
         static=_is_table(held, time.size),
     )
     return with_leads(history, None if held.measured is None else held.measured.at(history.thrust_samples.time))
