@@ -6,12 +6,16 @@ Dynamics of a few ticks (a lag, a ring, a delay) and limits have answers of thei
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from identification.mismatch.model.model import Model, acting
 from identification.mismatch.model.parameters import Theta
 from identification.physics.term import Scale, Term, TermContext
 from identification.recording import Floats
+from identification.run_history.filters import reconstructed
+from identification.run_history.history import Samples
 from identification.run_history.remembered import RememberedRun
 
 SMALL = 1e-4
@@ -41,6 +45,29 @@ def thrust_gain(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale
         return 1.0
     key = ("thrust gain", theta.C, tare, tuple((term, values) for term, values, _ in terms))
     return run.lately(key, lambda: _thrust_gain(terms, theta, run, x, tare), x)
+
+
+def jumping(
+    model: Model, theta: Theta, run: RememberedRun, scale: Scale, samples: Samples, commanded: Floats
+) -> Floats | None:
+    """(M,) rate at its `samples`, `commanded` (N,), less the line through its means, in units of the driver: of a rotor
+    that follows at once. None where no term makes it jump: a slope says it all then, and it says nothing of a jump."""
+    terms = [each for each in _static(model, theta, scale) if each[0].stage in ROTOR]
+    if not any(p.jumps for term, _, sizes in terms for p in term.parameters(sizes)):
+        return None
+    key = ("jumping", tuple((term, values) for term, values, _ in terms))
+    return run.lately(key, lambda: _jumping(terms, theta, run, samples, commanded), commanded)
+
+
+def _jumping(terms: Acting, theta: Theta, run: RememberedRun, samples: Samples, commanded: Floats) -> Floats:
+    history = run.history
+    still = RememberedRun(replace(history, excess=np.zeros(1)))  # an instant: the command does not move in it
+    line, seen = history.driver, commanded
+    for term, values, sizes in terms:
+        line = term.apply(line, TermContext(run, sizes, theta.C, 0.0, line), values)
+        seen = term.apply(seen, TermContext(still, sizes, theta.C, 0.0, seen), values)
+    beside = samples.means(seen) - reconstructed(line, history.middle, samples.middle)
+    return np.where(samples.count > 0, beside, 0.0)
 
 
 def _static(model: Model, theta: Theta, scale: Scale) -> Acting:

@@ -13,7 +13,7 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
-from identification.mismatch.model.static_gain import rotor_gain, thrust_gain
+from identification.mismatch.model.static_gain import jumping, rotor_gain, thrust_gain
 from identification.physics.term import Scale, Term
 from identification.physics.traits import Dynamics, LimitsCommand, LimitsReading
 from identification.recording import Floats
@@ -68,14 +68,26 @@ def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Sc
     known = _remembered(run, "rate", passed) if bent or _changes(passed, history) else history.rate_lead
     share, shift = passed_on(model, theta, history), theta.rate_shift
     gain = 1.0 if history.ticks is None else rotor_gain(model, theta, run, scale)
+    jumped = None if passed.rotor is not None else _jumped(model, theta, run, scale, passed.delay)
 
     def made() -> Floats:
         assert history.rate_sampled is not None
         moved = run.delayed(x, shift) if shift else x
         line = reconstructed(moved, history.middle, history.rate_sampled)
-        return np.asarray(line + share * gain * np.atleast_2d(known)[0], dtype=np.float64)
+        ticks = np.atleast_2d(known)[0]
+        beside = gain * ticks if jumped is None else np.where(ticks != 0, jumped, 0.0)
+        return np.asarray(line + share * beside, dtype=np.float64)
 
-    return run.lately(("turning", shift), made, x, known, share, gain)
+    return run.lately(("turning", shift), made, x, known, share, gain, jumped)
+
+
+def _jumped(model: Model, theta: Theta, run: RememberedRun, scale: Scale, delay: float) -> Floats | None:
+    """(M,) rate at its samples less the line through its means, where a tick may make a rotor jump."""
+    if run.history.ticks is None:
+        return None
+    value = run.history.ticks[1]
+    commanded = run.lately(("commanded", delay), lambda: value[run.after_ticks("rate", delay)[0]])
+    return jumping(model, theta, run, scale, run.samples("rate"), commanded)
 
 
 def sample_lead(model: Model, theta: Theta, run: RememberedRun, rate: Floats, largest: float) -> Floats:

@@ -21,6 +21,8 @@ TAU = 0.09
 LEVELS = (0.0, 9.0, -10.5, 4.0, 0.3, 10.0)
 HOLD = 3.0
 """s."""
+LATTICE = 0.04
+"""V: a threshold amid two values is further from both than a jump is spread."""
 
 
 def first_order(n, w, since):
@@ -83,3 +85,30 @@ def test_what_the_band_swallows_bends_nothing():
     low = (at > 4 * HOLD + 1.5) & (at < 5 * HOLD)
     assert low.any()
     assert np.max(np.abs(told[0][low])) < 1e-4
+
+
+def ticking(half_width):
+    """A sine of 9 V, written twenty times a second, on a rotor that begins to turn with a jump. Intervals keep step
+    with samples of the thrust, so that a tick falls within one."""
+    start = np.arange(0.0, 240.0, 0.049)
+    command = LATTICE * np.round(9.0 / LATTICE * np.sin(2 * np.pi * start / 60.0))
+
+    def turning(t):
+        at = command[np.searchsorted(start, t, side="right") - 1]
+        return np.where(np.abs(at) > half_width, at, 0.0)
+
+    t, force = np.arange(0.094, 239.0, 0.098), np.arange(0.0113, 239.9, 0.0302)
+    channels = (
+        Channel("command_voltage", "command", "command_voltage", "V", start, command),
+        Channel("thrust", "cell", "thrust", "N", force, 0.2 * turning(force) * np.abs(turning(force))),
+        Channel("rotation_rate", "drive", "rotation_rate", "rev/s", t, PER_DRIVER * turning(t)),
+    )
+    return data_of([Recording("ticking", "T1", channels)])[0]
+
+
+def test_a_rotor_that_jumps_at_a_tick_is_read_before_it_or_after():
+    """A slope said half of the jump, twenty sigma of a good tachometer, and a lag of 0.4 ms was told to repair that."""
+    data = ticking(15.5 * LATTICE)
+    model, theta = Model((DeadBand("jump"),)), Theta(0.2, ((15.5 * LATTICE,),), (0.0,), k=PER_DRIVER)
+    _, told = raw(model, theta, data, with_rate=True)
+    assert np.max(np.abs(told[0] - data.histories[0].rates)) < 1e-3
