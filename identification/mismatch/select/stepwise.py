@@ -173,7 +173,7 @@ def _lasting(
 ) -> S | None:
     """The larger model, pruned; of additions that are dropped again the next best. None where none lasts."""
     while found:
-        larger = system.enlarged(state, _best(found))
+        larger = system.enlarged(state, _best(system, found))
         smaller = pruned(system, larger)
         if frozenset(smaller.fit.values) not in seen:
             return smaller
@@ -182,17 +182,21 @@ def _lasting(
     return None
 
 
-def _best(found: Sequence[tuple[Candidate[T], F]]) -> F:
-    """The best gain beyond its price, or a simpler term that gains nearly as much; first what is possible."""
+def _best(system: System[T, F, S, Judged], found: Sequence[tuple[Candidate[T], F]]) -> F:
+    """The best gain beyond its price, or a simpler term that gains nearly as much; first what is possible, and before
+    a rare one the ordinary one that is hardly worse: what comes later is chosen beside it, and would keep it."""
     possible = [each for each in found if not each[0].at_bound] or found
-    most = max(candidate.chi2_gain - candidate.price for candidate, _ in possible)
+    most = max(map(_worth, possible))
+    near = [each for each in possible if _worth(each) >= policy.select.SIMPLER_TERM_GAIN * most]
+    best = min(near, key=lambda each: (len(each[1].values[each[0].term]), -_worth(each)))
+    least = _worth(best) - policy.select.RARE_TERM_BIC
+    ordinary = [each for each in possible if system.rarer(best[0].term, each[0].term) and _worth(each) > least]
+    return max(ordinary, key=_worth, default=best)[1]
 
-    def simplest(each: tuple[Candidate[T], F]) -> tuple[int, float]:
-        candidate, fitted = each
-        return len(fitted.values[candidate.term]), candidate.price - candidate.chi2_gain
 
-    near = [c for c in possible if c[0].chi2_gain - c[0].price >= policy.select.SIMPLER_TERM_GAIN * most]
-    return min(near, key=simplest)[1]
+def _worth(each: tuple[Candidate[T], F]) -> float:
+    """What it gains beyond its price."""
+    return each[0].chi2_gain - each[0].price
 
 
 def pruned(system: System[T, F, S, Judged], state: S) -> S:

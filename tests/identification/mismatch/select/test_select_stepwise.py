@@ -197,6 +197,14 @@ def test_a_rarer_rival_comes_only_where_it_would_stay():
         assert standing is not None
 
 
+def test_of_two_that_gain_the_same_the_ordinary_one_is_added():
+    """A rare one that gains 6 more waits; one that gains more than rare ones must is added."""
+    for gain, first in ((6.0, A), (policy.select.RARE_TERM_BIC + 2.0, B)):
+        y = 9 * wave(0) + np.sqrt(gain) * wave(1)
+        system = Columns(y, {A: wave(0), B: y / np.linalg.norm(y)}, rare=frozenset({B}))
+        assert list(forward(system, system.state(), 1, RNG)[0].fit.values) == [first]
+
+
 def test_exchanges_that_go_in_circles_end():
     circle = Columns(9 * wave(0), {A: wave(0), B: alike(0.999)}, frozenset({A, B}))
     last, standing = exchanged(circle, circle.state(A))
