@@ -17,10 +17,24 @@ MOST_REFUSED = 3
 
 
 def sureness(f: Finding) -> str:
-    """How many alternatives were looked at before it was taken, and its weight among those fitted in its place."""
+    """How many alternatives were looked at before it was taken, and its odds among those fitted in its place."""
     says = f"the best of {f.searched} alternatives looked at" if f.searched is not None and f.searched > 1 else ""
-    weight = f"weight {f.probability:.2g} among the {f.asked} effects asked ('none of these' was not)"
-    return ", ".join(part for part in (says, weight if f.asked > 1 else "") if part)
+    odds = (
+        f"{_percent(f.probability)} of the odds among the {f.asked} effects of the catalogue that were fitted in this "
+        "place; how likely physics outside the catalogue is, that does not say"
+    )
+    return ", ".join(part for part in (says, odds if f.asked > 1 else "") if part)
+
+
+def _percent(share: float) -> str:
+    """Whole, and never all or nothing.
+
+    >>> _percent(0.7), _percent(1.0), _percent(1e-9)
+    ('70 %', 'more than 99 %', 'less than 1 %')
+    """
+    if share >= 0.995:
+        return "more than 99 %"
+    return f"{100 * share:.0f} %" if share >= 0.005 else "less than 1 %"
 
 
 def degree(f: Finding) -> str:

@@ -99,11 +99,12 @@ def test_a_p_value_says_among_how_many_it_was_searched():
     found = replace(LAGS, searched=812, asked=9)
     for told in (said(answer(findings=(found,))), shown(answer(findings=(found,)))):
         assert "the best of 812 alternatives looked at" in told
-        assert "weight 0.7 among the 9 effects asked ('none of these' was not)" in told
+        assert "70 % of the odds among the 9 effects of the catalogue that were fitted in this place" in told
+        assert "how likely physics outside the catalogue is, that does not say" in told
         assert "probability among" not in told
     alone = replace(LAGS, searched=None, rivals=())
     assert "alternatives" not in said(answer(findings=(alone,)))
-    assert "weight" not in said(answer(findings=(alone,)))
+    assert "odds" not in said(answer(findings=(alone,)))
 
 
 def test_a_page_tells_recordings_by_their_files():
