@@ -24,6 +24,7 @@ from identification.mismatch.prepare import stage as prepare
 from identification.mismatch.prepare.channel_availability import predictable
 from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.select.forward_selection import search
+from identification.mismatch.select.search_again import search_again
 from identification.mismatch.select.stage import exchange_rivals
 from identification.mismatch.unnamed import stage as unnamed
 from identification.mismatch.validate import stage as validate
@@ -109,9 +110,7 @@ def traced(
     cleaned = untouched(original) if found.undone else periodic.run(first.after.fit, first.data, original)
     if cleaned.changed:  # back: a line hides small terms, and is taken for some; a peak of the noise makes it louder
         watch.stage("looking again, without lines")
-        found = search(
-            cleaned.histories, draws.select_again, given=given, bands=cleaned.bands, without=without, watch=watch
-        )
+        found = search_again(first, cleaned.histories, draws.select_again, given, cleaned.bands, without, watch)
     watch.stage("asking for rivals")
     selected = exchange_rivals(found, draws.exchange, watch)  # goes back where the exchange made another model
     selected = locate.calmed(selected, draws.calm)  # back to the baseline: noise after steps looks like many effects

@@ -92,10 +92,14 @@ class Selected:
     """What was not asked, as clauses, because the search was interrupted."""
 
 
+Given = Callable[[Data, Theta], tuple[Data, Theta, Model]]
+"""The baseline of a twin in the place of C V|V|."""
+
+
 def search(
     histories: Sequence[History],
     rng: np.random.Generator,
-    given: Callable[[Data, Theta], tuple[Data, Theta, Model]] | None = None,
+    given: Given | None = None,
     bands: tuple[tuple[float, float], ...] = (),
     without: Collection[str] = (),
     watch: Observer = UNWATCHED,
@@ -104,22 +108,32 @@ def search(
 
     `given` puts the baseline of a twin in the place of C V|V|; effects `without` are taken out of the catalogue.
     """
+    data, terms, before = beginning(histories, given, bands, without)
+    return onwards(data, terms, before, before, rng, watch)
+
+
+def beginning(
+    histories: Sequence[History],
+    given: Given | None,
+    bands: tuple[tuple[float, float], ...],
+    without: Collection[str],
+) -> tuple[Data, tuple[Term, ...], Estimate]:
+    """What a search begins with: the runs, the terms that may be chosen, and the baseline with its noise."""
     data, theta = start(histories)
     data, theta, first = given(data, theta) if given is not None else (data, theta, Model())
     data = replace(data, bands=bands)
     terms = available(data, without)
-    before = baseline(data, theta, terms, first)
-    return _forward(data, terms, before, before, rng, watch)
+    return data, terms, baseline(data, theta, terms, first)
 
 
 def resumed(found: Selected, estimate: Estimate, rng: np.random.Generator, watch: Observer = UNWATCHED) -> Selected:
     """The search gone on with from `estimate`, a model of the same recordings that is not the one that was `found`."""
     known = frozenset(found.after.fit.model.terms)
-    again = _forward(found.data, found.terms, found.before, estimate, rng, watch, known)
+    again = onwards(found.data, found.terms, found.before, estimate, rng, watch, known)
     return replace(again, rounds=(*found.rounds, *again.rounds))
 
 
-def _forward(
+def onwards(
     data: Data,
     terms: tuple[Term, ...],
     before: Estimate,

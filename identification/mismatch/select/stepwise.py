@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Generic, Protocol, TypeVar
 
@@ -208,6 +208,21 @@ def pruned(system: System[T, F, S, Judged], state: S) -> S:
         if min(short) > 0:
             break
         state = system.replaced(state, less[short.index(min(short))])
+    return state
+
+
+def asked_again(
+    system: System[T, F, S, Judged], state: S, passes: Callable[[Judged], bool], rng: np.random.Generator
+) -> S:
+    """Pruned, and without the weakest term as long as nothing passes beside what is left: a search from nothing would
+    not have come to a model that has it."""
+    state = pruned(system, state)
+    while state.fit.values:
+        less = [system.without(state, term) for term in state.fit.values]
+        smaller = system.replaced(state, min(less, key=lambda each: each.chi2))
+        if passes(system.judged(smaller, rng)):
+            break
+        state = smaller
     return state
 
 

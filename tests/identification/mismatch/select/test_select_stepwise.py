@@ -9,7 +9,15 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.name.named_term import Check, named_term, restated
 from identification.mismatch.select.rounds import Candidate, Unhidden
-from identification.mismatch.select.stepwise import ROUNDS, RivalTerm, accept_threshold, exchanged, forward, pruned
+from identification.mismatch.select.stepwise import (
+    ROUNDS,
+    RivalTerm,
+    accept_threshold,
+    asked_again,
+    exchanged,
+    forward,
+    pruned,
+)
 
 ROWS = 64
 LOGN = float(np.log(ROWS))
@@ -161,6 +169,14 @@ def test_a_column_is_dropped_below_its_threshold_the_worst_first():
     least = float(np.sqrt(accept_threshold(1)))
     system = Columns((least + 0.1) * wave(0) + (least - 0.1) * wave(1), {A: wave(0), B: wave(1)})
     assert list(pruned(system, system.state(A, B)).fit.values) == [A]
+
+
+def test_a_model_that_is_asked_again_loses_what_no_screening_would_have_let_in():
+    """`passes` says what a screening finds missing; what is below the price of a term goes without being asked."""
+    system = Columns(9 * wave(0) + 6 * wave(1) + 1 * wave(2), {A: wave(0), B: wave(1), C: wave(2)})
+    for missing, left in (({A, B}, [A, B]), ({A}, [A]), (set(), [])):
+        kept = asked_again(system, system.state(A, B, C), lambda judged, m=missing: bool(m & set(judged)), RNG)
+        assert list(kept.fit.values) == left
 
 
 def alike(share):
