@@ -140,7 +140,7 @@ def _periodic(trace: Trace) -> Iterator[str]:
     for f, quality in trace.cleaned.bands:
         yield f"broad peak of the noise at {f:.4g} Hz, quality {quality:.3g}: told to the noise model"
     if trace.cleaned.changed:
-        yield "the way goes back: the model is selected again"
+        yield "the way goes back: the model is selected again, from what of it still earns its place"
     else:
         yield f"no line (family-wise threshold p < {policy.periodic.LINE_FALSE_ALARM:g}), no peak; the model stands"
 
@@ -148,7 +148,7 @@ def _periodic(trace: Trace) -> Iterator[str]:
 def _rivals(trace: Trace) -> Iterator[str]:
     selected = trace.selected
     search, resumed = searches(selected)
-    begun = next((r.after for r in reversed(search) if r.after is not None), ())
+    begun = next((r.after for r in reversed(search) if r.after is not None), search[0].model)
     if resumed:
         yield f"exchanged: {_terms(begun)} -> {_terms(resumed[0].model)}; the way goes back: the search is resumed"
         for one in resumed:

@@ -137,3 +137,10 @@ def test_the_way_back_after_an_exchange_is_shown(trace):
     said = section(other, "rivals")
     assert "exchanged: dead_band (shrink) -> no term; the way goes back: the search is resumed" in said
     assert "exchanged: no term -> dead_band (shrink)" in said
+
+
+def test_a_search_that_begins_with_a_model_and_adds_nothing_is_no_exchange(trace):
+    (*_, last) = trace.selected.rounds
+    assert last.model == trace.selected.after.fit.model.terms
+    other = replace(trace, selected=replace(trace.selected, rounds=(last,)))
+    assert section(other, "rivals").startswith("none was exchanged")
