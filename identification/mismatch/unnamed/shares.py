@@ -52,9 +52,23 @@ def mostly_right(split: TrainTestSplit, unearned: Sequence[Named], best: float) 
         left = [n for n in left if n is not most and not (repairs(n) and repairs(most))]
         score = new
         if share(before, score, min(best, score.rmse)) >= policy.unnamed.MOSTLY_SHARE:
-            right, before = [*right, *tried], score
-            tried = []
+            kept, now, before = needed(split, now, tried)
+            right, score, tried = [*right, *kept], before, []
     return Mostly(tuple(right), tuple(n for n in unearned if n not in right))
+
+
+def needed(split: TrainTestSplit, now: Fit, group: Sequence[Named]) -> tuple[list[Named], Fit, Score]:
+    """Of names that together make most of it those that are needed for it, with the model of these and its score on
+    what was not fitted: a name that was the best by itself may do nothing beside those that came after it.
+
+    `now`: the model with all of them, `group`: in the order in which they were found, the last of which is kept.
+    """
+    kept, score = list(group), split.judge(now)
+    for one in group[:-1]:
+        less = fit(*now.less(one.term), split.data, split.estimate.weights)
+        if not better(score, without := split.judge(less), len(one.theta)):
+            kept, now, score = [n for n in kept if n is not one], less, without
+    return kept, now, score
 
 
 def with_shares(
