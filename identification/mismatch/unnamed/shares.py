@@ -52,23 +52,26 @@ def mostly_right(split: TrainTestSplit, unearned: Sequence[Named], best: float) 
         left = [n for n in left if n is not most and not (repairs(n) and repairs(most))]
         score = new
         if share(before, score, min(best, score.rmse)) >= policy.unnamed.MOSTLY_SHARE:
-            kept, now, before = needed(split, now, tried)
-            right, score, tried = [*right, *kept], before, []
-    return Mostly(tuple(right), tuple(n for n in unearned if n not in right))
+            right, before = [*right, *tried], score
+            tried = []
+    told = needed(split, right, unearned)
+    return Mostly(told, tuple(n for n in unearned if n not in told))
 
 
-def needed(split: TrainTestSplit, now: Fit, group: Sequence[Named]) -> tuple[list[Named], Fit, Score]:
-    """Of names that together make most of it those that are needed for it, with the model of these and its score on
-    what was not fitted: a name that was the best by itself may do nothing beside those that came after it.
+def needed(split: TrainTestSplit, right: Sequence[Named], unearned: Sequence[Named]) -> tuple[Named, ...]:
+    """Of names that together make most of it those that take something off beside the others: one that was the best by
+    itself may do nothing beside those that came after it.
 
-    `now`: the model with all of them, `group`: in the order in which they were found, the last of which is kept.
+    `split`: the whole model fitted to a part of the data, of which the rest of `unearned` is taken out.
     """
-    kept, score = list(group), split.judge(now)
-    for one in group[:-1]:
-        less = fit(*now.less(one.term), split.data, split.estimate.weights)
-        if not better(score, without := split.judge(less), len(one.theta)):
-            kept, now, score = [n for n in kept if n is not one], less, without
-    return kept, now, score
+    kept = list(right)
+    while kept:
+        score, without = scores_alone(split, kept, [n.term for n in unearned if n not in kept])
+        idle = [n for n in kept if without[n.term].rmse <= score.rmse]
+        if not idle:
+            break
+        kept.remove(min(idle, key=lambda n: without[n.term].rmse))
+    return tuple(kept)
 
 
 def with_shares(
