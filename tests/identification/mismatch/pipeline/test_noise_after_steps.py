@@ -8,30 +8,7 @@ import pytest
 from identification.mismatch.diagnosis import Diagnosis
 from identification.mismatch.pipeline import diagnose
 from tests.identification.diagnosed_runs import run
-
-SHARE, DECAY, TIME_CONSTANT = 0.03, 0.4, 0.15
-"""Of the step, s, s."""
-
-
-def late(t, F):
-    """(n,) N, the thrust less its running mean: what has not settled."""
-    keep = np.exp(-(t[1] - t[0]) / DECAY)
-    mean = np.empty(F.size)
-    mean[0] = F[0]
-    for i in range(1, F.size):
-        mean[i] = keep * mean[i - 1] + (1 - keep) * F[i]
-    return F - mean
-
-
-def unquiet(rng):
-    def made(t, V, F):
-        keep = np.exp(-(t[1] - t[0]) / TIME_CONSTANT)
-        x = np.zeros(t.size)
-        for i in range(1, t.size):
-            x[i] = keep * x[i - 1] + np.sqrt(1 - keep**2) * rng.standard_normal()
-        return F + SHARE * np.abs(late(t, F)) * x
-
-    return made
+from tests.identification.mismatch.locate.unquiet import late, unquiet
 
 
 @pytest.mark.parametrize("seed", range(3))
