@@ -16,7 +16,7 @@ from tests.identification.mismatch.small import data_of, placed
 
 C, TARE = 0.5, 1.5
 LAG, TAU = MotorLag("first_order"), 0.12
-BARE = Theta(C, (), (TARE,))
+NONE, BARE = Model(), Theta(C, (), (TARE,))
 
 
 def held(start, volts, at):
@@ -54,7 +54,7 @@ def stepped():
     return data, data.runs[0]
 
 
-def told(data, run, model=Model(), theta=BARE, late=0.0):  # noqa: B008  # frozen
+def told(data, run, model=NONE, theta=BARE, late=0.0):
     return at_samples(model, theta, run, data.scale, TARE, late)
 
 
@@ -95,7 +95,7 @@ def test_a_shift_of_the_clocks_moves_the_force_and_not_the_rate(stepped):
 
 def test_the_tare_is_no_part_of_it(stepped):
     data, run = stepped
-    other = at_samples(Model(), replace(BARE, tares=(9.0,)), run, data.scale, 9.0, 0.0)
+    other = at_samples(NONE, replace(BARE, tares=(9.0,)), run, data.scale, 9.0, 0.0)
     assert np.array_equal(other[0], told(data, run)[0])
 
 

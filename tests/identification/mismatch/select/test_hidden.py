@@ -1,4 +1,4 @@
-"""What slow noise takes for its own shows in no screening, and is told from it by estimating both; noise alone is not."""
+"""What slow noise takes for its own no screening shows; estimating both tells it apart, and of noise alone nothing."""
 
 from __future__ import annotations
 
