@@ -81,6 +81,24 @@ def test_of_a_rotor_that_lags_it_is_the_same_where_it_turns_by_then(stepped):
     assert np.std(told(data, run)[0][run.history.rows] - true) > 0.1 * np.std(true), "a lag of a tenth is seen"
 
 
+def test_of_ticks_as_fast_as_the_samples_it_is_what_was_held_at_each_of_them():
+    """A ramp whose ticks come between the samples: the line through the means is off by half a tick at some."""
+    start = np.arange(0.0, 30.0, 0.043)
+    volts = 9.0 * np.sin(2 * np.pi * start / 15.0)
+    t = np.arange(0.011, 30.0, 1 / 33.0)
+    channels = (
+        Channel("command_voltage", "command", "command_voltage", "V", start, volts),
+        Channel("thrust", "cell", "thrust", "N", t, force(held(start, volts, t)) + TARE),
+    )
+    data, _ = data_of([Recording("ramp", "T1", channels)])
+    run = data.runs[0]
+    rows = run.history.rows[2:-2]
+    true = run.samples("thrust").means(force(held(start, volts, run.history.sample_time)))[rows]
+    left = told(data, run)[0][rows] - true
+    assert np.std(left) < 0.01
+    assert np.std(force(run.history.driver[rows]) - true) > 5 * np.std(left)
+
+
 def test_a_shift_of_the_clocks_moves_the_force_and_not_the_rate(stepped):
     data, run = stepped
     shift = 0.4

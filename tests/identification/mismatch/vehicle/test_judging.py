@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
 from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.noise.covariance import Noise
+from identification.mismatch.validate.held_out import fitted_blocks
 from identification.mismatch.vehicle.free_force import judge_left, with_free_force
 from identification.mismatch.vehicle.judging import better_predicting, held_out, noise_rms, only, residuals, rms
 from identification.mismatch.vehicle.runs import Prepared
@@ -86,6 +89,34 @@ def test_runs_are_left_out_in_turn_where_there_are_several(runs: Prepared, state
     assert held.after == pytest.approx(NOISE, rel=0.1)
     assert held.before > 2 * held.after
     assert held.what.startswith("each run in turn simulated by a model fitted to the others")
+
+
+def test_each_of_them_is_predicted_by_the_others_alone(runs: Prepared, states: tuple[State, State]) -> None:
+    """As if it had been given for it; one is of another dead band, which the others must not know of."""
+    odd = prepared(
+        [boat(i, banded(w), levels) for i, (w, levels) in enumerate(zip((1.0, 2.5, 1.0), orders(3), strict=True))]
+    )
+    data = part(odd, 0, 1, 2)
+    whole = state(data), state(data, {BAND: (0.5,)})
+    squares, samples = np.zeros(2), 0
+    for j in range(3):
+        others, one = part(odd, *({0, 1, 2} - {j})), part(odd, j)
+        held = held_out(state(others), state(others, {BAND: (0.5,)}), others, one)
+        samples += one.runs[0].time.size
+        squares += one.runs[0].time.size * np.array([held.before, held.after]) ** 2
+    held = held_out(*whole, data, None)
+    assert [held.before, held.after] == pytest.approx(np.sqrt(squares / samples).tolist(), rel=1e-3)
+
+
+def test_what_is_kept_back_of_a_run_is_not_fitted_and_is_judged(runs: Prepared) -> None:
+    """The blocks that are kept back are read half a metre a second too high: the error is that, and no less."""
+    one = boat(0, banded(WIDTH), orders(1)[0])
+    command, speed = one.channels
+    spoilt = replace(speed, value=speed.value + 0.5 * ~fitted_blocks(speed.time))
+    data = prepared([replace(one, channels=(command, spoilt))])
+    model = state(part(runs, 0), {BAND: (0.5,)})
+    held = held_out(model, model, data, None)
+    assert held.after == pytest.approx(0.5, abs=0.02)
 
 
 def test_blocks_of_the_only_run_are_kept_back(runs: Prepared) -> None:

@@ -59,7 +59,7 @@ def test_a_parameter_that_differs_from_run_to_run_is_told(term: VehicleTerm) -> 
     }
     found = asked(term, *pushes[term])
     assert SECOND in found[SECOND].failed
-    assert found[SECOND].apart > 0.3
+    assert 0.3 < found[SECOND].apart < 4.0, "a share of itself"
 
 
 def test_a_parameter_that_changes_half_way_is_told() -> None:
