@@ -46,6 +46,8 @@ class Reading(NamedTuple):
 
 
 class Unreadable(NamedTuple):
+    """A line that the pattern does not match."""
+
     line: bytes
 
 

@@ -62,6 +62,8 @@ class Fault(NamedTuple):
 
 
 class Unreadable(NamedTuple):
+    """A line that is no answer of MT-SICS."""
+
     line: bytes
 
 

@@ -32,6 +32,8 @@ _INVALID = re.compile(rb"-9+(?:\.[09]*)?")
 
 
 class Velocity(NamedTuple):
+    """The velocity in one cell of the profile."""
+
     cell: int
     components: tuple[float, float, float]
     """m/s, NaN where the instrument says invalid or nothing."""
@@ -44,6 +46,8 @@ class OtherSentence(NamedTuple):
 
 
 class Unreadable(NamedTuple):
+    """A line that is no sentence, or whose checksum is wrong."""
+
     line: bytes
 
 

@@ -63,17 +63,23 @@ class Status5(NamedTuple):
 
 
 class Pong(NamedTuple):
+    """The answer to a ping: who is there."""
+
     vesc_id: int
     hardware: int | None
     """0 VESC, 1 battery management, 2 custom; None from old firmware, which does not say."""
 
 
 class FaultCode(NamedTuple):
+    """The fault that a VESC reports, 0 for none."""
+
     vesc_id: int
     code: int
 
 
 class NotUnderstood(NamedTuple):
+    """A frame that none of the others is."""
+
     frame: Frame
 
 
@@ -91,6 +97,7 @@ def set_current(vesc_id: int, amperes: float) -> Frame:
 
 
 def ping(vesc_id: int, host_id: int) -> Frame:
+    """The frame that asks whether a VESC is there. It feeds no timeout."""
     return Frame(PING << 8 | vesc_id, True, bytes([host_id]))
 
 

@@ -131,6 +131,8 @@ class Step:
 
 @dataclass(frozen=True)
 class Event:
+    """Something that happened `time` s after the run began, as the journal has it."""
+
     time: float
     level: str
     text: str

@@ -47,19 +47,28 @@ def shares(rows: Mapping[str, Row]) -> dict[str, float]:
     return {what: 100 * sum(part) / len(part) for what, part in parts.items() if part}
 
 
+def answered_at(answers: Answers, setting: str) -> Answers:
+    """The cases that were answered at a setting."""
+    return {case: rows for case, rows in answers.items() if setting in rows}
+
+
 def otherwise(answers: Answers, setting: str) -> tuple[int, int]:
-    """Cases with other names, and with another verdict."""
-    pairs = [(rows[AT_VALUE], rows[setting]) for rows in answers.values()]
+    """Cases with other names, and with another verdict, of those that were answered at a setting."""
+    pairs = [(rows[AT_VALUE], rows[setting]) for rows in answered_at(answers, setting).values()]
     return sum(a["named"] != b["named"] for a, b in pairs), sum(a["said"] != b["said"] for a, b in pairs)
 
 
-def _line(answers: Answers, setting: Setting, whole: Mapping[str, float]) -> str:
-    after = shares({case: rows[setting.id] for case, rows in answers.items()})
+def _line(answers: Answers, setting: Setting) -> str:
+    asked = answered_at(answers, setting.id)
+    whole = shares({case: rows[AT_VALUE] for case, rows in asked.items()})
+    after = shares({case: rows[setting.id] for case, rows in asked.items()})
     told = " | ".join(f"{after[h]:.1f} ({after[h] - whole[h]:+.1f})" for h in whole)
     value = dict(policy.thresholds())[setting.threshold]
-    names, verdicts = otherwise(answers, setting.id)
+    names, verdicts = otherwise(asked, setting.id)
     moved = value.moved(setting.value)
-    return f"| {setting.threshold} ({value:g}) | {moved:g} | {told} | names {names}, verdict {verdicts} |"
+    return (
+        f"| {setting.threshold} ({value:g}) | {moved:g} | {told} | names {names}, verdict {verdicts} of {len(asked)} |"
+    )
 
 
 def table(answers: Answers) -> Iterator[str]:
@@ -70,23 +79,26 @@ def table(answers: Answers) -> Iterator[str]:
     yield f"|---|---|{'---|' * (len(whole) + 1)}"
     base = " | ".join(f"{share:.1f}" for share in whole.values())
     yield f"| all at their values, {len(answers)} cases | | {base} | |"
-    yield from (_line(answers, setting, whole) for setting in changing)
+    yield from (_line(answers, setting) for setting in changing)
     still = [f"`{name}`" for name in ASKED if name not in {setting.threshold for setting in changing}]
     if still:
         yield ""
-        yield f"At half and at double of {', '.join(still)} not one of the {len(answers)} cases was answered otherwise,"
-        yield "in its names or in its verdict."
+        yield f"At half and at double of {', '.join(still)} not one case was answered otherwise, in its names or in"
+        yield "its verdict."
 
 
 def text(answers: Answers, seconds: Sequence[float], code: str) -> str:
     clean = sum(lane(case) == "clean" for case in answers)
     number = len(settings()) + 1
+    whole = [rows for rows in answers.values() if len(rows) == number]
     first = (
         f"The fixed set has {len(cases())} cases that are interleaved over the lanes; of these {len(answers)} were\n"
-        f"answered at all {number} settings ({number * len(answers):,} answers, each by the rules of the proof), by\n"
+        f"answered at the values themselves and {len(whole)} at all {number} settings\n"
+        f"({sum(map(len, answers.values())):,} answers, each by the rules of the proof), by\n"
         f"version {code} of the diagnosis, in {sum(seconds) / 3600:.1f} h of one core. Shares are per cent of\n"
         f"the cases of which each is asked ({clean} clean ones: one alarm is {100 / max(clean, 1):.1f} %); in\n"
-        "brackets the difference to the values themselves; settings at which none was answered otherwise have no line."
+        "brackets the difference to the values themselves, of the cases that were answered at the setting; settings\n"
+        "at which none was answered otherwise have no line."
     )
     return "\n".join((first, "", *table(answers)))
 
@@ -107,10 +119,9 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--page", action="store_true", help=f"put it into {PAGE.relative_to(ROOT)}")
     asked = parser.parse_args(arguments)
     versions = [version(), *asked.also]
-    every = {AT_VALUE, *(setting.id for setting in settings())}
-    answers = {case: rows for case, rows in known(asked.out, versions).items() if every <= rows.keys()}
+    answers = {case: rows for case, rows in known(asked.out, versions).items() if rows}  # some could not be drawn
     if not answers:
-        raise SystemExit(f"{asked.out} holds no case at all settings by version {', '.join(versions)}; work some out")
+        raise SystemExit(f"{asked.out} holds no case by version {', '.join(versions)}; work some out")
     told = text(answers, costs(asked.out, versions), " and ".join(versions))
     if asked.page:
         put(PAGE, told)

@@ -41,6 +41,8 @@ CAPACITY = 100_000
 
 
 class Frame(NamedTuple):
+    """One frame of a CAN bus: an identifier of 11 bits, or of 29 where it is `extended`, and up to 8 bytes."""
+
     id: int
     extended: bool
     data: bytes

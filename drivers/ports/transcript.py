@@ -14,6 +14,8 @@ _DIRECTIONS: dict[str, Direction] = {"<": "<", ">": ">"}
 
 
 class Chunk(NamedTuple):
+    """Bytes that came or went at one monotonic time in ns."""
+
     t_ns: int
     direction: Direction
     data: bytes

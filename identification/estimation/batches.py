@@ -69,6 +69,8 @@ class BatchSums:
 
 @dataclass(frozen=True, eq=False)
 class Sandwich:
+    """The covariance of p parameters from how the scores of batches of rows scatter, whatever the noise."""
+
     cov: Floats
     """(p, p)"""
     dof: Floats

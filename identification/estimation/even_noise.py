@@ -191,6 +191,8 @@ def _half_width(weight: Floats, std: Floats, outside: float) -> float:
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
+    """How likely n evenly spaced residuals are under each of the G noise laws of a grid."""
+
     n: int
     grid: _Grid
     log: Floats
@@ -200,6 +202,11 @@ class Likelihood:
 
 
 def likelihood(residual: Floats, constants: int, lost: Floats | None) -> Likelihood:
+    """The likelihood of each noise law of the grid, of a residual (n,) beside `constants` fitted constants.
+
+    `lost` (n,): the share of each cosine coefficient that a fit took out; None: none.
+    Raises ValueError for fewer than MIN_SAMPLES.
+    """
     n = residual.size
     if n < MIN_SAMPLES:
         raise ValueError(f"fit_noise needs at least {MIN_SAMPLES} samples, got {n}")
@@ -232,6 +239,7 @@ def fit_noise(residual: Floats, lost: Floats | None = None) -> NoiseModel:
 
 
 def posterior(found: Likelihood, log_weight: Floats) -> NoiseModel:
+    """The noise laws of the grid weighed by exp(`log_weight`) (G,), which need not be normalised."""
     weight = np.exp(log_weight - log_weight.max())
     return NoiseModel(found.n, weight / weight.sum(), found.variance, found.grid)
 

@@ -79,6 +79,7 @@ def gamma_sf(x: Floats | float, shape: float) -> Floats:
 
 
 def gamma_median(shape: float) -> float:
+    """The median of a gamma distribution of that shape and scale 1."""
     return float(gammaincinv(shape, 0.5))
 
 

@@ -131,6 +131,7 @@ def is_square(of: str) -> bool:
 
 
 def driver_symbol(history: History) -> str:
+    """The letter for what drives a run in a formula: n for a rotation rate, else V."""
     return "n" if history.driver_quantity == "rotation_rate" else "V"
 
 

@@ -54,18 +54,10 @@ def compare(
     `limits`: of the next experiment, as for diagnose(). `watch`: of both diagnoses; one that ends the search of the
     simulation ends that of the recording too.
     """
-    drives = _driver(simulation), _driver(real)
-    sim_driver, real_driver = drives
-    if sim_driver is None or real_driver is None or sim_driver.quantity != real_driver.quantity:
-        return Refusal(
-            f"the simulation {_name(simulation)} is driven by {_said(sim_driver)}, the recording {_name(real)} by "
-            f"{_said(real_driver)}; both need the same one"
-        )
-    offset = _offset(sim_driver, real_driver)
-    simulation = _shifted(simulation, -offset)
-    wrong = _disagreement(simulation, real)
-    if wrong is not None:
-        return wrong
+    aligned = _aligned(simulation, real)
+    if isinstance(aligned, Refusal):
+        return aligned
+    simulation, offset = aligned
     known = _described(simulation, real, seed, watch)
     if isinstance(known, Refusal):
         return known
@@ -116,6 +108,19 @@ def _offset(simulation: Channel, real: Channel) -> float:
     plain = float(np.mean(np.abs(held(a, grid) - held(b, grid))))
     moved = float(np.mean(np.abs(held(a, grid + late) - held(b, grid))))
     return late if moved < 0.5 * plain else 0.0
+
+
+def _aligned(simulation: Recording, real: Recording) -> tuple[Recording, float] | Refusal:
+    """The simulation on the clock of the recording, and the s by which its own was late; both were driven alike."""
+    sim_driver, real_driver = _driver(simulation), _driver(real)
+    if sim_driver is None or real_driver is None or sim_driver.quantity != real_driver.quantity:
+        return Refusal(
+            f"the simulation {_name(simulation)} is driven by {_said(sim_driver)}, the recording {_name(real)} by "
+            f"{_said(real_driver)}; both need the same one"
+        )
+    offset = _offset(sim_driver, real_driver)
+    moved = _shifted(simulation, -offset)
+    return _disagreement(moved, real) or (moved, offset)
 
 
 def _first_move(drive: Drive) -> float:

@@ -84,12 +84,16 @@ class Finding:
 
 @dataclass(frozen=True, slots=True)
 class Rmse:
+    """Root mean square errors of baseline and final model, in the unit of the response."""
+
     before: float
     after: float
 
 
 @dataclass(frozen=True, slots=True)
 class HeldOutRmse:
+    """The same on what was not fitted, beside the noise of one sample in that unit; `what`: which part that is."""
+
     before: float
     after: float
     noise: float
@@ -106,6 +110,8 @@ class HeldOutRmse:
 
 @dataclass(frozen=True, slots=True)
 class PlanStep:
+    """A hold of the next experiment: a level for `duration` s in water that flows at `flow_speed` m/s."""
+
     command_voltage: float
     """V, or what the `quantity` of its experiment is measured in."""
     duration: float
@@ -114,6 +120,8 @@ class PlanStep:
 
 @dataclass(frozen=True, slots=True)
 class NextExperiment:
+    """Steps that would settle which of several models is right, and the probability that they do."""
+
     why: str
     steps: tuple[PlanStep, ...]
     expected_power: float
@@ -178,6 +186,10 @@ class Curves:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
+    """All that was found of one thruster or vehicle: the verdict, where the baseline fails, the model that does not,
+    how well it predicts, and what a report draws.
+    """
+
     recordings: tuple[str, ...]
     thruster: str
     answer: Verdict

@@ -18,6 +18,8 @@ QUANTILE = 1.959964
 
 @dataclass(frozen=True, slots=True)
 class Value:
+    """A number that was measured, with its unit and how far it may be off."""
+
     value: float
     std: float
     """Such that value +- 1.96 std holds the whole 95 % interval."""

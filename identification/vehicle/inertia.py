@@ -127,9 +127,7 @@ def output_error(
         return Unusable("no trial was given; expected at least one with a measured motion")
     axis, floats = trials[0].axis, dict(buoyancy or {})
     chosen = dict(free) if free is not None else {"m": start_inertia(trials, known, floats)}
-    starts = starts_of(trials)
-    names = (*chosen, *(n for n in known.names if n not in chosen), *starts)
-    start = np.array([*chosen.values(), *(known[n] for n in known.names if n not in chosen), *starts.values()])
+    names, start = _begun(trials, known, chosen)
     scale = _scales(names, start, known)
     measured = [one.response for one in trials]
     roots = [np.full(one.time.size, sensor_noise(one)) for one in trials]
@@ -146,13 +144,23 @@ def output_error(
         roots = spectra if correlated else [_level(r, len(names) / len(trials)) for r in left]
         if max(float(np.abs(np.log(new / old)).mean()) for new, old in zip(roots, used, strict=True)) < SAME_NOISE:
             break
-    ratio = np.hstack([found / root for found, root in zip(spectra, used, strict=True)])
-    cov = best.with_noise(np.diag(ratio**2))
-    wanted = [name for name in names if name not in starts]
-    estimate = Gaussian(names, best.estimate.mean, cov).select(wanted)
+    estimate = _without_starts(trials, best, np.hstack([s / root for s, root in zip(spectra, used, strict=True)]))
     sigma = tuple(float(np.sqrt(np.mean(root**2))) for root in roots)
     white = tuple(whiteness(r) for r in left)
     return InertiaFit(axis, "output error", estimate, sigma, _validation(trials, left), white, best)
+
+
+def _begun(trials: Sequence[Trial], known: Gaussian, chosen: Mapping[str, float]) -> tuple[tuple[str, ...], Floats]:
+    """Every parameter by name and where its fit begins (p,): those chosen, what else is known, the trials' starts."""
+    begin = {**chosen, **{n: known[n] for n in known.names if n not in chosen}, **starts_of(trials)}
+    return tuple(begin), np.array([*begin.values()])
+
+
+def _without_starts(trials: Sequence[Trial], best: Maximum, louder: Floats) -> Gaussian:
+    """What was asked, with the covariance of noise that is `louder` (n,) times as strong at each frequency."""
+    names, starts = best.estimate.names, starts_of(trials)
+    whole = Gaussian(names, best.estimate.mean, best.with_noise(np.diag(louder**2)))
+    return whole.select([name for name in names if name not in starts])
 
 
 def _scales(names: Sequence[str], start: Floats, known: Gaussian) -> Floats:

@@ -57,6 +57,8 @@ class AtStrength:
 
 @dataclass(frozen=True, slots=True)
 class Method:
+    """One method on all recordings: its setting, what it found at each strength, and its false alarms."""
+
     name: str
     setting: dict[str, FiniteFloat | str]
     at: tuple[AtStrength, ...]
@@ -94,6 +96,8 @@ class HeldOut:
 
 @dataclass(frozen=True, slots=True)
 class Found:
+    """One effect that was named, with the effects that the recording cannot tell from it."""
+
     effect: str
     form: str
     statement: str
@@ -102,6 +106,8 @@ class Found:
 
 @dataclass(frozen=True, slots=True)
 class RealCase:
+    """What was said of one real recording; errors of what was held out are in `unit`."""
+
     name: str
     verdict: Literal["adequate", "explained", "ambiguous", "unexplained", "refused", "crashed"]
     statement: str
@@ -114,6 +120,8 @@ class RealCase:
 
 @dataclass(frozen=True, slots=True)
 class RealRecordings:
+    """What one version of the diagnosis says of recordings of real thrusters: no truth is known of them."""
+
     diagnosis: str
     """Version of the diagnosis."""
     cases: tuple[RealCase, ...]

@@ -32,6 +32,8 @@ class ProofError(RigError):
 
 @dataclass(frozen=True, slots=True)
 class Store:
+    """The folder of one proof: recordings in the open, truths sealed, and the answers given."""
+
     root: Path
 
     @property

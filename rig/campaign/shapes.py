@@ -24,10 +24,12 @@ def require(passed: bool, sentence: str) -> None:
 
 
 def require_above_zero(key: str, value: float, unit: str) -> None:
+    """Refuse a number of a campaign that is not above 0, by its key and unit. Raises PlanError."""
     require(isfinite(value) and value > 0, f"{key} must be a number above 0 {unit}, but is {value:g}")
 
 
 def require_not_negative(key: str, value: float, unit: str) -> None:
+    """Refuse a number of a campaign that is below 0, by its key and unit. Raises PlanError."""
     require(isfinite(value) and value >= 0, f"{key} must be a number of at least 0 {unit}, but is {value:g}")
 
 

@@ -18,6 +18,8 @@ Level = Literal["info", "warning", "trip", "error"]
 
 
 class Said(NamedTuple):
+    """One sentence and how grave it is, at a monotonic time in ns."""
+
     t_ns: int
     level: Level
     text: str

@@ -38,6 +38,7 @@ class VehicleFiles:
 
 
 def is_vehicle(recordings: Sequence[Recording]) -> bool:
+    """Whether any of the recordings is of a vehicle."""
     return any(recording.kind == "vehicle" for recording in recordings)
 
 

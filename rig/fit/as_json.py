@@ -20,14 +20,17 @@ from rig.fit.comparison import Alike, Changed, alike, coefficients
 
 
 def number(value: float | None) -> float | None:
+    """A number as JSON has it: null where it is not known or not finite."""
     return float(value) if value is not None and np.isfinite(value) else None
 
 
 def matrix(array: Floats) -> list[list[float | None]]:
+    """A matrix (n, m) as rows, what is not finite as null."""
     return [[number(value) for value in row] for row in array.tolist()]
 
 
 def parameter_json(p: Parameter) -> dict[str, Any]:
+    """A parameter with the parts of its standard error and its 95 % interval, all in `unit`."""
     return {
         "value": number(p.value),
         "std": number(p.std),
@@ -42,6 +45,7 @@ def parameter_json(p: Parameter) -> dict[str, Any]:
 
 
 def points_json(fit: ThrustFit) -> list[dict[str, Any]]:
+    """Every steady point that a fit of points was made of: V, N, and the window in s."""
     out = []
     for run in fit.runs:
         for point in run.points.points if run.points is not None and fit.rmse_of == "points" else ():

@@ -248,10 +248,7 @@ def import_command(
         }
         given |= {"--with": beside, "--with-map": with_map, "--with-where": with_where, "--with-levels": with_levels}
         refuse_without_map(file, given)
-        summary = import_plain(file, out, notes)
-        for sentence in summary.sentences:
-            click.echo(sentence)
-        click.echo(f"{summary.path}: {summary.rows} rows")
+        _tell_plain(import_plain(file, out, notes))
         return
     plan = plan_of(map_name, levels, where)
     _read(file, plan.file.encoding)  # what it is comes before whose it is
@@ -262,6 +259,12 @@ def import_command(
         its_rows = with_levels or levels, where if with_where is None else with_where
         second = Beside(beside, plan_of(with_map or map_name, *its_rows), offset_asked(offset))
     _tell(import_file(file, plan, out, assignments_of(assignments), notes, second), whose, known_by)
+
+
+def _tell_plain(summary: Summary) -> None:
+    for sentence in summary.sentences:
+        click.echo(sentence)
+    click.echo(f"{summary.path}: {summary.rows} rows")
 
 
 def _tell(summary: Summary, whose: str, known_by: str) -> None:

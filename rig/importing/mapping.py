@@ -90,6 +90,8 @@ class ChannelMap:
 
 @dataclass(frozen=True)
 class StreamMap:
+    """How the channels of one stream are read, and by which clock."""
+
     channels: dict[str, ChannelMap]
     source: str = "import"
     device_id: str = ""
@@ -102,6 +104,8 @@ class StreamMap:
 
 @dataclass(frozen=True)
 class FileMap:
+    """How the lines of a file become cells, and which lines are no data."""
+
     delimiter: str = ","
     """One character, `tab` or `whitespace`."""
     header: bool = True
@@ -122,6 +126,8 @@ class FileMap:
 
 @dataclass(frozen=True)
 class ImportMap:
+    """A whole map: how a text file of another program becomes a recording."""
+
     about: str
     streams: dict[str, StreamMap]
     time: Time
@@ -164,6 +170,7 @@ def read_map(name: str) -> ImportMap:
 
 
 def build_map(content: Mapping[str, Any], text: str, where: str) -> ImportMap:
+    """The map that a parsed TOML file describes; `text` is kept with it. Raises ConfigError that names `where`."""
     _known_keys(content, ImportMap, where, hidden=("text",))
     _known_keys(content.get("file", {}), FileMap, f"{where}: file")
     _known_keys(content.get("time", {}), Time, f"{where}: time")

@@ -22,6 +22,8 @@ COMMAND = "command_voltage"
 
 @dataclass(frozen=True, eq=False)
 class StreamData:
+    """The n rows of one stream, as a recording will hold them."""
+
     spec: StreamSpec
     time: Floats
     """(n,) s since the first row of the file; of a table of levels since the first level began."""

@@ -35,6 +35,8 @@ TraceRow = tuple[float, float, float]
 
 @dataclass
 class Client:
+    """One front end that is connected: what it has yet to be sent, and how much it says."""
+
     peer: Peer
     unsent: list[TraceRow]
     heard: float

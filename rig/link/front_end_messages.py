@@ -69,6 +69,8 @@ class Point:
 
 @dataclass(frozen=True, slots=True)
 class LogLine:
+    """One line of the log that a front end shows."""
+
     time: float
     """s since the controller began; in the recording's own events since its t0."""
     level: Literal["info", "warning", "trip", "error"]
@@ -77,6 +79,8 @@ class LogLine:
 
 @dataclass(frozen=True, slots=True)
 class Progress:
+    """How far a campaign is, and how much of it is left; times in s."""
+
     step: int
     """0-based index of the running step in its plan."""
     steps: int
@@ -152,6 +156,8 @@ RequestKind = Literal[
 
 @dataclass(frozen=True, slots=True)
 class Request:
+    """What a front end asks of the controller, which decides."""
+
     kind: RequestKind
     text: str = ""
     """The note, or who asks for the stop (`console`, `headless`, `SIGTERM` ...)."""

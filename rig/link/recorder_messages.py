@@ -106,6 +106,8 @@ class EventRow:
 
 @dataclass(frozen=True, slots=True)
 class Close:
+    """The run has ended so: the recorder writes that and closes the file."""
+
     outcome: Outcome
     cause: str = ""
 
@@ -131,6 +133,8 @@ class Ack:
 
 @dataclass(frozen=True, slots=True)
 class Closed:
+    """The file is whole, and on disk."""
+
     path: str
     sha256: str
     """Of the closed file, hexadecimal: results name the recording by it."""
@@ -138,4 +142,6 @@ class Closed:
 
 @dataclass(frozen=True, slots=True)
 class Failed:
+    """The recorder cannot go on, and why."""
+
     text: str

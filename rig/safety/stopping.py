@@ -43,6 +43,7 @@ class Stop:
 
 
 def is_rest(rotation: float | None, rest_rate: float) -> bool:
+    """Whether a rotor turns no faster than `rest_rate` (rev/s); a rate that is not known is no rest."""
     return rotation is not None and abs(rotation) <= rest_rate
 
 

@@ -53,6 +53,8 @@ class Proved(NamedTuple):
 
 
 class Refused(NamedTuple):
+    """Why the watchdog is not proved."""
+
     cause: str
 
 

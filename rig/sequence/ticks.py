@@ -119,4 +119,5 @@ def settings_for(campaign: CampaignConfig, thruster: str) -> Settings:
 
 
 def proof_settings(bench: BenchConfig, slew: float) -> ProofSettings:
+    """What a proof of the watchdog is run with: the numbers of the bench, and the slew of the campaign in V/s."""
     return ProofSettings(bench.proof_voltage, slew, bench.rest_rate, bench.watchdog_limit, bench.coast_time)

@@ -37,6 +37,7 @@ class Stamp(NamedTuple):
 
 
 def fresh_stamp() -> Stamp:
+    """An id that no other recording has, and the time now."""
     return Stamp(str(uuid.uuid4()), datetime.now(UTC).isoformat())
 
 

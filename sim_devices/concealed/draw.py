@@ -68,12 +68,8 @@ def case(
         drawn = bare(rng, effects, plan, noise, voltage, thrust, sampling, duration, channels, runs, lie)
         if channels is None and not lie:
             drawn = with_bystanders(drawn, rng.spawn(1)[0], frozenset(effects))
-        wanted = [*forms, *[""] * (len(effects) - len(forms))]
         try:
-            for effect, form in zip(effects, wanted, strict=True):
-                added = Concealed(shape(effect, drawn.scale, rng, form), 0.0)
-                drawn = scaled_to(replace(drawn, effects=(*drawn.effects, added)), effect, strength)
-            drawn = levelled(drawn, strength) if len(effects) > 1 else drawn
+            drawn = _holding(rng, drawn, effects, forms, strength)
         except OutOfReach:
             continue
         if lie:
@@ -81,6 +77,15 @@ def case(
             drawn = replace(drawn, fault=told)
         return drawn
     raise OutOfReach(f"no case of {TRIES} shows {', '.join(effects)} at {strength} sigma; expected a lower strength")
+
+
+def _holding(rng: Rng, drawn: Case, effects: Sequence[str], forms: Sequence[str], strength: float) -> Case:
+    """A case with these effects in it, each seen at `strength` sigma. Raises OutOfReach where it cannot show one so."""
+    wanted = [*forms, *[""] * (len(effects) - len(forms))]
+    for effect, form in zip(effects, wanted, strict=True):
+        added = Concealed(shape(effect, drawn.scale, rng, form), 0.0)
+        drawn = scaled_to(replace(drawn, effects=(*drawn.effects, added)), effect, strength)
+    return levelled(drawn, strength) if len(effects) > 1 else drawn
 
 
 def bare(

@@ -55,6 +55,7 @@ def crc16(data: bytes) -> int:
 
 
 def framed(body: bytes) -> bytes:
+    """An answer with its CRC, low byte first."""
     return body + struct.pack("<H", crc16(body))
 
 

@@ -59,6 +59,8 @@ class Cell:
 
 @dataclass(frozen=True, slots=True)
 class Bench:
+    """A bench as it was drawn: its cell, its devices and how fast its loop runs."""
+
     name: str
     cell: Cell
     devices: dict[str, DeviceOptions]

@@ -19,6 +19,8 @@ TARE, REST = 2.0, 2.0
 
 @dataclass(frozen=True, slots=True)
 class Campaign:
+    """A campaign for one thruster as it was drawn: its levels, and how it comes to each."""
+
     plan: str
     slew: float
     """V/s"""

@@ -25,6 +25,7 @@ BALLAST = (-40.0, -15.0, 2.0, 20.0, 45.0)
 
 
 def scaled(group: Mapping[str, float], volts: float) -> dict[str, float]:
+    """The volts of each thruster of a group whose shares are these."""
     return {name: share * volts for name, share in group.items()}
 
 
@@ -47,10 +48,12 @@ def surge_steady() -> list[Trial]:
 
 
 def sway_steady() -> list[Trial]:
+    """Steady trials of sway, at two headings."""
     return [there_and_back(f"sway-{h}", "sway", SIDEWAYS, LEVELS, h * pi / 180) for h in (0, 90)]
 
 
 def yaw_steady() -> list[Trial]:
+    """Steady trials of yaw, by the front pair and by all four."""
     return [there_and_back(f"yaw-{n}", "yaw", g, LEVELS) for n, g in (("front", TURN_FRONT), ("all", TURN))]
 
 

@@ -71,6 +71,7 @@ def _cell(trace: Trace, gain_std: float) -> Document:
 
 
 def stream(time: NDArray[np.float64], channels: Mapping[str, Document]) -> Document:
+    """One stream of channels on a clock (n,) in s."""
     return {"source": "simulated", "time": time.tolist(), "channels": dict(channels)}
 
 

@@ -86,6 +86,8 @@ class RecordedChannel:
 
 @dataclass(frozen=True, slots=True)
 class RecordedStep:
+    """One step of a trial as it was run; times in s."""
+
     index: int
     phase: str
     command_voltage: float

@@ -31,6 +31,7 @@ def label(term: Term) -> str:
 
 
 def p_text(p: float) -> str:
+    """A p-value as it is printed, no smaller than LEAST_P."""
     return f"p < {LEAST_P:g}" if p < LEAST_P else f"p = {p:.2g}"
 
 

@@ -17,6 +17,7 @@ LEAST_P = 1e-300
 
 
 def fault_finding(fault: Fault) -> Finding:
+    """A channel that lies as a finding: its kind is the form, and the BIC gain is that of its p-value alone."""
     values = {k: Value(v.value, v.std, v.unit) for k, v in fault.parameters.items()}
     p = max(fault.p_value, LEAST_P)
     channels = (fault.channel, fault.other) if fault.other else (fault.channel,)

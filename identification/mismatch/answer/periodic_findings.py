@@ -20,6 +20,7 @@ LEAST_P = 1e-300
 
 
 def twin_line(line: Line) -> TwinLine:
+    """A line that was found, as a twin keeps it."""
     return TwinLine(
         line.amplitude,
         line.amplitude_std,
@@ -35,6 +36,9 @@ def twin_line(line: Line) -> TwinLine:
 
 
 def line_values(line: TwinLine) -> dict[str, Value]:
+    """The parameters of a line by name: amplitude in N, frequency in Hz, and where it has them periods per turn,
+    growth, the speed at which it has that amplitude, and phase in rad.
+    """
     out = {
         "amplitude": Value(line.amplitude, line.amplitude_std, "N"),
         "frequency": Value(line.frequency, line.frequency_std, "Hz"),
@@ -51,6 +55,7 @@ def line_values(line: TwinLine) -> dict[str, Value]:
 
 
 def line_finding(line: Line) -> Finding:
+    """A line that was found as a finding, its rivals those that fit the same spectrum."""
     p = max(line.p_value, LEAST_P)
     rivals = tuple(_rivals(line))
     probability = probability_beside([r.bic_loss for r in rivals])

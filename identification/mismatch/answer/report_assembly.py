@@ -86,6 +86,7 @@ def _of_driver(fitted: Fit, data: Data) -> tuple[float, float]:
 def values_told(
     term: T, theta: Sequence[float], std: Sequence[float], scale: Any, known: Sequence[Interval] | None = None
 ) -> dict[str, Value]:
+    """Parameters of a term by name, from values and standard errors (p,), or from 95 % intervals where `known`."""
     told = term.parameters(scale)
     if known is None:
         triples = zip(told, theta, std, strict=True)
@@ -132,6 +133,7 @@ def _rival(rival: RivalTerm[T, F], scale: Any) -> RivalFinding:
 
 
 def curves_of(before: Estimate, after: Estimate, data: Data) -> tuple[Curves, ...]:
+    """Measured thrust of each run beside the thrust of two models, as a report draws it."""
     old, _ = raw(before.fit.model, before.fit.theta, data, with_rate=False)
     new, _ = raw(after.fit.model, after.fit.theta, data, with_rate=False)
     return tuple(

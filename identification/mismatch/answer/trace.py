@@ -17,7 +17,7 @@ from identification.mismatch.validate.stage import Validated
 
 @dataclass(frozen=True, eq=False, slots=True)
 class Trace:
-    """`rig diagnose --explain` tells it."""
+    """All that passed between the stages of one diagnosis of a thruster; `rig diagnose --explain` prints it."""
 
     prepared: Prepared
     sound: Sound

@@ -29,6 +29,7 @@ STAIRS = ndtri((np.arange(8) + 0.5) / 8)
 
 
 def given(twin: Twin) -> tuple[Given, ...]:
+    """A twin's terms with their values fixed, as a model takes them for its baseline."""
     return _given(twin.terms)
 
 

@@ -46,6 +46,8 @@ def missing(recording: Recording) -> Iterator[tuple[str, str, dict[str, Value]]]
 
 @dataclass(frozen=True, slots=True)
 class Stuck:
+    """A channel that stands at one value from `start` to `end` s while what it follows does not."""
+
     start: float
     end: float
     at: Value

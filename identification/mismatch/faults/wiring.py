@@ -70,13 +70,17 @@ def _mended(recording: Recording) -> Recording:
 
 
 def _unconverted(one: Differs) -> Differs:
-    """Of two runs, that one is in another unit whose figures were left as the device gave them."""
+    """Of two runs, that one is in another unit whose figures were left as the device gave them.
+
+    Nobody knows where either may be: one in kN, or the other in mN.
+    """
     unit = unit_of(one.changed)
     if one.known or unit is None or one.beside is None:
         return one
-    if not unit.inverse:
-        return replace(one, known=True)
     turned = replace(one.changed, factor=1.0 / one.changed.factor)
+    if not unit.inverse:
+        other = unit_of(turned)
+        return replace(one, known=other is None or other.inverse)
     return replace(one, recording=one.beside, beside=one.recording, changed=turned, known=True)
 
 

@@ -27,6 +27,8 @@ CHECK: Mapping[str, str] = {
     "driver": "check the settings of the motor controller, its scale of command and its supply in {run}",
     "strange": "check connector, name and clock of that channel in {run}",
 }
+SAME_FACTOR = 9
+"""Decimals of a logarithm to which two factors are one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,11 +43,15 @@ class Unit:
 
 
 def name_of(recording: Recording) -> str:
+    """The file that a run came from, or its id where it came from none."""
     return recording.source or recording.recording_id
 
 
 def unit_of(one: Changed) -> Unit | None:
-    """The unit of a channel that is rescaled; None where there is none."""
+    """The unit of a channel that is rescaled; None where there is none.
+
+    Of two that fit, as a kN that was left alone and a mN that was converted twice, the one that was left alone.
+    """
     if one.kind != "rescaled":
         return None
     near = [
@@ -53,7 +59,7 @@ def unit_of(one: Changed) -> Unit | None:
         for name, size in UNITS.get(one.channel, {}).items()
         for sign in (1, -1)
     ]
-    off, unit = min(near, key=lambda n: n[0], default=(1.0, None))
+    off, unit = min(near, key=lambda n: (round(n[0], SAME_FACTOR), n[1].inverse), default=(1.0, None))
     return unit if off < policy.faults.UNIT_BETWEEN_RUNS else None
 
 

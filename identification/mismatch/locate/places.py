@@ -29,11 +29,15 @@ ROUNDING = 1e-9
 def where_of(
     judged: CovariateTest, fitted: Fit, data: Data, weights: Weights
 ) -> tuple[Where, float, tuple[tuple[float, float, float], ...]]:
+    """Where a covariate tells most of what is left: the stretch, the share of the residual in it, and rows of
+    (covariate, N, standard error in N).
+    """
     place = locate(judged, fitted, data, weights)
     return Where(place.quantity, place.low, place.high, place.unit), place.share, place.table
 
 
 def says(where: Where, share: float, what: str) -> str:
+    """The sentence for such a place; `what` is how the baseline fails there."""
     unit = "" if where.unit == "1" else f" {where.unit}"
     place = f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
     return f"{100 * share:.0f} % of the residual lies at {place}: {what}."

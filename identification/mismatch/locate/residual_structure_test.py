@@ -40,6 +40,8 @@ class CovariateTest:
 
 @dataclass(frozen=True, eq=False)
 class ResidualStructure:
+    """What a model leaves over each covariate, and whether any of it is more than noise."""
+
     groups: tuple[CovariateTest, ...]
     """Smallest p-value first."""
     p_value: float

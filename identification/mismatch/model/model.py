@@ -82,4 +82,5 @@ def with_values(model: Model, theta: Theta, term: Term, values: tuple[float, ...
 
 
 def parameters(model: Model, scale: Scale) -> tuple[tuple[Parameter, ...], ...]:
+    """The parameters of each term of a model, in the order of `model.terms`."""
     return tuple(term.parameters(scale) for term in model.terms)

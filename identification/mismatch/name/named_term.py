@@ -97,6 +97,7 @@ class NamedTerm(Generic[T, F]):
 
 
 def effect_id(term: T) -> str:
+    """The effect that a term is a form of: what counts as one where rivals are told."""
     return term.id
 
 

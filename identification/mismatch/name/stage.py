@@ -8,7 +8,7 @@ from identification.mismatch.select.forward_selection import Selected
 
 
 def run(selected: Selected, located: Located) -> tuple[Named, ...]:
-    """Every term of the model, the largest gain first."""
+    """Every term of the model with what speaks for and against its name, the largest gain first."""
     data = selected.data
     named = name(located.estimate, data, selected.terms, selected.standing)
     return with_joint_checks(named, located.left if located.structured else None, measured=data.with_rate)

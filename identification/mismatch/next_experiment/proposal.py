@@ -92,6 +92,7 @@ def propose(
 
 
 def largest_level(data: Data, estimate: Estimate, limits: Limits) -> float:
+    """The largest driver, in its own unit, that the bench allows and that was recorded before."""
     largest = data.scale.driver if limits.max_voltage is None else min(limits.max_voltage, data.scale.driver)
     C = abs(estimate.fit.theta.C)
     if limits.max_thrust is not None and C > 0:

@@ -18,6 +18,8 @@ Ring = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class OrderLaw:
+    """How the size of a wave that goes with the rotor changes with its speed: by a power, and by what rings with it."""
+
     growth: int
     """Power of the speed that its force goes with: 2, or 0 of a pick-up."""
     ring: Ring | None = None

@@ -36,6 +36,8 @@ ALIAS_REACH = 4.0
 
 @dataclass(frozen=True, slots=True)
 class OrderCandidate:
+    """A peak of the spectrum over turns that may be an order of the rotor."""
+
     ratio: float
     """Periods per turn."""
     reach: float

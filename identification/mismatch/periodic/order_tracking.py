@@ -32,6 +32,8 @@ BESIDE = (-7, -6, -5, -4, 4, 5, 6, 7)
 
 @dataclass(frozen=True, eq=False)
 class RotorOrder:
+    """A wave of so many periods per turn, fitted in all stretches at once: a (n/n_top)^q sin(2 pi z theta + p)."""
+
     ratio: float
     ratio_std: float
     amplitude: float

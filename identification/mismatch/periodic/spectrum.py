@@ -52,6 +52,7 @@ class Spectrum:
 
 
 def finite(series: Series) -> Series:
+    """The samples of which residual, time and turns are numbers, and of those at one time the first."""
     good = np.isfinite(series.residual) & np.isfinite(series.time)
     if series.turns is not None:
         good &= np.isfinite(series.turns)

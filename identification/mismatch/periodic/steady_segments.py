@@ -74,6 +74,8 @@ class Colour:
 
 @dataclass(frozen=True, eq=False)
 class SteadySegment:
+    """n samples of one run during which the rotor hardly changes its speed: their turns, and what the model left."""
+
     run: int
     time: Floats
     turns: Floats

@@ -27,7 +27,10 @@ class Prepared:
 
 
 def run(recordings: Sequence[Recording], holdout: Sequence[Recording], baseline: Twin | None) -> Prepared | Refusal:
-    """Recordings of one thruster, driven by one quantity, that fit together and to the twin, if there is one."""
+    """Recordings of one thruster, driven by one quantity, that fit together and to the twin, if there is one.
+
+    A Refusal says which of them do not, and why.
+    """
     sampled = [as_sampled(recording) for recording in recordings]
     recordings, moved = [each for each, _ in sampled], tuple(told for _, told in sampled)
     holdout = [as_sampled(recording)[0] for recording in holdout]

@@ -227,6 +227,7 @@ def asked_again(
 
 
 def accept_threshold(extra: int) -> float:
+    """The fall of chi-square that `extra` parameters must be worth for a term to stay (KEPT_TERM_FALSE_ALARM)."""
     return chi2_isf(policy.select.KEPT_TERM_FALSE_ALARM, extra)
 
 

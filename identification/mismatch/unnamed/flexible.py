@@ -63,20 +63,22 @@ def extend(
 ) -> Extended | None:
     """The model with up to FLEXIBLE_TERMS flexible terms; None where none improves what was not fitted.
 
-    None also where they predict it worse than the baseline, `before`.
+    None also where they predict it worse than the baseline, `before`, or than the names alone.
 
     `located`: the covariate over which it is left; `unearned`: terms whose name was not earned; `split`: `after`,
     fitted to a part of the data.
     """
     part, judge, begin = split.data, split.judge, split.estimate
     first = judge(begin.fit)
-    plain = judge(fit(before.fit.model, before.fit.theta, part, begin.weights))
-    for smaller in _bases(begin, part, [n.term for n in unearned]):
+    bases = _bases(begin, part, [n.term for n in unearned])
+    plain = fit(before.fit.model, before.fit.theta, part, begin.weights)
+    least = min(judge(each).rmse for each in (plain, *(base.fit for base in bases)))
+    for smaller in bases:
         estimate, terms, held, equals = _grown(smaller, part, located, judge, rng)
         improves = better(held, first, 0) or (
             smaller is not begin and held.rmse < policy.unnamed.SHAPE_INSTEAD_OF_NAMES_RMSE * first.rmse
         )
-        if terms and improves and held.rmse < plain.rmse:
+        if terms and improves and held.rmse < least:
             break
     else:
         return None

@@ -54,7 +54,24 @@ def mostly_right(split: TrainTestSplit, unearned: Sequence[Named], best: float) 
         if share(before, score, min(best, score.rmse)) >= policy.unnamed.MOSTLY_SHARE:
             right, before = [*right, *tried], score
             tried = []
-    return Mostly(tuple(right), tuple(n for n in unearned if n not in right))
+    told = needed(split, right, unearned)
+    return Mostly(told, tuple(n for n in unearned if n not in told))
+
+
+def needed(split: TrainTestSplit, right: Sequence[Named], unearned: Sequence[Named]) -> tuple[Named, ...]:
+    """Of names that together make most of it those that take something off beside the others: one that was the best by
+    itself may do nothing beside those that came after it.
+
+    `split`: the whole model fitted to a part of the data, of which the rest of `unearned` is taken out.
+    """
+    kept = list(right)
+    while kept:
+        score, without = scores_alone(split, kept, [n.term for n in unearned if n not in kept])
+        idle = [n for n in kept if without[n.term].rmse <= score.rmse]
+        if not idle:
+            break
+        kept.remove(min(idle, key=lambda n: without[n.term].rmse))
+    return tuple(kept)
 
 
 def with_shares(

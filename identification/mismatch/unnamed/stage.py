@@ -22,6 +22,7 @@ from identification.mismatch.select.forward_selection import Selected
 from identification.mismatch.unnamed.confirmed import not_standing
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
+from identification.mismatch.unnamed.refuted import refuted, without_refuted
 from identification.mismatch.unnamed.shares import any_curve, mended, mostly_right, scores_alone, with_shares
 from identification.mismatch.validate.prediction import predicting, predicts
 from identification.mismatch.validate.stage import Validated
@@ -80,6 +81,13 @@ class _Told:
     earned: tuple[Named, ...]
     unearned: tuple[Named, ...]
     without: _Without
+    gone: tuple[Named, ...] = ()
+    """Names that were not earned, whose terms have left the model."""
+
+    @property
+    def refused(self) -> tuple[Named, ...]:
+        """Names that were not earned."""
+        return (*self.gone, *self.unearned)
 
     @property
     def nameless(self) -> list[Term]:
@@ -102,15 +110,35 @@ def run(
         if without.nothing and not located.structured:
             return _noise_followed(told.earned, without, now, data)
         told = told if without.nothing else replace(told, without=without)
+        if gone := refuted(split, told.unearned, same_run=not unseen):
+            now, split = without_refuted(now, gone, data, unseen)
+            located = replace(located, estimate=now)
+            earned = tuple(restated(told.earned, now.fit))
+            told = _Told(earned, tuple(n for n in told.unearned if n not in gone), told.without, gone)
+    return _completed(selected, located, told, split, unseen, rng, open_ended=open_ended)
+
+
+def _completed(
+    selected: Selected,
+    located: Located,
+    told: _Told,
+    split: TrainTestSplit,
+    unseen: Sequence[History],
+    rng: np.random.Generator,
+    *,
+    open_ended: bool,
+) -> Completed:
+    """With free shapes of what is left, or by its names alone."""
     flexible = None
     if open_ended and not selected.undone:
         told, flexible = _shaped(selected, located, told, split, rng)
     if flexible is None:
         return _by_names(selected, located, told, split, unseen, rng, open_ended=open_ended)
+    now, data = located.estimate, selected.data
     earned = with_shares(split, told.earned, told.nameless, flexible.held)
     valued, known = _with_values(earned, now, flexible.estimate, data, flexible)
     bare, left = told.without.bare, told.without.left
-    return Completed(flexible.estimate, valued, known, told.unearned, flexible, open_ended, bare, left)
+    return Completed(flexible.estimate, valued, known, told.refused, flexible, open_ended, bare, left)
 
 
 def _noise_followed(earned: Sequence[Named], without: _Without, now: Estimate, data: Data) -> Completed:
@@ -132,12 +160,12 @@ def _shaped(
     if mostly.right:  # back: a free shape is for what they leave
         unearned = tuple(n for n in told.unearned if n not in mostly.right)
         without = _without(now, data, unearned, rng)
-        told = _Told((*told.earned, *mostly.right), unearned, told.without if without.nothing else without)
+        told = _Told((*told.earned, *mostly.right), unearned, told.without if without.nothing else without, told.gone)
         flexible = again(unearned)
     if flexible is None or not told.unearned:
         return told, flexible
     earned, unearned, flexible = _standing(told.earned, told.unearned, flexible, now, split, data, again)
-    return _Told(earned, unearned, told.without), flexible
+    return replace(told, earned=earned, unearned=unearned), flexible
 
 
 def _by_names(
@@ -153,15 +181,15 @@ def _by_names(
     """The model of the names; that of the baseline where it predicts worse without the terms that have none."""
     data, before, now = selected.data, selected.before, located.estimate
     after = predicting(now, split, data, selected.terms, told.nameless, unseen)
-    if told.earned and told.unearned and not predicts(after, before, data, unseen):
+    if told.earned and told.refused and not predicts(after, before, data, unseen):
         refuted = Check("predicts", "predicts better than the baseline", ALONE)
         unearned = (*told.unearned, *(n.asked(refuted) for n in told.earned))
         without = _without(now, data, unearned, rng)
-        told = _Told((), unearned, _Without(now, located.left) if without.nothing else without)
+        told = _Told((), unearned, _Without(now, located.left) if without.nothing else without, told.gone)
         after = before
     earned = with_shares(split, told.earned, told.nameless, split.judge(split.estimate.fit).rmse)
     valued, known = _with_values(earned, now, after, data, None, told.nameless)
-    return Completed(after, valued, known, told.unearned, None, open_ended, told.without.bare, told.without.left)
+    return Completed(after, valued, known, told.refused, None, open_ended, told.without.bare, told.without.left)
 
 
 def _without(after: Estimate, data: Data, unearned: Sequence[Named], rng: np.random.Generator) -> _Without:

@@ -1,1 +1,1 @@
-"""Diagnosis of a vehicle in water: which physics m xi' = -k2 |xi| xi + sum of the thrusters leaves out."""
+"""From recordings of a vehicle in water to a diagnosis: what m xi' = -k2 |xi| xi + sum of the thrusters leaves out."""

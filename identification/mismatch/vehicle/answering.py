@@ -48,6 +48,7 @@ def _of_thruster(name: str, data: Prepared) -> tuple[float, str]:
 
 
 def where_of(structure: Structure) -> Where:
+    """The stretch of the covariate in which a free force is largest against its error."""
     place = place_of(structure)
     return Where(structure.covariate.quantity, place.low, place.high, structure.covariate.unit)
 

@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.mismatch import policy
 from identification.mismatch.answer.report_assembly import finding_of
 from identification.mismatch.answer.verdict import decided
-from identification.mismatch.diagnosis import Diagnosis, Mismatch, Rmse
+from identification.mismatch.diagnosis import Diagnosis, HeldOutRmse, Mismatch, NextExperiment, Rmse
 from identification.mismatch.name.named_term import Check, restated
 from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.select.stepwise import pruned
+from identification.mismatch.unexplained import Remainder
 from identification.mismatch.vehicle.answering import (
     baseline_words,
     curves_of,
@@ -63,7 +64,9 @@ def diagnose_vehicle(
         return whole
     data = only(whole, whole.runs[: len(recordings)])
     unseen = only(whole, whole.runs[len(recordings) :]) if holdout else None
-    return _diagnosed(recordings, data, unseen, np.random.default_rng(seed), tuple(without))
+    candidates, not_told = applicable(data, tuple(without))
+    found = _judged(Vehicle(data, candidates), unseen, np.random.default_rng(seed))
+    return _diagnosed(recordings, data, found, not_told)
 
 
 def _unfit(recordings: Sequence[Recording], holdout: Sequence[Recording]) -> Refusal | None:
@@ -82,15 +85,22 @@ def _unfit(recordings: Sequence[Recording], holdout: Sequence[Recording]) -> Ref
     return None
 
 
-def _diagnosed(
-    recordings: Sequence[Recording],
-    data: Prepared,
-    unseen: Prepared | None,
-    rng: np.random.Generator,
-    without: Sequence[str],
-) -> Diagnosis:
-    candidates, unseen_effects = applicable(data, without)
-    vehicle = Vehicle(data, candidates)
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """What a search came to, and how it does on what was not fitted."""
+
+    before: State
+    last: State
+    held: HeldOutRmse
+    places: tuple[Mismatch, ...]
+    earned: tuple[Named, ...]
+    unexplained: Remainder | None
+    experiment: NextExperiment | None
+
+
+def _judged(vehicle: Vehicle, unseen: Prepared | None, rng: np.random.Generator) -> _Judged:
+    """Locate, name, refit with a free force for what is left, and keep of it what predicts."""
+    data = vehicle.data
     before, found = search(vehicle, rng)
     after, named = name(found, vehicle)
     left = judge_left(after.fit, after.white, data, rng)
@@ -103,33 +113,36 @@ def _diagnosed(
     unnamed = [n.term for n in unearned if n.term in last.terms]
     if unnamed:
         held, last = better_predicting(before, (held, last), vehicle.less(last, unnamed), data, unseen)
-    earned = [_beside(n, last, left) for n in standing if not n.failed_checks]
+    earned = tuple(_beside(n, last, left) for n in standing if not n.failed_checks)
     doubtful = [n for n in unearned if not n.only_unpaid]
     unexplained = unexplained_of(_as_fitted(left, last), doubtful, data)
     experiment = propose(after, earned, data) if unexplained is None else None
-    findings = tuple(finding_of(n, data.scale, {}) for n in restated(earned, last.fit))
+    return _Judged(before, last, held, _places(before, after, data, left, rng), earned, unexplained, experiment)
+
+
+def _diagnosed(recordings: Sequence[Recording], data: Prepared, found: _Judged, unseen: Sequence[str]) -> Diagnosis:
+    """The answer in the words and units of this vehicle; `unseen`: sentences about effects that cannot be told."""
+    before, last = found.before, found.last
+    findings = tuple(finding_of(n, data.scale, {}) for n in restated(found.earned, last.fit))
     n, p = last.fit.residual.size, int(np.sum(last.fit.free))
-    channel, places = _channel(data), _places(before, after, data, left, rng)
+    unit = _unit(data)
     return Diagnosis(
         recordings=tuple(r.recording_id for r in recordings),
         thruster=recordings[0].thruster,
-        answer=decided(findings, unexplained, experiment, held, places, _unit(data)),
+        answer=decided(findings, found.unexplained, found.experiment, found.held, found.places, unit),
         baseline_model=baseline_words(data),
         baseline=values_of(before.fit, data),
-        mismatch=places,
+        mismatch=found.places,
         model_terms=tuple(term.id for term in last.terms),
         model=values_of(last.fit, data),
-        train=Rmse(
-            rms(residuals(before.fit, data)),
-            rms(residuals(last.fit, data)),
-        ),
-        heldout=held,
+        train=Rmse(rms(residuals(before.fit, data)), rms(residuals(last.fit, data))),
+        heldout=found.held,
         chi2_per_dof=last.fit.chi2 / max(n - p, 1),
         whiteness_p=state_whiteness(last),
-        notes=(*ties(data, last.fit, unseen_effects), *_noise_note(last, data)),
+        notes=(*ties(data, last.fit, unseen), *_noise_note(last, data)),
         curves=curves_of(before.fit, last.fit, data),
-        response=channel,
-        unit=_unit(data),
+        response=_channel(data),
+        unit=unit,
         force_unit=data.scale.force_unit,
     )
 

@@ -24,6 +24,7 @@ PIECES = 8
 
 
 def rms(parts: Sequence[Floats]) -> float:
+    """The root mean square of all samples of all runs, in their unit."""
     whole = np.concatenate(parts)
     return float(np.sqrt(np.mean(whole**2)))
 
@@ -34,10 +35,12 @@ def noise_rms(noise: Noise) -> float:
 
 
 def residuals(fitted: Fit, data: Prepared) -> list[Floats]:
+    """(n,) of each run: measured motion less predicted, in its unit."""
     return [run.response - y for run, y in zip(data.runs, fitted.predicted, strict=True)]
 
 
 def only(data: Prepared, runs: Sequence[Run]) -> Prepared:
+    """The same preparation with these runs alone."""
     return replace(data, runs=tuple(runs))
 
 

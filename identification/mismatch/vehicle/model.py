@@ -81,6 +81,9 @@ class Layout:
 
 
 def layout_of(model: VehicleModel, data: Prepared) -> Layout:
+    """The parameters of a model for these runs: which of the baseline are free follows from what is known of mass and
+    thrusters.
+    """
     scale = data.scale
     mass = _typical_mass(data)
     base = [Parameter("k2", scale.over(f"({scale.speed_unit})^2"), 0.0, 1e3 * scale.force / scale.speed**2)]
@@ -182,6 +185,7 @@ def _thrust(layout: Layout, theta: Floats, run: Run, volts: Floats) -> Floats:
 
 
 def body_of(layout: Layout, theta: Floats, run: Run, data: Prepared) -> Body:
+    """Mass, drags and steady forces of a run at the parameters `theta` (p,), what every term adds to them included."""
     names = {p.name: i for i, p in enumerate(layout.base)}
     mass = 1.0 if data.scale.per_kg else theta[names["m"]] if "m" in names else data.mass.value if data.mass else 1.0
     body = Body(mass=float(mass), quadratic=float(theta[names["k2"]]))
@@ -267,6 +271,7 @@ def with_term(
 
 
 def without_term(layout: Layout, data: Prepared, theta: Floats, term: VehicleTerm) -> tuple[Layout, Floats]:
+    """The same model and parameters with one term less."""
     new = layout_of(VehicleModel(tuple(t for t in layout.model.terms if t != term)), data)
     return new, np.delete(theta, layout.of(term))
 

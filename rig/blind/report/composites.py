@@ -19,6 +19,7 @@ CELLS = {"field": "Effects of field size", "difference": "One effect more in a s
 
 
 def composites_section(scores: Sequence[Score], tables: Mapping[str, Any]) -> Section | None:
+    """The section on recordings that conceal several effects at once; None where there were none."""
     parts: list[Picture | Table] = []
     for name, title in CELLS.items():
         rows = [row for row in tables["composites"] if row["cell"] == name]

@@ -80,9 +80,6 @@ def taken_for(counts: Mapping[str, Mapping[str, int]], others: Sequence[str]) ->
     effects = list(counts)
     answers = [*effects, *(n for n in _answers(counts) if n not in effects and n not in others), *others]
     total = {truth: sum(row.values()) for truth, row in counts.items()}
-    wrong = {t: sorted(((n, a) for a, n in row.items() if a != t), reverse=True) for t, row in counts.items()}
-    told = "; ".join(f"{t}: " + ", ".join(f"{a} {n} of {total[t]}" for n, a in w) for t, w in wrong.items() if w)
-    said = told or "every answer names what was concealed"
 
     def whole(axes: Axes) -> None:
         share = np.array([[counts[t].get(a, 0) / total[t] for a in answers] for t in effects])
@@ -115,7 +112,15 @@ def taken_for(counts: Mapping[str, Mapping[str, int]], others: Sequence[str]) ->
             short(figure, axes)
 
     height = max(1.2 + ROW * len(effects), LEAST)
-    return Plot(draw, f"What was concealed and what was answered: {said}.", (NARROW[0], height), (9.0, height + 1.9))
+    says = f"What was concealed and what was answered: {_wrongly(counts, total)}."
+    return Plot(draw, says, (NARROW[0], height), (9.0, height + 1.9))
+
+
+def _wrongly(counts: Mapping[str, Mapping[str, int]], total: Mapping[str, int]) -> str:
+    """In words, for who cannot see the figure: every wrong answer, the most frequent first."""
+    wrong = {t: sorted(((n, a) for a, n in row.items() if a != t), reverse=True) for t, row in counts.items()}
+    told = "; ".join(f"{t}: " + ", ".join(f"{a} {n} of {total[t]}" for n, a in w) for t, w in wrong.items() if w)
+    return told or "every answer names what was concealed"
 
 
 def _answers(counts: Mapping[str, Mapping[str, int]]) -> list[str]:

@@ -19,6 +19,7 @@ OUTCOMES = (*LOCATED, "misplaced", "wrong name", "missed", "failed")
 
 
 def open_section(tables: dict[str, Any]) -> Section | None:
+    """The section on effects that the catalogue does not have; None where there were none."""
     rows = tables["open_world"]
     if not rows:
         return None
@@ -72,6 +73,7 @@ def _twins(rows: Sequence[dict[str, Any]]) -> Table:
 
 
 def alarms_section(scores: Sequence[Score]) -> Section | None:
+    """The section on recordings that conceal nothing, by kind of noise; None where there were none."""
     groups = {**by_label(scores, "clean"), **by_label(scores, "wide")}
     if not groups:
         return None
@@ -84,6 +86,7 @@ def alarms_section(scores: Sequence[Score]) -> Section | None:
 
 
 def models_section(scores: Sequence[Score], tables: dict[str, Any]) -> Section | None:
+    """The section on how well the models found predict runs that nobody fitted; None where there were none."""
     model, baseline = ratios(scores, lambda h: h.model), ratios(scores, lambda h: h.baseline)
     parts: list[Picture | Table] = []
     if model.size:
@@ -113,6 +116,7 @@ def models_section(scores: Sequence[Score], tables: dict[str, Any]) -> Section |
 
 
 def power_section(scores: Sequence[Score], tables: dict[str, Any]) -> Section | None:
+    """The section on the strength at which each effect is named in half the runs; None where none is known."""
     by = named_by_strength(scores)
     if not tables["half_named"]:
         return None

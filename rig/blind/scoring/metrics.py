@@ -22,6 +22,7 @@ SEEN: Final = 3.0
 
 
 def cell(scores: Iterable[Score], *names: str) -> list[Score]:
+    """The scores of the cells of these names, in their order."""
     return [s for s in scores if s.order.cell in names]
 
 

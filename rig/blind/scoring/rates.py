@@ -144,4 +144,5 @@ def of_groups(what: str, groups: Iterable[Iterable[bool]], least: float = 0.0, m
 
 
 def of_rate(what: str, found: Rate, least: float = 0.0, most: float = 1.0) -> Goal:
+    """A goal that a rate be between `least` and `most`, shares of 1."""
     return Goal(what, least, most, found.value, found.low, found.high, found.n)

@@ -256,6 +256,7 @@ def next_section(n: NextExperiment | None) -> tuple[Section, ...]:
 
 
 def notes_section(d: Diagnosis) -> tuple[Section, ...]:
+    """The notes of a diagnosis as one section, or none where nothing was noted."""
     return (Section("Notes", sentences(map(words, d.notes))),) if d.notes else ()
 
 

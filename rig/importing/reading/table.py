@@ -77,6 +77,8 @@ class Lines:
 
 @dataclass(frozen=True)
 class Table:
+    """The cells of a text file, and what was found out about it on the way."""
+
     names: tuple[str, ...]
     """Of the header; empty without one."""
     rows: Lines
@@ -140,6 +142,7 @@ def _trimmed(cells: Sequence[str], width: int) -> Sequence[str]:
 
 
 def split(line: str, form: FileMap) -> Sequence[str]:
+    """The cells of one line, quotes understood."""
     if form.delimiter == "whitespace":
         return line.split()
     mark = "\t" if form.delimiter == "tab" else form.delimiter
@@ -165,6 +168,7 @@ def index_of(table: Table, column: ColumnRef) -> int | None:
 
 
 def no_such_column(table: Table, column: ColumnRef) -> RecordingError:
+    """The error of a column that is not there, which names the nearest that is."""
     if isinstance(column, int) or not table.names:
         return RecordingError(f"column {column!r} is not there: rows have {table.width} columns, counted from 1")
     near = difflib.get_close_matches(column, table.names, 1, cutoff=0.4)

@@ -104,6 +104,18 @@ def test_of_two_runs_a_unit_tells_which_and_a_factor_does_not() -> None:
     assert "or in run1.csv: of two runs nobody knows" in factor.statement
 
 
+def test_of_two_runs_one_in_kilonewtons_is_as_likely_as_the_other_in_millinewtons() -> None:
+    first, second = wired_run(1), wired_run(2)
+    (fault,) = wiring.run([first, edited(second, "thrust", lambda v: v / 1000)], ()).faults
+    assert (fault.recording_id, fault.parameters["factor"].value) == ("id-2", pytest.approx(0.001))
+    assert "it is in kN, told as N" in fault.statement
+    assert "or in run1.csv: of two runs nobody knows" in fault.statement
+    third = wired_run(3)
+    (sure,) = wiring.run([first, edited(second, "thrust", lambda v: v / 1000), third], ()).faults
+    assert "it is in kN, told as N" in sure.statement
+    assert "nobody knows" not in sure.statement
+
+
 @pytest.mark.parametrize("at", [0, 1])
 def test_of_two_runs_the_laws_tell_in_which_two_channels_are_exchanged(at: int) -> None:
     runs = [wired_run(1), wired_run(2, 10.0)]

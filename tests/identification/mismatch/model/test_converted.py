@@ -4,11 +4,14 @@ import numpy as np
 import pytest
 
 from identification.mismatch.estimate.fitting import raw
+from identification.mismatch.model.converted import converted_samples
+from identification.mismatch.model.predictor import predict
 from identification.mismatch.periodic.full_rate import series_of
 from identification.mismatch.prepare.acquisition import as_sampled
 from identification.physics.motor_lag import MotorLag
 from identification.recording import Acquisition, Channel, Recording
 from identification.run_history.converter import Converter
+from identification.run_history.filters import within_intervals
 from tests.identification.diagnosed_runs import TOP, C
 from tests.identification.mismatch.small import data_of, known_noise, placed
 
@@ -82,3 +85,18 @@ def test_hardly_any_lag_is_next_to_none(converter):
     (late,), _ = raw(model, little, data, with_rate=False)
     fastest = np.max(np.abs(np.diff(at_once) / np.diff(data.thrust_rows[0].time)))
     assert np.max(np.abs(late - at_once)) < 3e-5 * fastest
+
+
+@pytest.mark.parametrize("converter", CONVERTERS)
+@pytest.mark.parametrize("lag", [0.0, 0.004])
+def test_each_sample_is_told_as_the_converter_shows_it(converter, lag):
+    """The recording itself, without noise; means over intervals alone leave twice as much and more."""
+    data, theta = data_of([ticking(converter, lag=lag)])
+    model, theta = placed({MotorLag("first_order"): (lag,)} if lag else {}, theta)
+    (run,) = data.runs
+    F, _ = predict(model, theta, run, data.scale, 0.0)
+    told = converted_samples(model, theta, run, F, data.scale.driver)
+    untold = within_intervals(run.converted_amid(F), run.history.edges, run.history.sample_time)
+    left, rough = (np.std(run.history.sample_thrust - each - theta.tares[0]) for each in (told, untold))
+    assert left < 0.02
+    assert left < 0.5 * rough

@@ -1,4 +1,4 @@
-"""Channels that explain, sizes, and which recordings go together."""
+"""Channels that explain, and sizes."""
 
 from __future__ import annotations
 
@@ -7,16 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.prepare import stage
 from identification.mismatch.prepare.channel_availability import held_by_all, predictable
 from identification.mismatch.prepare.channels import followed, jumps, neighbour_at, supply, torque
 from identification.mismatch.prepare.grid import Held
-from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.prepare.scales import scale_of
 from identification.physics.speed_of_advance import SpeedOfAdvance
 from identification.recording import Channel
 from identification.run_history.remembered import RememberedRun
-from identification.twin import Twin, TwinNoise, TwinTerm
 from tests.identification.diagnosed_runs import NOISE, TOP, C, table
 from tests.identification.mismatch.small import history, known_noise, rng, short
 
@@ -157,57 +154,3 @@ def test_a_torque_that_goes_with_the_square_is_known_at_the_largest_driver():
 def test_scatter_of_a_table_is_that_of_neighbouring_rows():
     """A level each: no row has a neighbour of its own level, and nothing is known."""
     assert scale_of([RememberedRun(history(table(lambda v: C * v * np.abs(v))))], C).noise == 0.0
-
-
-# ---------------------------------------------------------------- admission
-
-
-def twin(**changes):
-    term = TwinTerm("speed_of_advance", "", {}, scale_of([RememberedRun(history(short()))], C))
-    how = {"thruster": "T1", "driver_quantity": "command_voltage", "terms": (), **changes}
-    if how["terms"]:
-        how["terms"] = (term,)
-    fixed = {"C": C, "names": ("C",), "covariance": ((0.0,),), "noise": TwinNoise(0.09, 0.0), "sources": ()}
-    return Twin(**fixed, interval=0.1, highest_driver=TOP, **how)
-
-
-def refused(recordings, holdout=(), baseline=None):
-    found = stage.run(recordings, holdout, baseline)
-    assert isinstance(found, Refusal), found
-    return found.reason
-
-
-def test_what_fits_together_is_prepared_in_the_order_given():
-    runs, kept = [short(seed=2), short(seed=1)], [short(seed=3)]
-    found = stage.run(runs, kept, twin())
-    assert found.recordings == tuple(runs)
-    assert [h.recording_id for h in found.histories] == [r.recording_id for r in runs]
-    assert [h.recording_id for h in found.unseen] == [kept[0].recording_id]
-
-
-def test_each_refusal_says_what_to_do():
-    one = short(seed=1)
-    other = short(seed=2, thruster="T9")
-    t = np.arange(0.0, 80.0, 0.1)
-    rate = channel("rotation_rate", "rev/s", t, 5 * np.sin(t / 5))
-    by_rate = replace(short(seed=3), channels=(rate, short(seed=3).channels[1]))
-    assert "hold out a recording of T1" in refused([one], [other])
-    assert "both to be diagnosed and held out" in refused([one], [one])
-    assert "driven by rotation_rate, the recordings to be diagnosed by command_voltage" in refused([one], [by_rate])
-    assert "driven by different quantities" in refused([one, by_rate])
-    assert "the same recording was given twice" in refused([one, one])
-    assert "no recording was given" in refused([])
-    assert "give the twin of T1" in refused([one], (), twin(thruster="T7"))
-    assert "the twin is driven by rotation_rate" in refused([one], (), twin(driver_quantity="rotation_rate"))
-    assert "the twin's speed_of_advance needs flow_speed" in refused([one], (), twin(terms=True))
-    assert isinstance(stage.run([with_water(one)], (), twin(terms=True)), stage.Prepared)
-
-
-def test_too_few_samples_and_one_level_are_not_diagnosed():
-    few = short(seconds=6.0, rate=5.0)
-    assert "thrust samples, at least" in refused([few])
-    flat = short()
-    command, thrust = flat.channels
-    hardly = replace(command, time=command.time - 1.0, value=5.0 + 1e-6 * (command.time > 9.0))
-    flat = replace(flat, channels=(hardly, thrust))
-    assert "at one level of command_voltage only" in refused([flat])

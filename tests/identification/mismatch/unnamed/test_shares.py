@@ -5,7 +5,15 @@ import pytest
 
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.name.naming import Check, name
-from identification.mismatch.unnamed.shares import any_curve, mended, mostly_right, only_repairs, share
+from identification.mismatch.unnamed.shares import (
+    any_curve,
+    mended,
+    mostly_right,
+    needed,
+    only_repairs,
+    scores_alone,
+    share,
+)
 from identification.mismatch.validate.held_out import Score
 from identification.mismatch.validate.train_test_split import train_test_split
 from identification.physics.asymmetry import Asymmetry
@@ -71,6 +79,16 @@ def test_names_of_which_none_makes_most_of_it_alone_are_said_together():
     first = fit(*split.estimate.fit.less(Asymmetry()), split.data, split.estimate.weights)
     bare = fit(*split.estimate.fit.less(DeadBand(), Asymmetry()), split.data, split.estimate.weights)
     assert share(split.judge(bare), split.judge(first), best) < 0.8
+
+
+def test_a_name_that_takes_nothing_off_beside_the_others_is_not_needed():
+    made = short(volts=dead_band(1.0))
+    data, estimate = known_noise({DeadBand(): (1.0,), Asymmetry(): (1.01,)}, [made])
+    split = train_test_split(estimate, data, ())
+    named = name(estimate, data, [])
+    score, without = scores_alone(split, named, [])
+    assert without[Asymmetry()].rmse < score.rmse  # so it is by chance
+    assert [n.term for n in needed(split, named, named)] == [DeadBand()]
 
 
 def test_what_makes_too_little_even_together_is_not_said():
