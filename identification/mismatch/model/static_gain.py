@@ -32,7 +32,8 @@ def rotor_gain(model: Model, theta: Theta, run: RememberedRun, scale: Scale) -> 
     if not terms:
         return 1.0
     key = ("rotor gain", tuple(each[:2] for each in terms))
-    return run.gains(key, lambda: _rotor_gain(terms, theta, run))
+    gain: Floats = run.gains(key, lambda: _rotor_gain(terms, theta, run))
+    return gain
 
 
 def thrust_gain(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, tare: float) -> Floats | float:
@@ -41,7 +42,8 @@ def thrust_gain(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale
     if not terms:
         return 1.0
     key = ("thrust gain", theta.C, tare, tuple(each[:2] for each in terms))
-    return run.gains(key, lambda: _thrust_gain(terms, theta, run, x, tare), x)
+    gain: Floats = run.gains(key, lambda: _thrust_gain(terms, theta, run, x, tare), x)
+    return gain
 
 
 def _static(model: Model, theta: Theta, scale: Scale) -> list[Acting]:
