@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from identification.recording import Floats
 
-SAME = 1e-10
-"""Of the largest value: means over intervals of what stands still differ by the rounding of their edges."""
+SAME = 1e-8
+"""Of the largest value: means over intervals of what stands still differ by the rounding of their edges, behind a dead
+band, which is a difference of integrals, by some 1e-9."""
 WORTH = 0.5
 """Of the intervals: of more pieces nothing is saved."""
 
