@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from functools import cached_property
 from math import exp, log
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 from identification.recording import Floats
 from identification.run_history.converter import Places
 from identification.run_history.filters import Delay, delay_of
+from identification.run_history.held import Held, held_of
 from identification.run_history.history import History, Samples
 from identification.run_history.least_recently_used import LeastRecentlyUsed
 from identification.run_history.rate_gap import RateGap, rate_gap
-from identification.run_history.rotor_lag import lag, lag_ends
+from identification.run_history.rotor_lag import lag_ends, lag_means
 from identification.run_history.step_response_rows import TickRows, tick_rows
 
 Channel = Literal["thrust", "rate"]
@@ -29,9 +30,11 @@ MOST_LEADS = 160
 """What dynamics make of the ticks: those of all trials of a screening, twice."""
 MOST_LATELY = 24
 """What the rates of the last few models make at the samples: most terms change none."""
+MOST_GAINS = 24
+"""How much of a small change the last few models pass on, term by term."""
 MOST_FOLLOWERS = 48
 """What follows the rates of the last few models late: most parameters change neither the rates nor its time."""
-MOST_REFERENCES = 24
+MOST_REFERENCES = 64
 """Rotors from whose rates those of similar ones are sought."""
 MOST_DELAYS = 8
 """Delays of which is known what each interval looks at: that of a fit, and of its slope."""
@@ -47,6 +50,7 @@ class RememberedRun:
         self.predictions = LeastRecentlyUsed[Floats](MOST_PREDICTIONS)
         self.leads = LeastRecentlyUsed[Floats](MOST_LEADS)
         self.lately = LeastRecentlyUsed[Floats](MOST_LATELY)
+        self.gains = LeastRecentlyUsed[Any](MOST_GAINS)
         self._followers = LeastRecentlyUsed[Floats](MOST_FOLLOWERS)
         self._references = LeastRecentlyUsed[Floats](MOST_REFERENCES)
         self._delays = LeastRecentlyUsed[Delay](MOST_DELAYS)
@@ -63,11 +67,20 @@ class RememberedRun:
         """What takes the noise out of how far the measured rate is from a model."""
         return rate_gap(self.history)
 
+    @cached_property
+    def _held(self) -> Held | None:
+        return held_of(self.history.driver, self.history.dt)
+
     def followed(self, value: Floats, rotor: tuple[float, float]) -> Floats:
-        """(M,) means of the rate of a rotor that follows `value` (rotor_lag.lag)."""
+        """(M,) means of the rate of a rotor that follows `value` (rotor_lag.lag_means)."""
         h = self.history
         near = self._reference("intervals", h.driver, h.dt, rotor)
-        return lag(value, h.dt, *rotor, float(value[0]), near)[1]
+        return lag_means(value, h.dt, *rotor, float(value[0]), near, self._held)
+
+    def driven(self, rotor: tuple[float, float] | None) -> Floats:
+        """(M,) the same of the driver itself, worked out once: a delay behind it moves and the rotor does not."""
+        driver = self.history.driver
+        return driver if rotor is None else self._followers(("driver", rotor), lambda: self.followed(driver, rotor))
 
     def follower(self, value: Floats, rotor: tuple[float, float]) -> Floats:
         """(M,) means of what follows a `value` (M,) as `rotor_lag.lag` says, from rest; worked out once of the same."""
@@ -75,7 +88,7 @@ class RememberedRun:
         def made() -> Floats:
             h = self.history
             near = self._reference("from rest", h.driver, h.dt, rotor, from_rest=True)
-            return lag(value, h.dt, *rotor, 0.0, near)[1]
+            return lag_means(value, h.dt, *rotor, 0.0, near, self._held)
 
         return self._followers(rotor, made, value)
 

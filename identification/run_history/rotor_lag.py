@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from identification.recording import Floats
 from identification.run_history.filters import lowpass, recursion
+from identification.run_history.held import Held
 
 LAG_STEPS = 12
 LAG_CLOSE = 1e-5
@@ -39,6 +40,25 @@ def lag(
     hold = _hold(w, dt, quadratic, linear)
     end = _lag_ends(hold, quadratic, linear, start, near)
     return end, _turned(hold, np.concatenate([[start], end[:-1]]), quadratic, linear) / dt
+
+
+def lag_means(
+    w: Floats,
+    dt: Floats,
+    quadratic: float,
+    linear: float,
+    start: float = 0.0,
+    near: Floats | None = None,
+    held: Held | None = None,
+) -> Floats:
+    """The means of `lag`. `held`: pieces in which w stands still, if it does: each is one step of the recursion."""
+    if quadratic == 0 or held is None or not held.holds(w):
+        return lag(w, dt, quadratic, linear, start, near)[1]
+    pieces = _hold(w[held.first], held.time, quadratic, linear)
+    end = _lag_ends(pieces, quadratic, linear, start, None if near is None else near[held.last])
+    before = np.concatenate([[start], end[:-1]])[held.which]
+    turned = _turned(_hold(w, held.since, quadratic, linear), before, quadratic, linear)
+    return held.beside_before(turned) / dt
 
 
 def lag_ends(

@@ -37,15 +37,14 @@ class Passed:
 
     def means(self, run: RememberedRun) -> Floats:
         """(M,) of the rotor's rate, means over intervals, of a driver that stands still in each."""
-        history = run.history
-        out = history.driver if self.rotor is None else run.followed(history.driver, self.rotor)
+        out = run.driven(self.rotor)
         return run.delayed(out, self.delay) if self.delay else out
 
     def rung_means(self, run: RememberedRun) -> Floats:
         """(M,) of rate |rate| as the stand shows it, means over intervals, of a driver that stands still in each."""
         assert self.ring is not None
         history = run.history
-        x = history.driver if self.rotor is None else run.followed(history.driver, self.rotor)
+        x = run.driven(self.rotor)
         force = x * np.abs(x)
         moved = force - history.driver[0] * np.abs(history.driver[0])
         out = force + self.ring[0] * (resonant(moved, history.dt, *self.ring[1:]) - moved)

@@ -15,7 +15,7 @@ from typing import Literal
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.estimate.fitting import Fit, bounds_of, fit, residual_of
+from identification.mismatch.estimate.fitting import Fit, bounds_of, change_of_rates, fit, residual_of
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
@@ -56,7 +56,10 @@ def _least(found: Fit, data: Data, weights: Weights, clock: Clock) -> Theta | No
     basis = np.linalg.qr(columns)[0]
 
     def left(shift: float) -> Floats:
-        return residual_of(found.model, _moved(found.theta, clock, shift), data, weights)
+        moved = _moved(found.theta, clock, shift)
+        if clock == "rate_shift":  # the thrust stays
+            return found.residual - change_of_rates(found.model, found.theta, moved, data, weights)
+        return residual_of(found.model, moved, data, weights)
 
     def chi2(shift: float) -> float:
         r = left(shift)

@@ -159,6 +159,14 @@ def change_of(
     return thrust, rate, ticks
 
 
+def change_of_rates(model: Model, before: Theta, after: Theta, data: Data, weights: Weights) -> Floats:
+    """(n,) whitened, where the two differ in what moves the rate alone."""
+    old, new = (_rates(model, theta, data, theta) for theta in (before, after))
+    still = [np.zeros(y.size) for y in data.thrust]
+    ticks = [np.zeros(rows.target.size) for rows in data.ticks] if weights.ticks else []
+    return weights.whiten(still, [b - a for a, b in zip(old, new, strict=True)], ticks)
+
+
 def ticks_told(model: Model, theta: Theta, data: Data, weights: Weights) -> list[Floats]:
     return ticked(model, theta, data) if weights.ticks else []
 

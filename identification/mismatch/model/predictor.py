@@ -20,8 +20,9 @@ HYDRO = STAGES.index("hydro")
 CELL = STAGES.index("cell")
 MOST_RUNS = 64
 """Histories of which something is remembered: a diagnosis has some tens at most, with their parts."""
-MOST_LATELY = 4
-"""Whole predictions: a fit asks for the residual and then for the slopes at the same values."""
+MOST_LATELY = 16
+"""Whole predictions: a fit asks for the residual and then for the slopes at the same values, and a term is put in the
+place of another from several starts."""
 MOST_COLUMNS = 64
 """Slopes over one parameter: those at one set of values are asked for with the noise before and after, and singly."""
 MOST_ANSWERS = 64

@@ -7,12 +7,14 @@ Dynamics of a few ticks (a lag, a ring, a delay) and limits have answers of thei
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from identification.mismatch.model.model import Model, acting
+from identification.mismatch.model.model import Acting, Model, acting
 from identification.mismatch.model.parameters import Theta
-from identification.physics.term import Scale, Term, TermContext
+from identification.physics.term import Scale, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed
 from identification.run_history.history import Samples
@@ -26,16 +28,15 @@ MOST_GAIN = 5.0
 """Where a curve is steeper, an interval is no place to speak of its slope."""
 ROTOR = ("command", "rotor")
 
-Acting = list[tuple[Term, tuple[float, ...], Scale]]
-
 
 def rotor_gain(model: Model, theta: Theta, run: RememberedRun, scale: Scale) -> Floats | float:
     """(M,) or 1: change of the rate per change of the driver, both in units of the driver."""
     terms = [each for each in _static(model, theta, scale) if each[0].stage in ROTOR]
     if not terms:
         return 1.0
-    key = ("rotor gain", tuple((term, values) for term, values, _ in terms))
-    return run.lately(key, lambda: _rotor_gain(terms, theta, run))
+    key = ("rotor gain", tuple(each[:2] for each in terms))
+    gain: Floats = run.gains(key, lambda: _rotor_gain(terms, theta, run))
+    return gain
 
 
 def thrust_gain(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, tare: float) -> Floats | float:
@@ -43,8 +44,9 @@ def thrust_gain(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale
     terms = [each for each in _static(model, theta, scale) if each[0].stage not in ROTOR]
     if not terms:
         return 1.0
-    key = ("thrust gain", theta.C, tare, tuple((term, values) for term, values, _ in terms))
-    return run.lately(key, lambda: _thrust_gain(terms, theta, run, x, tare), x)
+    key = ("thrust gain", theta.C, tare, tuple(each[:2] for each in terms))
+    gain: Floats = run.gains(key, lambda: _thrust_gain(terms, theta, run, x, tare), x)
+    return gain
 
 
 def jumping(
@@ -59,7 +61,7 @@ def jumping(
     return run.lately(key, lambda: _jumping(terms, theta, run, samples, commanded), commanded)
 
 
-def _jumping(terms: Acting, theta: Theta, run: RememberedRun, samples: Samples, commanded: Floats) -> Floats:
+def _jumping(terms: list[Acting], theta: Theta, run: RememberedRun, samples: Samples, commanded: Floats) -> Floats:
     history = run.history
     still = RememberedRun(replace(history, excess=np.zeros(1)))  # an instant: the command does not move in it
     line, seen = history.driver, commanded
@@ -70,7 +72,7 @@ def _jumping(terms: Acting, theta: Theta, run: RememberedRun, samples: Samples, 
     return np.where(samples.count > 0, beside, 0.0)
 
 
-def _static(model: Model, theta: Theta, scale: Scale) -> Acting:
+def _static(model: Model, theta: Theta, scale: Scale) -> list[Acting]:
     """Terms that answer a fast change at once, whatever they do later."""
     out = []
     for term, values, sizes in acting(model, theta, scale):
@@ -80,25 +82,42 @@ def _static(model: Model, theta: Theta, scale: Scale) -> Acting:
     return out
 
 
-def _rotor_gain(terms: Acting, theta: Theta, run: RememberedRun) -> Floats:
+def _rotor_gain(terms: list[Acting], theta: Theta, run: RememberedRun) -> Floats:
     driver = run.history.driver
     moved = driver * _alternating(driver.size)
     old, new = driver, moved
     for term, values, sizes in terms:
         old, new = (term.apply(value, TermContext(run, sizes, theta.C, 0.0, value), values) for value in (old, new))
-    return _ratio(new - old, moved - driver)
+    return _ratio(new - old, *_divisor(moved - driver))
 
 
-def _thrust_gain(terms: Acting, theta: Theta, run: RememberedRun, x: Floats, tare: float) -> Floats:
+def _thrust_gain(terms: list[Acting], theta: Theta, run: RememberedRun, x: Floats, tare: float) -> Floats:
+    """Term by term: a model that has one more than another has what the rest makes of the same change."""
+    x_moved, old, new, moves, divisor = run.gains(("moved", theta.C), lambda: _moved(x, theta.C), x)
+    key: object = (theta.C, tare)
+    for each in terms:
+        key = (key, each[:2])
+        made = partial(_passed, each, old, new, x, x_moved, theta.C, tare, run)
+        old, new = run.gains(("passed", key), made, x)
+    return _ratio(new - old, moves, divisor)
+
+
+def _passed(
+    each: Acting, old: Floats, new: Floats, x: Floats, moved: Floats, C: float, tare: float, run: RememberedRun
+) -> tuple[Floats, Floats]:
+    """What a term makes of a force and of one that a small change was made to."""
+    term, values, sizes = each
+    return (
+        term.apply(old, TermContext(run, sizes, C, tare, x, before=x), values),
+        term.apply(new, TermContext(run, sizes, C, tare, moved, before=x), values),
+    )
+
+
+def _moved(x: Floats, C: float) -> tuple[Floats, Floats, Floats, NDArray[np.bool_], Floats]:
+    """Rates with a small change, the force of C x|x| before it and after, and the divisor of `_ratio`."""
     moved = x * _alternating(x.size)
-    old, new = (theta.C * rate * np.abs(rate) for rate in (x, moved))
-    change = new - old
-    for term, values, sizes in terms:
-        old, new = (
-            term.apply(force, TermContext(run, sizes, theta.C, tare, rate, before=x), values)
-            for force, rate in ((old, x), (new, moved))
-        )
-    return _ratio(new - old, change)
+    old, new = (C * rate * np.abs(rate) for rate in (x, moved))
+    return moved, old, new, *_divisor(new - old)
 
 
 def _alternating(size: int) -> Floats:
@@ -108,8 +127,14 @@ def _alternating(size: int) -> Floats:
     return out
 
 
-def _ratio(new: Floats, old: Floats) -> Floats:
-    """1 where nothing was moved, but for what rounding leaves."""
-    moved = np.abs(old) > ROUNDING * np.max(np.abs(old), initial=0.0)
-    out: Floats = np.where(moved, new / np.where(moved, old, 1.0), 1.0)
-    return np.clip(out, 0.0, MOST_GAIN)
+def _divisor(change: Floats) -> tuple[NDArray[np.bool_], Floats]:
+    """Where anything was moved, but for what rounding leaves; and by how much, 1 elsewhere."""
+    size = np.abs(change)
+    moves = size > ROUNDING * np.max(size, initial=0.0)
+    return moves, np.where(moves, change, 1.0)
+
+
+def _ratio(new: Floats, moves: NDArray[np.bool_], divisor: Floats) -> Floats:
+    """1 where nothing was moved."""
+    out: Floats = np.where(moves, new / divisor, 1.0)
+    return np.clip(out, 0.0, MOST_GAIN, out=out)

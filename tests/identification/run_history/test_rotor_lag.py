@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from identification.run_history.rotor_lag import lag, lag_ends, lagged, to_rest
+from identification.run_history.held import held_of
+from identification.run_history.rotor_lag import lag, lag_ends, lag_means, lagged, to_rest
 from tests.identification.physics.one_term import integrated, steps
 
 ROTORS = [(0.5, 0.0), (0.05, 3.0), (5.0, 0.2), (0.02, 0.9), (0.4, 1e-9), (1e-9, 2.0), (1e-5, 2.0)]
@@ -26,6 +27,37 @@ def test_lag_is_the_rotor_equation_however_long_a_command_is_held(quadratic, lin
     assert end == pytest.approx(ends[:, 0], abs=1e-6)
     assert mean == pytest.approx(means, abs=1e-6)
     assert lag_ends(w, dt, quadratic, linear, -3.0) == pytest.approx(end, abs=1e-12)
+
+
+def divided(w, dt, parts=6):
+    """Each hold in so many intervals of random length, its value with the rounding of means over them."""
+    rng = np.random.default_rng(3)
+    share = rng.dirichlet(np.ones(parts), w.size)
+    rounding = 1 + 1e-14 * rng.standard_normal(w.size * parts)
+    return np.repeat(w, parts) * rounding, (share * dt[:, None]).ravel()
+
+
+@pytest.mark.parametrize(("quadratic", "linear"), ROTORS)
+@pytest.mark.parametrize("longest", [0.3, 40.0])
+def test_means_of_a_lag_need_one_step_for_each_hold(quadratic, linear, longest):
+    fastest = quadratic * 20 + linear
+    w, dt = steps(90, low=0.05 / fastest, high=longest / fastest)
+    w[::3] = 0.0
+    w, dt = divided(w, dt)
+    held = held_of(w, dt)
+    assert held.first.size > 40  # some neighbours are held alike
+    assert not np.any(held.first % 6)
+    found = lag_means(w, dt, quadratic, linear, -3.0, held=held)
+    assert found == pytest.approx(integrated(equation(quadratic, linear), [-3.0], w, dt)[1], abs=1e-6)
+
+
+def test_what_moves_within_a_hold_is_followed_interval_by_interval():
+    """A supply that sags while the command stands still."""
+    command, dt = divided(*steps(60, low=0.1, high=2.0))
+    w = command * (1 - 0.002 * (np.arange(command.size) % 7))
+    found = lag_means(w, dt, 0.4, 0.3, 1.0, held=held_of(command, dt))
+    assert found.tolist() == lag(w, dt, 0.4, 0.3, 1.0)[1].tolist()
+    assert held_of(w, dt) is None
 
 
 def test_a_lag_is_the_same_wherever_it_is_sought_from():

@@ -35,7 +35,9 @@ def nearer(
     with what the term does followed by all that is left and by `other` from `values` on, is near where one curve can
     be written as the other.
     """
-    near = _in_place(now, term, other, values, data, weights, (less.jacobian, less.free))
+    near = _in_place(
+        now, term, other, values, data, weights, (less.jacobian, less.free), _effect(now, term, data, weights)
+    )
     one = less.more(other, values)
     if near is None:
         return one
@@ -83,7 +85,8 @@ def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights
     kept = np.array([j < own.start or j >= own.stop for j in range(now.free.size)])
     slopes = now.jacobian[:, kept[now.free]], now.free[kept]
     trials = beginnings(term, now.values[term], other, data.scale)
-    starts = [_in_place(now, term, other, values, data, weights, slopes) for values in trials]
+    effect = _effect(now, term, data, weights)
+    starts = [_in_place(now, term, other, values, data, weights, slopes, effect) for values in trials]
     possible = [start for start in starts if start is not None]
     if not possible:
         return now
@@ -100,6 +103,11 @@ def _left(start: Start, data: Data, weights: Weights) -> float:
     return chi2 if np.isfinite(chi2) else np.inf
 
 
+def _effect(now: Fit, term: Term, data: Data, weights: Weights) -> Floats:
+    """(n,) whitened change that the term makes at its fitted values."""
+    return weights.whiten(*change_of(now.less(term), (now.model, now.theta), data, weights))
+
+
 def _in_place(
     now: Fit,
     term: Term,
@@ -108,15 +116,16 @@ def _in_place(
     data: Data,
     weights: Weights,
     slopes: tuple[Floats, NDArray[np.bool_]],
+    effect: Floats,
 ) -> Start | None:
-    """None where `other` cannot be had in any amount. `slopes`: of the rest of the model, and of which values.
+    """None where `other` cannot be had in any amount. `slopes`: of the rest of the model, and of which values; `effect`
+    (n,): whitened, what `term` does.
 
     The rest follows by its slopes where that leaves less, else it stays: the step is long where two are nearly one
     curve, as a delay and a lag on a sine beside an inflow, and ends far off.
     """
     rest, theta = now.less(term)
     bigger, begun = extended(rest, theta, other, values)
-    effect = weights.whiten(*change_of((rest, theta), (now.model, now.theta), data, weights))
     change = weights.whiten(*change_of((rest, theta), (bigger, begun), data, weights))
     size = float(np.linalg.norm(change))
     if size == 0 or not np.isfinite(size):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.mismatch.estimate.clock_hollows import in_best_hollow
-from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.estimate.fitting import change_of_rates, fit, residual_of
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
@@ -60,6 +60,15 @@ def test_the_lateness_of_both_is_found_past_a_tick_whatever_it_begins_with():
         found = settled(data, replace(theta, shift=begin, rate_shift=-begin)).theta
         assert found.rate_shift == pytest.approx(LATE, abs=2e-4)
         assert found.shift == pytest.approx(LATE, abs=5e-4)
+
+
+def test_the_clock_of_the_rate_changes_the_rate_alone():
+    data, theta = data_of([in_step()], clocks=True)
+    model, theta, w = Model((MotorLag("quadratic"),)), replace(theta, terms=((0.02,),)), stood(data)
+    moved = replace(theta, rate_shift=0.0013)
+    before, after = (residual_of(model, each, data, w) for each in (theta, moved))
+    assert np.max(np.abs(before - after)) > 0.1
+    assert change_of_rates(model, theta, moved, data, w) == pytest.approx(before - after, abs=1e-9)
 
 
 def test_nothing_that_smooths_ticks_is_wanted_beside_it():
