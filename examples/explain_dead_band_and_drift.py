@@ -13,8 +13,8 @@ import sys
 
 import numpy as np
 
-from identification.mismatch.answer.explain import explained
-from identification.mismatch.answer.trace import Trace
+from identification.mismatch.answer.explained.explain import explained
+from identification.mismatch.answer.explained.trace import Trace
 from identification.mismatch.pipeline import traced
 from identification.recording import Channel, Recording
 from rig.diagnose.explanation import explanation_text

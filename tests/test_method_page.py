@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from identification.mismatch.answer.explain import explained
+from identification.mismatch.answer.explained.explain import explained
 from identification.mismatch.policy import thresholds
 from rig.diagnose.explanation import explanation_text
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from identification.mismatch.answer import stage as answer
+from identification.mismatch.answer.explained.trace import Trace
 from identification.mismatch.answer.periodic_findings import told_lines
-from identification.mismatch.answer.trace import Trace
 from identification.mismatch.compare.earlier_recordings import Later, put_to_earlier
 from identification.mismatch.compare.saved_model_baseline import lasting, starting
 from identification.mismatch.faults import stage as faults

@@ -21,7 +21,7 @@ from identification.run_history.history import History, Samples
 from identification.run_history.least_recently_used import LeastRecentlyUsed
 from identification.run_history.rate_gap import RateGap, rate_gap
 from identification.run_history.rotor_lag import lag_ends, lag_means
-from identification.run_history.step_response_rows import TickRows, tick_rows
+from identification.run_history.ticks.step_response_rows import TickRows, tick_rows
 
 Channel = Literal["thrust", "rate"]
 MOST_PREDICTIONS = 400

@@ -22,7 +22,7 @@ from rig.errors import RecordingError, RigError
 from rig.list_option import ListCommand
 
 if TYPE_CHECKING:  # numpy and scipy come up when a diagnosis is made, not for `rig diagnose --help`
-    from identification.mismatch.answer.trace import Trace
+    from identification.mismatch.answer.explained.trace import Trace
     from identification.mismatch.diagnosis import Diagnosis
     from identification.mismatch.next_experiment.sweeps import Limits
     from identification.mismatch.observer import Observer
@@ -188,7 +188,7 @@ def _names(files: Iterable[Path]) -> dict[str, str]:
 
 def explain(trace: Trace, wanted: Wanted, files: Sequence[Path] = ()) -> None:
     """How it came to the answer, after it; on standard error where standard output is for the JSON alone."""
-    from identification.mismatch.answer.explain import explained
+    from identification.mismatch.answer.explained.explain import explained
     from rig.diagnose.explanation import explanation_text
 
     text = with_names(explanation_text(explained(trace)), _names(files))

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from identification.mismatch.answer.explain import Section
+    from identification.mismatch.answer.explained.explain import Section
 
 HEAD = "How it came to that, stage by stage (docs/method.md says what the figures mean)"
 

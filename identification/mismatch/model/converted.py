@@ -17,7 +17,7 @@ from identification.recording import Floats
 from identification.run_history.converter import Converter, Mode
 from identification.run_history.filters import within_intervals
 from identification.run_history.remembered import RememberedRun
-from identification.run_history.sub_interval_dynamics import Passed
+from identification.run_history.ticks.sub_interval_dynamics import Passed
 
 
 def beside_means(

@@ -14,7 +14,7 @@ from identification.physics.term import Scale, Term
 from identification.recording import Floats
 from identification.run_history.history import History
 from identification.run_history.remembered import RememberedRun
-from identification.run_history.step_response_rows import TickRows
+from identification.run_history.ticks.step_response_rows import TickRows
 
 
 @dataclass(frozen=True, eq=False, slots=True)

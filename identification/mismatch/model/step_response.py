@@ -10,7 +10,7 @@ from identification.mismatch.model.parameters import Theta
 from identification.physics.traits import Dynamics
 from identification.recording import Floats
 from identification.run_history.filters import lowpass, resonant
-from identification.run_history.step_response_rows import TickRows
+from identification.run_history.ticks.step_response_rows import TickRows
 
 
 def ticked(model: Model, theta: Theta, data: Data) -> list[Floats]:

@@ -20,8 +20,8 @@ from identification.recording import Floats
 from identification.run_history.filters import reconstructed
 from identification.run_history.history import History
 from identification.run_history.remembered import Channel, RememberedRun
-from identification.run_history.sub_interval_dynamics import Passed
-from identification.run_history.sub_interval_leads import curvature, each_lead, lead
+from identification.run_history.ticks.sub_interval_dynamics import Passed
+from identification.run_history.ticks.sub_interval_leads import curvature, each_lead, lead
 
 
 def dynamics_between(model: Model, theta: Theta, history: History, largest: float, late: float) -> Passed:

@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 
 from identification.mismatch import policy
 from identification.mismatch.prepare.binned import binned, untorn
+from identification.mismatch.prepare.chain.quantum import quantum_of
 from identification.mismatch.prepare.channels import followed, is_coarse, jumps, neighbour_at, supply, torque
 from identification.mismatch.prepare.grid import Held, distinct, edges_of
-from identification.mismatch.prepare.quantum import quantum_of
 from identification.mismatch.prepare.thermometer import warmed
 from identification.recording import Channel, Floats, Recording
 from identification.run_history.converter import Converter
 from identification.run_history.history import CHANGED, History
-from identification.run_history.sub_interval_leads import with_leads
+from identification.run_history.ticks.sub_interval_leads import with_leads
 
 DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
 """What may explain the thrust, best first."""

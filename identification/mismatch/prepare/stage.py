@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from identification.mismatch.prepare.acquisition import as_sampled
 from identification.mismatch.prepare.admission import unfit
+from identification.mismatch.prepare.chain.acquisition import as_sampled
 from identification.mismatch.prepare.preparing import Refusal, history_of
 from identification.recording import Recording
 from identification.run_history.history import History

@@ -7,7 +7,7 @@ from identification.mismatch.estimate.fitting import raw
 from identification.mismatch.model.converted import converted_samples
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.periodic.full_rate import series_of
-from identification.mismatch.prepare.acquisition import as_sampled
+from identification.mismatch.prepare.chain.acquisition import as_sampled
 from identification.physics.motor_lag import MotorLag
 from identification.recording import Acquisition, Channel, Recording
 from identification.run_history.converter import Converter

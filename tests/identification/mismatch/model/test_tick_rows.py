@@ -11,7 +11,7 @@ from identification.physics.stand_resonance import StandResonance
 from identification.physics.time_skew import TimeSkew
 from identification.recording import Channel, Recording
 from identification.run_history.remembered import RememberedRun
-from identification.run_history.step_response_rows import tick_rows
+from identification.run_history.ticks.step_response_rows import tick_rows
 
 C = 0.5
 TICK = 0.05

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.mismatch.estimate.fitting import raw
-from identification.mismatch.prepare.acquisition import as_sampled
+from identification.mismatch.prepare.chain.acquisition import as_sampled
 from identification.physics.motor_lag import MotorLag
 from identification.recording import Acquisition, Recording
 from identification.run_history.converter import Converter

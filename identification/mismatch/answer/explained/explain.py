@@ -12,7 +12,7 @@ from textwrap import wrap
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.answer.explain_search import (
+from identification.mismatch.answer.explained.explain_search import (
     baseline_lines,
     label,
     p_text,
@@ -20,7 +20,7 @@ from identification.mismatch.answer.explain_search import (
     searches,
     values_text,
 )
-from identification.mismatch.answer.trace import Trace
+from identification.mismatch.answer.explained.trace import Trace
 from identification.mismatch.diagnosis import Adequate, Ambiguous, Diagnosis, Explained, Unexplained
 from identification.mismatch.name.naming import Named
 from identification.mismatch.select.forward_selection import Rival, Selected

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.mismatch.prepare.chain.quantum import quantum_of
 from identification.mismatch.prepare.preparing import history_of
-from identification.mismatch.prepare.quantum import quantum_of
 from identification.recording import Acquisition, Channel
 from tests.identification.diagnosed_runs import run
 

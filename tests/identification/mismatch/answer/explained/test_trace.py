@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.mismatch.answer.trace import Trace
+from identification.mismatch.answer.explained.trace import Trace
 from identification.mismatch.locate import stage as locate
 from identification.mismatch.name import stage as name
 from identification.mismatch.pipeline import Draws, traced

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from identification.mismatch import policy
-from identification.mismatch.answer.explain import WIDTH, explained
-from identification.mismatch.answer.explain_search import best_trials, searches
+from identification.mismatch.answer.explained.explain import WIDTH, explained
+from identification.mismatch.answer.explained.explain_search import best_trials, searches
 from identification.mismatch.faults.channel_faults import Fault
 from identification.mismatch.name.naming import Check
 from identification.mismatch.periodic.periodic_disturbances import Line

@@ -14,7 +14,7 @@ from identification.physics.motor_lag import MotorLag
 from identification.physics.stand_resonance import StandResonance
 from identification.recording import Channel, Recording
 from identification.run_history.rotor_lag import lag_ends
-from identification.run_history.sub_interval_dynamics import Passed
+from identification.run_history.ticks.sub_interval_dynamics import Passed
 
 TICK = 0.05
 TAU = 0.003

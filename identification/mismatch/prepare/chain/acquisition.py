@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.prepare.sample_clock import sample_times
+from identification.mismatch.prepare.chain.sample_clock import sample_times
 from identification.recording import Channel, Floats, Recording
 
 

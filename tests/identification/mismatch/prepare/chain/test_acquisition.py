@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from identification.mismatch.prepare.acquisition import as_sampled
-from identification.mismatch.prepare.sample_clock import sample_times
+from identification.mismatch.prepare.chain.acquisition import as_sampled
+from identification.mismatch.prepare.chain.sample_clock import sample_times
 from identification.recording import Acquisition, Channel, Recording
 
 PERIOD = 1 / 92
