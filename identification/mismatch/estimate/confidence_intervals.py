@@ -162,8 +162,11 @@ class _Slopes:
         return cls(columns, size, columns.T @ columns / np.outer(size, size))
 
     def step(self, residual: Floats, down: Floats | None = None, up: Floats | None = None) -> Floats:
-        """(p,) that takes most from a residual (n,); what has no room `down` (p,) or `up` (p,) stays where it would go
-        there, and the others step without it (an active set; Nocedal and Wright, Numerical Optimization, 2006, 16.5)."""
+        """(p,) that takes most from a residual (n,).
+
+        What has no room `down` or `up` (p,) where it would go stays, and the others step without it: an active set
+        (Nocedal and Wright, Numerical Optimization, 2006, section 16.5).
+        """
         right = self.columns.T @ residual / self.size
         still = np.zeros(self.size.size, dtype=bool)
         while True:

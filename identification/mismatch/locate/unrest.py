@@ -3,6 +3,8 @@
 What is left after every step looks like structure to a test against stationary noise. It is noise where its sign is
 any from step to step: then a variance that goes with the thrust that has not settled describes it, beside columns of
 any shape over every covariate, which take what is alike in all steps.
+Where nothing is left, the values are told by that law as well: one of the same size everywhere has the noise right
+after a step too small, and would take C from the jump there with a standard error several times too small.
 """
 
 from __future__ import annotations
@@ -38,7 +40,19 @@ def beside_unrest(estimate: Estimate, data: Data) -> Estimate | None:
         return None
     shapes = np.column_stack([np.concatenate(c.columns) for c in covariates(estimate.fit, data)])
     span, residual = span_of(shapes, estimate, data), estimate.fit.residual[: data.size]
-    rest = residual - span @ (span.T @ residual)
+    return _beside(estimate, data, residual - span @ (span.T @ residual), shapes)
+
+
+def told_by_unrest(estimate: Estimate, data: Data) -> Estimate:
+    """A model that leaves nothing but noise, by whose residual that of its noise after steps is known as well; as it is
+    where that describes no more."""
+    if any(h.static for h in data.histories):
+        return estimate
+    return _beside(estimate, data, estimate.fit.residual[: data.size], None) or estimate
+
+
+def _beside(estimate: Estimate, data: Data, rest: Floats, shapes: Floats | None) -> Estimate | None:
+    """Noise after steps by `rest` (n,) of a whitened residual; estimated beside `shapes` (n, p), not whitened."""
     tried = [(decay, _unsettled(estimate, data, decay)) for decay in DECAYS]
     found = [(*_likeliest_share(rest, estimate, size), decay, size) for decay, size in tried]
     gain, share, decay, size = max(found, key=lambda each: each[0])
