@@ -132,7 +132,7 @@ def changed_constant(twin: Twin, estimate: Estimate, data: Data, known: str, uni
 
 def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], before: Twin | None) -> Twin:
     """The fitted model as a twin; files' hashes and the time are added by who knows them."""
-    fitted = estimate.fit
+    fitted, noise = estimate.fit, estimate.noise.everywhere(estimate.rows)
     terms = terms_of(fitted, data)
     return Twin(
         thruster=recordings[0].thruster,
@@ -141,14 +141,7 @@ def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], bef
         terms=terms,
         names=names_of(terms),
         covariance=_covariance(estimate, data, before),
-        noise=TwinNoise(
-            estimate.noise.white,
-            estimate.noise.proportional,
-            estimate.noise.scales,
-            estimate.noise.slow,
-            estimate.noise.bands,
-            estimate.noise.band,
-        ),
+        noise=TwinNoise(noise.white, noise.proportional, noise.scales, noise.slow, noise.bands, noise.band),
         sources=(
             *(() if before is None else before.sources),
             *(

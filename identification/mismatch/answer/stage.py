@@ -24,6 +24,7 @@ from identification.mismatch.faults.stage import Sound
 from identification.mismatch.locate.places import places_of
 from identification.mismatch.locate.stage import Located
 from identification.mismatch.locate.unclaimed import unclaimed
+from identification.mismatch.locate.unrest import told_by_unrest
 from identification.mismatch.model.data import Data
 from identification.mismatch.noise.whiteness import whiteness
 from identification.mismatch.periodic.periodic_disturbances import Line
@@ -98,7 +99,8 @@ def run(case: Case, found: Found, rng: np.random.Generator) -> Diagnosis:
         return _told(case, found, drafted)
     tried = " and ".join(dict.fromkeys(n.term.id for n in found.completed.earned))
     before = found.selected.before
-    bare = Completed(before, (), {}, (), None, False, before, found.located.left)
+    told = told_by_unrest(before, found.selected.data)
+    bare = Completed(before, (), {}, (), None, False, before, found.located.left, told)
     again = _drafted(case, replace(found, completed=bare, experiment=None), rng)
     return _told(case, found, again, TAKEN_BACK.format(tried))
 
@@ -122,7 +124,7 @@ def _drafted(case: Case, found: Found, rng: np.random.Generator) -> Drafted:
     new = told_new(_findings(completed, data), found.novelties, case.baseline, remainder, completed.nameless)
     quiet = located.estimate.noise
     held = with_held(score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None), flexible)
-    model = values_of(after.fit, data, completed.intervals)
+    model = values_of(completed.stated.fit, data, completed.intervals)
     near = unclaimed(selected, located)
     model["C"], moved = averaged(model["C"], located.estimate.fit, data, completed.earned, near)
     draft = Draft(
@@ -137,7 +139,7 @@ def _drafted(case: Case, found: Found, rng: np.random.Generator) -> Drafted:
     ids = case.ids
     draft = with_channels(draft, case.sound.faults, ids)
     beside = bool(new.not_new) or completed.open_ended
-    draft = with_twin(draft, after, data, case.recordings, case.baseline, completed.earned, beside=beside)
+    draft = with_twin(draft, completed.stated, data, case.recordings, case.baseline, completed.earned, beside=beside)
     draft = with_lines(draft, case.lines, train.before, case.baseline, ids)
     return Drafted(draft, after, new, train, held, found.experiment)
 

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from math import log, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.mismatch.estimate.bounded_least_squares import LEAST_REACH
 from identification.mismatch.estimate.fitting import Fit, bounds_of, columns_of, residual_of
@@ -77,18 +78,32 @@ class Profile:
     """The rise of chi-square where parameter `j` of theta's vector is held elsewhere and the other free ones follow.
 
     They follow by Gauss-Newton, each time from where they were last; from the fit where the prediction jumps at `j`.
+    One that ended at a bound follows as well, back into what is possible: held there it would be taken for known.
     """
 
     def __init__(self, fitted: Fit, data: Data, weights: Weights, j: int, *, jumps: bool = False) -> None:
         self.fitted, self.data, self.weights, self.j, self.jumps = fitted, data, weights, j, jumps
         self.low, self.high, _ = bounds_of(fitted.model, data, fitted.theta)
-        moves = np.linalg.norm(fitted.jacobian, axis=0) * (self.high - self.low)[fitted.free] > LEAST_REACH
-        mine = np.flatnonzero(fitted.free) == j
+        which, columns = self._moving()
+        moves = np.linalg.norm(columns, axis=0) * (self.high - self.low)[which] > LEAST_REACH
+        mine = which == j
         self.follow = np.zeros(fitted.free.size, dtype=bool)
-        self.follow[np.flatnonzero(fitted.free)[moves & ~mine]] = True
-        self.slopes = _Slopes.of(fitted.jacobian[:, moves & ~mine])
+        self.follow[which[moves & ~mine]] = True
+        self.slopes = _Slopes.of(columns[:, moves & ~mine])
         # others per unit of j
-        self.drawn = -self.slopes.step(fitted.jacobian[:, mine].sum(axis=1))
+        self.drawn = -self.slopes.step(columns[:, mine].sum(axis=1))
+
+    def _moving(self) -> tuple[NDArray[np.intp], Floats]:
+        """(p,) places in theta's vector of what was free, and of what ended at a bound; slopes (n, p) over them."""
+        fitted = self.fitted
+        ended = ~fitted.free & (self.high > self.low) & np.isfinite(self.high - self.low)
+        ended[fitted.layout.rate_shift] &= bool(self.weights.rate)
+        if not ended.any():
+            return np.flatnonzero(fitted.free), fitted.jacobian
+        slopes = columns_of(fitted.model, fitted.theta, self.data, self.weights, ended)
+        which = np.concatenate([np.flatnonzero(fitted.free), np.flatnonzero(ended)])
+        order = np.argsort(which)
+        return which[order], np.column_stack([fitted.jacobian, slopes])[:, order]
 
     def __call__(self, value: float) -> float:
         best, others = self.fitted.theta.vector, self.follow
@@ -99,7 +114,7 @@ class Profile:
         residual = self._residual(vector)
         share, fresh = 1.0, False
         for _ in range(REFITS):
-            step = share * self.slopes.step(residual)
+            step = share * self.slopes.step(residual, *self._room(vector))
             foretold = float(residual @ residual - np.sum((residual - self.slopes.columns @ step) ** 2))
             if foretold < FITTED:
                 break
@@ -118,6 +133,10 @@ class Profile:
             self.drawn = (vector[others] - best[others]) / away
         return float(residual @ residual) - self.fitted.chi2
 
+    def _room(self, vector: Floats) -> tuple[Floats, Floats]:
+        """(p,) each: how far those that follow may go down (not above 0) and up."""
+        return (self.low - vector)[self.follow], (self.high - vector)[self.follow]
+
     def _moved(self, vector: Floats, step: Floats) -> Floats:
         out = vector.copy()
         out[self.follow] += step
@@ -130,22 +149,37 @@ class Profile:
 
 @dataclass(frozen=True, eq=False, slots=True)
 class _Slopes:
-    """Columns (n, p) and the inverse of their Gram matrix."""
+    """Columns (n, p), their lengths, and the Gram matrix of columns of unit length."""
 
     columns: Floats
-    inverse: Floats
+    size: Floats
+    gram: Floats
 
     @classmethod
     def of(cls, columns: Floats) -> _Slopes:
         size = np.linalg.norm(columns, axis=0)
         size = np.where(size > 0, size, 1.0)
-        gram = columns.T @ columns / np.outer(size, size)
-        return cls(columns, np.linalg.pinv(gram, hermitian=True, rcond=1e-12) / np.outer(size, size))
+        return cls(columns, size, columns.T @ columns / np.outer(size, size))
 
-    def step(self, residual: Floats) -> Floats:
-        """(p,) that takes most from a residual (n,)."""
-        out: Floats = self.inverse @ (self.columns.T @ residual)
-        return out
+    def step(self, residual: Floats, down: Floats | None = None, up: Floats | None = None) -> Floats:
+        """(p,) that takes most from a residual (n,).
+
+        What has no room `down` or `up` (p,) where it would go stays, and the others step without it: an active set
+        (Nocedal and Wright, Numerical Optimization, 2006, section 16.5).
+        """
+        right = self.columns.T @ residual / self.size
+        still = np.zeros(self.size.size, dtype=bool)
+        while True:
+            out: Floats = np.zeros(self.size.size)
+            go = ~still
+            out[go] = np.linalg.pinv(self.gram[np.ix_(go, go)], hermitian=True, rcond=1e-12) @ right[go]
+            out /= self.size
+            if down is None or up is None:
+                return out
+            stopped = ((out < 0) & (down >= 0)) | ((out > 0) & (up <= 0))
+            if not stopped.any():
+                return out
+            still |= stopped
 
 
 def _end(rise: Callable[[float], float], wanted: float, value: float, bound: float, first: float) -> float:

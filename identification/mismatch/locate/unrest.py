@@ -3,6 +3,8 @@
 What is left after every step looks like structure to a test against stationary noise. It is noise where its sign is
 any from step to step: then a variance that goes with the thrust that has not settled describes it, beside columns of
 any shape over every covariate, which take what is alike in all steps.
+Where nothing is left, the values are told by that law as well: one of the same size everywhere has the noise right
+after a step too small, and would take C from the jump there with a standard error several times too small.
 """
 
 from __future__ import annotations
@@ -24,6 +26,8 @@ from identification.run_history.filters import lowpass
 
 DECAYS = (0.08, 0.2, 0.5, 1.25, 3.1)
 """s, in which water may settle: from a rotor's own time to that of a tank's turn-over near it."""
+DECAY_STEPS = (2.5, 1.6, 1.25)
+"""Ratios by which the likeliest is sought from there."""
 TRIED_SHARES = np.concatenate([[0.0], np.geomspace(1e-4, 0.3, 24)])
 """Standard deviation over the thrust that has not settled."""
 TIME_CONSTANTS = (0.1, 0.5)
@@ -38,12 +42,43 @@ def beside_unrest(estimate: Estimate, data: Data) -> Estimate | None:
         return None
     shapes = np.column_stack([np.concatenate(c.columns) for c in covariates(estimate.fit, data)])
     span, residual = span_of(shapes, estimate, data), estimate.fit.residual[: data.size]
-    rest = residual - span @ (span.T @ residual)
-    tried = [(decay, _unsettled(estimate, data, decay)) for decay in DECAYS]
-    found = [(*_likeliest_share(rest, estimate, size), decay, size) for decay, size in tried]
-    gain, share, decay, size = max(found, key=lambda each: each[0])
-    if float(chi2_sf(gain, 2)) > policy.locate.UNREST_FALSE_ALARM:
-        return None
+    plain = _plainly(estimate, data, residual - span @ (span.T @ residual))
+    return None if plain is None else _estimated(estimate, data, *plain, shapes)
+
+
+def told_by_unrest(estimate: Estimate, data: Data) -> Estimate:
+    """A model that leaves nothing but noise, fitted by the noise after steps that its residual shows; as it is where
+    that describes no more.
+
+    How long water takes to settle is sought by the likelihood of the fit: a residual whitened by a law that does not
+    hold tells it to a factor of three, and the wrong decay moves C by several of its errors.
+    """
+    if any(h.static for h in data.histories):
+        return estimate
+    plain = _plainly(estimate, data, estimate.fit.residual[: data.size])
+    if plain is None:
+        return estimate
+    at, share = plain
+    best = _estimated(estimate, data, at, share)
+    for way in (way for ratio in DECAY_STEPS for way in (ratio, 1 / ratio)):
+        while DECAYS[0] <= at * way <= DECAYS[-1]:
+            other = _estimated(estimate, data, at * way, share)
+            if other.fit.deviance >= best.fit.deviance:
+                break
+            at, best = at * way, other
+    return best
+
+
+def _plainly(estimate: Estimate, data: Data, rest: Floats) -> tuple[float, float] | None:
+    """(decay in s, share) that describe `rest` (n,) of a whitened residual plainly better than its stationary law."""
+    found = [(*_likeliest_share(rest, estimate, _unsettled(estimate, data, decay)), decay) for decay in DECAYS]
+    gain, share, decay = max(found)
+    return None if float(chi2_sf(gain, 2)) > policy.locate.UNREST_FALSE_ALARM else (decay, share)
+
+
+def _estimated(estimate: Estimate, data: Data, decay: float, share: float, shapes: Floats | None = None) -> Estimate:
+    """The same model by a law with noise after steps, estimated beside raw `shapes` (n, p)."""
+    size = _unsettled(estimate, data, decay)
     rows = tuple(replace(r, unsettled=s) for r, s in zip(estimate.rows, size, strict=True))
     begin = _with_part_after_steps(estimate.noise, decay, share)
     return refresh(estimate.fit.model, estimate.fit.theta, data, shapes, replace(estimate, rows=rows), begin)

@@ -8,6 +8,7 @@ apart make any noise between white and 1/f^2. All variances enter linearly; `noi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -89,6 +90,15 @@ class Noise:
     @property
     def variances(self) -> Floats:
         return np.array([self.white, self.proportional, *self.slow, *self.band])
+
+    def everywhere(self, rows: Sequence[Rows]) -> Noise:
+        """A law of one size throughout, with the mean power that noise after steps has on these rows."""
+        if not self.after_steps:
+            return self
+        size = np.concatenate([r.unsettled for r in rows if r.unsettled is not None])
+        always = len(self.slow) - self.after_steps
+        late = tuple(v * float(np.mean(size**2)) for v in self.slow[always:])
+        return replace(self, slow=(*self.slow[:always], *late), after_steps=0)
 
     def with_variances(self, values: Floats) -> Noise:
         J = len(self.scales)

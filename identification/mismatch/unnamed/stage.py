@@ -14,6 +14,7 @@ from identification.mismatch.estimate.estimate import Estimate, refresh
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.locate.residual_structure_test import ResidualStructure, residual_structure
 from identification.mismatch.locate.stage import Located
+from identification.mismatch.locate.unrest import told_by_unrest
 from identification.mismatch.model.data import Data
 from identification.mismatch.name.named_term import Check, restated
 from identification.mismatch.name.naming import Named
@@ -53,6 +54,13 @@ class Completed:
     """The model without the terms whose names were not earned."""
     left: ResidualStructure
     """What `bare` leaves, where that shows the place better."""
+    told: Estimate | None = None
+    """The final model with the noise by which its values are told, where that is another."""
+
+    @property
+    def stated(self) -> Estimate:
+        """The final model by whose values and standard errors it is told."""
+        return self.after if self.told is None else self.told
 
     @property
     def nameless(self) -> tuple[Term, ...]:
@@ -144,7 +152,8 @@ def _completed(
 def _noise_followed(earned: Sequence[Named], without: _Without, now: Estimate, data: Data) -> Completed:
     """It was noise that the terms without a name followed: they go."""
     after = refresh(without.bare.fit.model, without.bare.fit.theta, data, None, now)
-    return Completed(after, *_with_values(earned, now, after, data, None), (), None, False, after, without.left)
+    told = told_by_unrest(after, data)
+    return Completed(after, *_with_values(earned, now, told, data, None), (), None, False, after, without.left, told)
 
 
 def _shaped(
@@ -188,8 +197,10 @@ def _by_names(
         told = _Told((), unearned, _Without(now, located.left) if without.nothing else without, told.gone)
         after = before
     earned = with_shares(split, told.earned, told.nameless, split.judge(split.estimate.fit).rmse)
-    valued, known = _with_values(earned, now, after, data, None, told.nameless)
-    return Completed(after, valued, known, told.refused, None, open_ended, told.without.bare, told.without.left)
+    stated = after if open_ended else told_by_unrest(after, data)
+    valued, known = _with_values(earned, now, stated, data, None, told.nameless)
+    bare, left = told.without.bare, told.without.left
+    return Completed(after, valued, known, told.refused, None, open_ended, bare, left, stated)
 
 
 def _without(after: Estimate, data: Data, unearned: Sequence[Named], rng: np.random.Generator) -> _Without:
