@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 from identification.mismatch import policy
 from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Value, Where
-from identification.mismatch.verdict_clauses import beside, to_settle, together, unsettled
+from identification.mismatch.verdict_clauses import MISSING, beside, errors, to_settle, unsettled
 from identification.recording import Floats
 from identification.twin import Twin
 
@@ -255,8 +255,9 @@ class Diagnosis:
                 told = [f.statement for f in findings if not f.rivals] + [unsettled(f) for f in findings if f.rivals]
                 return f"{self._left_out(told)} {to_settle(self.next_experiment)}"
             case Unexplained(findings, remainder):
-                return beside(findings, remainder.statement, self.heldout, self.unit)
+                more = "a free curve, which is no physics" if remainder.flexible else "terms that have no name"
+                return beside(findings, remainder.statement, self.heldout, self.unit, more)
 
     def _left_out(self, told: Sequence[str]) -> str:
         """Of the findings, each told, and what they do together."""
-        return " ".join(filter(None, ["Left out:", *told, together(self.findings, self.heldout, self.unit)]))
+        return " ".join([MISSING, *told, errors(self.findings, self.heldout, self.unit)]).rstrip()

@@ -12,6 +12,7 @@ NOT_WHITE = (
     "intervals and p-values rest on the noise model, which does not describe all of it: they may be surer than they "
     "should"
 )
+MISSING = "Missing from the model:"
 MOST_REFUSED = 3
 """Names in a sentence: all of them are in the answer."""
 
@@ -48,27 +49,27 @@ def degree(f: Finding) -> str:
     )
 
 
-def graded(f: Finding, unit: str) -> str:
-    """With what it does on what was not fitted, in `unit`."""
+def graded(f: Finding) -> str:
+    """With how much it is of what could be taken off what was not fitted."""
     says = f"{'Partly' if f.grade == 'partly' else 'Mostly'} {f.statement[:1].lower()}{f.statement[1:]}"
-    if f.heldout is None or f.share is None:
+    if f.share is None:
         return says
-    without, with_it = f.heldout
     return (
-        f"{says} It takes the error on what was not fitted from {without:.3g} to {with_it:.3g} {unit}, "
-        f"{100 * f.share:.0f} % of what any shape in its place could take off."
+        f"{says} It does {100 * f.share:.0f} % of what any shape in its place could do for data that were not fitted."
     )
 
 
-def together(findings: Sequence[Finding], held: HeldOutRmse, unit: str) -> str:
-    """What several names do on what was not fitted; empty where one is all there is, or they do not do better."""
-    reached = [f.heldout[1] for f in findings if f.heldout is not None]
-    if len(reached) < 2 or reached[0] >= held.before:
+def errors(findings: Sequence[Finding], held: HeldOutRmse, unit: str, more: str = "") -> str:
+    """The errors on what was not fitted in one chain: of the baseline, with the names, with `more` that is in the
+    model; empty where it has nothing but names, and they do no better."""
+    named = next((f.heldout[1] for f in findings if f.heldout is not None), held.after) if findings else held.before
+    last = min(named, held.after) if more else named
+    if last >= held.before:
         return ""
-    return (
-        f"Together they take the error on what was not fitted from {held.before:.3g} to {reached[0]:.3g} {unit}; "
-        f"{of_noise(reached[0], held.noise, unit)}."
-    )
+    chain = [f"{held.before:.3g} {unit} before"]
+    chain += [f"{named:.3g} {unit} with {'it' if len(findings) == 1 else 'these'}"] if named < held.before else []
+    chain += [f"{last:.3g} {unit} with {more}"] if last < named else []
+    return f"Error on data that were not fitted: {', '.join(chain)}; {of_noise(last, held.noise, unit)}."
 
 
 def of_noise(error: float, noise: float, unit: str) -> str:
@@ -82,11 +83,14 @@ def of_noise(error: float, noise: float, unit: str) -> str:
     return f"noise alone gives {noise:.3g} {unit}"
 
 
-def beside(findings: Sequence[Finding], left: str, held: HeldOutRmse, unit: str) -> str:
-    """What is known, those that are not the whole of it first, and then the sentence of what is left."""
-    most = [graded(f, unit) for f in findings if f.doubts]
+def beside(findings: Sequence[Finding], left: str, held: HeldOutRmse, unit: str, more: str) -> str:
+    """What is known, those that are not the whole of it first, and then the sentence of what is left.
+
+    `more`: what is in the model without a name.
+    """
+    most = [graded(f) for f in findings if f.doubts]
     sure = [f.statement for f in findings if not f.doubts]
-    named = [*most, *(["Left out:", *sure] if sure else []), together(findings, held, unit)]
+    named = [*most, *([MISSING, *sure] if sure else []), errors(findings, held, unit, more)]
     said = f"Beside that {left[:1].lower()}{left[1:]}" if findings else left
     return " ".join([*filter(None, named), said])
 
@@ -95,7 +99,9 @@ def unsettled(f: Finding) -> str:
     """It, and by name the rivals that would do as well; by form, where they are the same effect."""
     names = [r.effect if r.effect != f.effect else f"{r.effect} ({r.form})" for r in f.rivals]
     others = " or ".join(name.replace("_", " ") for name in names)
-    return f"{f.statement} In its place it may be {others}: these recordings cannot tell which."
+    return (
+        f"{f.statement} Instead of {f.effect.replace('_', ' ')} it may be {others}: these recordings cannot tell which."
+    )
 
 
 def to_settle(found: NextExperiment | None) -> str:
@@ -106,11 +112,11 @@ def to_settle(found: NextExperiment | None) -> str:
     if not found.steps:
         return f"No sweep settles it: {why}."
     seconds = sum(step.duration for step in found.steps)
-    return f"To settle it run the next experiment, {len(found.steps)} steps of {seconds:.0f} s together: it {why}."
+    return f"To settle it run the next experiment, {len(found.steps)} steps, {seconds:.0f} s in all: it {why}."
 
 
 def refused(candidates: Sequence[tuple[str, str]]) -> str:
     """What was tried for it, each (name, first check that it failed); the first few."""
     told = [f"{name.replace('_', ' ')} ({why})" for name, why in candidates[:MOST_REFUSED]]
     more = len(candidates) - len(told)
-    return f"Tried for it and refused: {'; '.join(told)}{f'; and {more} more' if more else ''}."
+    return f"Tried for it and refused: {'; '.join(told)}{f'; and {more} more, in the list below' if more else ''}."

@@ -18,7 +18,8 @@ LEAST = 0.5
 BY_WATER = 1.5
 """A propeller by itself has 2.0 to 2.1, by its Reynolds number: what is so far below is the drive."""
 REGULATED = (
-    "a drive that holds its torque (1) or its power (2/3) does so: rate and current recorded at ten levels show which"
+    "a drive that regulates torque makes it 1, one that regulates power 2/3: rate and current recorded at ten levels "
+    "show which"
 )
 
 

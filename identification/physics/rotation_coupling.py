@@ -44,8 +44,8 @@ class RotationCoupling:
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
-            "Rotation coupling: thrust follows the measured rotation rate (share "
-            f"{theta[0]:.2f}), which the command alone does not give; model it in n."
+            f"Rotation coupling: thrust follows the measured rotation rate n by {100 * theta[0]:.0f} %, where the "
+            "command alone does not tell it; model it in n."
         )
 
 

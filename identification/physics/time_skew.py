@@ -57,7 +57,8 @@ class TimeSkew:
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
             f"Time skew: the force arrives {1000 * abs(theta[0]):.3g} ms "
-            f"{'after' if theta[0] > 0 else 'before'} the command that causes it."
+            f"{'after' if theta[0] > 0 else 'before'} the command that causes it; a pulse on both channels "
+            "tells whether clocks or transport."
         )
 
 

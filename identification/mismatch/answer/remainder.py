@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from identification.mismatch import policy
+from identification.mismatch.answer.advice import what_to_do
 from identification.mismatch.locate.places import says, where_of
 from identification.mismatch.model.data import Data
 from identification.mismatch.unexplained import Remainder
@@ -28,11 +30,12 @@ def remainder_of(completed: Completed, data: Data, unseen: Sequence[History]) ->
     judged = next((g for g in left.groups if g.covariate.quantity == quantity), left.groups[0])
     where, share, table = where_of(judged, bare.fit, data, bare.weights)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.failed_checks)}" for n in unearned)
-    text = f"Something is left that no term of the catalogue carries: {says(where, share, judged.covariate.what)}"
+    place = says(where, share, judged.covariate.what)
+    text = f"Something is left that no term of the catalogue carries: {place}"
     if unearned and len(only_repairs(unearned)) == len(unearned):
         names = " or ".join(n.term.id.replace("_", " ") for n in unearned)
         text += f" It is mostly {names}: each explains nearly the same alone, and neither all of it."
-    elif unearned:
-        text += f" {refused([(n.term.id, n.failed_checks[0]) for n in unearned])}"
     found = Remainder(where, judged.share, left.p_value, table, text, resembles)
-    return with_flexible(found, flexible, data, unseen)
+    found = with_flexible(found, flexible, data, unseen)
+    tried = refused([(n.term.id, n.failed_checks[0]) for n in unearned]) if unearned and text.endswith(place) else ""
+    return replace(found, statement=" ".join(filter(None, [found.statement, what_to_do(quantity), tried])))

@@ -22,6 +22,11 @@ from identification.mismatch.select.forward_selection import Selected
 from identification.mismatch.value import Where
 from identification.recording import Floats
 
+SIDES = {
+    "direction": ("in reverse", "forward"),
+    "direction_of_change": ("where the driver falls", "where the driver rises"),
+}
+"""Covariates that are a sign: what is told of the negative and of the positive one."""
 ROUNDING = 1e-9
 """Of a covariate's reach: such an edge is 0."""
 
@@ -38,6 +43,10 @@ def where_of(
 
 def says(where: Where, share: float, what: str) -> str:
     """The sentence for such a place; `what` is how the baseline fails there."""
+    if where.quantity in SIDES:  # it has two values or three, and a stretch of it says nothing to a person
+        falling, rising = SIDES[where.quantity]
+        side = rising if where.low >= 0 else falling if where.high <= 0 else "both ways"
+        return f"{100 * share:.0f} % of the residual lies {side}: {what}."
     unit = "" if where.unit == "1" else f" {where.unit}"
     place = f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
     return f"{100 * share:.0f} % of the residual lies at {place}: {what}."

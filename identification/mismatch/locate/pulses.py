@@ -72,7 +72,7 @@ class Pulses:
     def statement(self) -> str:
         way = "more" if self.share > 0 else "less"
         size, length = 100 * abs(self.share), self.length
-        return f"{size:.2g} % {way} of the thrust for {length:.2g} s every {self.period:.4g} s"
+        return f"thrust is {size:.2g} % {way} for {length:.2g} s every {self.period:.4g} s"
 
 
 @dataclass(frozen=True, eq=False, slots=True)

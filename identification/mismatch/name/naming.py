@@ -41,18 +41,27 @@ def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check
 
     `many`: terms of the model, all of which are asked.
     """
+    at = _told(term, estimate.fit.values[term], data)
     ended, unseen = at_bound(term, estimate.fit, data, estimate.weights), _unseen(estimate.fit, term, data)
     elsewhere = contradiction(estimate.fit, term, estimate.noise, data)
     change = _raw_effect(estimate.fit, (term,), data)
     cancelled = _cancelled(estimate.fit, term, change, data)
     return (
-        Check("possible", "its values are possible", "it would take values that are not possible" if ended else ""),
+        Check(
+            "possible", "its values are possible", f"it would take values that are not possible: {at}" if ended else ""
+        ),
         Check("sampled", "the samples can show it", "it is faster than the samples can show" if unseen else ""),
         *((Check("clipping", CLIPPING, elsewhere),) if term.traits.limits else ()),
         *(Check("undone", "no other term undoes it", f"it and {other.id} nearly cancel") for other in cancelled),
         *(() if cancelled else (Check("undone", "no other term undoes it"),)),
         *_constancy(estimate, change, data, many),
     )
+
+
+def _told(term: Term, theta: Sequence[float], data: Data) -> str:
+    """Its values with names and units."""
+    told = zip(term.parameters(data.scale), theta, strict=True)
+    return ", ".join(f"{p.name.replace('_', ' ')} {v:.3g}{'' if p.unit == '1' else f' {p.unit}'}" for p, v in told)
 
 
 def _constancy(estimate: Estimate, change: list[Floats], data: Data, many: int) -> Iterator[Check]:
@@ -141,7 +150,9 @@ def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[
         ):
             share = 100 * (1 - max(adds) / together)
             for term, beside in ((one, other), (other, one)):
-                told = f"{beside.id} alone explains nearly the same ({share:.0f} % of what both do), and neither all"
+                told = (
+                    f"{beside.id.replace('_', ' ')} by itself does {share:.0f} % of what both do, and neither does all"
+                )
                 out[term] = (*out.get(term, ()), told)
     return out
 
@@ -185,10 +196,10 @@ def with_joint_checks(named: Sequence[Named], left: ResidualStructure | None, *,
             for q, g in clear.items()
             if q in names and g.statistic - g.dof > policy.name.OWN_COVARIATE_SHARE * n.chi2_gain
         ]
-        over = f"more is left over its own covariate, {own[0]}" if own else ""
+        over = f"what is left still goes with {own[0].replace('_', ' ')}" if own else ""
         curve = static_curve(n.term, measured=measured)
         any_curve = bool(curve) and shapes[curve] >= policy.name.CURVE_OF_ANY_SHAPE_TERMS
-        many = f"{shapes[curve]} shapes on one static curve make any curve" if any_curve else ""
+        many = f"{shapes[curve]} shapes on one static curve can draw any curve" if any_curve else ""
         own_shape = Check("own_covariate", "nothing is left over its own covariate", over)
         out.append(n.asked(own_shape, Check("any_curve", "few shapes on a curve", many)))
     return tuple(out)

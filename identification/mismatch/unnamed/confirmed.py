@@ -18,9 +18,9 @@ from identification.mismatch.validate.held_out import Score
 from identification.physics.term import Scale, Term
 
 ASKED = "the same beside a free shape as beside the terms without a name"
-BOUND = "beside a free shape in the place of what has no name it would take values that are not possible"
-OTHER = "beside a free shape in the place of what has no name its value is another"
-WORSE = "without the terms that have no name what was not fitted is predicted better without it too"
+BOUND = "without the other terms that were refused it would take values that are not possible"
+OTHER = "without the other terms that were refused its value is another"
+WORSE = "what was not fitted is predicted better without it"
 
 
 def not_standing(

@@ -141,12 +141,10 @@ def with_flexible(found: Remainder, extended: Extended | None, data: Data, other
         return found
     shapes = shapes_of(extended, data)
     over = " and ".join(dict.fromkeys(s.covariate for s in shapes))
-    if extended.held < extended.without:
-        how = f"takes the error on data that were not fitted from {extended.without:.4g} to {extended.held:.4g} N"
-    else:
-        names = " and ".join(t.id for t in extended.dropped)
-        how = f"predicts data that were not fitted about as well as {names} ({extended.held:.4g} N)"
-    says = f"A flexible term over {over} {how}."
+    names = " and ".join(t.id.replace("_", " ") for t in extended.dropped)
+    better = extended.held < extended.without
+    how = "carries it" if better or not names else f"predicts about as well as {names}, and claims less"
+    says = f"A flexible term over {over} (a curve of any shape, no physics) {how}."
     if extended.equals:
         says += f" Over {' or '.join(extended.equals)} it does about as well: this plan cannot tell them apart."
     return replace(

@@ -118,7 +118,7 @@ def test_at_one_speed_a_line_may_stay_or_go_with_the_rotor_and_both_are_told():
     assert rival["parameters"]["frequency"]["value"] == pytest.approx(finding["parameters"]["frequency"]["value"], 1e-3)
     assert finding["probability"] == pytest.approx(0.5, abs=0.4)
     assert said["verdict"] == "ambiguous"
-    assert "16.8 Hz. In its place it may be" in said["statement"]
+    assert "16.8 Hz. Instead of periodic disturbance it may be" in said["statement"]
     assert "(rotation)" in said["statement"]
     levels_ = {step["command_voltage"] for step in said["next_experiment"]["steps"]}
     assert len(levels_ - {0.0}) == 2

@@ -1,13 +1,18 @@
 """What a verdict's sentence says of rivals, of what would tell them, and of what was tried and refused."""
 
-from identification.mismatch.diagnosis import NextExperiment, PlanStep
-from identification.mismatch.verdict_clauses import refused, to_settle
+from dataclasses import replace
+
+from identification.mismatch.diagnosis import HeldOutRmse, NextExperiment, PlanStep
+from identification.mismatch.locate.places import says
+from identification.mismatch.value import Where
+from identification.mismatch.verdict_clauses import errors, refused, to_settle
+from tests.rig.diagnose.page.written_answers import LAGS
 
 
 def test_the_next_experiment_is_told_with_what_it_separates():
     steps = (PlanStep(5.4, 3.0), PlanStep(-5.4, 4.0))
     found = to_settle(NextExperiment("separates exponent from dead_band: levels of 5.4 V; exponent stays", steps, 0.9))
-    assert found.endswith("2 steps of 7 s together: it separates exponent from dead_band: levels of 5.4 V.")
+    assert found.endswith("2 steps, 7 s in all: it separates exponent from dead_band: levels of 5.4 V.")
 
 
 def test_where_no_sweep_settles_it_that_is_said():
@@ -26,4 +31,35 @@ def test_each_name_that_was_refused_has_its_own_reason():
         ("x", "y"),
     ]
     assert refused(tried[:1]) == "Tried for it and refused: dead band (too wide)."
-    assert refused(tried).endswith("dead band (too wide); exponent (two values); heating (no); and 2 more.")
+    assert refused(tried).endswith(
+        "dead band (too wide); exponent (two values); heating (no); and 2 more, in the list below."
+    )
+
+
+HELD = HeldOutRmse(24.5, 0.457, 0.305, "every fourth of the levels")
+BENT = replace(LAGS, heldout=(25.2, 1.47), share=1.0)
+
+
+def test_errors_on_what_was_not_fitted_are_one_chain():
+    """An engineer had five figures for one recording, and none of them said which was his."""
+    told = errors([BENT, BENT], HELD, "N", "a free curve, which is no physics")
+    assert told == (
+        "Error on data that were not fitted: 24.5 N before, 1.47 N with these, 0.457 N with a free curve, which is no "
+        "physics; noise alone gives 0.305 N."
+    )
+    assert errors([BENT], HELD, "N").startswith("Error on data that were not fitted: 24.5 N before, 1.47 N with it; ")
+    assert ": 24.5 N before, 0.457 N with a curve; " in errors([], HELD, "N", "a curve")
+
+
+def test_names_that_do_no_better_have_no_chain():
+    assert errors([replace(BENT, heldout=(24.5, 24.6))], HELD, "N") == ""
+
+
+def test_a_covariate_that_is_a_sign_is_told_as_a_side():
+    rising = Where("direction_of_change", 0.5, 1.5, "1")
+    assert says(rising, 0.94, "up and down differ") == (
+        "94 % of the residual lies where the driver rises: up and down differ."
+    )
+    assert "lies in reverse:" in says(Where("direction", -1.5, -0.5, "1"), 0.5, "the two directions differ")
+    assert "lies both ways:" in says(Where("direction", -1.5, 1.5, "1"), 0.5, "the two directions differ")
+    assert "at command_voltage -0.5 to 1 V:" in says(Where("command_voltage", -0.5, 1.0, "V"), 0.7, "it is bent")

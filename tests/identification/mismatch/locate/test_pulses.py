@@ -43,7 +43,7 @@ def test_period_length_and_share_are_found(losses):
     assert found.length == pytest.approx(LENGTH, abs=0.6)
     assert found.share == pytest.approx(-SHARE, rel=0.25)
     assert found.begin % PERIOD == pytest.approx(PERIOD - LENGTH, abs=1.5)
-    assert found.statement.split()[:3] == [f"{-100 * found.share:.2g}", "%", "less"]
+    assert found.statement.split()[2:5] == [f"{-100 * found.share:.2g}", "%", "less"]
 
 
 def test_white_residuals_show_none(losses):
@@ -66,7 +66,7 @@ def test_they_are_located_in_time_and_followed_by_a_spline_that_begins_anew(loss
     found = diagnose([losses])
     assert isinstance(found, Diagnosis)
     assert (found.verdict, found.unexplained.where.quantity) == ("unexplained", "time")
-    assert "less of the thrust for" in found.unexplained.statement
+    assert "% less for" in found.unexplained.statement
     assert found.mismatch[0].where.quantity == "time"
     (shape,) = found.unexplained.flexible
     assert shape.period == pytest.approx(PERIOD, abs=0.2)
