@@ -88,11 +88,12 @@ def beside(findings: Sequence[Finding], left: str, held: HeldOutRmse, unit: str,
 
     `more`: what is in the model without a name.
     """
+    if not findings:
+        return f"{left} {errors(findings, held, unit, more)}".rstrip()
     most = [graded(f) for f in findings if f.doubts]
     sure = [f.statement for f in findings if not f.doubts]
     named = [*most, *([MISSING, *sure] if sure else []), errors(findings, held, unit, more)]
-    said = f"Beside that {left[:1].lower()}{left[1:]}" if findings else left
-    return " ".join([*filter(None, named), said])
+    return " ".join([*filter(None, named), f"Beside that {left[:1].lower()}{left[1:]}"])
 
 
 def unsettled(f: Finding) -> str:

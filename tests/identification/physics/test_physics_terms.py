@@ -201,7 +201,7 @@ def test_the_engine_names_no_effect():
 
 def test_an_exponent_far_below_a_propellers_says_what_the_drive_may_hold():
     exponent = term("exponent")
-    assert "a drive that holds" in exponent.statement((0.65,), S)
+    assert "a drive that regulates torque" in exponent.statement((0.65,), S)
     assert "drive" not in exponent.statement((1.9,), S)
     assert "drive" not in exponent.statement((0.65,), replace(S, driver_unit="rev/s")), "a measured rate has none"
 
