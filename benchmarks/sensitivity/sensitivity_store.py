@@ -8,9 +8,10 @@ comment, a docstring, a reason of a threshold, or another part of the repository
 from __future__ import annotations
 
 import ast
+import gzip
 import json
 import sys
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -55,20 +56,24 @@ def line(case: str, code: str, rows: Mapping[str, Row], base: str, seconds: Mapp
 
 
 def known(path: Path, versions: Collection[str]) -> dict[str, dict[str, Row]]:
-    """Case -> setting -> answer, by these versions; a line that was broken off is none, of two the later counts."""
+    """Case -> setting -> answer, by these versions; of two the later counts."""
     found: dict[str, dict[str, Row]] = {}
-    for text in path.read_text(encoding="utf-8").splitlines() if path.exists() else ():
-        if not text.endswith("}"):
-            continue
-        row = json.loads(text)
+    for row in rows_of(path):
         if row["version"] in versions:
             rows = {each: row["at"] | row["otherwise"].get(each, {}) for each in row["settings"]}
             found.setdefault(row["case"], {}).update(rows)
     return found
 
 
+def rows_of(path: Path) -> list[Row]:
+    """What is in the file, packed by gzip or not; a line that was broken off is none."""
+    if not path.exists():
+        return []
+    packed = path.read_bytes()
+    text = (gzip.decompress(packed) if path.suffix == ".gz" else packed).decode("utf-8")
+    return [json.loads(each) for each in text.splitlines() if each.endswith("}")]
+
+
 def costs(path: Path, versions: Collection[str]) -> list[float]:
     """s of CPU of each case."""
-    lines: Sequence[str] = path.read_text(encoding="utf-8").splitlines() if path.exists() else ()
-    rows = [json.loads(text) for text in lines if text.endswith("}")]
-    return [sum(row["cpu"].values()) for row in rows if row["version"] in versions]
+    return [sum(row["cpu"].values()) for row in rows_of(path) if row["version"] in versions]

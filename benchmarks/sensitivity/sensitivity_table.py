@@ -14,7 +14,7 @@ from pathlib import Path
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from sensitivity_set import cases
 from sensitivity_settings import ASKED, AT_VALUE, Setting, settings
-from sensitivity_store import Row, costs, known, version
+from sensitivity_store import Row, costs, known, rows_of, version
 
 from identification.mismatch import policy
 from rig.blind.scoring.score import LOCATED, OPEN_CELLS
@@ -122,7 +122,8 @@ def main(arguments: Sequence[str]) -> None:
     answers = {case: rows for case, rows in known(asked.out, versions).items() if rows}  # some could not be drawn
     if not answers:
         raise SystemExit(f"{asked.out} holds no case by version {', '.join(versions)}; work some out")
-    told = text(answers, costs(asked.out, versions), " and ".join(versions))
+    answered = {row["version"] for row in rows_of(asked.out)}
+    told = text(answers, costs(asked.out, versions), " and ".join(v for v in versions if v in answered))
     if asked.page:
         put(PAGE, told)
     else:
