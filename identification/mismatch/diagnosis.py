@@ -255,8 +255,16 @@ class Diagnosis:
                 told = [f.statement for f in findings if not f.rivals] + [unsettled(f) for f in findings if f.rivals]
                 return f"{self._left_out(told)} {to_settle(self.next_experiment)}"
             case Unexplained(findings, remainder):
-                more = "a free curve, which is no physics" if remainder.flexible else "terms that have no name"
-                return beside(findings, remainder.statement, self.heldout, self.unit, more)
+                return beside(findings, remainder.statement, self.heldout, self.unit, self._nameless)
+
+    @property
+    def _nameless(self) -> str:
+        """What is in the model beside names; empty where nothing is."""
+        if self.unexplained is not None and self.unexplained.flexible:
+            return "a free curve, which is no physics"
+        named = {f.effect for f in self.findings}
+        of_twin = {parameter.partition(".")[0] for parameter in self.baseline}
+        return "terms that have no name" if set(self.model_terms) - named - of_twin else ""
 
     def _left_out(self, told: Sequence[str]) -> str:
         """Of the findings, each told, and what they do together."""

@@ -60,16 +60,18 @@ def graded(f: Finding) -> str:
 
 
 def errors(findings: Sequence[Finding], held: HeldOutRmse, unit: str, more: str = "") -> str:
-    """The errors on what was not fitted in one chain: of the baseline, with the names, with `more` that is in the
-    model; empty where it has nothing but names, and they do no better."""
-    named = next((f.heldout[1] for f in findings if f.heldout is not None), held.after) if findings else held.before
-    last = min(named, held.after) if more else named
-    if last >= held.before:
+    """The errors on what was not fitted in one chain that ends with that of the model which is told: of the baseline,
+    with the names, and with `more` where the model has anything but names; empty where it does no better.
+    """
+    if held.after >= held.before:
         return ""
+    names = next((f.heldout[1] for f in findings if f.heldout is not None), None) if more else held.after
     chain = [f"{held.before:.3g} {unit} before"]
-    chain += [f"{named:.3g} {unit} with {'it' if len(findings) == 1 else 'these'}"] if named < held.before else []
-    chain += [f"{last:.3g} {unit} with {more}"] if last < named else []
-    return f"Error on data that were not fitted: {', '.join(chain)}; {of_noise(last, held.noise, unit)}."
+    if findings and names is not None:
+        chain.append(f"{names:.3g} {unit} with {'it' if len(findings) == 1 else 'these'}")
+    if more:
+        chain.append(f"{held.after:.3g} {unit} with {more}")
+    return f"Error on data that were not fitted: {', '.join(chain)}; {of_noise(held.after, held.noise, unit)}."
 
 
 def of_noise(error: float, noise: float, unit: str) -> str:

@@ -30,12 +30,12 @@ def remainder_of(completed: Completed, data: Data, unseen: Sequence[History]) ->
     judged = next((g for g in left.groups if g.covariate.quantity == quantity), left.groups[0])
     where, share, table = where_of(judged, bare.fit, data, bare.weights)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.failed_checks)}" for n in unearned)
-    place = says(where, share, judged.covariate.what)
-    text = f"Something is left that no term of the catalogue carries: {place}"
-    if unearned and len(only_repairs(unearned)) == len(unearned):
+    text = f"Something is left that no term of the catalogue carries: {says(where, share, judged.covariate.what)}"
+    repairs = bool(unearned) and len(only_repairs(unearned)) == len(unearned)
+    if repairs:
         names = " or ".join(n.term.id.replace("_", " ") for n in unearned)
         text += f" It is mostly {names}: each explains nearly the same alone, and neither all of it."
     found = Remainder(where, judged.share, left.p_value, table, text, resembles)
     found = with_flexible(found, flexible, data, unseen)
-    tried = refused([(n.term.id, n.failed_checks[0]) for n in unearned]) if unearned and text.endswith(place) else ""
+    tried = refused([(n.term.id, n.failed_checks[0]) for n in unearned]) if unearned and not repairs else ""
     return replace(found, statement=" ".join(filter(None, [found.statement, what_to_do(quantity), tried])))

@@ -191,8 +191,8 @@ def _by_names(
     data, before, now = selected.data, selected.before, located.estimate
     after = predicting(now, split, data, selected.terms, told.nameless, unseen)
     if told.earned and told.refused and not predicts(after, before, data, unseen):
-        refuted = Check("predicts", "predicts better than the baseline", ALONE)
-        unearned = (*told.unearned, *(n.asked(refuted) for n in told.earned))
+        worse = Check("predicts", "predicts better than the baseline", ALONE)
+        unearned = (*told.unearned, *(n.asked(worse) for n in told.earned))
         without = _without(now, data, unearned, rng)
         told = _Told((), unearned, _Without(now, located.left) if without.nothing else without, told.gone)
         after = before

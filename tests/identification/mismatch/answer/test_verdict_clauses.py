@@ -6,7 +6,7 @@ from identification.mismatch.diagnosis import HeldOutRmse, NextExperiment, PlanS
 from identification.mismatch.locate.places import says
 from identification.mismatch.value import Where
 from identification.mismatch.verdict_clauses import errors, refused, to_settle
-from tests.rig.diagnose.page.written_answers import LAGS
+from tests.identification.mismatch.answer.answered import finding
 
 
 def test_the_next_experiment_is_told_with_what_it_separates():
@@ -37,7 +37,7 @@ def test_each_name_that_was_refused_has_its_own_reason():
 
 
 HELD = HeldOutRmse(24.5, 0.457, 0.305, "every fourth of the levels")
-BENT = replace(LAGS, heldout=(25.2, 1.47), share=1.0)
+BENT = replace(finding(), heldout=(25.2, 1.47), share=1.0)
 
 
 def test_errors_on_what_was_not_fitted_are_one_chain():
@@ -47,12 +47,19 @@ def test_errors_on_what_was_not_fitted_are_one_chain():
         "Error on data that were not fitted: 24.5 N before, 1.47 N with these, 0.457 N with a free curve, which is no "
         "physics; noise alone gives 0.305 N."
     )
-    assert errors([BENT], HELD, "N").startswith("Error on data that were not fitted: 24.5 N before, 1.47 N with it; ")
     assert ": 24.5 N before, 0.457 N with a curve; " in errors([], HELD, "N", "a curve")
 
 
-def test_names_that_do_no_better_have_no_chain():
-    assert errors([replace(BENT, heldout=(24.5, 24.6))], HELD, "N") == ""
+def test_the_chain_ends_with_the_error_of_the_model_that_is_told():
+    """With names alone it is theirs, whatever they did beside terms that have gone; with more it is told, too, where
+    it is worse than the names by themselves."""
+    assert ": 24.5 N before, 0.457 N with it; " in errors([BENT], HELD, "N")
+    worse = replace(BENT, heldout=(24.5, 0.3))
+    assert ": 24.5 N before, 0.3 N with it, 0.457 N with terms; " in errors([worse], HELD, "N", "terms")
+
+
+def test_a_model_that_does_no_better_has_no_chain():
+    assert errors([BENT], replace(HELD, after=24.6), "N") == ""
 
 
 def test_a_covariate_that_is_a_sign_is_told_as_a_side():
