@@ -9,7 +9,15 @@ from typing import ClassVar, Literal
 from identification.mismatch import policy
 from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Value, Where
-from identification.mismatch.verdict_clauses import MISSING, beside, errors, to_settle, unsettled
+from identification.mismatch.verdict_clauses import (
+    beside,
+    errors,
+    in_part,
+    missing,
+    named_share,
+    to_settle,
+    unsettled,
+)
 from identification.recording import Floats
 from identification.twin import Twin
 
@@ -65,6 +73,8 @@ class Finding:
     """Of a channel fault, quantities: the one that lies, and the one that it was exchanged with."""
     recording: str = ""
     """Of a channel fault, the id of the recording that it is in."""
+    in_measurement: bool = False
+    """Whether it is of the stand, the cell or a channel: what is measured has it, the thruster's thrust has not."""
     since: Literal["", "changed", "not shown before"] = ""
     """Beside a twin: new since its own recordings, or nothing that those could have shown; empty: nobody asked."""
 
@@ -250,12 +260,28 @@ class Diagnosis:
             case Adequate():
                 return f"Nothing is missing: {self.baseline_model} describes these recordings within their noise."
             case Explained(findings):
-                return self._left_out([f.statement for f in findings])
+                return self._left_out([(f, f.statement) for f in findings])
             case Ambiguous(findings):
-                told = [f.statement for f in findings if not f.rivals] + [unsettled(f) for f in findings if f.rivals]
+                told = [(f, f.statement) for f in findings if not f.rivals]
+                told += [(f, unsettled(f)) for f in findings if f.rivals]
                 return f"{self._left_out(told)} {to_settle(self.next_experiment)}"
             case Unexplained(findings, remainder):
                 return beside(findings, remainder.statement, self.heldout, self.unit, self._nameless)
+
+    @property
+    def named_share(self) -> float | None:
+        """Of the rms error beyond the noise that the baseline has on what was not fitted, how much is gone with the
+        names, 0 to 1; None where nothing is named, or there is no error beyond the noise.
+        """
+        return named_share(self.findings, self.heldout, self._nameless)
+
+    @property
+    def headline(self) -> str:
+        """The verdict for people: unexplained where nothing is known is not the same as where nearly all is."""
+        share = self.named_share
+        if self.unexplained is None or self.unexplained.unpredictive or share is None:
+            return self.verdict
+        return in_part(share) if share >= policy.answer.LEAST_SHARE_TOLD else self.verdict
 
     @property
     def _nameless(self) -> str:
@@ -266,6 +292,6 @@ class Diagnosis:
         of_twin = {parameter.partition(".")[0] for parameter in self.baseline}
         return "terms that have no name" if set(self.model_terms) - named - of_twin else ""
 
-    def _left_out(self, told: Sequence[str]) -> str:
+    def _left_out(self, told: Sequence[tuple[Finding, str]]) -> str:
         """Of the findings, each told, and what they do together."""
-        return " ".join([MISSING, *told, errors(self.findings, self.heldout, self.unit)]).rstrip()
+        return " ".join([*missing(told), errors(self.findings, self.heldout, self.unit)]).rstrip()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import isfinite, sqrt
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -13,6 +14,7 @@ NOT_WHITE = (
     "should"
 )
 MISSING = "Missing from the model:"
+IN_MEASUREMENT = "In the measurement, not in the thruster:"
 MOST_REFUSED = 3
 """Names in a sentence: all of them are in the answer."""
 
@@ -59,13 +61,56 @@ def graded(f: Finding) -> str:
     )
 
 
+def missing(told: Sequence[tuple[Finding, str]]) -> list[str]:
+    """Findings as they are told: those of the thruster first, and apart those of the stand, the cell and channels."""
+    of_thruster = [text for f, text in told if not f.in_measurement]
+    of_measurement = [text for f, text in told if f.in_measurement]
+    first = [MISSING, *of_thruster] if of_thruster else []
+    return [*first, *([IN_MEASUREMENT, *of_measurement] if of_measurement else [])]
+
+
+def beyond_noise(error: float, noise: float) -> float:
+    """A model's own part of an rms error; noise and model error are independent.
+
+    >>> beyond_noise(5.0, 4.0), beyond_noise(0.3, 0.4)
+    (3.0, 0.0)
+    """
+    return sqrt(max(error**2 - noise**2, 0.0))
+
+
+def with_names(findings: Sequence[Finding], held: HeldOutRmse, more: str) -> float | None:
+    """RMSE on what was not fitted of the model with its names alone; `more`: what else is in it. None: not known."""
+    if not more:
+        return held.after
+    return next((f.heldout[1] for f in findings if f.heldout is not None), None)
+
+
+def named_share(findings: Sequence[Finding], held: HeldOutRmse, more: str) -> float | None:
+    """Of the rms error beyond the noise that the baseline has on what was not fitted, how much is gone with the names,
+    0 to 1; None where nothing is named, or there is no error beyond the noise.
+    """
+    names = with_names(findings, held, more) if findings else None
+    if names is None or not isfinite(held.noise) or not held.before > held.noise:
+        return None
+    return max(1 - beyond_noise(names, held.noise) / beyond_noise(held.before, held.noise), 0.0)
+
+
+def in_part(share: float) -> str:
+    """A headline where a part has names.
+
+    >>> in_part(0.973)
+    'unexplained in part: what has a name takes off 97 % of the error'
+    """
+    return f"unexplained in part: what has a name takes off {_percent(share)} of the error"
+
+
 def errors(findings: Sequence[Finding], held: HeldOutRmse, unit: str, more: str = "") -> str:
     """The errors on what was not fitted in one chain that ends with that of the model which is told: of the baseline,
     with the names, and with `more` where the model has anything but names; empty where it does no better.
     """
     if held.after >= held.before:
         return ""
-    names = next((f.heldout[1] for f in findings if f.heldout is not None), None) if more else held.after
+    names = with_names(findings, held, more)
     chain = [f"{held.before:.3g} {unit} before"]
     if findings and names is not None:
         chain.append(f"{names:.3g} {unit} with {'it' if len(findings) == 1 else 'these'}")
@@ -93,8 +138,8 @@ def beside(findings: Sequence[Finding], left: str, held: HeldOutRmse, unit: str,
     if not findings:
         return f"{left} {errors(findings, held, unit, more)}".rstrip()
     most = [graded(f) for f in findings if f.doubts]
-    sure = [f.statement for f in findings if not f.doubts]
-    named = [*most, *([MISSING, *sure] if sure else []), errors(findings, held, unit, more)]
+    sure = [(f, f.statement) for f in findings if not f.doubts]
+    named = [*most, *missing(sure), errors(findings, held, unit, more)]
     return " ".join([*filter(None, named), f"Beside that {left[:1].lower()}{left[1:]}"])
 
 

@@ -20,6 +20,8 @@ THERMOMETER = "motor_temperature"
 """The channel of the motor's temperature."""
 KELVIN = 273.15
 """At 0 degC."""
+MEASURED: tuple[Stage, ...] = ("stand", "cell")
+"""Stages behind the thruster: what acts there changes what is measured, and no vehicle has it."""
 STAGES: tuple[Stage, ...] = ("command", "rotor", "hydro", "stand", "cell")
 
 

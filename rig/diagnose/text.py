@@ -19,7 +19,7 @@ BAR = 24
 
 def diagnosis_text(d: Diagnosis) -> str:
     """Everything that a person needs to act."""
-    lines = [*_para(f"{d.thruster or 'This thruster'}: {d.verdict}. {d.statement}"), ""]
+    lines = [*_para(f"{d.thruster or 'This thruster'}: {d.headline}. {d.statement}"), ""]
     lines += _where(d)
     lines += _findings(d)
     if d.unexplained is not None:
@@ -96,7 +96,7 @@ def _findings(d: Diagnosis) -> Iterator[str]:
 
 def _finding(f: Finding) -> Iterator[str]:
     form = f" ({f.form.replace('_', ' ')})" if f.form else ""
-    yield f"{f.effect}{form}"
+    yield f"{f.effect}{form}{', in the measurement, not in the thruster' if f.in_measurement else ''}"
     yield from _para(f.statement, "  ")
     if f.parameters:
         yield from _para(_values({v.told or name: v for name, v in f.parameters.items()}), "  ")

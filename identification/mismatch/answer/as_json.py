@@ -19,6 +19,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, object]:
         "thruster": d.thruster,
         "response": {"quantity": d.response, "unit": d.unit, "force_unit": d.force_unit},
         "verdict": d.verdict,
+        "headline": d.headline,
         "statement": d.statement,
         "baseline": {"model": d.baseline_model, "parameters": _values(d.baseline)},
         "mismatch": [
@@ -45,6 +46,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, object]:
             },
             "chi2_per_dof": _number(d.chi2_per_dof),
             "whiteness_p": _number(d.whiteness_p),
+            "named_share": None if d.named_share is None else _number(d.named_share),
         },
         "next_experiment": None if d.next_experiment is None else _next_experiment(d.next_experiment),
         "notes": list(d.notes),
@@ -86,6 +88,7 @@ def _finding(f: Finding) -> dict[str, object]:
         "asked": f.asked,
         "share": None if f.share is None else _number(f.share),
         "grade": f.grade,
+        "in_measurement": f.in_measurement,
         "heldout": None
         if f.heldout is None
         else {"rmse_without": _number(f.heldout[0]), "rmse_with": _number(f.heldout[1])},

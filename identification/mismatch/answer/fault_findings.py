@@ -33,6 +33,7 @@ def fault_finding(fault: Fault) -> Finding:
         searched=None,
         channels=channels,
         recording=fault.recording_id,
+        in_measurement=True,
     )
 
 

@@ -64,6 +64,7 @@ def line_finding(line: Line) -> Finding:
         *(EFFECT, line.kind, line.statement, values, p, line.gain, probability, rivals),
         searched=line.searched,
         asked=asked,
+        in_measurement=line.kind != "rotation",
     )
 
 

@@ -34,7 +34,7 @@ from identification.mismatch.unnamed.stage import Completed
 from identification.mismatch.validate.each_run import run_differences
 from identification.mismatch.validate.held_out import rmse
 from identification.mismatch.validate.stage import score
-from identification.physics.term import Term
+from identification.physics.term import MEASURED, Term
 from identification.recording import Recording
 from identification.run_history.history import History
 from identification.twin import Twin
@@ -174,7 +174,7 @@ def _findings(completed: Completed, data: Data) -> dict[Term, Finding]:
     apart = run_differences(completed.after, data, inside)
     out = {}
     for n in completed.earned:
-        found = finding_of(n, data.scale, completed.intervals)
+        found = replace(finding_of(n, data.scale, completed.intervals), in_measurement=n.term.stage in MEASURED)
         said = apart.get(n.term)
         out[n.term] = found if said is None else replace(found, statement=f"{found.statement} {said.statement}")
     return out

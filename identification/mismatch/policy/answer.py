@@ -36,6 +36,14 @@ SURE_SIGMA = Threshold(
         "less sure than that tell nothing of it."
     ),
 )
+LEAST_SHARE_TOLD = Threshold(
+    0.05,
+    unit="share of the error beyond the noise",
+    reason=(
+        "An answer that leaves something unexplained says in its headline how much of the error has names, unless it "
+        "is so little that it is none of what a reader would act on."
+    ),
+)
 LINE_KNOWN_SIGMA = Threshold(
     4.0,
     unit="sigma",

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import isfinite, sqrt
+from math import isfinite
 from pathlib import Path
 
 from identification.mismatch.compare.reported_runs import Run, runs_of
 from identification.mismatch.diagnosis import Diagnosis, NextExperiment
 from identification.mismatch.value import Value
-from identification.mismatch.verdict_clauses import NOT_WHITE
+from identification.mismatch.verdict_clauses import NOT_WHITE, beyond_noise
 from identification.recording import Recording
 from rig.diagnose.recording_names import NO_NAMES, told_by_name
 from rig.diagnose.report.flexible import flexible_pictures, modelled_remarks
@@ -67,12 +67,12 @@ def diagnosis_page(
         *notes_section(d),
         provenance_section(diagnosis, names),
     )
-    return Page(f"Diagnosis of {d.thruster or 'a thruster'}: {d.verdict}", words(d.statement), sections, contents=True)
+    return Page(f"Diagnosis of {d.thruster or 'a thruster'}: {d.headline}", words(d.statement), sections, contents=True)
 
 
 def short(d: Diagnosis) -> Iterator[Remark]:
     """Verdict, error on what was not fitted, what next."""
-    yield UNPREDICTIVE if d.unexplained is not None and d.unexplained.unpredictive else VERDICTS[d.verdict]
+    yield _verdict(d)
     held = d.heldout
     if isfinite(held.before) and isfinite(held.after):
         better = "" if held.after >= held.before else f", {_change(held.before, held.after)} less"
@@ -85,6 +85,14 @@ def short(d: Diagnosis) -> Iterator[Remark]:
         total = sum(step.duration for step in d.next_experiment.steps)
         first = _clauses(d.next_experiment.why)[0]
         yield Remark(f"Next: a sweep of {total:.0f} s, expected power {d.next_experiment.expected_power:.2f}. {first}")
+
+
+def _verdict(d: Diagnosis) -> Remark:
+    if d.unexplained is not None and d.unexplained.unpredictive:
+        return UNPREDICTIVE
+    if d.headline == d.verdict:
+        return VERDICTS[d.verdict]
+    return Remark(f"{d.headline[:1].upper()}{d.headline[1:]}; what is left nothing in the catalogue carries.", "doubt")
 
 
 def _clauses(text: str) -> list[str]:
@@ -103,15 +111,6 @@ def _change(before: float, after: float) -> str:
         return "–"
     share = 100 * (1 - after / before)
     return (f"{share:.0f} %" if abs(share) >= 10 else f"{share:.2g} %").replace("-", "−")
-
-
-def _beyond(error: float, noise: float) -> float:
-    """The model's own part of an RMSE, in N; noise and model error are independent.
-
-    >>> _beyond(5.0, 4.0), _beyond(0.3, 0.4)
-    (3.0, 0.0)
-    """
-    return sqrt(max(error**2 - noise**2, 0.0))
 
 
 def where_section(d: Diagnosis, runs: Sequence[Run]) -> Section:
@@ -164,7 +163,7 @@ def after_table(d: Diagnosis) -> tuple[Table, Sentences]:
     ]
     rows: list[tuple[str, ...]] = [(name, f"{a:.4g}", f"{b:.4g}", floor, _change(a, b)) for name, a, b, floor in listed]
     if known and max(held.before, held.after) > held.noise:
-        own = [_beyond(x, held.noise) for x in (held.before, held.after)]
+        own = [beyond_noise(x, held.noise) for x in (held.before, held.after)]
         told = ["within noise" if x == 0 else f"{x:.3g}" for x in own]
         rows.append(("not fitted, noise taken out", *told, "", _change(*own) if own[1] > 0 else ""))
     white = "white" if d.white else "not white"

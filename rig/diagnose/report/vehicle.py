@@ -54,7 +54,7 @@ def vehicle_page(diagnosis: Diagnosis, names: Mapping[str, str] = NO_NAMES) -> P
         *notes_section(d),
         provenance_section(diagnosis, names),
     )
-    return Page(f"Diagnosis of {d.thruster or 'a vehicle'}: {d.verdict}", words(d.statement), sections, contents=True)
+    return Page(f"Diagnosis of {d.thruster or 'a vehicle'}: {d.headline}", words(d.statement), sections, contents=True)
 
 
 def where_section(d: Diagnosis) -> Section:

@@ -2,11 +2,23 @@
 
 from dataclasses import replace
 
-from identification.mismatch.diagnosis import HeldOutRmse, NextExperiment, PlanStep
+import pytest
+
+from identification.mismatch.diagnosis import (
+    Adequate,
+    Diagnosis,
+    Explained,
+    HeldOutRmse,
+    NextExperiment,
+    PlanStep,
+    Rmse,
+    Unexplained,
+)
 from identification.mismatch.locate.places import says
+from identification.mismatch.unexplained import FlexibleShape
 from identification.mismatch.value import Where
-from identification.mismatch.verdict_clauses import errors, refused, to_settle
-from tests.identification.mismatch.answer.answered import finding
+from identification.mismatch.verdict_clauses import errors, missing, named_share, refused, to_settle
+from tests.identification.mismatch.answer.answered import LEFT, finding
 
 
 def test_the_next_experiment_is_told_with_what_it_separates():
@@ -70,3 +82,65 @@ def test_a_covariate_that_is_a_sign_is_told_as_a_side():
     assert "lies in reverse:" in says(Where("direction", -1.5, -0.5, "1"), 0.5, "the two directions differ")
     assert "lies both ways:" in says(Where("direction", -1.5, 1.5, "1"), 0.5, "the two directions differ")
     assert "at command_voltage -0.5 to 1 V:" in says(Where("command_voltage", -0.5, 1.0, "V"), 0.7, "it is bent")
+
+
+BAND = finding()
+CREEP = replace(finding("load_cell_creep", statement="Creep."), in_measurement=True)
+
+
+def test_what_the_stand_adds_stands_apart_from_the_thruster():
+    told = [(CREEP, "Creep."), (BAND, "Dead band.")]
+    assert missing(told) == [
+        "Missing from the model:",
+        "Dead band.",
+        "In the measurement, not in the thruster:",
+        "Creep.",
+    ]
+    assert missing(told[:1]) == ["In the measurement, not in the thruster:", "Creep."]
+    assert missing(told[1:]) == ["Missing from the model:", "Dead band."]
+
+
+def test_the_share_that_has_names_is_of_the_error_beyond_the_noise():
+    """sqrt(24.5^2 - 0.305^2) = 24.498 before, sqrt(1.47^2 - 0.305^2) = 1.438 with the names: 94.13 % is gone."""
+    assert named_share([BENT], HELD, "a free curve") == pytest.approx(0.9413, abs=1e-4)
+    assert named_share([BENT], HELD, "") == pytest.approx(0.9861, abs=1e-4)
+    assert named_share([BENT], replace(HELD, after=0.2), "") == 1.0
+
+
+def test_no_share_is_told_where_nothing_is_named_or_nothing_was_wrong():
+    assert named_share([], HELD, "") is None
+    assert named_share([finding()], HELD, "a free curve") is None
+    assert named_share([BENT], replace(HELD, before=0.3), "") is None
+    assert named_share([replace(BENT, heldout=(25.0, 30.0))], HELD, "a free curve") == 0.0
+
+
+@pytest.mark.parametrize(
+    ("findings", "headline"),
+    [
+        ((), "unexplained"),
+        ((BENT,), "unexplained in part: what has a name takes off 94 % of the error"),
+        ((replace(BENT, heldout=(24.5, 24.0)),), "unexplained"),
+    ],
+)
+def test_the_headline_tells_how_much_has_names(findings, headline):
+    left = replace(LEFT, flexible=(FREE,))
+    d = diagnosis(Unexplained(findings, left, None), HELD)
+    assert (d.verdict, d.headline) == ("unexplained", headline)
+    assert diagnosis(Unexplained(findings, replace(left, unpredictive=True), None), HELD).headline == "unexplained"
+
+
+def test_a_verdict_that_leaves_nothing_is_its_own_headline():
+    assert diagnosis(Explained((BENT,)), HELD).headline == "explained"
+    assert diagnosis(Adequate(), HELD).headline == "adequate"
+
+
+FREE = FlexibleShape("thrust", "N", (0.0, 1.0), 3, 0.0, 0.0, {}, (), "A free curve.")
+
+
+def diagnosis(answer, held):
+    return Diagnosis(
+        *(("r",), "T1", answer, "C V|V|", {}, (), (), {}, Rmse(1.0, 0.5)),
+        heldout=held,
+        chi2_per_dof=1.0,
+        whiteness_p=0.5,
+    )
