@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -26,6 +27,7 @@ from identification.thruster.thrust_data import gain_std, voltage_at
 from identification.thruster.thrust_forms import FORMS, Form, Model
 from rig.errors import RecordingError
 from rig.hdf5 import load
+from rig.hdf5.apart import apart, open_no_more
 from rig.hdf5.blocks import LongChannel, long_channels
 
 LONG = 200_000
@@ -79,9 +81,13 @@ def thrust_rows(paths: Sequence[Path]) -> int:
     for path in paths:
         thrust = load(path, rows=0).first_of("thrust")
         if thrust is not None:
-            with long_channels(path, thrust) as (found,):
-                total += found.rows
+            total += apart(partial(_row_count, path, thrust), path)
     return total
+
+
+def _row_count(path: Path, channel: Channel) -> int:
+    with long_channels(path, channel) as (found,):
+        return found.rows
 
 
 def fit_one_pass(paths: Sequence[Path], model: Model = "C V|V|", against: str = FALLBACK[0]) -> tuple[OnePass, ...]:
@@ -117,8 +123,12 @@ def _prepared(path: Path, against: str) -> Pass:
 
 
 def _has_numbers(path: Path, channel: Channel) -> bool:
-    with long_channels(path, channel) as (found,):
-        return any(bool(np.any(np.isfinite(value))) for _, value in found.blocks())
+    def looked() -> bool:
+        with long_channels(path, channel) as (found,):
+            open_no_more()
+            return any(bool(np.any(np.isfinite(value))) for _, value in found.blocks())
+
+    return apart(looked, path)
 
 
 def _rows(run: Pass, form: Form, time: Floats, thrust: Floats, source: Channel) -> tuple[Floats, Floats, int]:
@@ -180,11 +190,14 @@ def _sample(run: Pass, form: Form, thrust: LongChannel, source: LongChannel) -> 
     return np.vstack([empty, *(H for H, _, _ in parts)]), np.concatenate([np.empty(0), *(y for _, y, _ in parts)])
 
 
-def _condensed(run: Pass, form: Form) -> Condensed:
+def _gathered(run: Pass, form: Form) -> Pass:
+    """The run with what one reading of its file gives."""
     with long_channels(run.path, run.thrust, run.source) as (thrust, source):
+        open_no_more()
         H, y = _sample(run, form, thrust, source)
         run.sums = BatchSums(np.asarray(np.linalg.lstsq(H, y, rcond=None)[0], dtype=np.float64))
-        return condense(_blocks(run, form, thrust, source), H.shape[1], (H, y) if y.size else None)
+        run.rows = condense(_blocks(run, form, thrust, source), H.shape[1], (H, y) if y.size else None)
+    return run
 
 
 def _fit(thruster: str, runs: Sequence[Pass], model: Model) -> OnePass:
@@ -196,9 +209,9 @@ def _fit(thruster: str, runs: Sequence[Pass], model: Model) -> OnePass:
     form = FORMS[model, "rotation_rate" in kinds]
     if form.with_flow:
         raise RecordingError(f"{form.name}: the flow term is not fitted in one pass; expected C V|V| or C+/C-")
+    runs = [apart(partial(_gathered, run, form), run.path) for run in runs]
     for run in runs:
-        run.rows = _condensed(run, form)
-        if run.rows.rows == 0:
+        if run.rows is None or run.rows.rows == 0:
             raise RecordingError(f"{run.path} has no thrust sample at a known {run.source.quantity}")
     count = len(form.coefficients)
     places = [(*range(count), count + k) for k in range(len(runs))]

@@ -1,6 +1,9 @@
 """`rig.fit.one_pass`: the same numbers as a fit in memory, from files read once and in blocks."""
 
 import json
+import os
+import signal
+import sys
 import tracemalloc
 from pathlib import Path
 
@@ -12,6 +15,7 @@ from click.testing import CliRunner
 from identification.recording import Channel
 from identification.thruster.thrust_data import voltage_at
 from rig.errors import RecordingError
+from rig.fit import one_pass
 from rig.fit.command import fit_command
 from rig.fit.one_pass import fit_one_pass, thrust_rows
 from rig.fit.one_pass_text import one_pass_json, one_pass_text
@@ -192,7 +196,10 @@ def test_counts_by_rate_with_missing_rows(tmp_path):
     assert "explained by rotation_rate" in one_pass_text(found)
 
 
-def test_memory_does_not_grow_with_the_recording(tmp_path):
+def test_memory_does_not_grow_with_the_recording(tmp_path, monkeypatch):
+    """Of the reading itself, which is done in a child otherwise, where tracemalloc does not look."""
+    monkeypatch.setattr(one_pass, "apart", lambda work, path: work())
+    monkeypatch.setattr(one_pass, "open_no_more", lambda: None)
     peaks = []
     for n in (400_000, 1_600_000):
         path = sine_run(tmp_path / f"{n}.h5", n=n)
@@ -201,6 +208,18 @@ def test_memory_does_not_grow_with_the_recording(tmp_path):
         peaks.append(tracemalloc.get_traced_memory()[1])
         tracemalloc.stop()
     assert peaks[1] < 1.1 * peaks[0] < 12e6
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="read in the process itself elsewhere: docs/decisions/0014")
+def test_what_ends_hdf5_does_not_end_the_command(tmp_path, monkeypatch):
+    path = sine_run(tmp_path / "a.h5", n=3000)
+
+    def dies(*_):
+        os.kill(os.getpid(), signal.SIGSEGV)
+
+    monkeypatch.setattr(one_pass, "_sample", dies)
+    with pytest.raises(RecordingError, match=r"a\.h5 is damaged, or was made to harm: HDF5 ended with SIGSEGV"):
+        fit_one_pass([path])
 
 
 def test_a_piece_of_a_channel_says_the_same_as_all_of_it(tmp_path):
