@@ -7,6 +7,7 @@ import select
 import signal
 import sys
 import termios
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -20,6 +21,8 @@ LEASE_PERIOD = 0.5
 """s between leases; the controller lets one hold 2 s."""
 SILENCE = 10
 """Lease periods without a snapshot (they come at 10 Hz) after which the controller counts as hung: 5 s."""
+PATIENCE = 10.0
+"""s that a check may stay failed before it is given up: a device is tried again every 3 s, a rotor comes to rest."""
 CTRL_C = "Ctrl+C in the terminal of the progress bar"
 
 
@@ -35,6 +38,8 @@ class Headless:
     _asked: set[str] = field(default_factory=set)
     _prompted: str = ""
     """Thruster that the operator was asked to put on the bench."""
+    _failing: float | None = None
+    """s (monotonic) since when a check of the preflight has failed; None: none has."""
     _silent: int = 0
     """Lease periods without a snapshot, in a row."""
     _interrupted: bool = False
@@ -90,12 +95,22 @@ class Headless:
             self._prompted = ""
 
     def _judge(self, snapshot: Snapshot) -> None:
-        """Start when every check has passed, give up when one has failed."""
-        failed = [f"{check.name}: {check.text}" for check in snapshot.checks if check.verdict == "failed"]
+        """Start when every check has passed, give up when one stays failed."""
+        failed = "; ".join(f"{check.name}: {check.text}" for check in snapshot.checks if check.verdict == "failed")
         if failed:
-            self._ask(Request("stop", "the preflight: " + "; ".join(failed)))
-        elif all(check.verdict in ("passed", "warning") for check in snapshot.checks):
+            self._wait_or_give_up(failed)
+            return
+        self._failing = None
+        if all(check.verdict in ("passed", "warning") for check in snapshot.checks):
             self._ask(Request("start"))
+
+    def _wait_or_give_up(self, failed: str) -> None:
+        now = time.monotonic()
+        if self._failing is None:
+            self._failing = now
+            self.narration.say(f"waiting up to {PATIENCE:g} s for {failed}", STYLES["warning"])
+        elif now - self._failing > PATIENCE:
+            self._ask(Request("stop", f"the preflight: {failed}"))
 
     def _mount(self, snapshot: Snapshot) -> None:
         """Ask the operator once per thruster; with nobody to ask, one thruster alone is the one on the bench."""

@@ -16,8 +16,9 @@ import pytest
 from rich.console import Console
 
 from rig.cli import COMMANDS
-from rig.link.front_end_messages import LogLine, Progress, Request
+from rig.link.front_end_messages import Check, LogLine, Progress, Request
 from rig.link.sockets import Peer, pair
+from rig.operate import headless as headless_module
 from rig.operate.headless import Headless
 from rig.operate.narration import Narration
 from tests.rig.console.feeds import CHECKS, running, snapshot
@@ -112,6 +113,36 @@ def test_it_starts_when_all_checks_have_passed():
         peer.send(running("done"))
 
     played(None, play)
+
+
+RED = (*CHECKS, Check("tunnel", "failed", "its port is not there"))
+
+
+def test_a_device_that_comes_late_is_waited_for():
+    def play(peer: Peer) -> None:
+        peer.send(snapshot("preflight", checks=RED))
+        until(peer, "lease")
+        peer.send(snapshot("preflight", checks=CHECKS))
+        until(peer, "start")
+        peer.send(running("done"))
+
+    _, said = played(None, play)
+    assert "waiting up to 10 s for tunnel: its port is not there" in said
+
+
+def test_a_device_that_never_comes_is_given_up(monkeypatch):
+    monkeypatch.setattr(headless_module, "PATIENCE", 0.0)
+    asked = []
+
+    def play(peer: Peer) -> None:
+        peer.send(snapshot("preflight", checks=RED))
+        until(peer, "lease")
+        peer.send(snapshot("preflight", checks=RED))
+        asked.append(until(peer, "stop").text)
+        peer.send(running("done"))
+
+    played(None, play)
+    assert asked == ["the preflight: tunnel: its port is not there"]
 
 
 @pytest.mark.parametrize("name", COMMANDS)
