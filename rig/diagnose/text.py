@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping
 from math import floor, isfinite, log10
 from textwrap import wrap
 
+from identification.mismatch.answer.equations import TYPED
 from identification.mismatch.diagnosis import Diagnosis, Finding
 from identification.mismatch.unexplained import FlexibleShape, FormulaFound, Remainder
 from identification.mismatch.value import Value, Where
@@ -25,6 +26,7 @@ def diagnosis_text(d: Diagnosis) -> str:
     if d.unexplained is not None:
         lines += _unexplained(d.unexplained, d.force_unit)
     lines += _model(d)
+    lines += _equations(d)
     lines += _fit(d)
     lines += _next(d)
     lines += [line for note in d.notes for line in _para(f"- {note}")]
@@ -180,6 +182,19 @@ def _model(d: Diagnosis) -> Iterator[str]:
     terms = "".join(f" + {term}" for term in d.model_terms)
     named = {name: value for name, value in d.model.items() if not name.startswith("flexible:")}  # these have a table
     yield from _para(f"Model: {d.baseline_model.split(' (')[0]}{terms}; {_values(named)}")
+
+
+def _equations(d: Diagnosis) -> Iterator[str]:
+    """Each line with whose it is; a comment that has no room stands above."""
+    if d.equations:
+        yield f"The model, to type in ({TYPED}):"
+    for e in d.equations:
+        line, _, comment = e.line.partition("  # ")
+        told = ": ".join(part for part in (e.effect, comment) if part)
+        beside = f"  {line}  # {told}" if told else f"  {line}"
+        if len(beside) > WIDTH:
+            yield from wrap(told, WIDTH, initial_indent="  # ", subsequent_indent="  # ")
+        yield beside if len(beside) <= WIDTH else f"  {line}"
 
 
 def _fit(d: Diagnosis) -> Iterator[str]:
