@@ -6,11 +6,11 @@ from collections.abc import Iterator, Mapping
 from math import floor, isfinite, log10
 from textwrap import wrap
 
-from identification.mismatch.answer.equations import TYPED
 from identification.mismatch.diagnosis import Diagnosis, Finding
 from identification.mismatch.unexplained import FlexibleShape, FormulaFound, Remainder
 from identification.mismatch.value import Value, Where
 from identification.mismatch.verdict_clauses import NOT_WHITE, degree, sureness
+from rig.diagnose.typed import TITLE, typed
 
 WIDTH = 100
 MOST_STEPS = 12
@@ -185,16 +185,9 @@ def _model(d: Diagnosis) -> Iterator[str]:
 
 
 def _equations(d: Diagnosis) -> Iterator[str]:
-    """Each line with whose it is; a comment that has no room stands above."""
     if d.equations:
-        yield f"The model, to type in ({TYPED}):"
-    for e in d.equations:
-        line, _, comment = e.line.partition("  # ")
-        told = ": ".join(part for part in (e.effect, comment) if part)
-        beside = f"  {line}  # {told}" if told else f"  {line}"
-        if len(beside) > WIDTH:
-            yield from wrap(told, WIDTH, initial_indent="  # ", subsequent_indent="  # ")
-        yield beside if len(beside) <= WIDTH else f"  {line}"
+        yield TITLE
+    yield from (f"  {line}" for line in typed(d.equations, WIDTH - 2))
 
 
 def _fit(d: Diagnosis) -> Iterator[str]:

@@ -12,9 +12,6 @@ from identification.physics.term import EquationContext, Stage
 from identification.run_history.history import TURNING
 from identification.twin import Twin, TwinLine
 
-TYPED = "numpy's names; units as recorded; d(a)/dt from a(0) on"
-"""What a reader of the lines must know."""
-
 
 def equations_of(twin: Twin, tares: Mapping[str, float], recorded: Collection[str] = ()) -> tuple[Equation, ...]:
     """A twin's model from the driver to the reading. `tares`: N, of each recording by its id; `recorded`: quantities
@@ -64,7 +61,7 @@ def _rotor(told: Sequence[tuple[Equation, ...]], V: str) -> Iterator[Equation]:
 
 def _tares(tares: Mapping[str, float]) -> Iterator[Equation]:
     for name, tare in tares.items():
-        yield Equation(f"tare = {tare:.6g}" + (f"  # of {name}" if len(tares) > 1 else ""))
+        yield Equation(f"tare = {tare:.6g}" + (f"  # run {name}" if len(tares) > 1 else ""))
 
 
 def _periodic(line: TwinLine, highest_driver: float) -> Iterator[Equation]:
