@@ -148,7 +148,7 @@ class Heating:
             most = model.scale.current
             load = f"(current / {f'{most:.6g}' if most else 'max(abs(current))'}) ** 2"
         copper, flux, later = self._amounts(theta)
-        lines = [follows("warmth", load, theta[1])]
+        lines = [f"load = {load}", follows("warmth", "load", theta[1])]
         if later is not None:
             lines.append(follows("magnets", "warmth", later))
         more = f"{copper_at_full(copper, winding, full):.6g} * warmth" if copper else ""

@@ -62,11 +62,12 @@ def hot_equation(name: str, winding: float, copper: str, flux: str, comment: str
     weaker = (f"weaker = {flux}",) if flux else ()
     if not (winding or copper):
         return *weaker, f"{name} = {name}{left}"
-    lost = f"({winding:.6g} + {copper})" if copper else f"{winding:.6g}"
+    lost = " + ".join([f"{winding:.6g}", *filter(None, (copper,))])
+    lost = f"({lost}){left} ** 3" if flux else lost
     return (
         *weaker,
         f"voltage = abs({name}) + {winding:.6g} * {name} ** 2{comment}",
-        f"lost = {lost}{f'{left} ** 3' if flux else ''}",
+        f"lost = {lost}",
         f"{name} = sign({name}) * 2 * voltage / (1 + sqrt(1 + 4 * lost * voltage)){left}",
     )
 
