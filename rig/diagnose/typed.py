@@ -13,7 +13,7 @@ TITLE = "The model, to type in (numpy's names; units as recorded; d(a)/dt from a
 def typed(equations: Sequence[Equation], width: int) -> Iterator[str]:
     """Lines of at most `width` columns, where the equations themselves are no longer.
 
-    >>> list(typed([Equation("F = F + 0.2 * x", "linear_term"), Equation("thrust = F + tare  # N")], 34))
+    >>> list(typed([Equation("F = F + 0.2 * x", "linear_term"), Equation("thrust = F + tare  # N")], 28))
     ['# linear_term', 'F = F + 0.2 * x', 'thrust = F + tare  # N']
     """
     for e in equations:
