@@ -10,8 +10,10 @@ from pathlib import Path
 import pytest
 
 from identification.mismatch.answer.explained.explain import explained
+from identification.mismatch.answer.explained.trace import Trace
 from identification.mismatch.policy import thresholds
 from rig.diagnose.explanation import explanation_text
+from rig.diagnose.typed import TITLE, typed
 
 ROOT = Path(__file__).parents[1]
 PAGE = (ROOT / "docs" / "method.md").read_text(encoding="utf-8")
@@ -24,14 +26,21 @@ COUNTED, CLOSE_COUNT = 100, 0.005
 
 
 @pytest.fixture(scope="module")
-def said() -> list[str]:
+def found() -> Trace:
     path = ROOT / "examples" / "explain_dead_band_and_drift.py"
     spec = importlib.util.spec_from_file_location(path.stem, path)
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)
-    return explanation_text(explained(module.trace())).splitlines()
+    trace = module.trace()
+    assert isinstance(trace, Trace)
+    return trace
+
+
+@pytest.fixture(scope="module")
+def said(found: Trace) -> list[str]:
+    return explanation_text(explained(found)).splitlines()
 
 
 def words(line: str) -> list[str]:
@@ -72,3 +81,11 @@ def test_code_that_is_named_is_there():
     beside = re.findall(r"`(identification/mismatch/\w+/)(?:\w+\.py)?`[^\n]*?\(([^)]*\.py[^)]*)\)", PAGE)
     files = chain(named, (room + name for room, told in beside for name in re.findall(r"`(\w+\.py)`", told)))
     assert [name for name in files if not (ROOT / name).exists()] == []
+
+
+def test_the_equations_that_the_how_to_quotes(found):
+    page = (ROOT / "docs" / "howto" / "diagnose.md").read_text(encoding="utf-8")
+    quoted = page.partition(f"    {TITLE}\n")[2].partition("\n\n")[0].splitlines()
+    lines = list(typed(found.diagnosis.equations, 98))
+    assert len(quoted) == len(lines)
+    assert all(same(a, b) for a, b in zip(quoted, lines, strict=True))

@@ -12,7 +12,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass, since_opposite
@@ -39,6 +39,7 @@ ALONE: tuple[Multiplier, ...] = ("force", "gain", "even", "drive")
 """Where a constant would be the tare, another C, an asymmetry or another rate: the spline is zero at `zero`."""
 COMPUTED = ("time", "time_since_step", "previous_voltage", "direction", "direction_of_change", "load_history")
 """Coordinates that every run has."""
+TABLE = "curve: the table of what is not explained"
 MOST = 5.0
 """Bound of a coefficient, in full thrusts or full drives."""
 
@@ -126,6 +127,35 @@ class Flexible:
                 m, value, now, self.memory
             )
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        over = self._told_over(model)
+        curves = [f"curve{'_' * (len(self.times) > 1)}{m if len(self.times) > 1 else ''}({over})" for m in self.times]
+        parts = " + ".join(c + self._told_times(m, model) for c, m in zip(curves, self.times, strict=True))
+        made, of = ("x", model.symbol) if self.stage == "rotor" else ("F", "F")
+        return (f"{made} = {of} + {parts}  # {TABLE}",)
+
+    def _told_over(self, model: EquationContext) -> str:
+        if self.quantity == "time":
+            return f"t % {self.period:.6g}" if self.period else "t"
+        if self.quantity == "rotation_rate" and "drive" in self.times:
+            return f"rotation_rate / {model.rate_per_driver:.6g} - {model.symbol}"
+        return self.quantity
+
+    def _told_times(self, multiplier: Multiplier, model: EquationContext) -> str:
+        match multiplier:
+            case "force" | "drive":
+                return ""
+            case "gain" | "reversed":
+                return " * F"
+            case "even":
+                return " * abs(F)"
+            case "step":
+                return f" * (F - {model.C:.6g} * previous_voltage * abs(previous_voltage))"
+            case "rate":
+                return f" * abs(x) / {model.scale.driver:.6g}"
+            case "late":
+                return f" * (lowpass(F, {self.memory:.6g}) - F)"
 
     def over(self, run: RememberedRun, x: Floats, scale: Scale) -> Floats:
         """(M,) of the covariate, in `unit`."""

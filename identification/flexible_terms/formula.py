@@ -8,7 +8,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import signed
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
@@ -88,6 +89,16 @@ class Formula:
             out = out + c * times(m.times, value) * (product - middle if m.times == "F" else product)
         return out
 
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        sizes, middles = dict(self.sizes), self.middles or (0.0,) * len(self.monomials)
+        line = "F = F"
+        for c, m, middle in zip(theta, self.monomials, middles, strict=True):
+            product = " * ".join(f"({_typed(q, model)} / {sizes[q]:.6g}) ** {p}" for q, p in m.powers)
+            if m.times == "F":
+                product = f"({product} {signed(-middle)})"
+            line += f" {signed(c)} * {product}" + {"1": "", "F": " * F", "|F|": " * abs(F)"}[m.times]
+        return (line,)
+
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return f"A formula, {self.form}; no physics is claimed for it."
 
@@ -100,6 +111,17 @@ def product_of(m: Monomial, unit: Mapping[str, Floats]) -> Floats:
 def _told(m: Monomial) -> str:
     powers = " ".join(q if p == 1 else f"{q}^{p}" for q, p in m.powers)
     return powers if m.times == "1" else f"{powers} {m.times}"
+
+
+def _typed(symbol: str, model: EquationContext) -> str:
+    """A symbol by the name that its quantity has in a recording."""
+    if symbol.startswith("lp"):
+        memory, of = symbol[2:-1].split("(")
+        load = f"{model.driver} * abs({model.driver})" if is_square(of) else f"abs({model.driver})"
+        return f"lowpass({load}, {memory})"
+    if symbol == model.symbol:
+        return model.driver
+    return CHANNELS[symbol][0] if symbol in CHANNELS else symbol
 
 
 def times(kind: Times, force: Floats) -> Floats:

@@ -182,6 +182,15 @@ Verdict = Adequate | Explained | Ambiguous | Unexplained
 VerdictName = Literal["adequate", "explained", "ambiguous", "unexplained"]
 
 
+@dataclass(frozen=True, slots=True)
+class Equation:
+    """A line of the model, to be typed in."""
+
+    line: str
+    effect: str = ""
+    """That it is of; empty: of the baseline's form, C V|V| and the tare."""
+
+
 @dataclass(frozen=True, eq=False)
 class Curves:
     """What a report draws, per run: on the intervals with thrust, (n,) each."""
@@ -225,6 +234,8 @@ class Diagnosis:
     """Statements of what a twin lacks and its own recordings have as well."""
     force_unit: str = "N"
     """Of the shape of what is not explained: of a vehicle a force all the same."""
+    equations: tuple[Equation, ...] = ()
+    """The final model line by line, in the order in which the bench acts; of a vehicle none."""
 
     @property
     def white(self) -> bool:

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -36,6 +36,9 @@ class Asymmetry:
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = np.where(now.x < 0, theta[0] * value, value)
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        return (f"F = where(x < 0, {theta[0]:.6g} * F, F)",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

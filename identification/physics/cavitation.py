@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 
@@ -47,6 +47,10 @@ class Cavitation:
         lost = theta[0] * np.maximum(np.abs(now.x) - theta[1], 0.0)
         out: Floats = value * np.maximum(1 - (lost if self.form == "linear" else lost**2), 0.0)
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        lost = f"{theta[0]:.6g} * maximum(abs(x) - {theta[1]:.6g}, 0)"
+        return (f"F = F * maximum(1 - {lost if self.form == 'linear' else f'({lost}) ** 2'}, 0)",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         lost = theta[0] * max(scale.driver - theta[1], 0.0)

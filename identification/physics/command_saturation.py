@@ -7,8 +7,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.soft_limit import limited, mean_slope
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.soft_limit import knee, limited, mean_slope
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.history import History
@@ -74,6 +74,10 @@ class CommandSaturation:
     def _start(self, theta: tuple[float, ...]) -> float:
         """Where the drive begins to give less."""
         return theta[0] if self.form == "hard" else theta[1]
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        V = model.symbol
+        return (f"{V} = clip({V}, -{theta[0]:.6g}, {theta[0]:.6g})",) if self.form == "hard" else knee(V, *theta)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         unit = scale.driver_unit

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -60,6 +60,12 @@ class DeadBand:
         half = 0.5 * np.maximum(LEAST_MOVE * now.scale.driver, moved)
         shrunk: Floats = (_integral(value + half, theta[0]) - _integral(value - half, theta[0])) / (2 * half)
         return shrunk
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        V, width = model.symbol, f"{theta[0]:.6g}"
+        if self.form == "jump":
+            return (f"{V} = where(abs({V}) < {width}, 0, {V})",)
+        return (f"{V} = sign({V}) * maximum(abs({V}) - {width}, 0)",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         what = "thrust begins with a jump" if self.form == "jump" else "only the voltage beyond it acts"

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -48,6 +48,10 @@ class Exponent:
         size = np.abs(now.x) / now.scale.driver
         out: Floats = value * np.maximum(size, 1e-9) ** (theta[0] - 2)
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        size = f"maximum(abs(x) / {model.scale.driver:.6g}, 1e-9)"
+        return (f"F = F * {size} ** ({theta[0]:.6g} - 2)",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         hint = f"; {REGULATED}" if theta[0] < BY_WATER and scale.driver_unit == "V" else ""

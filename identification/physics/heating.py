@@ -7,8 +7,16 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.hot_motor import TYPICAL_LOSS, cold_motor, copper_at_full, hot_rate, weaker_at_full
-from identification.physics.term import KELVIN, THERMOMETER, Parameter, Scale, Stage, TermContext
+from identification.physics.equation import follows
+from identification.physics.hot_motor import (
+    TYPICAL_LOSS,
+    cold_motor,
+    copper_at_full,
+    hot_equation,
+    hot_rate,
+    weaker_at_full,
+)
+from identification.physics.term import KELVIN, THERMOMETER, EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
@@ -29,6 +37,11 @@ def _slowest(scale: Scale) -> float:
 def _full_current(now: TermContext) -> float:
     """A, one for all runs."""
     return now.scale.current or float(np.nanmax(np.abs(now.history.others["current"])))
+
+
+def _taken(model: EquationContext) -> str:
+    """A comment on a winding of which nobody said how much it takes."""
+    return f"  # the cold winding is taken to lose {100 * TYPICAL_LOSS:g} %" if model.winding is None else ""
 
 
 COLD_LOSS = Parameter("cold_loss", "1", 0.02, 0.5, told="share of the voltage in the cold winding")
@@ -106,17 +119,17 @@ class Heating:
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         history, current = now.history, now.history.others.get("current")
-        share = theta[2] if self.form == "own_winding" else TYPICAL_LOSS
-        winding, full = cold_motor(self._winding(now), now.scale.driver, share)
+        winding, full = self._cold_motor(now.winding, now.scale, theta)
         load = (value / full) ** 4 if current is None else (current / _full_current(now)) ** 2
         copper, flux, later = self._amounts(theta)
         warm = lowpass(load, history.dt, theta[1])[1]
         magnets = lowpass(warm, history.dt, later)[1] if later is not None else warm
         return hot_rate(value, winding, copper_at_full(copper, winding, full) * warm, flux * magnets)
 
-    def _winding(self, now: TermContext) -> float | None:
+    def _cold_motor(self, known: float | None, scale: Scale, theta: tuple[float, ...]) -> tuple[float, float]:
         """A winding that takes voltage warms with the magnets: magnets alone are of a motor with next to none."""
-        return now.winding or 0.0 if self.form == "magnet" else now.winding
+        share = theta[2] if self.form == "own_winding" else TYPICAL_LOSS
+        return cold_motor(known or 0.0 if self.form == "magnet" else known, scale.driver, share)
 
     def _amounts(self, theta: tuple[float, ...]) -> tuple[float, float, float | None]:
         """Loss by copper, loss of flux, time constant of the magnets behind the copper."""
@@ -127,6 +140,20 @@ class Heating:
                 return 0.0, theta[0], theta[2]
             case _:
                 return theta[0], theta[2], theta[3]
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        winding, full = self._cold_motor(model.winding, model.scale, theta)
+        load = f"({model.symbol} / {full:.6g}) ** 4"
+        if "current" in model.recorded:
+            most = model.scale.current
+            load = f"(current / {f'{most:.6g}' if most else 'max(abs(current))'}) ** 2"
+        copper, flux, later = self._amounts(theta)
+        lines = [f"load = {load}", follows("warmth", "load", theta[1])]
+        if later is not None:
+            lines.append(follows("magnets", "warmth", later))
+        more = f"{copper_at_full(copper, winding, full):.6g} * warmth" if copper else ""
+        weaker = f"{flux:.6g} * magnets" if later is not None else ""
+        return *lines, *hot_equation(model.symbol, winding, more, weaker, "" if "own" in self.form else _taken(model))
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         copper, flux, _ = self._amounts(theta)
@@ -187,11 +214,14 @@ class MeasuredHeating:
         measured = now.history.others[THERMOMETER]
         rise = measured + KELVIN - now.scale.cold if now.scale.cold > 0 else measured - measured[0]
         magnets = lowpass(rise, now.history.dt, later, float(rise[0]))[1] if later is not None else rise
-        alone = self.form == "measured_magnet"  # as Heating
-        share = theta[1] if self.form == "measured_own_winding" else TYPICAL_LOSS
-        winding, full = cold_motor(now.winding or 0.0 if alone else now.winding, now.scale.driver, share)
+        winding, full = self._cold_motor(now.winding, now.scale, theta)
         weaker = np.minimum(flux * magnets, MOST_FLUX)
         return hot_rate(value, winding, copper * weaker_at_full(winding, full) * rise, weaker)
+
+    def _cold_motor(self, known: float | None, scale: Scale, theta: tuple[float, ...]) -> tuple[float, float]:
+        """As of Heating."""
+        share = theta[1] if self.form == "measured_own_winding" else TYPICAL_LOSS
+        return cold_motor(known or 0.0 if self.form == "measured_magnet" else known, scale.driver, share)
 
     def _amounts(self, theta: tuple[float, ...]) -> tuple[float, float, float | None]:
         """Loss by copper and of flux per kelvin, time constant of the magnets behind the thermometer."""
@@ -202,6 +232,18 @@ class MeasuredHeating:
                 return 0.0, theta[0], theta[1]
             case _:
                 return theta[0], theta[1], theta[2]
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        scale = model.scale
+        copper, flux, later = self._amounts(theta)
+        winding, full = self._cold_motor(model.winding, scale, theta)
+        cold = f"{scale.cold - KELVIN:.6g}" if scale.cold > 0 else "motor_temperature(0)"
+        lines = [f"rise = motor_temperature - {cold}"]
+        if later is not None:
+            lines.append(follows("magnets", "rise", later, "rise(0)"))
+        more = f"{copper * weaker_at_full(winding, full):.6g} * rise" if copper else ""
+        weaker = f"minimum({flux:.6g} * magnets, {MOST_FLUX:g})" if later is not None else ""
+        return *lines, *hot_equation(model.symbol, winding, more, weaker, "" if "own" in self.form else _taken(model))
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         copper, flux, later = self._amounts(theta)

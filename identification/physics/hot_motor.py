@@ -56,6 +56,22 @@ def hot_rate(cold: Floats, winding: float, copper: Floats | float, flux: Floats 
     return out
 
 
+def hot_equation(name: str, winding: float, copper: str, flux: str, comment: str = "") -> tuple[str, ...]:
+    """`hot_rate` of a variable, to be typed in; `copper` and `flux` as expressions, empty where there is none."""
+    left = " / (1 - weaker)" if flux else ""
+    weaker = (f"weaker = {flux}",) if flux else ()
+    if not (winding or copper):
+        return *weaker, f"{name} = {name}{left}"
+    lost = " + ".join([f"{winding:.6g}", *filter(None, (copper,))])
+    lost = f"({lost}){left} ** 3" if flux else lost
+    return (
+        *weaker,
+        f"voltage = abs({name}) + {winding:.6g} * {name} ** 2{comment}",
+        f"lost = {lost}",
+        f"{name} = sign({name}) * 2 * voltage / (1 + sqrt(1 + 4 * lost * voltage)){left}",
+    )
+
+
 def voltage_of(size: Floats, winding: float) -> Floats:
     """|V| that a cold motor needs to turn at `size`."""
     out: Floats = size + winding * size**2

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import play
@@ -36,6 +36,10 @@ class Hysteresis:
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         return play(value, theta[0])
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        w = f"{theta[0]:.6g}"
+        return (f"F = play(F, {w})  # y = min(max(y, F - {w}), F + {w}) from one instant to the next, y = 0 before",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return f"Hysteresis: up- and down-sweep differ by {2 * theta[0]:.3g} N; friction or play in the load path."

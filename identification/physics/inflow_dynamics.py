@@ -7,7 +7,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import follows
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -60,6 +61,15 @@ class InflowDynamics:
         u = now.run.follower(now.settled, rotor)
         out: Floats = value + now.C * np.abs(now.x) * theta[0] * (now.x - u)
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        share, tau = theta
+        if self.form:
+            rate = f"(x * abs(x) - inflow * abs(inflow)) / (2 * {tau:.6g} * {model.scale.driver:.6g})"
+            water = f"d(inflow)/dt = {rate}, inflow(0) = 0"
+        else:
+            water = follows("inflow", "x", tau)
+        return water, f"F = F + {share:.6g} * {model.C:.6g} * abs(x) * (x - inflow)"
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         slower = "" if not self.form else f" at {scale.driver:.3g} {scale.driver_unit}, slower at less"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import signed
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -38,6 +39,9 @@ class LinearTerm:
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * now.x
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        return (f"F = F {signed(theta[0])} * x",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return f"Linear term: thrust has a part of {theta[0]:.3g} N per {scale.driver_unit} beside the square."

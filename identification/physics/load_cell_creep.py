@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import follows, signed
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
@@ -55,6 +56,16 @@ class LoadCellCreep:
         if self.form == "two_constants":
             out += theta[2] * lowpass(value, now.history.dt, theta[3])[1]
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        share, tau, *second = theta
+        if not second:
+            return follows("creep", "F", tau), f"F = F {signed(share)} * creep"
+        return (
+            follows("creep", "F", tau),
+            follows("creep_2", "F", second[1]),
+            f"F = F {signed(share)} * creep {signed(second[0])} * creep_2",
+        )
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

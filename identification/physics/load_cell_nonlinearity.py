@@ -7,7 +7,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import signed
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -54,6 +55,10 @@ class LoadCellNonlinearity:
         bend = value**2 if self.form == "cubic" else np.abs(value)
         out: Floats = value * (1 + theta[0] * bend)
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        bend = "F ** 2" if self.form == "cubic" else "abs(F)"
+        return (f"F = F * (1 {signed(theta[0])} * {bend})",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         power = 2 if self.form == "cubic" else 1

@@ -12,8 +12,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from scipy.special import ndtr
 
-from identification.physics.soft_limit import limited, slope_at
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.soft_limit import knee, limited, slope_at
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.history import TAIL, History
@@ -129,6 +129,12 @@ class LoadCellSaturation:
     def start(self, theta: tuple[float, ...]) -> float:
         """N: where the cell begins to show less."""
         return theta[0] if self.sharp else theta[1]
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        if not self.sharp:
+            return "F = F + tare", *knee("F", *theta), "F = F - tare"
+        noise = "each sample with its noise" if self.silent else "before the noise of the amplifier"
+        return (f"F = clip(F + tare, -{theta[0]:.6g}, {theta[0]:.6g}) - tare  # {noise}",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         advice = "change the range of the amplifier or the cell"

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import follows
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Dynamics, Traits
 from identification.recording import Floats
 
@@ -67,6 +68,17 @@ class MotorLag:
         if theta[0] <= AT_ONCE:
             return value
         return now.run.followed(value, torques(self.form, theta, now.scale.driver))
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        V = model.symbol
+        if theta[0] <= AT_ONCE:
+            return (f"x = {V}",)
+        if self.form == "first_order":
+            return (follows("x", V, theta[0], f"{V}(0)"),)
+        quadratic, linear = torques(self.form, theta, model.scale.driver)
+        rate = f"{quadratic:.6g} * ({V} * abs({V}) - x * abs(x))"
+        rate += f" + {linear:.6g} * ({V} - x)" if self.form == "mixed" else ""
+        return (f"d(x)/dt = {rate}, x(0) = {V}(0)",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         alike = self.form == "first_order" or (self.form == "mixed" and theta[1] > NEARLY_LINEAR)

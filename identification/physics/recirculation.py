@@ -10,7 +10,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import follows
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 
@@ -70,6 +71,14 @@ class Recirculation:
             u = now.run.follower(u, follows)
         out: Floats = value - theta[0] * np.abs(now.x) * u
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        coefficient, tau = theta
+        made = follows(
+            "jet", {"rate": "x", "thrust": f"sign(F) * sqrt(abs(F / {model.C:.6g}))", "circuit": "far"}[self.form], tau
+        )
+        water = (follows("far", "x", tau), made) if self.form == "circuit" else (made,)
+        return *water, f"F = F - {coefficient:.6g} * abs(x) * jet"
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

@@ -7,7 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.filters import since_opposite
@@ -46,6 +46,15 @@ class ReversalLoss:
         wake = np.where(known, np.exp(-np.maximum(age, 0.0) / theta[1]), 0.0)
         out: Floats = value * (1 - theta[0] * wake)
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        turning = f"{TURNING * model.scale.driver:.6g}"
+        what = "x last turned the other way" if self.form == "wake" else "x began to turn this way"
+        since = "since_opposite" if self.form == "wake" else "since_turned"
+        return (
+            f"age = {since}(x, {turning})  # s since {what}, beyond {turning}; inf before a first reversal",
+            f"F = F * (1 - {theta[0]:.6g} * exp(-age / {theta[1]:.6g}))",
+        )
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

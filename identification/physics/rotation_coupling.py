@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import ClassVar
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 from identification.run_history.slip import slip
@@ -41,6 +41,11 @@ class RotationCoupling:
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * slip(now.run, value, now.history.rate_per_driver)
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        V, k = model.symbol, f"{model.rate_per_driver:.6g}"
+        noise = f"without the noise of the rate; C is of {k} rev/s per {model.scale.driver_unit}"
+        return (f"x = {V} + {theta[0]:.6g} * (rotation_rate / {k} - {V})  # {noise}",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

@@ -32,6 +32,19 @@ def _lost(e: Floats, bend: float) -> Floats:
     return out
 
 
+def knee(name: str, bend: float, onset: float) -> tuple[str, ...]:
+    """Of a variable of either sign what g makes of it, to be typed in.
+
+    >>> knee("V", 0.5, 2.0)
+    ('over = clip(abs(V) - 2, 0, 2)', 'V = sign(V) * (minimum(abs(V), 4) - 0.25 * over ** 2)')
+    """
+    width = 1 / bend if bend > 0 else np.inf
+    return (
+        f"over = clip(abs({name}) - {onset:.6g}, 0, {width:.6g})",
+        f"{name} = sign({name}) * (minimum(abs({name}), {onset + width:.6g}) - {bend / 2:.6g} * over ** 2)",
+    )
+
+
 def mean_slope(size: Floats, half: Floats, bend: float, onset: float) -> Floats:
     """Share of a motion of +-half (> 0) round `size` that is passed on.
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -52,6 +52,9 @@ class SpeedOfAdvance:
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value - theta[0] * np.abs(now.x) * now.history.others["flow_speed"]
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        return (f"F = F - {theta[0]:.6g} * abs(x) * flow_speed",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return f"Speed of advance: flow through the disc takes {theta[0]:.3g} N per {scale.driver_unit} and m/s."

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Dynamics, Traits
 from identification.recording import Floats
 from identification.run_history.filters import resonant
@@ -64,6 +64,16 @@ class StandResonance:
         rung = resonant(value, now.history.dt, theta[1], theta[2])
         out: Floats = value + theta[0] * (rung - value)
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        compliance, frequency, damping = theta
+        w = 2 * np.pi * frequency
+        pull = f"{w**2:.6g} * (F - ringing) - {2 * damping * w:.6g} * moving"
+        return (
+            "d(ringing)/dt = moving, ringing(0) = 0",
+            f"d(moving)/dt = {pull}, moving(0) = 0",
+            f"F = F + {compliance:.6g} * (ringing - F)",
+        )
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return f"Stand resonance: the stand rings at {theta[1]:.3g} Hz with {100 * theta[2]:.2g} % of critical damping."

@@ -7,7 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import signed
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -46,6 +47,9 @@ class StrutDrag:
         flow = now.history.others["flow_speed"]
         out: Floats = value + theta[0] * flow * np.abs(flow)
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        return (f"F = F {signed(theta[0])} * flow_speed * abs(flow_speed)",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

@@ -7,7 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import follows
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 from identification.run_history.filters import lowpass
@@ -19,6 +20,15 @@ OTHER_SUPPLY = (("", "another supply voltage at the same levels"),)
 def _reference(now: TermContext) -> float:
     """V, one for all runs that are fitted and all that these numbers are for: supplies differ between runs, too."""
     return now.scale.bus or float(np.nanmax(now.history.others["bus_voltage"]))
+
+
+def _loss(drop: float, driver: float) -> float:
+    """Where e + a V^2 e^2 = V: a, if e = (1 - drop) V at the largest driver."""
+    return drop / ((1 - drop) ** 2 * driver**3)
+
+
+def _reference_told(scale: Scale) -> str:
+    return f"{scale.bus:.6g}" if scale.bus else "max(bus_voltage)"
 
 
 def _highest(scale: Scale) -> str:
@@ -58,6 +68,10 @@ class SupplySag:
         ratio = np.maximum(bus / _reference(now), 1e-3)
         out: Floats = value * ratio ** theta[0]
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        V = model.symbol
+        return (f"{V} = {V} * (bus_voltage / {_reference_told(model.scale)}) ** {theta[0]:.6g}",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
@@ -99,6 +113,13 @@ class Buffered:
         felt = lowpass(bus, now.history.dt, theta[1], float(bus[0]))[1]
         out: Floats = value * np.maximum(felt / _reference(now), 1e-3) ** theta[0]
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        V = model.symbol
+        return (
+            follows("supply", "bus_voltage", theta[1], "bus_voltage(0)"),
+            f"{V} = {V} * (supply / {_reference_told(model.scale)}) ** {theta[0]:.6g}",
+        )
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
@@ -147,6 +168,14 @@ class Discharge:
         out: Floats = value / (1 + theta[0] * (np.cumsum(drawn) - 0.5 * drawn))
         return out
 
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        V, scale = model.symbol, model.scale
+        power = f"abs({model.driver} / {scale.driver:.6g}) ** 3"
+        return (
+            f"d(drawn)/dt = {power} / {scale.duration:.6g}, drawn(0) = 0",
+            f"{V} = {V} / (1 + {theta[0]:.6g} * drawn)",
+        )
+
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
             f"Supply sag: the voltage falls as the supply is drawn on, by {100 * theta[0] / (1 + theta[0]):.2g} % for "
@@ -190,10 +219,13 @@ class Loaded:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        # e + a V^2 e^2 = V, and e = (1 - d) V_max at V_max
-        a = theta[0] / ((1 - theta[0]) ** 2 * now.scale.driver**3)
+        a = _loss(theta[0], now.scale.driver)
         out: Floats = 2 * value / (1 + np.sqrt(1 + 4 * a * np.abs(value) ** 3))
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        V, a = model.symbol, _loss(theta[0], model.scale.driver)
+        return (f"{V} = 2 * {V} / (1 + sqrt(1 + 4 * {a:.6g} * abs({V}) ** 3))",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

@@ -108,6 +108,27 @@ class TermContext:
         return self.x if self.before is None else self.before
 
 
+@dataclass(frozen=True, slots=True)
+class EquationContext:
+    """What a term may write of the model beside its own values."""
+
+    scale: Scale
+    C: float
+    driver: str = "command_voltage"
+    """What drives, by its name in a recording: the variable of stage command is what the terms before made of it."""
+    winding: float | None = None
+    """As in TermContext."""
+    rate_per_driver: float = 1.0
+    """rev/s per unit of the driver: what a measured rate is referred to."""
+    recorded: frozenset[str] = frozenset()
+    """Quantities that are there beside command and thrust."""
+
+    @property
+    def symbol(self) -> str:
+        """The variable of stage command."""
+        return "n" if self.driver == "rotation_rate" else "V"
+
+
 class Term(Protocol):
     """One effect in one textbook form."""
 
@@ -149,6 +170,13 @@ class Term(Protocol):
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         """The value of its stage (M,) with this effect in it."""
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        """The same as lines to be typed in, in continuous time, with numbers of six digits in SI (equation.py).
+
+        They change the variable of the stage: `V` (`n` where a rate drives) for command, `F` from hydro on; a term of
+        stage rotor makes `x` of `V`. Behind them are `x`, the time `t`, `tare` in stage cell, and recorded quantities
+        by their names. A `# comment` says what a line can't."""
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         """One sentence a person can act on."""

@@ -7,9 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
+
+STANDS_IN = "neighbour_thrust: V|V| of its command where no thrust of it was recorded"
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,6 +51,11 @@ class ThrusterInteraction:
         jet = np.sqrt(neighbour / max(now.scale.neighbour or float(np.max(neighbour)), 1e-12))
         out: Floats = value - theta[0] * now.C * now.scale.driver * np.abs(now.x) * jet
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        full = f"{model.scale.neighbour:.6g}" if model.scale.neighbour else "max(abs(neighbour_thrust))"
+        lost = f"{theta[0]:.6g} * {model.C:.6g} * {model.scale.driver:.6g}"
+        return (f"F = F - {lost} * abs(x) * sqrt(abs(neighbour_thrust) / {full})  # {STANDS_IN}",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Dynamics, Traits
 from identification.recording import Floats
 
@@ -53,6 +53,9 @@ class TimeSkew:
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         return now.run.delayed(value, theta[0])
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        return (f"F = delayed(F, {theta[0]:.6g})  # F so many s before",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

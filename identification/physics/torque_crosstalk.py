@@ -7,7 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import signed
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 
@@ -57,6 +58,9 @@ class TorqueCrosstalk:
         out: Floats = value + theta[0] * now.x**2
         return out
 
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        return (f"F = F {signed(theta[0])} * x ** 2",)
+
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
             f"Torque cross-talk: the cell shows {theta[0]:.3g} N/{scale.driver_unit}^2 "
@@ -94,6 +98,9 @@ class MeasuredTorque:
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         out: Floats = value + theta[0] * now.history.others[TORQUE]
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        return (f"F = F {signed(theta[0])} * torque",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         share = 100 * abs(theta[0]) / _lever(scale)

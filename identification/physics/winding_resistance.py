@@ -11,7 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -51,6 +51,10 @@ class WindingResistance:
             return value
         out: Floats = np.sign(value) * 2 * np.abs(value) / (1 + np.sqrt(1 + 4 * loss * np.abs(value)))
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        V = model.symbol
+        return (f"{V} = 2 * {V} / (1 + sqrt(1 + 4 * {theta[0]:.6g} * abs({V})))",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         e = 2 / (1 + (1 + 4 * theta[0] * scale.driver) ** 0.5)

@@ -7,7 +7,8 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.equation import signed
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -53,6 +54,11 @@ class ZeroDrift:
             return value + theta[0] * t
         out: Floats = value + theta[0] * (1 - np.exp(-t / theta[1]))
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        if self.form == "linear":
+            return (f"F = F {signed(theta[0])} * t",)
+        return (f"F = F {signed(theta[0])} * (1 - exp(-t / {theta[1]:.6g}))",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         if self.form == "linear":

@@ -7,7 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from identification.physics.term import Parameter, Scale, Stage, TermContext
+from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -44,6 +44,9 @@ class ZeroOffset:
         area = np.where(np.abs(edges) < 0.5, 0.5 * (edges + 0.5) ** 2, np.maximum(edges, 0.0))
         out: Floats = value + theta[0] * np.diff(area) * ramp / now.history.dt
         return out
+
+    def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
+        return (f"F = F + where(t < {theta[1]:.6g}, 0, {theta[0]:.6g})",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (

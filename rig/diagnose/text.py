@@ -10,6 +10,7 @@ from identification.mismatch.diagnosis import Diagnosis, Finding
 from identification.mismatch.unexplained import FlexibleShape, FormulaFound, Remainder
 from identification.mismatch.value import Value, Where
 from identification.mismatch.verdict_clauses import NOT_WHITE, degree, sureness
+from rig.diagnose.typed import TITLE, typed
 
 WIDTH = 100
 MOST_STEPS = 12
@@ -25,6 +26,7 @@ def diagnosis_text(d: Diagnosis) -> str:
     if d.unexplained is not None:
         lines += _unexplained(d.unexplained, d.force_unit)
     lines += _model(d)
+    lines += _equations(d)
     lines += _fit(d)
     lines += _next(d)
     lines += [line for note in d.notes for line in _para(f"- {note}")]
@@ -180,6 +182,12 @@ def _model(d: Diagnosis) -> Iterator[str]:
     terms = "".join(f" + {term}" for term in d.model_terms)
     named = {name: value for name, value in d.model.items() if not name.startswith("flexible:")}  # these have a table
     yield from _para(f"Model: {d.baseline_model.split(' (')[0]}{terms}; {_values(named)}")
+
+
+def _equations(d: Diagnosis) -> Iterator[str]:
+    if d.equations:
+        yield TITLE
+    yield from (f"  {line}" for line in typed(d.equations, WIDTH - 2))
 
 
 def _fit(d: Diagnosis) -> Iterator[str]:

@@ -68,6 +68,15 @@ class Table:
             raise ValueError(f"table {self.caption!r}: row {wrong[0]} has not the {len(self.head)} cells of its head")
 
 
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """Lines to be copied as they are."""
+
+    caption: str
+    lines: tuple[str, ...]
+    kind: str = "listing"
+
+
 @dataclass(frozen=True, eq=False)
 class Picture:
     """A figure with its title and a caption that says what to look for."""
@@ -97,7 +106,7 @@ class Section:
     """A heading, a sentence under it, and what belongs to it; sections may hold sections."""
 
     title: str
-    parts: tuple[Section | Sentences | Table | Picture, ...]
+    parts: tuple[Section | Sentences | Table | Listing | Picture, ...]
     lead: str = ""
     kind: str = "section"
 

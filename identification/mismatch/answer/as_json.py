@@ -34,7 +34,11 @@ def diagnosis_json(d: Diagnosis) -> dict[str, object]:
         ],
         "findings": [_finding(f) for f in d.findings],
         "unexplained": None if d.unexplained is None else _unexplained(d.unexplained),
-        "model": {"terms": list(d.model_terms), "parameters": _values(d.model)},
+        "model": {
+            "terms": list(d.model_terms),
+            "parameters": _values(d.model),
+            "equations": [{"effect": e.effect or None, "line": e.line} for e in d.equations],
+        },
         "fit": {
             "train": {"rmse_before": _number(d.train.before), "rmse_after": _number(d.train.after)},
             "heldout": {

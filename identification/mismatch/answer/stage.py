@@ -11,14 +11,15 @@ from identification.mismatch import policy
 from identification.mismatch.answer.against_twin import ToldNew, told_new, with_twin
 from identification.mismatch.answer.averaged_constant import averaged
 from identification.mismatch.answer.draft import Draft
+from identification.mismatch.answer.equations import equations_of
 from identification.mismatch.answer.fault_findings import with_channels
-from identification.mismatch.answer.periodic_findings import with_lines
+from identification.mismatch.answer.periodic_findings import seen_once, twin_line, with_lines
 from identification.mismatch.answer.proxies import proxies
 from identification.mismatch.answer.remainder import remainder_of
 from identification.mismatch.answer.report_assembly import curves_of, finding_of, values_of
 from identification.mismatch.answer.verdict import decided, refuted
 from identification.mismatch.compare.earlier_recordings import Novelty
-from identification.mismatch.diagnosis import Diagnosis, Finding, HeldOutRmse, NextExperiment, Rmse
+from identification.mismatch.diagnosis import Diagnosis, Equation, Finding, HeldOutRmse, NextExperiment, Rmse
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.faults.stage import Sound
 from identification.mismatch.locate.places import places_of
@@ -165,7 +166,17 @@ def _told(case: Case, found: Found, drafted: Drafted, *taken_back: str) -> Diagn
         curves=curves_of(found.selected.before, after, data),
         twin=draft.twin,
         not_new=new.not_new,
+        equations=_equations(found.completed.stated, data, case, draft),
     )
+
+
+def _equations(stated: Estimate, data: Data, case: Case, draft: Draft) -> tuple[Equation, ...]:
+    """Of the model that is told, with the lines that came again."""
+    assert draft.twin is not None
+    lines = tuple(twin_line(line) for line in case.lines if not seen_once(line, case.baseline))
+    tares = {h.recording_id: tare for h, tare in zip(data.histories, stated.fit.theta.tares, strict=True)}
+    recorded = frozenset.intersection(*(frozenset(h.others) for h in data.histories))
+    return equations_of(replace(draft.twin, lines=lines), tares, recorded)
 
 
 def _findings(completed: Completed, data: Data) -> dict[Term, Finding]:

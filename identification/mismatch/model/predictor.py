@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -69,7 +69,7 @@ def predict(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: 
     stage = 0
     key: object = scale
     terms = acting(model, theta, scale)
-    winding = _winding(terms)
+    winding = winding_of(terms)
     for term, values, sizes in terms:
         at = STAGES.index(term.stage)
         if stage < HYDRO <= at:
@@ -90,7 +90,7 @@ def predict(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: 
     return value, x if modelled is None else modelled
 
 
-def _winding(terms: list[Acting]) -> float | None:
+def winding_of(terms: Sequence[Acting]) -> float | None:
     """The voltage that the model loses in the winding, 1/(unit of the driver); None where no term says so."""
     for term, values, sizes in terms:
         if term.traits.winding:

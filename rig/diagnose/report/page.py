@@ -24,10 +24,13 @@ from rig.diagnose.report.pictures import (
 )
 from rig.diagnose.report.rivals import told_apart
 from rig.diagnose.report.words import driver_quantity, effect_name, evidence, rarity, value_cells, words
+from rig.diagnose.typed import TITLE, typed
 from rig.report import page as pages
 from rig.report import provenance
-from rig.report.page import Page, Remark, Section, Sentences, Table, columns, sentences
+from rig.report.page import Listing, Page, Remark, Section, Sentences, Table, columns, sentences
 
+LISTED = 80
+"""Columns of the equations."""
 MOST_ROWS = 12
 """Rows of a table of steps that stays open."""
 VERDICTS: Mapping[str, Remark] = {
@@ -188,7 +191,8 @@ def parameter_section(d: Diagnosis) -> Section:
     rows = tuple(_parameter_row(name, value, d.baseline.get(name), findings) for name, value in physics.items())
     table = Table("Model with its standard errors", head, rows, columns(head, "parameter", "of", "unit"))
     terms = " + ".join([d.baseline_model, *map(effect_name, d.model_terms)])
-    return Section("Parameters", (table,), words(f"Model: {terms}."))
+    listed = (Listing(TITLE, tuple(typed(d.equations, LISTED))),) if d.equations else ()
+    return Section("Parameters", (table, *listed), words(f"Model: {terms}."))
 
 
 def _parameter_row(name: str, value: Value, before: Value | None, findings: set[str]) -> tuple[str, ...]:
