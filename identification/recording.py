@@ -117,13 +117,17 @@ class Channel:
         return self.time[low:high], self.value[low:high]
 
 
+VOID = "void"
+"""Phase of a row that marks the time of another row as bad: an operator saw that something was wrong then."""
+
+
 @dataclass(frozen=True)
 class Step:
     """One step as it was really run."""
 
     index: int
     phase: str
-    """`tare`, `ramp`, `hold`, `rest`, `sine` or `free`."""
+    """`tare`, `ramp`, `hold`, `rest`, `sine` or `free`; in a file also VOID."""
     command_voltage: float
     t_start: float
     t_end: float

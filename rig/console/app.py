@@ -15,9 +15,11 @@ from textual.widgets import ContentSwitcher
 
 from rig.console.dialogs import LeaveDialog, Leaving, NoteDialog
 from rig.console.feed import Feed
+from rig.console.key_help import KeyHelp
 from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
 from rig.console.parting import Parting, begin, refused, settled
 from rig.console.plots import FitPlot, ResidualPlot, TimePlot
+from rig.console.view_model.alarms import call
 from rig.console.view_model.keys import device_gone, key_line, page_of
 from rig.console.view_model.view import View, absorb
 from rig.errors import LinkError
@@ -46,7 +48,14 @@ class ConsoleApp(App[None], inherit_bindings=False):
         Binding("f5", "go", "start"),
         Binding("p", "ask('pause')", "pause"),
         Binding("r", "again", "resume, retry"),
+        Binding("a", "ask('accept')", "accept"),
+        Binding("x", "ask('extend')", "extend"),
+        Binding("t", "ask('repeat')", "take again"),
+        Binding("b", "ask('back')", "back"),
         Binding("k", "ask('skip')", "skip"),
+        Binding("m", "ask('bad')", "mark as bad"),
+        Binding("l", "take_lease", "take the lease"),
+        Binding("?", "help", "keys"),
         Binding("n", "note", "note"),
         Binding("d", "leave", "detach"),
         *(Binding(str(i + 1), f"view('{name}')", name) for i, name in enumerate(VIEWS)),
@@ -63,6 +72,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
         self.state = View(now=clock())
         self.chosen = "main"
         self.parting: Parting | None = None
+        self.called = ""
 
     def compose(self) -> ComposeResult:
         yield Head()
@@ -130,9 +140,16 @@ class ConsoleApp(App[None], inherit_bindings=False):
         base.query_one(ResultsPanel).show(view)
         base.query_one(LogPanel).show(view)
         base.query_one("#keys", Panel).put(line := key_line(view), line)
-        if isinstance(self.screen, NoteDialog | LeaveDialog):
+        if isinstance(self.screen, NoteDialog | LeaveDialog | KeyHelp):
             self.screen.show(view)
         base.set_class(view.condition != "live", "old")
+        self._ring(call(view))
+
+    def _ring(self, calls: str) -> None:
+        """The terminal's bell for what somebody must come for."""
+        if calls and calls != self.called:
+            self.bell()
+        self.called = calls
 
     def show_plots(self) -> None:
         """The plots that are on the screen, from the view."""
@@ -156,17 +173,27 @@ class ConsoleApp(App[None], inherit_bindings=False):
             failed = ""
         except LinkError as error:
             failed = str(error)
-        self.state = replace(self.state, stop_asked=self.clock(), stop_failed=failed)
+        first = self.state.stop_asked
+        self.state = replace(self.state, stop_asked=self.clock() if first is None else first, stop_failed=failed)
         self.call_later(self.show_text)
 
     def action_ask(self, kind: RequestKind, text: str = "") -> None:
         """Send a request that needs no answer; say so when it cannot be sent."""
+        if self.state.looks_on:
+            self.notify("This console looks on: another one attends. Press l to attend too.", severity="warning")
+            return
         try:
             self.feed.send(Request(kind, text))
         except LinkError as error:
             self.notify(str(error), title=f"{kind}: not sent", severity="error", markup=False)
             return
         self.notify(f"asked the controller: {kind} {text}", timeout=2.0, markup=False)
+
+    def action_take_lease(self) -> None:
+        """From now on this console attends, beside the one that does."""
+        self.state = replace(self.state, looks_on=False)
+        self._renew_lease()
+        self.show_text()
 
     def action_go(self) -> None:
         """F5: start, or the thruster is mounted, whichever the controller waits for."""
@@ -191,6 +218,10 @@ class ConsoleApp(App[None], inherit_bindings=False):
         self.show_text()
         self.call_after_refresh(self.show_plots)
 
+    def action_help(self) -> None:
+        self.push_screen(KeyHelp())
+        self.call_after_refresh(self.show_text)
+
     def action_note(self) -> None:
         self.push_screen(NoteDialog(), self._keep_note)
         self.call_after_refresh(self.show_text)
@@ -202,7 +233,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
     def action_leave(self) -> None:
         if len(self.screen_stack) > 1:
             return  # a dialog is open: Escape first
-        if self._ended or not self.state.connected:
+        if self._ended or not self.state.connected or self.state.looks_on:
             self.exit()
             return
         self.push_screen(LeaveDialog(self.state.snapshot, self.again), self._leave)
@@ -232,6 +263,6 @@ class ConsoleApp(App[None], inherit_bindings=False):
         leaving = self.parting is not None and self.parting.kind == "detach"
         if self.state.connected and not leaving:
             try:
-                self.feed.send(Request("lease"))
+                self.feed.send(Request("watch" if self.state.looks_on else "lease"))
             except LinkError:
                 return  # `receive` reports the end of the link, and the banner says so

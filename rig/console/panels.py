@@ -64,7 +64,7 @@ class Head(Vertical):
             doing = f"last known: {doing}"
         lines.append(doing, "bold #ffffff").append(f"   {name}\n", "#b0b0b0")
         lines.append(wording.link(view), "#7fd88f" if live else "#b0b0b0" if ended else "bold #ff9090")
-        lines.append(_attendance(view.snapshot) if live else "", "#b0b0b0")
+        lines.append(_attendance(view) if live else "", "#b0b0b0")
         if view.snapshot is not None and view.snapshot.files:
             lines.append(
                 f"\n{view.snapshot.files[-1]}", "#b0b0b0"
@@ -81,10 +81,12 @@ class Head(Vertical):
             line.set_class(severity == said.severity, severity)
 
 
-def _attendance(snapshot: Snapshot | None) -> str:
-    if snapshot is None:
+def _attendance(view: View) -> str:
+    if view.snapshot is None:
         return ""
-    return "   attended: stops without you" if snapshot.attended else "   unattended: goes on without you"
+    if view.looks_on:
+        return "   READ-ONLY: another console attends; l to attend too"
+    return "   attended: stops without you" if view.snapshot.attended else "   unattended: goes on without you"
 
 
 class ProgressPanel(Panel):

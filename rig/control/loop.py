@@ -213,7 +213,7 @@ class Loop:
             )
         if self._lapse:
             return Trip(self._lapse, "late", now)
-        if not self.unattended and self.clients.last_lease is not None and not self.clients.connected:
+        if not self.unattended and self.clients.last_lease is not None and not self.clients.attending:
             return Trip("the operator is gone: the last front end has closed its connection", "lease", now)
         newest = {one.channel: self.readings.newest(one.channel) for one in self.guarded_channels}
         vitals = self._vitals(now)

@@ -29,6 +29,7 @@ from rig.errors import RecordingError
 from rig.hdf5 import load
 from rig.hdf5.apart import apart, open_no_more
 from rig.hdf5.blocks import LongChannel, long_channels
+from rig.hdf5.voided import void_spans
 
 LONG = 200_000
 """Thrust samples in all files above which `rig fit` goes by one pass on its own accord: 200 s at 1 kHz. A fit of a sine
@@ -134,7 +135,7 @@ def _has_numbers(path: Path, channel: Channel) -> bool:
 def _rows(run: Pass, form: Form, time: Floats, thrust: Floats, source: Channel) -> tuple[Floats, Floats, int]:
     """H (k, c + 1) with a last column of ones, thrust (k,), and how many samples of the windows could not be used."""
     voltage = voltage_at(source, time)
-    inside = _inside(run.windows, time)
+    inside = _inside(run.windows, void_spans(run.recording.steps), time)
     good = inside & np.isfinite(thrust) & np.isfinite(voltage)
     V = voltage[good]
     H = np.empty((V.size, len(form.coefficients) + 1))
@@ -146,13 +147,18 @@ def _rows(run: Pass, form: Form, time: Floats, thrust: Floats, source: Channel) 
     return H, thrust[good], int(np.count_nonzero(inside)) - V.size
 
 
-def _inside(windows: Sequence[Window], time: Floats) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
-    """Samples in the second half of a hold; all of them when there are no holds."""
+def _inside(
+    windows: Sequence[Window], void: Sequence[tuple[float, float]], time: Floats
+) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    """Samples in the second half of a hold, all of them when there are no holds; none that is `void`."""
     inside = np.full(time.size, not windows, dtype=np.bool_)
     for window in windows:
         settled = window.t_start + LONGEST_CUT * (window.t_end - window.t_start)
         low, high = np.searchsorted(time, (settled, window.t_end))
         inside[low:high] = True
+    for span in void:
+        low, high = np.searchsorted(time, span)
+        inside[low:high] = False
     return inside
 
 

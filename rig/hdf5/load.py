@@ -18,6 +18,7 @@ from rig.hdf5.apart import apart, open_no_more
 from rig.hdf5.layout import text_of
 from rig.hdf5.members import DAMAGE, LARGEST_VALUE, attributes, measured, member, members, numeric_columns, table
 from rig.hdf5.opening import number, open_for_reading, require_file
+from rig.hdf5.voided import without_voided
 
 UNIT_SPELLINGS: Final = {"Nm": "N.m", "N m": "N.m", "N·m": "N.m", "°C": "degC", "m/s2": "m/s^2", "m/s²": "m/s^2"}
 """Spellings of the format's units that other programs use."""
@@ -83,7 +84,7 @@ def _recording(file: h5py.File, path: Path, opened_as: str, rows: int | None) ->
     root = {name: _plain(value) for name, value in attributes(file, findings.texts).items()}
     latest = max((float(channel.time[-1]) for channel in channels if channel.time.size), default=0.0)
     warnings = [Event(latest, "warning", text) for text in findings.texts]
-    return Recording(
+    recording = Recording(
         recording_id=str(root.get("recording_id", "")),
         thruster=str(root.get("thruster", "")),
         channels=channels,
@@ -96,6 +97,7 @@ def _recording(file: h5py.File, path: Path, opened_as: str, rows: int | None) ->
         attributes=_rest(root) | {"opened_as": opened_as, "streams": {n: _facts(g) for n, g in streams.items()}},
         **_end(file, root),
     )
+    return without_voided(recording)
 
 
 def _end(file: h5py.File, root: Mapping[str, object]) -> dict[str, Any]:

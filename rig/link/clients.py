@@ -44,6 +44,8 @@ class Client:
     since: float
     """s, where the second began in which `count` messages came."""
     count: int = 0
+    attends: bool = True
+    """False: it looks on. Of what it asks only a stop is passed on, until it sends a lease."""
 
     def floods(self, messages: int, now: float) -> bool:
         """Whether these are too many for the second in which they came."""
@@ -65,6 +67,11 @@ class Clients:
     last_lease: float | None = None
     """s, when any front end last said that somebody attends, by a lease or by starting the campaign; from the first on
     an attended campaign needs one."""
+
+    @property
+    def attending(self) -> int:
+        """How many of those connected do not merely look on."""
+        return sum(client.attends for client in self.connected)
 
     def poll(self, now: float) -> list[Request]:
         """Accept who waits, take all requests; leases are renewed here and not passed on. Who floods, sends what is no
@@ -94,7 +101,7 @@ class Clients:
         """Send to everybody; who does not read is dropped, and never holds the loop."""
         for client in list(self.connected):
             try:
-                client.peer.send(replace(snapshot, trace=tuple(client.unsent), clients=len(self.connected)))
+                client.peer.send(replace(snapshot, trace=tuple(client.unsent), clients=self.attending))
                 client.unsent.clear()
             except (Overrun, LinkError):
                 self._drop(client)
@@ -137,13 +144,20 @@ class Clients:
             if not isinstance(message, Request):
                 self._drop(client)
                 return requests
-            if message.kind in ("lease", "start"):
-                self.last_lease = now
-            if message.kind != "lease":
-                requests.append(message)
+            requests += self._heard(client, message, now)
         if client.peer.closed or floods or now - client.heard > SILENCE:
             self._drop(client)
         return requests
+
+    def _heard(self, client: Client, message: Request, now: float) -> list[Request]:
+        """What is to be passed on of it."""
+        if message.kind in ("lease", "watch"):
+            client.attends = message.kind == "lease"
+        if message.kind in ("lease", "start") and client.attends:
+            self.last_lease = now
+        if message.kind in ("lease", "watch"):
+            return []
+        return [message] if client.attends or message.kind == "stop" else []
 
     def _drop(self, client: Client) -> None:
         client.peer.close()

@@ -132,6 +132,7 @@ class Snapshot:
     attended: bool = True
     """False: the campaign may go on with no front end connected (`unattended = true`)."""
     clients: int = 0
+    """Front ends that attend; those that only look on are not among them."""
     since_begin: float = 0.0
     """s since the controller began, the clock of `log`."""
     mounted_by_hand: bool = False
@@ -147,10 +148,16 @@ RequestKind = Literal[
     "stop",  # zero now, end the campaign, close the file
     "pause",
     "resume",
-    "skip",  # end the running hold now, keep its data
+    "accept",  # end the running hold now, keep its data
+    "skip",  # leave the running step out: nothing of it counts
+    "repeat",  # take the running step again from its beginning
+    "back",  # measure the step before once more, and go on from there
+    "extend",  # let the running hold last longer
+    "bad",  # what was measured last is wrong: no fit takes it
     "note",  # operator's remark into the events
     "detach",  # this client leaves on purpose; refused (log line) when attended and no other client is there
     "lease",  # I am here (sent twice a second by a front end that attends)
+    "watch",  # I look on and do not attend (as often, in its place): of what I ask, only a stop is obeyed
 ]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from math import isnan
 
 from rig.campaign.plan import Step
@@ -22,6 +23,7 @@ class Holding:
 
     def __init__(self, start: float, step: Step, settings: Settings) -> None:
         self._start, self._step, self._settings = start, step, settings
+        self._longest = step.max_duration
         self._next_look = step.min_duration - (LOOKS - 1) * LOOK_PERIOD
         self._steady_looks = 0
         self._window = Window(start + step.settle, settings.estimator)
@@ -37,6 +39,12 @@ class Holding:
         return elapsed >= self._step.max_duration or (
             self._steady_looks >= LOOKS and elapsed >= self._step.min_duration
         )
+
+    def extend(self) -> float:
+        """Let it last longer, by as long as it was to last at most; returns that, s."""
+        longer = self._longest
+        self._step = replace(self._step, max_duration=self._step.max_duration + longer)
+        return longer
 
     def point(self, time: float, tare: float) -> Point | None:
         """The point of a hold that ends at `time` s, less `tare` N; None with too few samples for an error."""

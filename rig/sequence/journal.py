@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Literal
 
+from identification.recording import VOID
 from identification.recording import Step as StepRow
 from rig.campaign.plan import Step
 from rig.link.front_end_messages import LogLine, Point, State
@@ -16,12 +18,15 @@ class Journal:
     """Collects during one tick; `clear` at the start of the next."""
 
     def __init__(self) -> None:
+        self._last: StepRow | None = None
         self.clear()
 
     def clear(self) -> None:
         self.points: list[Point] = []
         self.rows: list[StepRow] = []
         self.events: list[LogLine] = []
+        self.given_up: list[int] = []
+        """Indices of steps without which a run is whole: an operator wants no data of them."""
 
     def say(self, time: float, level: Literal["info", "warning", "trip", "error"], text: str) -> None:
         self.events.append(LogLine(time, level, text))
@@ -45,3 +50,12 @@ class Journal:
             case _ if cut:
                 phase = "free"
         self.rows.append(StepRow(index, phase, value, start, end))
+        if phase in ("hold", "sine"):
+            self._last = self.rows[-1]
+
+    def void_last(self) -> StepRow | None:
+        """Mark what was measured last as bad, by a row of its own; returns that row, None where there is none."""
+        last, self._last = self._last, None
+        if last is not None:
+            self.rows.append(replace(last, phase=VOID))
+        return last

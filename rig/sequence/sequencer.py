@@ -12,11 +12,12 @@ from math import copysign, isfinite, pi, sin
 from types import MappingProxyType
 
 from rig.campaign.plan import Step, places, require_steps
-from rig.link.front_end_messages import Request, State
+from rig.link.front_end_messages import State
 from rig.safety.stopping import Stop, is_rest, turning
 from rig.safety.watchdog_proof import Proof, Refused
 from rig.sequence.holding import Holding
 from rig.sequence.journal import Journal
+from rig.sequence.requests import obey
 from rig.sequence.taring import Taring
 from rig.sequence.ticks import Outcome, Output, Settings, Tick, settings_for
 
@@ -30,143 +31,140 @@ class Sequencer:
     """One run of one thruster, advanced once per control period. Raises PlanError for steps it may not run."""
 
     def __init__(self, steps: Iterable[Step], settings: Settings) -> None:
-        self._steps = tuple(steps)
+        self.steps = tuple(steps)
         self._settings = settings
-        require_steps(self._steps, settings.max_voltage)
-        self._numbers = places(self._steps)
-        self._after = tuple(accumulate((s.expected for s in reversed(self._steps)), initial=0.0))[-2::-1]
-        self._state: State = "tare"
-        self._position = 0
+        require_steps(self.steps, settings.max_voltage)
+        self.numbers = places(self.steps)
+        self._after = tuple(accumulate((s.expected for s in reversed(self.steps)), initial=0.0))[-2::-1]
+        self.state: State = "tare"
+        self.position = 0
         self._command = 0.0
         self._silent = False
         self._last: float | None = None
         self._dt = 0.0
-        self._since = 0.0
+        self.since = 0.0
         self._target = 0.0
         self._rate = settings.slew
         self._approach = False
-        self._holding = Holding(0.0, self._steps[0], settings)
+        self.holding = Holding(0.0, self.steps[0], settings)
         self._taring = Taring(0.0, 0.0, settings.tare, settings.estimator)
         self._tare: float | None = None
         self._proof: Proof | None = None
-        self._prove_before = settings.proofs_before(step.phase for step in self._steps)
+        self._prove_before = settings.proofs_before(step.phase for step in self.steps)
         self._time_to_zero: float | None = None
         self._stop = Stop(0.0, settings.rest_rate, settings.coast_time)
         self._outcome: Outcome = "running"
         self._cause = ""
         self._trip_told = self._release = False
         self._stop_confirmed: bool | None = None
-        self._journal = Journal()
+        self.journal = Journal()
 
     def advance(self, tick: Tick) -> Output:
         """Decide one tick. Raises ValueError when time runs backwards or is not finite."""
         if not isfinite(tick.time) or (self._last is not None and tick.time < self._last):
             raise ValueError(f"tick time must be finite and must not run backwards: {tick.time} s after {self._last} s")
-        self._journal.clear()
+        self.journal.clear()
         if self._last is None:
             self._last = tick.time
-            self._begin(tick.time)
+            self.begin(tick.time)
         self._dt, self._last = tick.time - self._last, tick.time
         self._interrupt(tick)
-        while (handler := HANDLERS.get(self._state)) and handler(self, tick):
+        while (handler := HANDLERS.get(self.state)) and handler(self, tick):
             self._dt = 0.0
         return self._output(tick.time)
 
     def _interrupt(self, tick: Tick) -> None:
-        if self._state == "run_done":
+        if self.state == "run_done":
             return
         if tick.trip:
             self._tripped(tick.time, tick.trip.cause)
-        if self._state not in ("paused", "stopping") and self._dt > self._settings.lapse:
+        if self.state not in ("paused", "stopping") and self._dt > self._settings.lapse:
             cause = f"the control loop gave no tick for {self._dt:.2f} s, {self._settings.lapse:.2f} s are allowed"
             self._tripped(tick.time, cause)
         for request in tick.requests:
-            if self._state != "stopping":
-                self._obey(request, tick.time)
+            if self.state != "stopping":
+                obey(self, request, tick.time)
 
     def _tripped(self, time: float, cause: str) -> None:
         """Stop for this cause; during a stop that is already going on it is only told, once."""
-        if self._state != "stopping":
-            self._halt(time, "tripped", cause)
+        if self.state != "stopping":
+            self.halt(time, "tripped", cause)
         elif not self._trip_told:
-            self._journal.say(time, "trip", f"while stopping: {cause}")
+            self.journal.say(time, "trip", f"while stopping: {cause}")
         self._trip_told = True
 
-    def _obey(self, request: Request, time: float) -> None:
-        match request.kind:
-            case "stop":
-                self._halt(time, "aborted", f"stopped by {request.text or 'the operator'}")
-            case "pause" if self._state != "paused":
-                self._end_row(time, cut=True)
-                self._zero(time, "paused")
-                self._journal.say(time, "info", f"paused in step {self._numbers[self._position]}: command 0 V")
-            case "resume" if self._state == "paused":
-                self._end_row(time)
-                self._journal.say(time, "info", f"resumed: step {self._numbers[self._position]} is retaken")
-                self._dt = 0.0  # 0 V once more: also a pause that was resumed in the same tick sends it
-                self._begin(time)
-            case "skip" if self._state in ("hold", "sine", "free"):
-                self._journal.say(
-                    time, "info", f"step {self._numbers[self._position]} ended early on request, its data are kept"
-                )
-                self._finish_step(time)
-            case "pause" | "resume" | "skip":
-                self._journal.say(time, "warning", f"{request.kind} ignored: it means nothing in state {self._state}")
-            case _:
-                pass  # notes, leases and the like are the controller's
+    @property
+    def step(self) -> Step:
+        """The one under way."""
+        return self.steps[self.position]
 
-    def _halt(self, time: float, outcome: Outcome, cause: str) -> None:
+    @property
+    def place(self) -> str:
+        """Which step of the plan that is, for people: they count from 1."""
+        return f"step {self.numbers[self.position] + 1}"
+
+    def halt(self, time: float, outcome: Outcome, cause: str) -> None:
         """Command 0 V at once and wait for rest."""
-        self._end_row(time, cut=True)
-        self._zero(time, "stopping")
+        self.end_row(time, cut=True)
+        self.zero(time, "stopping")
         self._outcome, self._cause = outcome, cause
-        self._journal.say(time, "trip" if outcome == "tripped" else "warning", f"{cause}: command 0 V")
+        self.journal.say(time, "trip" if outcome == "tripped" else "warning", f"{cause}: command 0 V")
 
-    def _zero(self, time: float, state: State) -> None:
-        self._state, self._since, self._command, self._silent = state, time, 0.0, False
+    def zero(self, time: float, state: State) -> None:
+        self.state, self.since, self._command, self._silent = state, time, 0.0, False
         self._stop = Stop(time, self._settings.rest_rate, self._settings.coast_time)
 
-    def _begin(self, time: float) -> None:
+    def begin(self, time: float) -> None:
         """Begin the step at the present position, by an approach ramp where the command is elsewhere."""
-        self._since = time
-        step = self._steps[self._position]
+        self.since = time
+        step = self.step
         if self._settings.proof is not None and self._prove_before[:1] in (("start",), (step.phase,)):
-            self._proof, self._state = Proof(self._settings.proof), "proving"
+            self._proof, self.state = Proof(self._settings.proof), "proving"
             return
         entry = step.from_voltage if step.swept else step.voltage
         self._approach = (step.phase != "ramp" or step.swept) and abs(self._command - entry) > EPSILON
         if self._approach:
-            self._state, self._target, self._rate = "ramp", entry, self._settings.slew
+            self.state, self._target, self._rate = "ramp", entry, self._settings.slew
             return
-        self._state, self._target = step.phase, step.voltage
-        self._holding = Holding(time, step, self._settings)
+        self.state, self._target = step.phase, step.voltage
+        self.holding = Holding(time, step, self._settings)
         self._taring = Taring(time, step.min_duration, self._settings.tare, self._settings.estimator)
         travel = abs(step.voltage - step.from_voltage)
         self._rate = travel / step.min_duration if step.swept else self._settings.slew
 
-    def _next(self, time: float) -> None:
-        self._end_row(time)
+    def next_step(self, time: float) -> None:
+        self.end_row(time)
         if not self._approach:
-            if self._position == len(self._steps) - 1:
-                self._zero(time, "stopping")
+            if self.position == len(self.steps) - 1:
+                self.zero(time, "stopping")
                 self._outcome = "completed"
                 return
-            self._position += 1
-        self._begin(time)
+            self.position += 1
+        self.begin(time)
 
-    def _finish_step(self, time: float) -> None:
+    def stand_still(self) -> None:
+        """No time passes in what is left of this tick: the command stays."""
+        self._dt = 0.0
+
+    def leave_step(self, time: float) -> None:
+        """Go on without what this step has measured."""
+        self.end_row(time, cut=True)
+        self.since = time
+        self.next_step(time)
+
+    def finish_step(self, time: float) -> None:
         """End a step that has measured: a hold gives its point."""
-        if self._state == "hold":
-            point = self._holding.point(time, self._tare or 0.0)
+        if self.state == "hold":
+            point = self.holding.point(time, self._tare or 0.0)
             if point is not None:
-                self._journal.points.append(point)
+                self.journal.points.append(point)
             if point is None or not point.steady:
-                self._journal.say(time, "warning", f"{'not steady' if point else 'no point'}, {self._holding}")
-        self._next(time)
+                self.journal.say(time, "warning", f"{'not steady' if point else 'no point'}, {self.holding}")
+        self.next_step(time)
 
-    def _end_row(self, time: float, cut: bool = False) -> None:
-        volts = self._target if self._state == "ramp" and not cut else self._command
-        self._journal.row(self._state, self._steps[self._position], volts, self._since, time, cut=cut)
+    def end_row(self, time: float, cut: bool = False) -> None:
+        volts = self._target if self.state == "ramp" and not cut else self._command
+        self.journal.row(self.state, self.step, volts, self.since, time, cut=cut)
 
     # one handler per state; True: the state has changed, ask the new one in this same tick
 
@@ -177,13 +175,13 @@ class Sequencer:
         if verdict is None:
             return False
         if isinstance(verdict, Refused):
-            self._halt(tick.time, "tripped", verdict.cause)
+            self.halt(tick.time, "tripped", verdict.cause)
             return True
         self._time_to_zero = verdict.time_to_zero_s
-        self._journal.say(tick.time, "info", f"watchdog proved: at rest {verdict.time_to_zero_s:.2f} s after silence")
-        self._end_row(tick.time)
+        self.journal.say(tick.time, "info", f"watchdog proved: at rest {verdict.time_to_zero_s:.2f} s after silence")
+        self.end_row(tick.time)
         self._prove_before = self._prove_before[1:]
-        self._begin(tick.time)
+        self.begin(tick.time)
         return True
 
     def _zeroing(self, tick: Tick) -> bool:
@@ -194,94 +192,95 @@ class Sequencer:
                 return False
             case "accepted":
                 self._tare = mean
-                self._journal.say(tick.time, "info", text)
-                self._next(tick.time)
+                self.journal.say(tick.time, "info", text)
+                self.next_step(tick.time)
             case "failed" if self._tare is None:
-                self._halt(tick.time, "tripped", text)
+                self.halt(tick.time, "tripped", text)
             case _:
                 kept = f"; the last tare of {self._tare:.4f} N stays in use" if verdict == "failed" else ""
-                self._journal.say(tick.time, "warning", text + kept)
-                self._end_row(tick.time, cut=True)
-                self._since = tick.time
+                self.journal.say(tick.time, "warning", text + kept)
+                self.end_row(tick.time, cut=True)
+                self.since = tick.time
                 if verdict == "failed":
-                    self._next(tick.time)
+                    self.next_step(tick.time)
         return verdict != "again"
 
     def _ramping(self, tick: Tick) -> bool:
         gap, most = self._target - self._command, self._rate * self._dt
         if abs(gap) <= most + EPSILON:
             self._command = self._target
-            self._next(tick.time)
+            self.next_step(tick.time)
             return True
         self._command += copysign(most, gap)
         return False
 
     def _hold(self, tick: Tick) -> bool:
-        if not self._holding.advance(tick.time, tick.thrust):
+        if not self.holding.advance(tick.time, tick.thrust):
             return False
-        self._finish_step(tick.time)
+        self.finish_step(tick.time)
         return True
 
     def _resting(self, tick: Tick) -> bool:
-        step = self._steps[self._position]
-        elapsed, at_rest = tick.time - self._since + EPSILON, is_rest(tick.rotation, self._settings.rest_rate)
+        step = self.step
+        elapsed, at_rest = tick.time - self.since + EPSILON, is_rest(tick.rotation, self._settings.rest_rate)
         if elapsed >= step.max_duration or (elapsed >= step.min_duration and at_rest):
             if not at_rest:
                 text = f"not at rest after {elapsed:.1f} s at 0 V: {turning(tick.rotation)}"
-                self._journal.say(tick.time, "warning", text)
-            self._next(tick.time)
+                self.journal.say(tick.time, "warning", text)
+            self.next_step(tick.time)
             return True
         return False
 
     def _waving(self, tick: Tick) -> bool:
-        step = self._steps[self._position]
-        elapsed = tick.time - self._since
+        step = self.step
+        elapsed = tick.time - self.since
         value = step.voltage + step.amplitude * sin(2 * pi * step.frequency * elapsed)
         most = self._settings.slew * self._dt
         self._command += min(max(value - self._command, -most), most)
         return self._timed(tick)
 
     def _timed(self, tick: Tick) -> bool:
-        if tick.time - self._since < self._steps[self._position].max_duration - EPSILON:
+        if tick.time - self.since < self.step.max_duration - EPSILON:
             return False
-        self._next(tick.time)
+        self.next_step(tick.time)
         return True
 
     def _stopping(self, tick: Tick) -> bool:
         """0 V until measured rest."""
         confirmed, self._release = self._stop.advance(tick.time, tick.rotation, tick.thrust_rest)
         if confirmed is not None:
-            self._end_row(tick.time)
-            self._stop_confirmed, self._state = confirmed, "run_done"
-            after = f"{tick.time - self._since:.2f} s after command 0 V: {turning(tick.rotation, tick.thrust_rest)}"
+            self.end_row(tick.time)
+            self._stop_confirmed, self.state = confirmed, "run_done"
+            after = f"{tick.time - self.since:.2f} s after command 0 V: {turning(tick.rotation, tick.thrust_rest)}"
             text = f"at rest {after}" if confirmed else f"STOP NOT CONFIRMED {after}; cut the power"
-            self._journal.say(tick.time, "info" if confirmed else "error", text)
+            self.journal.say(tick.time, "info" if confirmed else "error", text)
         return False
 
     def _output(self, time: float) -> Output:
-        step, elapsed = self._steps[self._position], time - self._since
+        step, elapsed = self.step, time - self.since
         once = self._settings.proof.expected if self._settings.proof else 0.0
-        expected, after = step.expected, self._after[self._position] + once * len(self._prove_before)
-        if self._state == "proving":
+        expected, after = step.expected, self._after[self.position] + once * len(self._prove_before)
+        if self.state == "proving":
             expected, after = once, expected + after - once
         return Output(
             volts=None if self._silent else self._command,
-            state=self._state,
-            step=self._numbers[self._position],
-            steps=self._numbers[-1] + 1,
+            state=self.state,
+            step=self.numbers[self.position],
+            steps=self.numbers[-1] + 1,
             step_elapsed=elapsed,
             step_expected=expected,
             remaining=0.0 if self._outcome != "running" else max(expected - elapsed, 0.0) + after,
             release=self._release,
-            points=tuple(self._journal.points),
-            rows=tuple(self._journal.rows),
-            events=tuple(self._journal.events),
+            points=tuple(self.journal.points),
+            rows=tuple(self.journal.rows),
+            events=tuple(self.journal.events),
+            given_up=tuple(self.journal.given_up),
             tare=self._tare,
             time_to_zero_s=self._time_to_zero,
             outcome=self._outcome,
             cause=self._cause,
             stop_confirmed=self._stop_confirmed,
-            done=self._state == "run_done",
+            done=self.state == "run_done",
         )
 
 

@@ -64,7 +64,7 @@ class Tick:
     """Whether the force sensor says that nothing pushes; None: it is no witness."""
     trip: Trip | None = None
     requests: tuple[Request, ...] = ()
-    """`stop`, `pause`, `resume`, `skip` are obeyed, others are ignored."""
+    """Those of `rig.sequence.requests` are obeyed, others are ignored."""
 
 
 class Output(NamedTuple):
@@ -87,6 +87,8 @@ class Output(NamedTuple):
     rows: tuple[StepRow, ...] = ()
     """Steps that were finished in this tick, as really run, for `/steps`."""
     events: tuple[LogLine, ...] = ()
+    given_up: tuple[int, ...] = ()
+    """Indices of steps that an operator left out or marked bad in this tick: a run is whole without them."""
     tare: float | None = None
     """N, latest accepted tare; None before the first."""
     time_to_zero_s: float | None = None

@@ -40,7 +40,7 @@ def preflight(session: Session) -> None:
     while True:
         requests = session.turn()
         session.status.state = "preflight"
-        seen = session.loop.now if session.loop.clients.connected else seen
+        seen = session.loop.now if session.loop.clients.attending else seen
         if session.loop.now - seen > UNSEEN:
             raise Stopped("aborted", f"nobody started the campaign, and no front end was there for {UNSEEN:g} s")
         links.look(requests)

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterable, Set
 from dataclasses import replace
 
+from identification.recording import VOID
 from rig.campaign.plan import TARE_AGAIN, Step
 from rig.control.loop import Decision, Inputs
+from rig.control.status import Status
 from rig.link.recorder_messages import Outcome, StepRow
 from rig.recording.ledger import Fact, attempts, kept_steps
 from rig.recording.recorder_link import recording_path
@@ -24,6 +26,7 @@ def measure(session: Session) -> None:
     thruster = status.thruster
     status.outcome, status.cause, status.stop_confirmed = "running", "", None
     session.measured.clear()
+    session.given_up.clear()
     path = recording_path(session.folder, thruster)
     attempt = attempts(session.before, thruster) + 1
     kept = kept_steps(session.before, thruster)
@@ -108,9 +111,20 @@ def _take(session: Session, output: Output, t0_ns: int, begun: float) -> None:
         start, end = row.t_start + offset, row.t_end + offset
         session.recorder.step(StepRow(row.index, row.phase, row.command_voltage, start, end))
         session.measured.add((row.index, row.phase))
+        if row.phase == VOID:
+            _forget_point(status, row.index)
         session.ledger.write("step", thruster=status.thruster, index=row.index, phase=row.phase, t_end=end)
+    session.given_up.update(output.given_up)
     for line in output.events:
         session.event_log.say(round((begun + line.time) * 1e9), line.level, line.text)
+
+
+def _forget_point(status: Status, step: int) -> None:
+    """Of the step that was marked bad, the newest one."""
+    for place in range(len(status.points) - 1, -1, -1):
+        if status.points[place].step == step:
+            del status.points[place]
+            return
 
 
 def _close(session: Session, output: Output) -> None:
@@ -143,7 +157,7 @@ def judged(session: Session, output: Output) -> tuple[Outcome, str]:
     """Outcome and cause of a run that is over. Completed is only what measured every step and came to rest."""
     if output.outcome in ("aborted", "tripped"):
         return output.outcome, output.cause
-    plan = [step for step in session.campaign.plan if step.index not in session.kept]
+    plan = [step for step in session.campaign.plan if step.index not in session.kept | session.given_up]
     missing = missing_steps(plan, session.measured, {point.step for point in session.status.points})
     if missing:
         return "aborted", f"the plan is not measured whole: step {missing[0].index} ({missing[0].phase}) has no data"

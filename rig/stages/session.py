@@ -64,6 +64,8 @@ class Session:
     """This run is; False once it was said why it is not."""
     measured: set[tuple[int, str]] = field(default_factory=set)
     """(index, phase) of the steps of this run that were run to their end."""
+    given_up: set[int] = field(default_factory=set)
+    """Indices of the steps of this run that an operator left out or marked bad: it is whole without them."""
     kept: frozenset[int] = frozenset()
     """Indices of the steps of this run that earlier recordings hold: it goes on after a cut."""
     stamp: Callable[[], Stamp] = fresh_stamp
@@ -142,7 +144,7 @@ class Session:
             if request.kind == "note":
                 self.say("info", f"note: {request.text}")
             elif request.kind == "detach":
-                alone = not self.campaign.unattended and len(self.loop.clients.connected) < 2
+                alone = not self.campaign.unattended and self.loop.clients.attending < 2
                 self.say(
                     "warning" if alone else "info",
                     "the only front end of an attended run wants to leave: when it does, the run stops"

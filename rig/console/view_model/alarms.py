@@ -38,6 +38,21 @@ def alarm(view: View) -> Alarm:
     return _running(view, snapshot)
 
 
+def call(view: View) -> str:
+    """What an operator who looks elsewhere must hear of; empty: nothing. It rings when this changes."""
+    snapshot = view.snapshot
+    if alarm(view).severity == "danger":
+        return "danger"
+    if snapshot is None:
+        return ""
+    if snapshot.state == "mount" and snapshot.mounted_by_hand:
+        return f"mount {snapshot.thruster}"
+    ready = snapshot.state == "preflight" and all(c.verdict in ("passed", "warning") for c in snapshot.checks)
+    if ready and snapshot.checks:
+        return "ready"
+    return snapshot.state if snapshot.state in ("paused", "done") else ""
+
+
 def _rotation(snapshot: Snapshot) -> str:
     for reading in snapshot.readings:
         if reading.quantity == "rotation_rate" and reading.value is not None:
@@ -69,7 +84,8 @@ def _running(view: View, snapshot: Snapshot) -> Alarm:
             "warning", f"STOP SENT {age(view.now - view.stop_asked)} ago — the controller has not answered yet."
         )
     if snapshot.state == "stopping" and snapshot.stop_confirmed is None:
-        return Alarm("warning", "STOPPING — command is 0 V; waiting until the measured rotation is at rest.")
+        after = f", {1000 * view.zero_after:.0f} ms after your key" if view.zero_after is not None else ""
+        return Alarm("warning", f"STOPPING — command is 0 V{after}; waiting until the measured rotation is at rest.")
     if snapshot.state == "done":
         return _ended(snapshot)
     if snapshot.state == "mount" and snapshot.mounted_by_hand:

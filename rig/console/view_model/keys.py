@@ -8,6 +8,24 @@ from rig.console.view_model.view import View
 from rig.link.front_end_messages import Snapshot
 
 VIEW_KEYS = (("1", "main"), ("2", "V|V|"), ("3", "time"), ("4", "log"), ("5", "table"))
+EVERY_KEY = (
+    ("F9, Ctrl+C", "STOP: 0 V now, the campaign ends, the recording is closed. Works everywhere"),
+    ("F5", "start once the preflight has passed; the thruster is on the bench"),
+    ("p", "pause: 0 V at once"),
+    ("r", "resume: the step under way is taken again. Preflight: try a device again"),
+    ("a", "accept: the running hold or sine ends now, its data are kept"),
+    ("x", "extend: the running hold may last as long again"),
+    ("t", "take again: the running step from its beginning"),
+    ("b", "back: measure the step before once more, and go on from there"),
+    ("k", "skip: the running step is left out"),
+    ("m", "mark as bad what was measured last: no fit takes it"),
+    ("n", "a note into the recording"),
+    ("l", "attend, where another console does and this one only looks on"),
+    ("d, Ctrl+Q", "leave; a dialog says first what that does"),
+    ("1 2 3 4 5", "main page, thrust over V|V|, over time, events, results"),
+    ("?", "these keys"),
+)
+"""For a help page, the most urgent first."""
 
 
 def page_of(view: View, chosen: str) -> str:
@@ -21,7 +39,7 @@ def page_of(view: View, chosen: str) -> str:
 def key_line(view: View) -> Text:
     """The keys that mean something now."""
     text = Text(no_wrap=True, overflow="ellipsis")
-    for key, does in (*_doing(view), *VIEW_KEYS):
+    for key, does in (("?", "keys"), *_doing(view), *VIEW_KEYS):
         text.append(f" {key} ", "bold #ffffff on #3a4a5a").append(f"{does} ")
     return text
 
@@ -35,6 +53,8 @@ def device_gone(snapshot: Snapshot) -> str:
 
 def _doing(view: View) -> tuple[tuple[str, str], ...]:
     snapshot = view.snapshot
+    if view.looks_on and view.connected:
+        return (("l", "attend"), ("d", "leave"))
     if not view.connected or (snapshot is not None and snapshot.state == "done"):
         return (("d", "leave"),)
     leave = (("n", "note"), ("d", "detach"))
@@ -47,5 +67,6 @@ def _doing(view: View) -> tuple[tuple[str, str], ...]:
         return (("F5", "mounted"), *leave) if snapshot.mounted_by_hand else leave
     if snapshot.state == "paused":
         return (("r", "resume"), *leave)
-    skip = (("k", "skip"),) if snapshot.state in ("hold", "sine", "free") else ()
-    return (("p", "pause"), *skip, *leave)
+    measuring = snapshot.state in ("hold", "sine", "free")
+    step = (("a", "accept"), ("t", "again"), ("k", "skip")) if measuring else ()
+    return (("p", "pause"), *step, *leave)

@@ -32,8 +32,12 @@ class View:
     """Finished holds of each thruster seen since this console attached, in order of appearance."""
     trace: tuple[TraceRow, ...] = ()
     """(s of the recording, V, N) of the running recording."""
+    looks_on: bool = False
+    """Another front end attends, and this one asks for nothing but a stop."""
     stop_asked: float | None = None
-    """s, when the stop key was pressed; None: not yet."""
+    """s, when the stop key was pressed first; None: not yet."""
+    zero_after: float | None = None
+    """s from then until a snapshot said that the command is 0 V."""
     stop_failed: str = ""
     """Why the stop could not be sent; empty: it was."""
 
@@ -61,7 +65,16 @@ def absorb(view: View, snapshot: Snapshot, now: float) -> View:
         received=now,
         points=_with_points(view.points, snapshot),
         trace=_with_trace(view, snapshot),
+        zero_after=_zero_after(view, snapshot, now),
+        looks_on=view.looks_on if view.snapshot is not None else snapshot.clients > 1,
     )
+
+
+def _zero_after(view: View, snapshot: Snapshot, now: float) -> float | None:
+    if view.zero_after is not None or view.stop_asked is None:
+        return view.zero_after
+    stopped = snapshot.command == 0 and snapshot.state in ("stopping", "run_done", "done")
+    return now - view.stop_asked if stopped else None
 
 
 def _with_points(known: Mapping[str, tuple[Point, ...]], snapshot: Snapshot) -> Mapping[str, tuple[Point, ...]]:

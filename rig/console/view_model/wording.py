@@ -111,7 +111,8 @@ def link(view: View) -> str:
     if view.condition == "waiting":
         return "waiting for the controller"
     if view.condition == "disconnected" and view.snapshot is not None and view.snapshot.state == "done":
-        return "the controller has ended, as it should after a campaign"
+        whole = view.snapshot.outcome == "completed"
+        return f"the controller has ended{', as it should after a campaign' if whole else ''}"
     name = "NO FRESH DATA" if view.condition == "stale" else "DISCONNECTED"
     return f"{name}, last came {age(view.silence)} ago"
 

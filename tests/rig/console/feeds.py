@@ -71,8 +71,8 @@ class PlayedFeed:
         self._news.set()
 
     def kinds(self) -> list[RequestKind]:
-        """What was asked, leases apart."""
-        return [request.kind for request in self.sent if request.kind != "lease"]
+        """What was asked, apart from leases and that somebody looks on."""
+        return [request.kind for request in self.sent if request.kind not in ("lease", "watch")]
 
 
 def wobble(t: float) -> float:

@@ -6,8 +6,11 @@ from dataclasses import replace
 
 import pytest
 
+from rig.console.app import ConsoleApp
 from rig.console.dialogs import LeaveDialog
+from rig.console.key_help import KeyHelp
 from rig.console.panels import ChecksPanel, ProgressPanel, ReadingsPanel, ResultsPanel
+from rig.console.view_model.keys import EVERY_KEY
 from rig.link.front_end_messages import LogLine, Request
 from tests.rig.console.feeds import CHECKS, LOG, campaign, points, running, snapshot
 from tests.rig.console.sitting import sitting
@@ -70,6 +73,28 @@ async def test_pause_resume_skip():
         assert desk.kinds() == ["pause", "resume", "skip"]
 
 
+@pytest.mark.parametrize(
+    ("key", "kind"), [("a", "accept"), ("x", "extend"), ("t", "repeat"), ("b", "back"), ("k", "skip"), ("m", "bad")]
+)
+async def test_each_key_of_a_step_asks_for_one_thing(key, kind):
+    async with sitting(running()) as desk:
+        await desk.press(key)
+        assert desk.kinds() == [kind]
+
+
+async def test_the_page_of_keys_has_them_all_and_the_stop_key_works_on_it():
+    async with sitting(running()) as desk:
+        await desk.press("question_mark")
+        assert isinstance(desk.app.screen, KeyHelp)
+        known = " ".join(key for key, _ in EVERY_KEY).lower()
+        keys = {binding.key for binding in ConsoleApp.BINDINGS} - {"?"}
+        assert all(key in known for key in keys)
+        await desk.press("p", "f9")
+        assert desk.kinds() == ["stop"]
+        await desk.press("escape")
+        assert len(desk.app.screen_stack) == 1
+
+
 async def test_a_note_may_contain_every_letter_that_is_a_key_elsewhere():
     async with sitting(running()) as desk:
         await desk.press("n", *"pdk1", "space", "n", "enter")
@@ -125,7 +150,8 @@ async def test_enter_at_once_in_the_leave_dialog_stays():
 
 
 async def test_a_refused_detach_keeps_the_console_and_its_leases():
-    async with sitting(running(attended=True, clients=2)) as desk:
+    async with sitting(running(attended=True, clients=1)) as desk:
+        await desk.play(running(t=47.5, attended=True, clients=2))
         await desk.press("d", "tab", "enter")
         no = LogLine(48.0, "warning", "detach refused: the campaign is attended and nobody else is here")
         await desk.play(running(t=48.0, attended=True, log=(*LOG, no), log_count=len(LOG) + 1))
@@ -233,3 +259,57 @@ async def test_there_is_no_command_palette():
     async with sitting(running()) as desk:
         await desk.press("ctrl+p")
         assert len(desk.app.screen_stack) == 1
+
+
+async def test_the_time_from_the_stop_key_to_zero_is_on_the_screen():
+    async with sitting(running()) as desk:
+        await desk.press("f9")
+        desk.clock.now += 0.08
+        await desk.play(running("stopping", command=0.0))
+        assert "command is 0 V, 80 ms after your key" in desk.alarm()
+        await desk.press("f9")
+        await desk.wait(1.0)
+        await desk.play(running("stopping", command=0.0))
+        assert "80 ms after your key" in desk.alarm()
+
+
+async def test_what_somebody_must_come_for_rings_once(monkeypatch):
+    rung = []
+    monkeypatch.setattr(ConsoleApp, "bell", lambda app: rung.append(app.state.snapshot.state))
+    async with sitting(running()) as desk:
+        await desk.play(running("mount", thruster="T3", mounted_by_hand=True))
+        await desk.play(running("mount", thruster="T3", mounted_by_hand=True))
+        await desk.play(running())
+        await desk.play(running("paused", command=0.0))
+        await desk.play(running("done", outcome="completed"))
+    assert rung == ["mount", "paused", "done"]
+
+
+async def test_a_second_console_looks_on_until_it_takes_the_lease():
+    async with sitting(running(attended=True, clients=2)) as desk:
+        assert "READ-ONLY" in desk.text(".head-state")
+        await desk.press("p", "a", "m")
+        assert desk.kinds() == []
+        desk.app._renew_lease()
+        assert desk.feed.sent[-1] == Request("watch")
+        await desk.press("l")
+        assert desk.feed.sent[-1] == Request("lease")
+        assert "READ-ONLY" not in desk.text(".head-state")
+        await desk.press("p")
+        assert desk.kinds() == ["pause"]
+
+
+async def test_the_stop_key_works_on_a_console_that_looks_on_and_it_leaves_without_a_question():
+    async with sitting(running(attended=True, clients=2)) as desk:
+        await desk.press("f9")
+        assert desk.kinds() == ["stop"]
+        await desk.press("d")
+        await desk.pilot.pause()
+    assert not desk.app.is_running
+
+
+async def test_the_first_console_goes_on_attending_when_others_come():
+    async with sitting(running(attended=True, clients=1)) as desk:
+        await desk.play(running(t=48.0, attended=True, clients=3))
+        await desk.press("p")
+        assert desk.kinds() == ["pause"]

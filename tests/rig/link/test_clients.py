@@ -198,3 +198,26 @@ def test_no_descriptor_left_is_no_end_of_a_run(tmp_path):
             resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
         clients.poll(0.1)
         assert len(clients.connected) == 1
+
+
+def test_who_looks_on_is_obeyed_in_a_stop_alone_and_attends_nothing(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        peer = front()
+        for kind in ("watch", "pause", "start", "skip", "stop"):
+            peer.send(Request(kind))
+        assert [request.kind for request in clients.poll(1.0)] == ["stop"]
+        assert (len(clients.connected), clients.attending, clients.last_lease) == (1, 0, None)
+        peer.send(Request("lease"))
+        peer.send(Request("pause"))
+        assert [request.kind for request in clients.poll(2.0)] == ["pause"]
+        assert (clients.attending, clients.last_lease) == (1, 2.0)
+
+
+def test_a_snapshot_counts_those_that_attend(tmp_path):
+    with listening(tmp_path) as (clients, front):
+        attends, looks_on = front(), front()
+        attends.send(Request("lease"))
+        looks_on.send(Request("watch"))
+        clients.poll(1.0)
+        clients.publish(snapshot())
+        assert [message.clients for message in attends.receive()] == [1]

@@ -40,7 +40,7 @@ def test_every_trip_and_stop_ends_at_zero_at_once_and_stays(number, how):
     assert ran.outputs[number].outcome == ran.last.outcome
 
 
-KINDS = st.sampled_from(["pause", "resume", "skip", "note"])
+KINDS = st.sampled_from(["pause", "resume", "accept", "extend", "repeat", "note"])
 
 
 @settings(max_examples=40, deadline=None)
@@ -98,9 +98,9 @@ def test_sine_and_sweep_are_retaken_from_their_start(plan, state):
     assert slew_kept(ran)
 
 
-def test_skip_ends_a_hold_now_and_keeps_its_data():
+def test_accept_ends_a_hold_now_and_keeps_its_data():
     number = in_state(UNDISTURBED, "hold", skip=40)
-    ran = run(SHORT, PROVED, at={number: asks("skip")})
+    ran = run(SHORT, PROVED, at={number: asks("accept")})
     assert ran.points[0].duration < 0.9
     assert [p.voltage for p in ran.points] == HOLDS
     assert ran.said("ended early")
@@ -164,7 +164,85 @@ def test_after_the_end_nothing_moves_any_more():
     sequencer, world = Sequencer(SHORT, FIXED), World()
     while not (output := sequencer.advance(world.tick())).done:
         world.step(output.volts)
-    for kind in ("resume", "skip", "pause", "stop"):
+    for kind in ("resume", "skip", "accept", "repeat", "back", "extend", "bad", "pause", "stop"):
         world.step(0.0)
         output = sequencer.advance(world.tick(**asks(kind), trip=TRIP))
         assert (output.volts, output.state, output.outcome, output.events) == (0.0, "run_done", "completed", ())
+
+
+ANY = st.sampled_from(["pause", "resume", "accept", "skip", "repeat", "back", "extend", "bad"])
+
+
+@settings(max_examples=60, deadline=None)
+@given(st.dictionaries(st.integers(0, 1500), st.lists(ANY, min_size=1, max_size=3), max_size=12))
+def test_whatever_is_asked_the_slew_is_kept_and_a_step_is_measured_or_given_up(requests):
+    at = {number: asks(*kinds) for number, kinds in requests.items()}
+    at |= {number: asks("resume") for number in range(1501, 1510)}
+    ran = run(SHORT, PROVED, at=at, ticks=12000)
+    assert ran.last.done
+    assert ran.last.outcome == "completed"
+    assert slew_kept(ran)
+    given_up = {index for output in ran.outputs for index in output.given_up}
+    measured = {row.index for row in ran.rows if row.phase == "hold"}
+    assert {step.index for step in SHORT if step.phase == "hold"} <= measured | given_up
+
+
+def test_a_step_that_is_skipped_gives_no_point_and_its_row_is_free():
+    number = in_state(UNDISTURBED, "hold", skip=40)
+    index = UNDISTURBED.outputs[number].step
+    ran = run(SHORT, PROVED, at={number: asks("skip")})
+    assert [p.voltage for p in ran.points] == HOLDS[1:]
+    assert [row.phase for row in ran.rows if row.index == index and row.phase != "ramp"] == ["free"]
+    assert ran.outputs[number].given_up == (index,)
+    assert ran.said(f"step {index + 1} is left out on request")
+
+
+def test_a_step_that_is_taken_again_lasts_its_whole_time():
+    number = in_state(UNDISTURBED, "hold", skip=40)
+    index = UNDISTURBED.outputs[number].step
+    ran = run(SHORT, PROVED, at={number: asks("repeat")})
+    assert [p.voltage for p in ran.points] == HOLDS
+    assert [row.phase for row in ran.rows if row.index == index and row.phase != "ramp"] == ["free", "hold"]
+    assert ran.points[0].duration == pytest.approx(UNDISTURBED.points[0].duration, abs=PERIOD)
+
+
+def test_back_measures_the_step_before_once_more_and_goes_on():
+    steps = [row.index for row in UNDISTURBED.rows if row.phase == "hold"]
+    number = next(i for i, o in enumerate(UNDISTURBED.outputs) if o.state == "hold" and o.step == steps[1])
+    ran = run(SHORT, PROVED, at={number + 20: asks("back")})
+    assert [row.index for row in ran.rows if row.phase == "hold"] == [steps[0], *steps]
+    assert ran.last.outcome == "completed"
+    assert slew_kept(ran)
+
+
+def test_back_before_anything_is_measured_is_refused():
+    number = in_state(UNDISTURBED, "hold", skip=20)
+    ran = run(SHORT, PROVED, at={number: asks("back")})
+    assert ran.said("back ignored: nothing was measured before step")
+    assert [p.voltage for p in ran.points] == HOLDS
+
+
+def test_a_hold_that_is_extended_lasts_twice_as_long():
+    plain = run(SHORT, FIXED)
+    ran = run(SHORT, FIXED, at={in_state(plain, "hold", skip=20): asks("extend")})
+    assert ran.points[0].duration == pytest.approx(2 * plain.points[0].duration, abs=2 * PERIOD)
+    assert ran.points[1].duration == pytest.approx(plain.points[1].duration, abs=2 * PERIOD)
+
+
+def test_what_was_measured_last_is_marked_by_a_row_of_its_own():
+    steps = [row for row in UNDISTURBED.rows if row.phase == "hold"]
+    number = next(i for i, o in enumerate(UNDISTURBED.outputs) if o.state == "hold" and o.step == steps[1].index)
+    ran = run(SHORT, PROVED, at={number + 5: asks("bad"), number + 6: asks("bad")})
+    (void,) = [row for row in ran.rows if row.phase == "void"]
+    (hold, *_) = [row for row in ran.rows if row.phase == "hold"]
+    assert (void.index, void.t_start, void.t_end) == (hold.index, hold.t_start, hold.t_end)
+    assert ran.outputs[number + 5].given_up == (hold.index,)
+    assert ran.said("marked bad by the operator: step")
+    assert ran.said("bad ignored: no step was measured since")
+    assert ran.last.outcome == "completed"
+
+
+def test_what_means_nothing_before_the_first_hold_says_so():
+    ran = run(SHORT, FIXED, at={3: asks("accept", "extend", "back", "bad")})
+    for kind in ("accept", "extend", "back", "bad"):
+        assert ran.said(f"{kind} ignored")

@@ -84,13 +84,25 @@ def test_later_tare_that_is_not_stable_leaves_the_one_before_and_completes(tmp_p
 
 
 def test_hold_without_a_point_is_no_completed_run(tmp_path):
-    """Promise 27: ended by `skip` before it had a sample after its settling time."""
+    """Promise 27: ended by `accept` before it had a sample after its settling time."""
     with virtual(tmp_path) as world:
-        play(world, [("hold", 6.0, lambda: world.session.loop.signals.append(Request("skip")))])
+        play(world, [("hold", 6.0, lambda: world.session.loop.signals.append(Request("accept")))])
         assert outcome(world)[0] == "aborted"
         assert f"step {HOLDS[0]} (hold) has no data" in outcome(world)[1]
         ends = [fact for fact in read(tmp_path) if fact["fact"] == "run_end"]
         assert [end["outcome"] for end in ends] == ["aborted"]
+
+
+@pytest.mark.parametrize("asked", ["skip", "bad"])
+def test_a_run_is_whole_without_what_an_operator_left_out_or_marked(tmp_path, asked):
+    """The hold at -6 V follows that at 6 V: in it 6 V is the last that was measured."""
+    with virtual(tmp_path) as world:
+        play(world, [("hold", -6.0, lambda: world.session.loop.signals.append(Request(asked)))])
+        assert outcome(world) == ("completed", "")
+        points = {point.step for point in world.session.status.points}
+        assert points == set(HOLDS) - {HOLDS[1] if asked == "skip" else HOLDS[0]}
+        marked = [row for row in world.recorder.steps if row.phase == "void"]
+        assert [row.index for row in marked] == ([] if asked == "skip" else [HOLDS[0]])
 
 
 @pytest.mark.parametrize("shape", [Ramp(4.0, 4.0), Sine(3.0, (2.0,), 2)])
@@ -155,7 +167,7 @@ def test_run_that_lacks_a_step_of_its_rest_is_not_completed(tmp_path):
     kept = {"fact": "kept", "thruster": "T1", "recordings": ["T1.h5"], "continues": "id-1", "steps": [0, 1, 2]}
     before = ({"fact": "start", "identities": {}}, {"fact": "run_start", "thruster": "T1"}, kept)
     with virtual(tmp_path, before=before) as world:
-        play(world, [("hold", -6.0, lambda: world.session.loop.signals.append(Request("skip")))])
+        play(world, [("hold", -6.0, lambda: world.session.loop.signals.append(Request("accept")))])
         assert f"step {HOLDS[1]} (hold) has no data" in outcome(world)[1]
 
 
