@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import ClassVar, Final
 
@@ -13,6 +13,7 @@ from textual.containers import Container, Horizontal, Vertical, VerticalScroll
 from textual.message import Message
 from textual.widgets import ContentSwitcher
 
+from rig.console.diagnosing import DIAGNOSE, NOT_YET, DiagnosisPanel, answers
 from rig.console.dialogs import LeaveDialog, Leaving, NoteDialog
 from rig.console.feed import Feed
 from rig.console.key_help import KeyHelp
@@ -33,7 +34,7 @@ LEASE: Final = 0.5
 """s between leases. From the screen's own loop on purpose: when the screen hangs, the lease goes stale."""
 STOP_KEYS: Final = ("ctrl+c", "super+c", "f9")
 """super+c is Cmd+C where a terminal passes it on."""
-VIEWS: Final = ("main", "fit", "time", "log", "results")
+VIEWS: Final = ("main", "fit", "time", "log", "results", "diagnosis")
 
 
 class ConsoleApp(App[None], inherit_bindings=False):
@@ -54,6 +55,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
         Binding("b", "ask('back')", "back"),
         Binding("k", "ask('skip')", "skip"),
         Binding("m", "ask('bad')", "mark as bad"),
+        Binding("g", "diagnose", "diagnose"),
         Binding("l", "take_lease", "take the lease"),
         Binding("?", "help", "keys"),
         Binding("n", "note", "note"),
@@ -61,14 +63,22 @@ class ConsoleApp(App[None], inherit_bindings=False):
         *(Binding(str(i + 1), f"view('{name}')", name) for i, name in enumerate(VIEWS)),
     ]
 
-    def __init__(self, feed: Feed, clock: Callable[[], float], again: str = "rig console") -> None:
-        """`clock` gives s and never goes back; `again` is the command line that attaches once more."""
+    def __init__(
+        self,
+        feed: Feed,
+        clock: Callable[[], float],
+        again: str = "rig console",
+        diagnose: Sequence[str] = DIAGNOSE,
+    ) -> None:
+        """`clock` gives s and never goes back; `again` is the command line that attaches once more, `diagnose` one to
+        which a recording is added."""
         super().__init__()
         self.HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # columns from which all panels fit at once
         self.VERTICAL_BREAKPOINTS = [(0, "-low"), (32, "-tall")]  # rows
         self.feed = feed
         self.clock = clock
         self.again = again
+        self.diagnose = diagnose
         self.state = View(now=clock())
         self.chosen = "main"
         self.parting: Parting | None = None
@@ -92,6 +102,8 @@ class ConsoleApp(App[None], inherit_bindings=False):
                         yield TimePlot()
             with VerticalScroll(id="results"):
                 yield ResultsPanel()
+            with VerticalScroll(id="diagnosis"):
+                yield DiagnosisPanel()
         yield Panel(id="keys", markup=False)
 
     def on_mount(self) -> None:
@@ -99,6 +111,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
         self.query_one("#log").border_title = "events"
         self.query_one("#preflight").border_title = "preflight"
         self.query_one("#results").border_title = "result per thruster: C V|V| fitted to the holds"
+        self.query_one("#diagnosis").border_title = "diagnosis: what C V|V| leaves out"
         self.run_worker(self._follow())
         self.set_interval(REDRAW, self.show_text)
         self.set_interval(REPLOT, self.show_plots)
@@ -188,6 +201,23 @@ class ConsoleApp(App[None], inherit_bindings=False):
             self.notify(str(error), title=f"{kind}: not sent", severity="error", markup=False)
             return
         self.notify(f"asked the controller: {kind} {text}", timeout=2.0, markup=False)
+
+    def action_diagnose(self) -> None:
+        """G: not while anything may turn, and one at a time."""
+        if not self._ended:
+            self.notify(NOT_YET, severity="warning")
+            return
+        self.action_view("diagnosis")
+        self.run_worker(self._diagnose(), group="diagnose", exclusive=True)
+
+    async def _diagnose(self) -> None:
+        files = self.state.snapshot.files if self.state.snapshot is not None else ()
+        panel, said = self.query_one(DiagnosisPanel), list[str]()
+        panel.tell(said, f"rig diagnose {files[0]} ..." if files else "no recording was made")
+        async for answer in answers(files, self.diagnose):
+            said.append(answer)
+            rest = files[len(said) :]
+            panel.tell(said, f"rig diagnose {rest[0]} ..." if rest else "")
 
     def action_take_lease(self) -> None:
         """From now on this console attends, beside the one that does."""

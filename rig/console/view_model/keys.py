@@ -7,7 +7,7 @@ from rich.text import Text
 from rig.console.view_model.view import View
 from rig.link.front_end_messages import Snapshot
 
-VIEW_KEYS = (("1", "main"), ("2", "V|V|"), ("3", "time"), ("4", "log"), ("5", "table"))
+VIEW_KEYS = (("1", "main"), ("2", "V|V|"), ("3", "time"), ("4", "log"), ("5", "table"), ("6", "diagnosis"))
 EVERY_KEY = (
     ("F9, Ctrl+C", "STOP: 0 V now, the campaign ends, the recording is closed. Works everywhere"),
     ("F5", "start once the preflight has passed; the thruster is on the bench"),
@@ -22,16 +22,17 @@ EVERY_KEY = (
     ("n", "a note into the recording"),
     ("l", "attend, where another console does and this one only looks on"),
     ("d, Ctrl+Q", "leave; a dialog says first what that does"),
-    ("1 2 3 4 5", "main page, thrust over V|V|, over time, events, results"),
+    ("g", "diagnose the recordings, once the campaign has ended"),
+    ("1 to 6", "main page, thrust over V|V|, over time, events, results, diagnosis"),
     ("?", "these keys"),
 )
 """For a help page, the most urgent first."""
 
 
 def page_of(view: View, chosen: str) -> str:
-    """`preflight`, `live` or `results`: the operator's choice; before the start, `main` is the preflight list."""
-    if chosen == "results":
-        return "results"
+    """`preflight`, `live`, `results` or `diagnosis`: the operator's choice; `main` is the preflight list at first."""
+    if chosen in ("results", "diagnosis"):
+        return chosen
     before = view.snapshot is None or view.snapshot.state in ("connecting", "preflight")
     return "preflight" if before and chosen == "main" else "live"
 
@@ -55,7 +56,9 @@ def _doing(view: View) -> tuple[tuple[str, str], ...]:
     snapshot = view.snapshot
     if view.looks_on and view.connected:
         return (("l", "attend"), ("d", "leave"))
-    if not view.connected or (snapshot is not None and snapshot.state == "done"):
+    if snapshot is not None and snapshot.state == "done":
+        return (("g", "diagnose"), ("d", "leave"))
+    if not view.connected:
         return (("d", "leave"),)
     leave = (("n", "note"), ("d", "detach"))
     if snapshot is None or snapshot.state in ("connecting", "stopping", "run_done"):

