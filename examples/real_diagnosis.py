@@ -84,7 +84,7 @@ def diagnosed(root: Path, case: Case, folder: Path) -> Diagnosis:
 def short(case: Case, found: Diagnosis, took: float) -> str:
     held = found.heldout
     error = f"{held.before:.4g} -> {held.after:.4g} N rms (noise {held.noise:.3g})"
-    return f"{case.name}: {found.verdict}\n  {found.statement}\n  not fitted: {error}; {held.what}; {took:.0f} s"
+    return f"{case.name}: {found.headline}\n  {found.statement}\n  not fitted: {error}; {held.what}; {took:.0f} s"
 
 
 @click.command(help=__doc__)

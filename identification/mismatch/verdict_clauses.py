@@ -88,11 +88,14 @@ def with_names(findings: Sequence[Finding], held: HeldOutRmse, more: str) -> flo
 def named_share(findings: Sequence[Finding], held: HeldOutRmse, more: str) -> float | None:
     """Of the rms error beyond the noise that the baseline has on what was not fitted, how much is gone with the names,
     0 to 1; None where nothing is named, or there is no error beyond the noise.
+
+    What is held out may be quieter than what was fitted: where the model falls below that noise, its error counts.
     """
     names = with_names(findings, held, more) if findings else None
-    if names is None or not isfinite(held.noise) or not held.before > held.noise:
+    noise = min(held.noise, held.after)
+    if names is None or not isfinite(held.noise) or not held.before > noise:
         return None
-    return max(1 - beyond_noise(names, held.noise) / beyond_noise(held.before, held.noise), 0.0)
+    return max(1 - beyond_noise(names, noise) / beyond_noise(held.before, noise), 0.0)
 
 
 def in_part(share: float) -> str:

@@ -26,7 +26,7 @@ class KeyHelp(ModalScreen[None]):
         for key, does in EVERY_KEY:
             table.add_row(f"[bold]{key}[/]", does)
         yield Head()
-        with VerticalScroll(classes="dialog"):
+        with VerticalScroll(classes="dialog keys"):
             yield Static("Keys", classes="dialog-title")
             yield Static(table)
 

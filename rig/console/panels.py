@@ -85,7 +85,7 @@ def _attendance(view: View) -> str:
     if view.snapshot is None:
         return ""
     if view.looks_on:
-        return "   READ-ONLY: another console attends; l to attend too"
+        return "   READ-ONLY: press l to attend"
     return "   attended: stops without you" if view.snapshot.attended else "   unattended: goes on without you"
 
 

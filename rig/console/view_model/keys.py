@@ -7,23 +7,23 @@ from rich.text import Text
 from rig.console.view_model.view import View
 from rig.link.front_end_messages import Snapshot
 
-VIEW_KEYS = (("1", "main"), ("2", "V|V|"), ("3", "time"), ("4", "log"), ("5", "table"), ("6", "diagnosis"))
+VIEW_KEYS = (("1", "main"), ("2", "V|V|"), ("3", "time"), ("4", "log"), ("5", "table"), ("6", "physics"))
 EVERY_KEY = (
-    ("F9, Ctrl+C", "STOP: 0 V now, the campaign ends, the recording is closed. Works everywhere"),
-    ("F5", "start once the preflight has passed; the thruster is on the bench"),
+    ("F9, Ctrl+C", "STOP: 0 V now, the campaign ends; everywhere"),
+    ("F5", "start; the thruster is on the bench"),
     ("p", "pause: 0 V at once"),
-    ("r", "resume: the step under way is taken again. Preflight: try a device again"),
-    ("a", "accept: the running hold or sine ends now, its data are kept"),
-    ("x", "extend: the running hold may last as long again"),
-    ("t", "take again: the running step from its beginning"),
-    ("b", "back: measure the step before once more, and go on from there"),
-    ("k", "skip: the running step is left out"),
-    ("m", "mark as bad what was measured last: no fit takes it"),
+    ("r", "resume; in the preflight: try a device again"),
+    ("a", "accept: end the hold now, keep its data"),
+    ("x", "extend: the hold may last as long again"),
+    ("t", "take the running step again"),
+    ("b", "back: the step before once more, and on from it"),
+    ("k", "skip: leave the running step out"),
+    ("m", "mark as bad what was measured last"),
     ("n", "a note into the recording"),
-    ("l", "attend, where another console does and this one only looks on"),
+    ("g", "diagnose, once the campaign has ended"),
+    ("l", "attend, where this console only looks on"),
     ("d, Ctrl+Q", "leave; a dialog says first what that does"),
-    ("g", "diagnose the recordings, once the campaign has ended"),
-    ("1 to 6", "main page, thrust over V|V|, over time, events, results, diagnosis"),
+    ("1 to 6", "main, V|V|, time, events, results, diagnosis"),
     ("?", "these keys"),
 )
 """For a help page, the most urgent first."""

@@ -49,6 +49,8 @@ SCENES = {
     "mount": Scene((
         running("mount", thruster="T3", command=0.0, points=(), trace=(), mounted_by_hand=True,
                 progress=Progress(0, 0, 0.0, 0.0, 1, 2, 60.0, 241.0, 0.2)),)),
+    "keys": Scene((running(),), keys=("question_mark",)),
+    "looks_on": Scene((running(attended=True, clients=2),)),
     "note": Scene((running(),), keys=("n", *"weed on duct")),
     "leave": Scene((running(),), keys=("d",)),
     "leave_attended": Scene((running(attended=True),), keys=("d",)),

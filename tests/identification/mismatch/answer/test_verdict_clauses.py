@@ -105,12 +105,14 @@ def test_the_share_that_has_names_is_of_the_error_beyond_the_noise():
     assert named_share([BENT], HELD, "a free curve") == pytest.approx(0.9413, abs=1e-4)
     assert named_share([BENT], HELD, "") == pytest.approx(0.9861, abs=1e-4)
     assert named_share([BENT], replace(HELD, after=0.2), "") == 1.0
+    quiet = HeldOutRmse(1.819, 1.019, 1.22, "another run, quieter than those fitted")
+    assert named_share([replace(BENT, heldout=(1.9, 1.07))], quiet, "a free curve") == pytest.approx(0.783, abs=1e-3)
 
 
 def test_no_share_is_told_where_nothing_is_named_or_nothing_was_wrong():
     assert named_share([], HELD, "") is None
     assert named_share([finding()], HELD, "a free curve") is None
-    assert named_share([BENT], replace(HELD, before=0.3), "") is None
+    assert named_share([BENT], replace(HELD, before=0.3, after=0.3), "") is None
     assert named_share([replace(BENT, heldout=(25.0, 30.0))], HELD, "a free curve") == 0.0
 
 
