@@ -20,6 +20,8 @@ from rig.exporting.content import STEP_COLUMNS, TIME, Column, Content
 LEVELS = {"info": 2, "warning": 3, "error": 4, "trip": 5}
 """Of foxglove.Log: INFO, WARNING, ERROR, FATAL."""
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+ENCODER = json.JSONEncoder(allow_nan=False)
+"""Made once: `json.dumps` with an option makes one for each message."""
 CONFIGURATION = ("bench_toml", "campaign_toml")
 
 
@@ -111,4 +113,4 @@ def _log(start: int, event: tuple[float, str, str]) -> dict[str, Any]:
 
 def _say(writer: Writer, topic: int, start: int, time: float, message: dict[str, Any]) -> None:
     stamp = _stamp(start, time)
-    writer.add_message(topic, stamp, json.dumps(message, allow_nan=False).encode(), stamp)
+    writer.add_message(topic, stamp, ENCODER.encode(message).encode(), stamp)

@@ -33,7 +33,7 @@ class Sequencer:
         self._steps = tuple(steps)
         self._settings = settings
         require_steps(self._steps, settings.max_voltage)
-        self._numbers = places(self._steps)
+        self._places = places(self._steps)
         self._after = tuple(accumulate((s.expected for s in reversed(self._steps)), initial=0.0))[-2::-1]
         self._state: State = "tare"
         self._position = 0
@@ -99,15 +99,15 @@ class Sequencer:
             case "pause" if self._state != "paused":
                 self._end_row(time, cut=True)
                 self._zero(time, "paused")
-                self._journal.say(time, "info", f"paused in step {self._numbers[self._position]}: command 0 V")
+                self._journal.say(time, "info", f"paused in step {self._places[self._position] + 1}: command 0 V")
             case "resume" if self._state == "paused":
                 self._end_row(time)
-                self._journal.say(time, "info", f"resumed: step {self._numbers[self._position]} is retaken")
+                self._journal.say(time, "info", f"resumed: step {self._places[self._position] + 1} is retaken")
                 self._dt = 0.0  # 0 V once more: also a pause that was resumed in the same tick sends it
                 self._begin(time)
             case "skip" if self._state in ("hold", "sine", "free"):
                 self._journal.say(
-                    time, "info", f"step {self._numbers[self._position]} ended early on request, its data are kept"
+                    time, "info", f"step {self._places[self._position] + 1} ended early on request, its data are kept"
                 )
                 self._finish_step(time)
             case "pause" | "resume" | "skip":
@@ -267,8 +267,8 @@ class Sequencer:
         return Output(
             volts=None if self._silent else self._command,
             state=self._state,
-            step=self._numbers[self._position],
-            steps=self._numbers[-1] + 1,
+            step=self._places[self._position],
+            steps=self._places[-1] + 1,
             step_elapsed=elapsed,
             step_expected=expected,
             remaining=0.0 if self._outcome != "running" else max(expected - elapsed, 0.0) + after,
