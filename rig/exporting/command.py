@@ -43,8 +43,8 @@ def written(content: Content, out: Path, write: Callable[[Content, Path], None])
     try:
         write(content, part)
         part.rename(out)
-    except OSError as error:
-        raise RecordingError(f"{out} can't be written: {error.strerror or error}") from error
+    except (OSError, UnicodeError) as error:  # UnicodeError: a name that a stranger's file has and UTF-8 has not
+        raise RecordingError(f"{out} can't be written: {error}") from error
     finally:
         _remove(part)
 

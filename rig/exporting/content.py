@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Collection, Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import PackageNotFoundError, version
@@ -90,7 +91,16 @@ def content_of(path: Path, wanted: Collection[str] = ()) -> Content:
 
 
 def _known(facts: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: value for name, value in facts.items() if value not in (None, "", {})}
+    """What is said at all, as JSON has it: no number that is none."""
+    return {name: _finite(value) for name, value in facts.items() if value not in (None, "", {})}
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {name: _finite(item) for name, item in value.items()}
+    if isinstance(value, list):
+        return [_finite(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
 
 
 def _column(channel: Channel) -> Column:

@@ -44,7 +44,7 @@ def kind_of(path: Path) -> str:
     if is_hdf5(path):
         return RECORDING
     if not path.is_file():
-        raise RecordingError(f"{path} is not there; give the path of a recording (*.h5)")
+        raise RecordingError(f"{path} is no file; give the path of a recording (*.h5)")
     try:
         content = json.loads(path.read_bytes()) if path.stat().st_size <= MOST_BYTES else None
     except (OSError, ValueError, RecursionError):

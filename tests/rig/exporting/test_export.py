@@ -22,6 +22,7 @@ from rig.exporting.targets import TARGETS
 from rig.hdf5 import load, stream_rows
 from tests.rig.exporting.conftest import EVENT
 from tests.rig.hdf5.plain_files import plain
+from tests.rig.hdf5.test_hdf5_recover import left_open, uneven
 
 ThirdParty = Callable[[str], Any]
 Columns = dict[str, np.ndarray[Any, Any]]
@@ -179,6 +180,30 @@ def test_rows_that_cannot_be_used_are_left_out_and_said(
     assert "cell: 4 rows of time [s], thrust, 3 left out: time not finite or running back" in capsys.readouterr().out
 
 
+def test_what_a_killed_writer_left(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = left_open(tmp_path / "r.h5", uneven)
+    out = exported(path, "csv")
+    assert_equal(csv_tables(out, path), path)
+    assert "not closed in order, or still being written" in capsys.readouterr().out
+
+
+def test_a_header_of_odd_numbers_is_json(tmp_path: Path) -> None:
+    out = exported(plain(tmp_path / "a.h5", depth=np.nan, gains=[1.0, np.inf], thruster="T1"), "csv")
+    header = json.loads((out / "header.json").read_text(), parse_constant=pytest.fail)
+    assert (header["depth"], header["gains"], header["thruster"]) == (None, [1.0, None], "T1")
+
+
+def test_a_stream_whose_name_is_no_file_name_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = plain(tmp_path / "a.h5")
+    with h5py.File(path, "a") as file:
+        file.move("streams/cell", "streams/..cell")
+    assert main(["export", str(path), "--to", "csv"]) == 2
+    assert "can't be called '..cell'" in capsys.readouterr().err
+    assert [each.name for each in tmp_path.iterdir()] == ["a.h5"]
+    assert main(["export", str(path), "--to", "mat"]) == 0
+    assert main(["export", str(path), "--to", "csv", "--streams", "drive"]) == 0
+
+
 def test_the_table_has_a_writer_for_every_word() -> None:
     assert {target.of for target in TARGETS.values()} == {"recording"}
     assert list(TARGETS) == ["csv", "parquet", "mat", "mcap"]
@@ -190,7 +215,7 @@ def test_the_table_has_a_writer_for_every_word() -> None:
         (("T1.h5", "--to", "csv", "-o", "T1.h5"), "T1.h5 exists; an export is never written over anything"),
         (("T1.h5", "--to", "mat", "-o", "no/T1.mat"), "there is no folder no"),
         (("T1.h5", "--to", "csv", "--streams", "flow"), "no such stream; it has load_cell, 2nd flow, command"),
-        (("T2.h5", "--to", "csv"), "T2.h5 is not there"),
+        (("T2.h5", "--to", "csv"), "T2.h5 is no file"),
         (("twin.json", "--to", "csv"), "this takes a recording, but twin.json is a twin; a twin can't be exported"),
         (("text.json", "--to", "mat"), "text.json is nothing that the rig makes"),
     ],
