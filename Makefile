@@ -56,7 +56,7 @@ wheel: $(VENV)/.test
 	$(BIN)/python -m pip wheel --quiet --disable-pip-version-check --no-deps --wheel-dir build/wheel .
 	$(PYTHON) -m venv --clear build/clean
 	build/clean/bin/python -m pip install --quiet --disable-pip-version-check -c constraints.txt build/wheel/*.whl
-	cd build && clean/bin/rig --help
+	cd build && clean/bin/rig --help && rm -rf first && clean/bin/rig init first
 
 prove: $(VENV)/.demo
 	$(BIN)/rig prove --store build/prove --report build/prove/report.html --json build/prove/report.json

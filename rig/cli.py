@@ -6,6 +6,7 @@ A command's module is imported when the command is called: `rig stop` shall not 
 
 from __future__ import annotations
 
+import difflib
 import os
 import sys
 from importlib import import_module
@@ -18,10 +19,26 @@ from rig.errors import RigError
 from rig.visible_text import visible_output
 
 if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
     from rig.operate.virtual_time import World
 
 ONE_THREAD = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
 """What the libraries of linear algebra read when they are loaded."""
+
+
+GROUPS: Final = {
+    "measure": "Measure on a bench",
+    "identify": "Identify tau = C V|V|",
+    "diagnose": "Diagnose what the model leaves out",
+    "vehicles": "Vehicles",
+    "data": "Data in, out, and saved from a crash",
+    "develop": "Develop the diagnosis",
+}
+"""What a person wants to do, in the order of `rig --help`, and its heading there."""
+
+COMPLETING: Final = "_RIG_COMPLETE"
+"""Set by a shell that asks what the Tab key offers (docs/howto/first-steps.md)."""
 
 
 class Entry(NamedTuple):
@@ -30,34 +47,60 @@ class Entry(NamedTuple):
     place: str
     """`module:attribute`"""
     help: str
+    group: str = "data"
+    """One of GROUPS."""
 
 
 COMMANDS: Final = {
-    "check": Entry("rig.operate.check:check_command", "Check a campaign and its bench without opening a port."),
-    "run": Entry("rig.operate.run:run_command", "Run a campaign on its bench: console, recording, table of the fits."),
+    "init": Entry("rig.first_steps.command:init_command", "Make a bench, a world and a campaign to edit.", "measure"),
+    "check": Entry(
+        "rig.operate.check:check_command", "Check a campaign and its bench without opening a port.", "measure"
+    ),
+    "run": Entry(
+        "rig.operate.run:run_command", "Run a campaign on its bench: console, recording, table of the fits.", "measure"
+    ),
     "resume": Entry(
-        "rig.operate.resume:resume_command", "Go on with a campaign that was cut, at its first unfinished thruster."
+        "rig.operate.resume:resume_command",
+        "Go on with a campaign that was cut, at its first unfinished thruster.",
+        "measure",
     ),
-    "console": Entry("rig.operate.run:console_command", "Attach to a run that is going on."),
-    "stop": Entry("rig.operate.run:stop_command", "Stop a run that is going on: zero volts now, close the recording."),
-    "design": Entry("rig.design.command:design_command", "Best levels, order and dwells for the time in the tunnel."),
+    "console": Entry("rig.operate.run:console_command", "Attach to a run that is going on.", "measure"),
+    "stop": Entry(
+        "rig.operate.run:stop_command", "Stop a run that is going on: zero volts now, close the recording.", "measure"
+    ),
+    "design": Entry(
+        "rig.design.command:design_command", "Best levels, order and dwells for the time in the tunnel.", "measure"
+    ),
     "calibrate": Entry(
-        "rig.fit.load_cell:calibrate_command", "Scale, offset and uncertainty of a load cell from known weights."
+        "rig.fit.load_cell:calibrate_command",
+        "Scale, offset and uncertainty of a load cell from known weights.",
+        "measure",
     ),
-    "fit": Entry("rig.fit.command:fit_command", "Fit tau = C V|V| to recordings."),
+    "fit": Entry("rig.fit.command:fit_command", "Fit tau = C V|V| to recordings.", "identify"),
     "diagnose": Entry(
-        "rig.diagnose.command:diagnose_command", "Find, name and model the physics that C V|V| leaves out."
+        "rig.diagnose.command:diagnose_command", "Find, name and model the physics that C V|V| leaves out.", "diagnose"
     ),
     "settle": Entry(
-        "rig.operate.settle:settle_command", "Run the next experiment and diagnose again until one answer stands."
+        "rig.operate.settle:settle_command",
+        "Run the next experiment and diagnose again until one answer stands.",
+        "diagnose",
     ),
-    "simulate": Entry("rig.twin.simulate:simulate_command", "The run of a plan that a twin predicts, as a recording."),
-    "compare": Entry("rig.diagnose.compare:compare_command", "What a simulation leaves out relative to the real run."),
-    "prove": Entry("rig.blind.command:prove_command", "Prove the diagnosis on recordings with concealed physics."),
+    "simulate": Entry(
+        "rig.twin.simulate:simulate_command", "The run of a plan that a twin predicts, as a recording.", "diagnose"
+    ),
+    "compare": Entry(
+        "rig.diagnose.compare:compare_command", "What a simulation leaves out relative to the real run.", "diagnose"
+    ),
+    "prove": Entry(
+        "rig.blind.command:prove_command", "Prove the diagnosis on recordings with concealed physics.", "develop"
+    ),
     "vehicle": Entry(
-        "rig.vehicle.command:vehicle_command", "Identify drag, efficiency and inertia of a vehicle from its trials."
+        "rig.vehicle.command:vehicle_command",
+        "Identify drag, efficiency and inertia of a vehicle from its trials.",
+        "vehicles",
     ),
     "import": Entry("rig.importing.command:import_command", "Make a recording of another program's table or log."),
+    "export": Entry("rig.exporting.command:export_command", "Write a recording as CSV, Parquet, MATLAB or MCAP."),
     "recover": Entry(
         "rig.recording.recover:recover_command", "Copy a recording that was not closed in order into a plain file."
     ),
@@ -80,11 +123,32 @@ class LazyGroup(click.Group):
         command: click.Command = getattr(import_module(module), attribute)
         return command
 
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Raises UsageError for what is no command, with the nearest that is one."""
+        name = args[0]
+        if name not in COMMANDS and not name.startswith("-") and not ctx.resilient_parsing:
+            near = difflib.get_close_matches(name, COMMANDS, n=1)
+            hint = f"did you mean {near[0]}?" if near else f"known are {', '.join(COMMANDS)}"
+            raise click.UsageError(f"there is no command {name!r}; {hint}", ctx)
+        return super().resolve_command(ctx, args)
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        """The list in `rig --help`, from the table alone."""
+        """The list in `rig --help`, by what a person wants to do, from the table alone."""
         del ctx
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, entry.help) for name, entry in COMMANDS.items()])
+        width = max(map(len, COMMANDS))
+        for group, heading in GROUPS.items():
+            with formatter.section(heading):
+                rows = [(name.ljust(width), entry.help) for name, entry in COMMANDS.items() if entry.group == group]
+                formatter.write_dl(rows)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem]:
+        """What the Tab key offers, from the table alone: it shall not wait for scipy either."""
+        from click.shell_completion import CompletionItem
+
+        found = [CompletionItem(name, help=e.help) for name, e in COMMANDS.items() if name.startswith(incomplete)]
+        return found + click.Command.shell_complete(self, ctx, incomplete)
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -95,6 +159,8 @@ def rig() -> None:
 
 def main(arguments: list[str] | None = None) -> int:
     """Run one command; what is the input's fault is one sentence on stderr and status 2."""
+    if COMPLETING in os.environ:  # the shell reads this, as bytes
+        return _main(arguments)
     with visible_output():
         return _main(arguments)
 

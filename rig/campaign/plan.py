@@ -52,6 +52,11 @@ class Step:
     """True for a ramp that is itself the measurement: after a pause it is retaken from `from_voltage`."""
 
     @property
+    def number(self) -> int:
+        """As people count the steps of a plan, from 1, wherever they read it; `index` is from 0, for programs."""
+        return self.index + 1
+
+    @property
     def expected(self) -> float:
         """Seconds this step takes by plan. A hold until steady: half way between its bounds; a tare: one attempt."""
         return (self.min_duration + self.max_duration) / 2 if self.phase == "hold" else self.min_duration
@@ -263,7 +268,7 @@ class Plan:
         for step in self:
             require(
                 step.peak <= max_voltage,
-                f"step {step.index} ({step.phase}) commands {step.peak:g} V, but {whose} allows at most "
+                f"step {step.number} ({step.phase}) commands {step.peak:g} V, but {whose} allows at most "
                 f"{max_voltage:g} V: lower the plan's levels",
             )
         require(
@@ -293,5 +298,5 @@ def require_steps(steps: tuple[Step, ...], max_voltage: float) -> None:
     """Raise PlanError for no steps at all and for a command beyond `max_voltage` V."""
     require(len(steps) > 0, "the plan has no steps: nothing would be measured")
     for step in steps:
-        sentence = f"step {step.index} commands {step.peak:g} V, but at most {max_voltage:g} V are allowed"
+        sentence = f"step {step.number} commands {step.peak:g} V, but at most {max_voltage:g} V are allowed"
         require(step.peak <= max_voltage, sentence)

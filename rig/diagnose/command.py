@@ -20,6 +20,7 @@ from rig.diagnose.recording_names import file_names, told_by_name, with_names
 from rig.diagnose.vehicle import VehicleFiles, diagnose_vehicle_files, is_vehicle, refuse_for_tunnel
 from rig.errors import RecordingError, RigError
 from rig.list_option import ListCommand
+from rig.recording.recover import rather_recovered
 
 if TYPE_CHECKING:  # numpy and scipy come up when a diagnosis is made, not for `rig diagnose --help`
     from identification.mismatch.answer.explained.trace import Trace
@@ -40,7 +41,7 @@ def recordings_in(paths: Iterable[Path], who: str = "rig diagnose") -> list[Path
     found = list(chain.from_iterable(_in(Path(path)) for path in paths))
     if not found:
         raise RecordingError(f"{who}: no recording was given; {WHAT}")
-    return found
+    return rather_recovered(found)
 
 
 def _in(path: Path) -> list[Path]:
@@ -252,6 +253,7 @@ def diagnose_command(
         wanted = wanted_of(**outputs)
         vehicle = VehicleFiles(thrusters, installation, mass, mass_std, axis or "")
         traces: list[Trace] = []
+        files = tuple(recordings_in(files))
         with observed(shown=not wanted.alone) as observer:
             found = diagnose_files(
                 files,

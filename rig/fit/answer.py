@@ -17,6 +17,7 @@ from identification.thruster.thrust_data import Run, Unusable, prepare
 from identification.thruster.thrust_forms import FORMS, MODELS, Model
 from rig.errors import RecordingError
 from rig.hdf5 import load
+from rig.hdf5.layout import FLUSH_PERIOD
 
 FIT_FORMAT = "thruster-rig-fit"
 FIT_VERSION = 1
@@ -91,11 +92,21 @@ def _answer(recordings: Sequence[Recording], runs: Sequence[Run], wanted: Wanted
         for recording in recordings
         if recording.outcome in {"aborted", "tripped"}
     )
-    notes = (*_out_of_order(recordings), *_skewed(recordings), *notes, *_whose_tares(recordings))
+    notes = (*unclosed(recordings), *_out_of_order(recordings), *_skewed(recordings), *notes, *_whose_tares(recordings))
     others = tuple(_beside(recordings, runs, wanted))
     dynamics = fit_dynamics(recordings) if wanted.dynamics else None
     remainders = tuple(without(fit, name) for name in fit.parameters)
     return Answer(fit, others, notes, side_by_side((fit, *others)), remainders, dynamics)
+
+
+def unclosed(recordings: Iterable[Recording]) -> list[str]:
+    """What is to be known of recordings whose writer was killed or is at work."""
+    names = [r.source or r.recording_id for r in recordings if r.attributes.get("opened_as") == "swmr"]
+    return [
+        f"{name} was not closed in order, or is still being written: what it holds was used, what came in the last "
+        f"{2 * FLUSH_PERIOD:g} s may be lost; rig recover {name} makes a plain copy and counts the loss"
+        for name in names
+    ]
 
 
 def _out_of_order(recordings: Sequence[Recording]) -> list[str]:

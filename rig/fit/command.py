@@ -19,6 +19,7 @@ from rig.fit.comparison import alike, changed
 from rig.fit.one_pass import LONG, fit_one_pass, thrust_rows
 from rig.fit.one_pass_text import one_pass_json, one_pass_text
 from rig.fit.text import alike_text, answer_text, changed_text, set_text
+from rig.recording.recover import rather_recovered
 from rig.result_path import RESULT, RESULT_FILE
 
 __all__ = ["Answer", "answer_json", "answer_text", "fit_command", "fit_files", "fit_json", "fit_recordings"]
@@ -125,20 +126,21 @@ def fit_command(
     try:
         choice = NAMES[model or "C V|V|"]
         signal = choice.against or voltage or against or AGAINST[0]
-        if one_pass or (one_pass is None and thrust_rows(expand(files)) > LONG):
+        given = rather_recovered(expand(files))
+        if one_pass or (one_pass is None and thrust_rows(given) > LONG):
             refused = ("--model dynamics", model == "dynamics"), ("--report", report), ("--compare", compare)
             _not_with_one_pass(*refused, ("--method ls", method == "ls"))
-            long = fit_one_pass(expand(files), choice.model, signal)
+            long = fit_one_pass(given, choice.model, signal)
             _tell(json.dumps(one_pass_json(long), indent=1, allow_nan=False), json_path, map(one_pass_text, long))
             return
-        answers = fit_files(files, choice.model, signal, method, dynamics=True)
+        answers = fit_files(given, choice.model, signal, method, dynamics=True)
         if model == "dynamics":
             _rotor_told(answers)
         changes = [changed(answers, path) for path in compare]
         if report is not None:
             from rig.fit.report.page import write_report  # matplotlib takes a second to come up: only where it is used
 
-            write_report(answers, report, files, changes)
+            write_report(answers, report, given, changes)
         text = json.dumps(answer_json(answers, changes), indent=1, allow_nan=False)
         _tell(text, json_path, [fit_text(answers), *(changed_text(one) for one in changes)])
     except (RigError, OSError) as error:

@@ -11,7 +11,9 @@ from identification.estimation.batches import BATCHES
 from identification.steady_state.settling import LONGEST_CUT
 from identification.thruster.thrust_data import gain_std
 from identification.thruster.thrust_report import digits
+from rig.fit.answer import unclosed
 from rig.fit.as_json import parameter_json
+from rig.fit.columns import laid_out
 from rig.fit.one_pass import OnePass
 
 
@@ -38,6 +40,7 @@ def remarks(found: OnePass) -> Iterator[str]:
     if len(found.passes) > 1:
         sources = (run.recording.source or run.recording.recording_id for run in found.passes)
         yield ", ".join(f"tare {k} is of {source}" for k, source in enumerate(sources, start=1))
+    yield from unclosed(run.recording for run in found.passes)
     quantity = found.passes[0].source.quantity
     if quantity != "command_voltage":
         yield f"explained by {quantity}, not by the command"
@@ -52,13 +55,15 @@ def one_pass_text(found: OnePass) -> str:
         f"{found.thruster or 'thruster'}: thrust = {found.form.name} + tare; RMSE {found.rmse:.3g} N over {found.rows} "
         f"samples of {count} recording{plural}, {found.form.name} by {found.passes[0].source.quantity}",
         "",
-        f"  {'':<9}{'value':>14}{'std':>12}{'95 % from':>14}{'to':>14}  unit",
     ]
+    rows: list[tuple[str, ...]] = [("", "value", "std", "95 % from", "to", "unit")]
     tares = {"tare" if count == 1 else f"tare {k + 1}": p for k, p in enumerate(found.tare.values())}
     for name, p in (found.parameters | tares).items():
         numbers = [digits(x, p.std) for x in (p.value, p.std, p.low, p.high)]
-        lines.append("  {:<9}{:>14}{:>12}{:>14}{:>14}  {}".format(name, *numbers, p.unit))
-    return "\n".join([*lines, "", *(f"  - {text}" for text in remarks(found))])
+        rows.append((name, *numbers, p.unit))
+    return "\n".join(
+        [*lines, *laid_out(rows, "<9 >14 >12 >14 >14 <0"), "", *(f"  - {text}" for text in remarks(found))]
+    )
 
 
 def one_pass_json(fits: Sequence[OnePass]) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from itertools import chain, islice
 
 import numpy as np
 
@@ -10,14 +11,17 @@ from identification.thruster import dynamics_report
 from identification.thruster.comparison import POWER, Change, Difference
 from identification.thruster.dynamics import UNITS
 from identification.thruster.model_choice import Candidate, statement
+from identification.thruster.thrust import ThrustFit
 from identification.thruster.thrust_data import Unusable
-from identification.thruster.thrust_report import digits, misfit, sentence, table, verdicts
+from identification.thruster.thrust_report import Row, digits, misfit, sentence, table, verdicts
 from rig.fit.answer import Answer
+from rig.fit.columns import laid_out
 from rig.fit.comparison import Alike, Changed
 
-FORM = "  {:<9}{:>11}{:>9}{:>11}{:>11}  {:<14}{:>9}{:>9}  {}"
-SIDE = "  {:<24}{:>4}{:>10}{:>10}{:>10}{:>10}{:>10}  {}"
-ALL = "  {:<10}{:<10}{:>11}{:>10}  {:<24}{:>5}{:>9}{:>9}"
+FORM = "<9 >11 >9 >11 >11 <14 >9 >9 <0"
+SIDE = "<24 >4 >10 >10 >10 >10 >10 <0"
+ALL = "<10 <10 >11 >10 <24 >5 >9 >9"
+ROTOR = ">9 >12 >12 <0"
 MOST_PAIRS = 10
 """Pairs that differ, listed; the rest is in the JSON."""
 
@@ -38,15 +42,7 @@ def _small(value: float | None, pattern: str = "{:.3g}") -> str:
 def answer_text(answer: Answer) -> str:
     """Sentence, table, models side by side, verdicts, rotor."""
     lines = [sentence(answer.fit), *_misfit(answer), ""]
-    heads = ("", "value", "std", "95 % from", "to", "unit", "error", "(white)", "")
-    lines.append(FORM.format(*heads).rstrip())
-    for fit in (answer.fit, *answer.alternatives):
-        lines.append(f" {fit.model}: RMSE {fit.rmse:.4g} N")
-        for row in table(fit):
-            numbers = [digits(x, row.std) for x in (row.value, row.std, row.low, row.high)]
-            known = [text if text != "not determined" else "-" for text in numbers]
-            errors = [_small(x, "{:.2g} %") for x in (row.percent, row.percent_uncorrected)]
-            lines.append(FORM.format(row.name, *known, row.unit, *errors, row.verdict).rstrip())
+    lines += _parameters((answer.fit, *answer.alternatives))
     lines.append(
         "  error: std in % of the value (eq. 4.11), without the calibration; (white): if samples were independent"
     )
@@ -56,6 +52,24 @@ def answer_text(answer: Answer) -> str:
         lines.append(f"  - {statement(answer.candidates)}")
     lines += _rotor(answer)
     return "\n".join(lines)
+
+
+def _parameters(fits: Sequence[ThrustFit]) -> Iterator[str]:
+    """One table of all models, the name of each above its parameters."""
+    heads = ("", "value", "std", "95 % from", "to", "unit", "error", "(white)", "")
+    parts = [[_parameter(row) for row in table(fit)] for fit in fits]
+    lines = iter(laid_out([heads, *chain.from_iterable(parts)], FORM))
+    yield next(lines)
+    for fit, part in zip(fits, parts, strict=True):
+        yield f" {fit.model}: RMSE {fit.rmse:.4g} N"
+        yield from islice(lines, len(part))
+
+
+def _parameter(row: Row) -> tuple[str, ...]:
+    numbers = [digits(x, row.std) for x in (row.value, row.std, row.low, row.high)]
+    known = [text if text != "not determined" else "-" for text in numbers]
+    errors = [_small(x, "{:.2g} %") for x in (row.percent, row.percent_uncorrected)]
+    return row.name, *known, row.unit, *errors, row.verdict
 
 
 def _misfit(answer: Answer) -> Iterator[str]:
@@ -68,12 +82,13 @@ def _misfit(answer: Answer) -> Iterator[str]:
 def _models(candidates: Sequence[Candidate]) -> Iterator[str]:
     if not candidates:
         return
-    yield SIDE.format("models side by side", "p", "RMSE / N", "chi2/dof", "its p", "white p", "BIC", "").rstrip()
+    rows: list[tuple[str, ...]] = [("models side by side", "p", "RMSE / N", "chi2/dof", "its p", "white p", "BIC", "")]
     for c in candidates:
         numbers = [_small(x, "{:.2g}") for x in (c.chi2_per_dof, c.underfit_p, c.whiteness_p)]
         bic = _small(c.bic, "{:+.1f}")
         drop = f"drop {', '.join(c.insignificant)}" if c.insignificant else ""
-        yield SIDE.format(c.model, c.parameters, f"{c.rmse:.4g}", *numbers, bic, drop).rstrip()
+        rows.append((c.model, str(c.parameters), f"{c.rmse:.4g}", *numbers, bic, drop))
+    yield from laid_out(rows, SIDE)
 
 
 def _without(answer: Answer) -> Iterator[str]:
@@ -91,30 +106,31 @@ def _rotor(answer: Answer) -> list[str]:
     if isinstance(found, Unusable):
         return [f"  - rotor: {found.reason}"]
     beta, std = found.beta
-    lines = ["", f"  {dynamics_report.sentence(found)}"]
+    rows: list[tuple[str, ...]] = []
     for name, plain in zip(found.estimate.names, found.uncorrected.tolist(), strict=True):
         value, error, verdict = found.estimate[name], found.estimate.std_of(name), found.significance[name]
         known = [digits(x, error) for x in (value, error, *found.interval(name))]
         errors = [f"{verdict.percent:.2g} %", _small(100 * plain / abs(value) if value else None, "{:.2g} %")]
         word = "significant" if verdict.significant else "not significant"
-        lines.append(FORM.format(name, *known, UNITS[name], *errors, word))
-    lines.append(FORM.format("beta", digits(beta, std), digits(std, std), "", "", UNITS["beta"], "", "", "").rstrip())
-    lines += ["  {:>9}{:>12}{:>12}  {}".format(*row) for row in dynamics_report.levels_table(found)]
+        rows.append((name, *known, UNITS[name], *errors, word))
+    rows.append(("beta", digits(beta, std), digits(std, std), "", "", UNITS["beta"], "", "", ""))
+    levels = laid_out(dynamics_report.levels_table(found), ROTOR)
+    lines = ["", f"  {dynamics_report.sentence(found)}", *laid_out(rows, FORM), *levels]
     return [*lines, *(f"  - {text}" for text in dynamics_report.verdicts(found))]
 
 
 def set_text(answers: Sequence[Answer]) -> str:
     """One table of all thrusters."""
-    lines = [ALL.format("thruster", "", "value", "std", "95 % interval", "n", "RMSE / N", "chi2/dof")]
+    rows: list[tuple[str, ...]] = [("thruster", "", "value", "std", "95 % interval", "n", "RMSE / N", "chi2/dof")]
     for answer in answers:
         fit = answer.fit
         tail = (str(fit.estimate.rows.y.size), f"{fit.rmse:.3g}", _small(fit.chi2_per_dof, "{:.2f}"))
         for name, p in fit.parameters.items():
             low, high, value, std = (digits(x, p.std) for x in (p.low, p.high, p.value, p.std))
             known = (value, std, f"{low} .. {high}") if np.isfinite(p.std) else (value, "-", "-")
-            lines.append(ALL.format(fit.thruster or "?", name, *known, *tail).rstrip())
+            rows.append((fit.thruster or "?", name, *known, *tail))
     names = dict.fromkeys(f"{a.fit.model}, {next(iter(a.fit.parameters.values())).unit}" for a in answers)
-    return "\n".join([f"thrust = {'; '.join(names)}; one tare per recording", *lines])
+    return "\n".join([f"thrust = {'; '.join(names)}; one tare per recording", *laid_out(rows, ALL)])
 
 
 def _gain(shared: bool) -> str:

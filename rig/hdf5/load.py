@@ -58,15 +58,20 @@ def _load(path: Path, rows: int | None) -> Recording:
 
 def recording_id_of(path: Path) -> str:
     """The id alone; empty where the file has none. Raises RecordingError."""
+    return identity_of(path)[0]
+
+
+def identity_of(path: Path) -> tuple[str, str]:
+    """The id alone, and `plain` or `swmr` (see `load`). Raises RecordingError."""
     require_file(path)
-    return apart(lambda: _id_of(path), path)
+    return apart(lambda: _identity_of(path), path)
 
 
-def _id_of(path: Path) -> str:
-    file, _ = open_for_reading(path)
+def _identity_of(path: Path) -> tuple[str, str]:
+    file, opened_as = open_for_reading(path)
     open_no_more()
     with file:
-        return text_of(file.attrs.get("recording_id", ""))
+        return text_of(file.attrs.get("recording_id", "")), opened_as
 
 
 def _recording(file: h5py.File, path: Path, opened_as: str, rows: int | None) -> Recording:

@@ -1,7 +1,9 @@
-"""`rig recover`: a plain copy of a recording whose writer was killed, and its loss in samples."""
+"""`rig recover`: a plain copy of a recording whose writer was killed, and its loss in samples; and which of the two is
+read where both are given."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import click
@@ -23,6 +25,23 @@ def recover_command(file: Path, output: Path | None) -> None:
     for loss in losses:
         click.echo(sentence(loss))
     click.echo(f"{out}: {sum(loss.kept for loss in losses)} rows in {len(losses)} streams")
+
+
+def rather_recovered(paths: Sequence[Path]) -> list[Path]:
+    """The files without those of which a recovered copy is among them; each that is left aside is said on stderr.
+
+    Raises RecordingError for what is no recording.
+    """
+    if len(paths) < 2:
+        return list(paths)
+    from rig.hdf5 import identity_of
+
+    found = {path: identity_of(path) for path in paths}
+    copies = {name: path for path, (name, opened_as) in found.items() if opened_as == "plain" and name}
+    damaged = {path: name for path, (name, opened_as) in found.items() if opened_as != "plain" and name in copies}
+    for path, name in damaged.items():
+        click.echo(f"{path.name} was not closed in order: its recovered copy {copies[name].name} is taken", err=True)
+    return [path for path in paths if path not in damaged]
 
 
 def end_of(file: Path) -> tuple[str, str]:

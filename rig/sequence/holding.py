@@ -67,4 +67,4 @@ class Holding:
         return error is None or drift is None or self._window.steady(error, drift)
 
     def __str__(self) -> str:
-        return f"step {self._step.index} at {self._step.voltage:g} V: {self._window}"
+        return f"step {self._step.number} at {self._step.voltage:g} V: {self._window}"

@@ -34,7 +34,7 @@ class Sequencer:
         self.steps = tuple(steps)
         self._settings = settings
         require_steps(self.steps, settings.max_voltage)
-        self.numbers = places(self.steps)
+        self._places = places(self.steps)
         self._after = tuple(accumulate((s.expected for s in reversed(self.steps)), initial=0.0))[-2::-1]
         self.state: State = "tare"
         self.position = 0
@@ -101,7 +101,7 @@ class Sequencer:
     @property
     def place(self) -> str:
         """Which step of the plan that is, for people: they count from 1."""
-        return f"step {self.numbers[self.position] + 1}"
+        return f"step {self._places[self.position] + 1}"
 
     def halt(self, time: float, outcome: Outcome, cause: str) -> None:
         """Command 0 V at once and wait for rest."""
@@ -265,8 +265,8 @@ class Sequencer:
         return Output(
             volts=None if self._silent else self._command,
             state=self.state,
-            step=self.numbers[self.position],
-            steps=self.numbers[-1] + 1,
+            step=self._places[self.position],
+            steps=self._places[-1] + 1,
             step_elapsed=elapsed,
             step_expected=expected,
             remaining=0.0 if self._outcome != "running" else max(expected - elapsed, 0.0) + after,

@@ -61,7 +61,7 @@ def _where(steps: tuple[Step, ...], kept: Fact | None) -> str:
     if kept is None or first is None:
         return "the run is repeated from its first tare"
     return (
-        f"it goes on at step {first.index + 1} ({first.phase}) after a tare; the steps before are in "
+        f"it goes on at step {first.number} ({first.phase}) after a tare; the steps before are in "
         f"{', '.join(kept['recordings'])}"
     )
 
@@ -160,7 +160,7 @@ def judged(session: Session, output: Output) -> tuple[Outcome, str]:
     plan = [step for step in session.campaign.plan if step.index not in session.kept | session.given_up]
     missing = missing_steps(plan, session.measured, {point.step for point in session.status.points})
     if missing:
-        return "aborted", f"the plan is not measured whole: step {missing[0].index} ({missing[0].phase}) has no data"
+        return "aborted", f"the plan is not measured whole: step {missing[0].number} ({missing[0].phase}) has no data"
     if not output.stop_confirmed:
         return "tripped", "STOP NOT CONFIRMED at the end of the run: nothing is mounted on a propeller that may turn"
     return "completed", ""

@@ -16,6 +16,7 @@ from identification.vehicle.trials import dominant_axis, response_of
 from identification.velocity.constant_velocity import LEAST_SAMPLES
 from rig.errors import RecordingError
 from rig.hdf5 import load
+from rig.recording.recover import rather_recovered
 
 T = TypeVar("T")
 MOTION = ("position", "depth", "heading", "speed")
@@ -61,7 +62,7 @@ def _expanded(paths: Iterable[Path]) -> list[Path]:
         if not found:
             raise RecordingError(f"{path} is a folder without recordings; expected *.h5 files in it")
         files += found
-    return files
+    return rather_recovered(files)
 
 
 def check(named: Named, installation: Installation, axis: str = "") -> tuple[str, ...]:

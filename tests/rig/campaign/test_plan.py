@@ -131,7 +131,7 @@ def test_impossible_plans_are_refused(make, text):
 def test_limits_of_the_bench_are_kept():
     plan = Plan(Levels((5.0,)), DWELL, 10.0)
     plan.require_within(5.0, 10.0, "the bench")
-    with pytest.raises(PlanError, match=r"step 1 \(ramp\) commands 5 V, but the bench allows at most 4 V"):
+    with pytest.raises(PlanError, match=r"step 2 \(ramp\) commands 5 V, but the bench allows at most 4 V"):
         plan.require_within(4.0, 10.0, "the bench")
     with pytest.raises(PlanError, match="slew is 10 V/s, but the bench allows at most 9 V/s"):
         plan.require_within(5.0, 9.0, "the bench")

@@ -204,3 +204,15 @@ def test_nothing_but_nan_is_refused_and_few_samples_say_that_nothing_is_known(tm
     result = run(few)
     assert result.exit_code == 0, result.output
     assert "3 points" in result.output or "3 samples" in result.output
+
+
+def test_long_names_and_large_numbers_do_not_run_together(tmp_path):
+    """A thruster of a name of 27 letters, thrust a million times larger than ours."""
+    name = "starboard aft, 2026-11-24 b"
+    files = [write(tmp_path / "a.h5", thruster=name, C=4e5, tare=1e8), write(tmp_path / "b.h5", C=3e5)]
+    lines = run(*files).output.splitlines()
+    (row,) = [line for line in lines if line.startswith(f"  {name}")]
+    assert row.removeprefix(f"  {name}").split()[:2] == ["C", "400000"]
+    tare = next(line for line in lines if line.strip().startswith("tare "))
+    assert tare.split()[1].startswith("1000000")
+    assert all(float(cell) for cell in tare.split()[1:5])

@@ -180,7 +180,7 @@ def test_hold_that_never_gets_steady_says_so():
     ran = run(plan, replace(SETTINGS, tare=TareConfig(1.0, 9.0, 9.0)), World(drift=2.0))
     assert [point.steady for point in ran.points] == [False]
     assert ran.points[0].duration == pytest.approx(4.0, abs=PERIOD)
-    assert ran.said("not steady, step 2 at 3 V")
+    assert ran.said("not steady, step 3 at 3 V")
 
 
 def test_hold_without_samples_gives_no_point():

@@ -88,7 +88,7 @@ def test_hold_without_a_point_is_no_completed_run(tmp_path):
     with virtual(tmp_path) as world:
         play(world, [("hold", 6.0, lambda: world.session.loop.signals.append(Request("accept")))])
         assert outcome(world)[0] == "aborted"
-        assert f"step {HOLDS[0]} (hold) has no data" in outcome(world)[1]
+        assert f"step {HOLDS[0] + 1} (hold) has no data" in outcome(world)[1]
         ends = [fact for fact in read(tmp_path) if fact["fact"] == "run_end"]
         assert [end["outcome"] for end in ends] == ["aborted"]
 
@@ -168,7 +168,7 @@ def test_run_that_lacks_a_step_of_its_rest_is_not_completed(tmp_path):
     before = ({"fact": "start", "identities": {}}, {"fact": "run_start", "thruster": "T1"}, kept)
     with virtual(tmp_path, before=before) as world:
         play(world, [("hold", -6.0, lambda: world.session.loop.signals.append(Request("accept")))])
-        assert f"step {HOLDS[1]} (hold) has no data" in outcome(world)[1]
+        assert f"step {HOLDS[1] + 1} (hold) has no data" in outcome(world)[1]
 
 
 def test_signal_at_any_instant_is_a_request(tmp_path):

@@ -1,0 +1,1 @@
+"""What the rig has made goes to other programs: a recording in, tables with units that they read out."""
