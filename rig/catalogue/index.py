@@ -1,0 +1,184 @@
+"""The index: a SQLite file with what was read of each file, and where it lies. A cache; nothing is lost with it."""
+
+from __future__ import annotations
+
+import fcntl
+import hashlib
+import json
+import os
+import sqlite3
+import stat
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import closing, contextmanager, suppress
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, Final, TypeVar
+
+from rig.catalogue.entry import Entry
+from rig.catalogue.reading.files import Stamp
+
+T = TypeVar("T")
+
+NAME: Final = ".thruster-rig-catalogue.sqlite"
+PATIENCE: Final = 30.0
+"""s that another process may write before this one gives up waiting for it."""
+LONGEST: Final = 2000
+"""Characters of a text that is kept."""
+HINDERED: Final = frozenset(
+    {sqlite3.SQLITE_PERM, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_IOERR}
+    | {sqlite3.SQLITE_FULL, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_NOLFS, sqlite3.SQLITE_PROTOCOL}
+)
+"""Primary result codes of SQLite that say that the place does not do."""
+COLUMNS: Final = tuple(each.name for each in fields(Entry) if each.name not in ("path", "facts", "recordings"))
+SCHEMA: Final = (
+    "CREATE TABLE files (path BLOB PRIMARY KEY, size INTEGER, mtime_ns INTEGER)",
+    "CREATE TABLE entries (key INTEGER PRIMARY KEY, path BLOB REFERENCES files (path) ON DELETE CASCADE, "
+    f"{', '.join(COLUMNS)}, facts)",
+    "CREATE TABLE links (entry INTEGER REFERENCES entries (key) ON DELETE CASCADE, id)",
+    "CREATE INDEX entries_of_file ON entries (path)",
+    "CREATE INDEX entries_by_id ON entries (id)",
+    "CREATE INDEX entries_by_time ON entries (what, began)",
+    "CREATE INDEX links_of_entry ON links (entry)",
+    "CREATE INDEX links_by_id ON links (id)",
+)
+"""An index made with any other is made anew: it is older or later than this program, or another's."""
+
+
+class Foreign(sqlite3.DatabaseError):
+    """A SQLite file that is no index of this version."""
+
+
+def with_index(folder: Path, cache: Path, work: Callable[[sqlite3.Connection], T], say: Callable[[str], None]) -> T:
+    """What `work` returns of the index of a folder: beside the data; in `cache` where that can't be; or in memory.
+
+    `work` is done again when the index turns out to be damaged; `say` is told in one line what was not as it should be.
+    """
+    for place in places(folder, cache):
+        try:
+            return _with_index(place, work, say)
+        except (sqlite3.OperationalError, OSError) as error:
+            if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_IOERR) & 0xFF not in HINDERED:
+                raise
+            say(f"the index {place} can't be used ({error})")
+    with closing(_connected(":memory:")) as connection:
+        say("nothing is kept: every file is read again each time")
+        return work(connection)
+
+
+def places(folder: Path, cache: Path) -> Iterator[Path]:
+    """Where an index of the folder may be written."""
+    beside = folder / NAME
+    if os.access(beside if beside.exists() else folder, os.W_OK):
+        yield beside
+    yield cache / "thruster-rig" / f"catalogue-{hashlib.sha256(os.fsencode(folder)).hexdigest()[:16]}.sqlite"
+
+
+def _with_index(place: Path, work: Callable[[sqlite3.Connection], T], say: Callable[[str], None]) -> T:
+    if place.name != NAME:
+        place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
+    if os.path.lexists(place) and not stat.S_ISREG(place.lstat().st_mode):
+        raise OSError("it is no regular file; remove it")
+    try:
+        with closing(_connected(place)) as connection:
+            return work(connection)
+    except (sqlite3.OperationalError, sqlite3.ProgrammingError):
+        raise
+    except sqlite3.DatabaseError as error:
+        say(f"the index {place} was {error}: made anew")
+    _remove(place)
+    with closing(_connected(place)) as connection:
+        return work(connection)
+
+
+def _remove(place: Path) -> None:
+    """Of two processes that both found it damaged the later one leaves what the first has made: SQLite would take the
+    journal of the one for that of the other (How To Corrupt An SQLite Database File, section 2.4)."""
+    with _locked(place.parent):
+        with suppress(sqlite3.DatabaseError), closing(_connected(place)) as connection:
+            if connection.execute("PRAGMA quick_check").fetchone() == ("ok",):
+                return
+        for name in (place, place.with_name(place.name + "-journal")):
+            name.unlink(missing_ok=True)
+
+
+@contextmanager
+def _locked(folder: Path) -> Iterator[None]:
+    descriptor = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        with suppress(OSError):  # a file system without locks
+            fcntl.flock(descriptor, fcntl.LOCK_EX)
+        yield
+    finally:
+        os.close(descriptor)
+
+
+def _connected(place: Path | str) -> sqlite3.Connection:
+    """A connection to an index of this version, made where there was none. Raises sqlite3.DatabaseError."""
+    connection = sqlite3.connect(place, timeout=PATIENCE, isolation_level=None)
+    try:
+        connection.text_factory = lambda data: data.decode("utf-8", "replace")
+        for pragma in ("trusted_schema = off", "foreign_keys = on", "synchronous = normal"):
+            connection.execute(f"PRAGMA {pragma}")
+        with transaction(connection):
+            made = [sql for (sql,) in connection.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL")]
+            if not made:
+                for statement in SCHEMA:
+                    connection.execute(statement)
+            elif made != list(SCHEMA):
+                raise Foreign("not of this program and version")
+    except BaseException:
+        connection.close()
+        raise
+    return connection
+
+
+@contextmanager
+def transaction(connection: sqlite3.Connection) -> Iterator[None]:
+    """All or nothing; other processes wait."""
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+    except BaseException:
+        with suppress(sqlite3.Error):  # what is damaged can't be rolled back either
+            connection.execute("ROLLBACK")
+        raise
+    connection.execute("COMMIT")
+
+
+def stamps(connection: sqlite3.Connection) -> dict[str, Stamp]:
+    """Every file that was read, as it was then."""
+    rows = connection.execute("SELECT path, size, mtime_ns FROM files")
+    return {os.fsdecode(path): Stamp(size, mtime_ns) for path, size, mtime_ns in rows}
+
+
+def forget(connection: sqlite3.Connection, paths: Iterable[str]) -> None:
+    """With all that was said in these files."""
+    connection.executemany("DELETE FROM files WHERE path = ?", [(os.fsencode(path),) for path in paths])
+
+
+def keep(connection: sqlite3.Connection, path: str, stamp: Stamp, entries: Iterable[Entry]) -> None:
+    """What a file says now, in place of what it said before."""
+    forget(connection, [path])
+    connection.execute("INSERT INTO files VALUES (?, ?, ?)", (os.fsencode(path), *stamp))
+    marks = ", ".join("?" * (len(COLUMNS) + 2))
+    for entry in entries:
+        values = [_kept(getattr(entry, name)) for name in COLUMNS]
+        facts = json.dumps(dict(entry.facts))
+        into = f"INSERT INTO entries (path, {', '.join(COLUMNS)}, facts) VALUES ({marks})"  # noqa: S608 - our own names
+        key = connection.execute(into, (os.fsencode(path), *values, facts)).lastrowid
+        connection.executemany("INSERT INTO links VALUES (?, ?)", [(key, _kept(each)) for each in entry.recordings])
+
+
+def _kept(value: Any) -> Any:
+    """A text as SQLite can keep it."""
+    return value[:LONGEST].encode("utf-8", "backslashreplace").decode() if isinstance(value, str) else value
+
+
+def entry_of(row: Mapping[str, Any], recordings: tuple[str, ...] = ()) -> Entry:
+    """A row of `entries`. Raises sqlite3.DatabaseError for one that no program of ours has written."""
+    try:
+        facts = json.loads(row["facts"])
+        known = {name: row[name] for name in COLUMNS}
+        return Entry(path=os.fsdecode(row["path"]), facts=facts, recordings=recordings, **known)
+    except (TypeError, ValueError) as error:
+        raise Foreign(f"damaged ({error})") from None
