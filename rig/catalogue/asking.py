@@ -92,15 +92,15 @@ def with_catalogue(folder: Path, cache: Path, work: Callable[[sqlite3.Connection
     return with_index(folder, cache.expanduser(), fresh, lambda text: click.echo(f"rig: {text}", err=True))
 
 
-def tell(document: dict[str, Any], json_path: Path | None, text: str) -> None:
+def tell(json_path: Path | None, document: Callable[[], dict[str, Any]], text: Callable[[], str]) -> None:
     """JSON where it is wanted; what a person reads on standard output, unless the JSON goes there."""
-    written = json.dumps(document, indent=1, allow_nan=False)
-    if json_path is not None and str(json_path) == "-":
-        click.echo(written)
-        return
     if json_path is not None:
+        written = json.dumps(document(), indent=1, allow_nan=False)
+        if str(json_path) == "-":
+            click.echo(written)
+            return
         json_path.write_text(written + "\n", encoding="utf-8")
-    click.echo(text)
+    click.echo(text())
 
 
 def entry_json(entry: Entry) -> dict[str, Any]:

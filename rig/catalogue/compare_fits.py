@@ -61,12 +61,12 @@ def compare_fits_command(
     sources = sources_named(named, folder, cache) if named else sources_of(folder or Path(), cache, chosen)
     found = compared(sources, Wanted(thruster, model, against))
     if len(found.fits) < 2:
-        why = "; ".join(found.left_out)
+        why = "; ".join(found.remarks)
         raise ConfigError(
             f"two fits of {found.thruster or 'a thruster'} are needed, {len(found.fits)} came"
             + (f": {why}" if why else "")
         )
-    tell(history_json(found), json_path, history_text(found))
+    tell(json_path, lambda: history_json(found), lambda: history_text(found))
 
 
 def _is_plain_folder(item: str) -> bool:
@@ -129,7 +129,8 @@ def sentence(found: History) -> str:
     d = pair.change.difference
     std = 100 * d.std / abs(d.value / d.relative) if d.relative else float("nan")
     size, word = digits(abs(100 * d.relative), std), "larger" if d.relative > 0 else "smaller"
-    what = f"{d.coefficient} of fit {pair.later + 1} is {size} +- {digits(2 * std, std)} % {word} than that of fit {pair.earlier + 1}"
+    of = f"{d.coefficient} of fit {pair.later + 1} is {size} +- {digits(2 * std, std)} %"
+    what = f"{of} {word} than that of fit {pair.earlier + 1}"
     place = f"since {since}" if of_first else f"between fits {pair.earlier + 1} and {pair.later + 1}"
     return f"{name} has changed {place}: {what} (k = 2); {len(changed)} of {count} differ {share}"
 
@@ -153,7 +154,7 @@ def notes(found: History) -> Iterator[str]:
         yield found.repeat.statement
     else:
         yield "one recording of each: what taking it off and on again would change is not in these figures"
-    yield from (f"left out: {text}" for text in found.left_out)
+    yield from found.remarks
 
 
 def _which(pairs: Sequence[Pair], *, shared: bool) -> str:

@@ -53,7 +53,8 @@ class History:
     pairs: tuple[Pair, ...]
     repeat: Repeatability | None
     """What changes from one recording to the next within a campaign; None: no campaign has two."""
-    left_out: tuple[str, ...]
+    remarks: tuple[str, ...]
+    """What was left out and why, and what of the rest to look at."""
 
     @property
     def changed(self) -> bool:
@@ -66,19 +67,19 @@ def history(
     model: str,
     fits: Iterable[DatedFit],
     repeat: Repeatability | None = None,
-    left_out: Sequence[str] = (),
+    remarks: Sequence[str] = (),
 ) -> History:
     """In order of time; fits without a time stay in the order in which they came, behind the others."""
     ordered = sorted(fits, key=lambda fit: float("inf") if fit.began is None else fit.began)
     kept: list[DatedFit] = []
     groups: list[Group] = []
-    out = list(left_out)
+    out = list(remarks)
     for fit in ordered:
         group = group_of_json(fit.entry, thruster)
         if group is None:
-            out.append(f"{fit.source}: its coefficients are not determined")
+            out.append(f"left out: {fit.source}: its coefficients are not determined")
         elif groups and (group.coefficients != groups[0].coefficients):
-            out.append(f"{fit.source}: fitted as {fit.entry['model']}, the others as {model}")
+            out.append(f"left out: {fit.source}: fitted as {fit.entry['model']}, the others as {model}")
         else:
             kept.append(fit)
             groups.append(with_repeatability(group, repeat))

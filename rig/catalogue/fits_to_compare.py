@@ -6,7 +6,7 @@ import sqlite3
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from identification.thruster.thrust_forms import Model
 from rig.catalogue.asking import Place, with_catalogue
@@ -17,6 +17,9 @@ from rig.errors import ConfigError, RecordingError
 from rig.fit.answer import Answer, fit_files
 from rig.fit.as_json import answer_json
 from rig.fit.comparison import of_model, read_fit, repeats
+
+WHAT_IT_HOLDS: Final = "what it holds was used"
+"""In the note of a fit to a recording that was aborted or tripped."""
 
 
 class Wanted(NamedTuple):
@@ -44,7 +47,7 @@ class Fitted:
 
     fits: list[DatedFit] = field(default_factory=list)
     answers: list[Answer] = field(default_factory=list)
-    left_out: list[str] = field(default_factory=list)
+    remarks: list[str] = field(default_factory=list)
     seen: dict[str, str] = field(default_factory=dict)
     """Recording -> source that it went into."""
 
@@ -99,8 +102,8 @@ def compared(sources: Sequence[Source], wanted: Wanted) -> History:
         try:
             _add(done, source, wanted)
         except RecordingError as error:
-            done.left_out.append(f"{source.name}: {error}")
-    return history(wanted.thruster, wanted.model, done.fits, repeats(done.answers), done.left_out)
+            done.remarks.append(f"left out: {source.name}: {error}")
+    return history(wanted.thruster, wanted.model, done.fits, repeats(done.answers), done.remarks)
 
 
 def _common(sources: Sequence[Source]) -> str:
@@ -117,13 +120,18 @@ def _add(done: Fitted, source: Source, wanted: Wanted) -> None:
     for entry, answer in _entries(source, wanted):
         twice = next((name for name in entry["recordings"] if name in done.seen), None)
         if twice is not None:
-            done.left_out.append(f"{source.name}: recording {twice} is in {done.seen[twice]} too, and is counted once")
+            done.remarks.append(
+                f"left out: {source.name}: recording {twice} is in {done.seen[twice]} too, and is counted once"
+            )
         elif entry.get("voltage", wanted.against) != wanted.against:
-            done.left_out.append(f"{source.name}: fitted over {entry['voltage']}, the others over {wanted.against}")
+            done.remarks.append(
+                f"left out: {source.name}: fitted over {entry['voltage']}, the others over {wanted.against}"
+            )
         else:
             done.seen |= dict.fromkeys(entry["recordings"], source.name)
             done.fits.append(DatedFit(source.name, source.began, entry))
             done.answers += [answer] if answer is not None else []
+            done.remarks += [note for note in (answer.notes if answer is not None else ()) if WHAT_IT_HOLDS in note]
 
 
 def _entries(source: Source, wanted: Wanted) -> Iterator[tuple[dict[str, Any], Answer | None]]:

@@ -57,7 +57,7 @@ def with_index(folder: Path, cache: Path, work: Callable[[sqlite3.Connection], T
         try:
             return _with_index(place, work, say)
         except (sqlite3.OperationalError, OSError) as error:
-            if getattr(error, "sqlite_errorcode", sqlite3.SQLITE_IOERR) & 0xFF not in HINDERED:
+            if isinstance(error, sqlite3.Error) and error.sqlite_errorcode & 0xFF not in HINDERED:
                 raise
             say(f"the index {place} can't be used ({error})")
     with closing(_connected(":memory:")) as connection:
@@ -81,13 +81,19 @@ def _with_index(place: Path, work: Callable[[sqlite3.Connection], T], say: Calla
     try:
         with closing(_connected(place)) as connection:
             return work(connection)
-    except (sqlite3.OperationalError, sqlite3.ProgrammingError):
-        raise
     except sqlite3.DatabaseError as error:
+        if not _is_damage(error):
+            raise
         say(f"the index {place} was {error}: made anew")
     _remove(place)
     with closing(_connected(place)) as connection:
         return work(connection)
+
+
+def _is_damage(error: sqlite3.DatabaseError) -> bool:
+    """Whether the index itself is at fault. A text that is no UTF-8 is an error of Python's, without SQLite's code."""
+    code = getattr(error, "sqlite_errorcode", None)
+    return isinstance(error, Foreign) or code is None or code & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
 
 
 def _remove(place: Path) -> None:
@@ -116,7 +122,6 @@ def _connected(place: Path | str) -> sqlite3.Connection:
     """A connection to an index of this version, made where there was none. Raises sqlite3.DatabaseError."""
     connection = sqlite3.connect(place, timeout=PATIENCE, isolation_level=None)
     try:
-        connection.text_factory = lambda data: data.decode("utf-8", "replace")
         for pragma in ("trusted_schema = off", "foreign_keys = on", "synchronous = normal"):
             connection.execute(f"PRAGMA {pragma}")
         with transaction(connection):

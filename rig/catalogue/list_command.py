@@ -11,7 +11,7 @@ import click
 
 from rig.catalogue.asking import CACHE, JSON, REBUILD, SINCE, UNTIL, aligned, entry_json, spent, tell, with_catalogue
 from rig.catalogue.entry import UNREADABLE, WHAT, Entry, date_of
-from rig.catalogue.selection import Filter, selected
+from rig.catalogue.selection import Filter, counted, selected
 
 SHORT: Final = 8
 """Letters of an id that are shown; `rig show` takes as few as are unique."""
@@ -81,19 +81,15 @@ def list_command(
     wanted = Filter(what, thruster, kind, campaign, outcome, since, until)
 
     def work(connection: sqlite3.Connection) -> tuple[list[Entry], int]:
-        unreadable = selected(connection, Filter(what, outcome=UNREADABLE))
-        return selected(connection, wanted), len(unreadable)
+        found = selected(connection, wanted, limit, facts=json_path is not None)
+        return found, counted(connection, Filter(what, outcome=UNREADABLE))
 
-    entries, unreadable = with_catalogue(folder, cache, work, rebuild=rebuild)
-    shown = entries[-limit:] if limit else entries
-    tell(list_json(folder, wanted, shown), json_path, list_text(what, shown) or f"no {what} in {folder}")
-    click.echo(_summary(len(shown), len(entries), what), err=True)
+    found, unreadable = with_catalogue(folder, cache, work, rebuild=rebuild)
+    nothing = f"no {what} in {folder}"
+    tell(json_path, lambda: list_json(folder, wanted, found), lambda: list_text(what, found) or nothing)
+    click.echo(f"{len(found)} {what}" + (", the newest" if len(found) == limit else ""), err=True)
     if unreadable and outcome != UNREADABLE:
         click.echo(f"{unreadable} can't be read; why: rig list --what {what} --outcome {UNREADABLE}", err=True)
-
-
-def _summary(shown: int, found: int, what: str) -> str:
-    return f"{found} {what}" if shown == found else f"the newest {shown} of {found} {what}"
 
 
 def list_text(what: str, entries: Sequence[Entry]) -> str:

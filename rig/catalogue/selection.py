@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from rig.catalogue.entry import UNCLOSED, Entry
-from rig.catalogue.index import entry_of
+from rig.catalogue.index import COLUMNS, entry_of
 from rig.errors import ConfigError
 
 QUIET: Final = 60.0
@@ -21,6 +21,7 @@ STATE: Final = (
     "CASE WHEN outcome = 'running' AND (SELECT mtime_ns FROM files WHERE files.path = e.path) < :quiet_ns "
     "THEN :unclosed ELSE outcome END"
 )
+NO_FACTS: Final = "'{}' AS facts"
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,31 +38,54 @@ class Filter:
     """Not itself."""
 
 
-def selected(connection: sqlite3.Connection, wanted: Filter) -> list[Entry]:
-    """In the order of time, what has none first."""
-    exact = [name for name in ("kind", "campaign") if getattr(wanted, name)]
-    clauses = ["what = :what", *(f"{name} = :{name}" for name in exact)]
+def selected(
+    connection: sqlite3.Connection, wanted: Filter, newest: int | None = None, *, facts: bool = True
+) -> list[Entry]:
+    """In the order of time; the `newest` of them if given. `facts`: whether those are read, half of the time."""
+    texts = [name for name in ("kind", "campaign", "outcome") if getattr(wanted, name)]
+    clauses = ["what = :what", *(f"{name} = :{name}" for name in texts)]
     clauses += ["began >= :since"] if wanted.since is not None else []
     clauses += ["began < :until"] if wanted.until is not None else []
-    clauses += ["state = :outcome"] if wanted.outcome else []
-    clauses += [f"{'instr(said, :thruster)' if wanted.what == 'campaigns' else 'thruster = :thruster'}"] * bool(
-        wanted.thruster
-    )
-    found = list(_entries(connection, " AND ".join(clauses), {name: getattr(wanted, name) for name in _NAMES}))
     if wanted.thruster and wanted.what == "campaigns":
-        found = [each for each in found if wanted.thruster in each.facts.get("thrusters", ())]
-    return merged(found) if wanted.what == "calibrations" else found
+        found = [
+            each for each in _all(connection, clauses, wanted) if wanted.thruster in each.facts.get("thrusters", ())
+        ]
+        return found[-newest:] if newest else found
+    clauses += ["thruster = :thruster"] if wanted.thruster else []
+    if wanted.what == "calibrations":
+        uses = merged(_all(connection, clauses, wanted))
+        return uses[-newest:] if newest else uses
+    return _all(connection, clauses, wanted, newest, facts=facts)
 
 
-_NAMES: Final = ("what", "thruster", "kind", "campaign", "outcome", "since", "until")
+def counted(connection: sqlite3.Connection, wanted: Filter) -> int:
+    """How many `selected` would give of recordings and results that are chosen by their outcome alone."""
+    asked = "SELECT count(*) FROM entries WHERE what = ? AND outcome = ?"
+    return int(connection.execute(asked, (wanted.what, wanted.outcome)).fetchone()[0])
 
 
-def _entries(connection: sqlite3.Connection, where: str, values: dict[str, Any]) -> Iterator[Entry]:
+def _all(
+    connection: sqlite3.Connection,
+    clauses: Iterable[str],
+    wanted: Filter,
+    newest: int | None = None,
+    *,
+    facts: bool = True,
+) -> list[Entry]:
+    values = {name: getattr(wanted, name) for name in wanted.__slots__}
+    return list(_entries(connection, " AND ".join(clauses), values, newest, facts=facts))
+
+
+def _entries(
+    connection: sqlite3.Connection, where: str, values: dict[str, Any], newest: int | None = None, *, facts: bool = True
+) -> Iterator[Entry]:
     connection.row_factory = sqlite3.Row
-    quiet_ns = int((time.time() - QUIET) * 1e9)
-    asked = f"SELECT * FROM (SELECT e.*, {STATE} AS state FROM entries AS e) WHERE {where} ORDER BY began, path, key"  # noqa: S608 - our own
-    for row in connection.execute(asked, values | {"quiet_ns": quiet_ns, "unclosed": UNCLOSED}):
-        yield replace(entry_of(row), outcome=row["state"])
+    shown = ", ".join(f"{STATE} AS outcome" if name == "outcome" else name for name in COLUMNS)
+    inner = f"SELECT key, path, {shown}, {'facts' if facts else NO_FACTS} FROM entries AS e"  # noqa: S608 - our own
+    asked = f"SELECT * FROM ({inner}) WHERE {where} ORDER BY began DESC, path DESC, key DESC LIMIT :newest"  # noqa: S608
+    since = {"quiet_ns": int((time.time() - QUIET) * 1e9), "unclosed": UNCLOSED, "newest": newest or -1}
+    rows = connection.execute(asked, values | since).fetchall()
+    yield from map(entry_of, reversed(rows))
 
 
 def merged(calibrations: Iterable[Entry]) -> list[Entry]:

@@ -56,7 +56,7 @@ def show_command(what: str, folder: Path | None, json_path: Path | None, cache: 
     found = with_catalogue(place.folder, cache, work)
     if found.first.what == "recordings" and found.first.outcome != UNREADABLE:
         found = Shown(found.entries, found.related, header_of(place.folder.resolve() / found.first.path))
-    tell(show_json(found), json_path, show_text(found))
+    tell(json_path, lambda: show_json(found), lambda: show_text(found))
 
 
 def _others(connection: sqlite3.Connection, entries: Iterable[Entry]) -> Iterator[Entry]:

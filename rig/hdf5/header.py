@@ -15,20 +15,20 @@ from typing import Any, Final, NamedTuple, TypeVar
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5g, h5l, h5s
+from h5py import h5a, h5d, h5f, h5g, h5l, h5s
 
 from identification.recording import QUANTITY_UNITS
 from rig.errors import RecordingError
 from rig.hdf5.apart import apart, apart_for_all, open_again, open_no_more
 from rig.hdf5.layout import text_of
-from rig.hdf5.members import DAMAGE, LARGEST_VALUE, is_column, table
-from rig.hdf5.opening import number, open_for_reading, require_file
+from rig.hdf5.members import DAMAGE, LARGEST_VALUE, is_column
+from rig.hdf5.opening import open_for_reading, require_file
 
 T = TypeVar("T")
 
 ROOT: Final = (
-    "recording_id", "thruster", "kind", "created", "campaign", "operator", "facility", "notes", "attempt", "continues",
-    "software", "bench_toml",
+    "recording_id", "thruster", "kind", "created", "campaign", "operator", "facility", "attempt", "continues",
+    "bench_toml",
 )  # fmt: skip
 """Attributes of the file that a header has, as texts."""
 LONGEST: Final = 2**20
@@ -114,72 +114,75 @@ def _header(path: Path) -> Header:
         if not any(stream.channels for stream in found):
             raise RecordingError(f"{path} says it is a recording, but no stream in it has a time and a channel")
         texts = {name: _text(file.id, name) for name in ROOT}
-        complete, outcome, cause = (_end(file, name) for name in ("complete", "outcome", "cause"))
-        return Header(texts, bool(number(complete)), text_of(outcome), text_of(cause), opened_as, found)
+        complete, outcome, cause = (_end(file.id, name) for name in ("complete", "outcome", "cause"))
+        return Header(texts, _is_true(complete), outcome, cause, opened_as, found)
 
 
-def _end(file: h5py.File, name: str) -> Any:
+def _end(file: h5f.FileID, name: str) -> str:
     """/end is believed before the root attribute."""
-    end = file.get("end") if _is_own(file.id, b"end") else None
-    item = table(end, name) if isinstance(end, h5py.Group) else None
-    value = item[()] if item is not None and item.size == 1 else file.attrs.get(name)
-    return "" if value is None else value
+    with suppress(*DAMAGE):
+        item = h5d.open(file, f"end/{name}".encode())
+        if item.get_space().get_simple_extent_npoints() == 1:
+            value = np.empty(item.shape, item.dtype)
+            item.read(h5s.ALL, h5s.ALL, value)
+            return text_of(value)
+    return _text(file, name)
 
 
-def _is_own(group: h5g.GroupID, name: bytes) -> bool:
-    """Whether the group itself holds an object of that name, and does not only point somewhere."""
-    return name in group and group.links.get_info(name).type == h5l.TYPE_HARD
+def _is_true(text: str) -> bool:
+    """Of a truth or a number, as texts."""
+    try:
+        return text == "True" or bool(float(text))
+    except ValueError:
+        return False
 
 
 def _members(group: h5g.GroupID) -> list[bytes]:
-    return [name for name in group if _is_own(group, name)]
+    """Names of what the group itself holds, and does not only point to."""
+    return [name for name in group if group.links.get_info(name).type == h5l.TYPE_HARD]
 
 
 def _stream(streams: h5g.GroupID, name: bytes) -> StreamHeader:
     shown = name.decode("utf-8", "replace")
     try:
         group = h5g.open(streams, name)
-        time = h5py.Dataset(h5d.open(group, b"time")) if _is_own(group, b"time") else None
+        members = _members(group)
+        time = h5py.Dataset(h5d.open(group, b"time")) if b"time" in members else None
     except DAMAGE:
         return StreamHeader(shown, (), 0, None, None)
     if time is None or not is_column(time):
         return StreamHeader(shown, (), 0, None, None)
-    channels = [_channel(group, each) for each in _members(group) if each != b"time"]
-    rows = len(time)
-    return StreamHeader(shown, tuple(filter(None, channels)), rows, _time(time, 0), _time(time, rows - 1))
+    channels = [_channel(group, each) for each in members if each != b"time"]
+    return StreamHeader(shown, tuple(channels), len(time), *_ends(time.id))
 
 
-def _channel(group: h5g.GroupID, name: bytes) -> ChannelHeader | None:
-    """None for what is no column."""
-    try:
-        item = h5d.open(group, name)
-        if item.rank != 1:
-            return None
-        quantity = _text(item, "quantity")
-        unit = _text(item, "unit") or QUANTITY_UNITS.get(quantity, ("",))[0]
-        calibration = _text(item, "calibration") if quantity == "thrust" else ""
-    except DAMAGE:
-        return None
+def _channel(group: h5g.GroupID, name: bytes) -> ChannelHeader:
+    quantity = _text(group, "quantity", name)
+    unit = _text(group, "unit", name) or QUANTITY_UNITS.get(quantity, ("",))[0]
+    calibration = _text(group, "calibration", name) if quantity == "thrust" else ""
     return ChannelHeader(name.decode("utf-8", "replace"), quantity, unit, calibration)
 
 
-def _time(time: h5py.Dataset, row: int) -> float | None:
-    """One row of a column; None where there is none that can be a time."""
+def _ends(time: h5d.DatasetID) -> tuple[float | None, float | None]:
+    """The first and the last row of a column; None where there is none that can be a time."""
     with suppress(*DAMAGE):
-        space = time.id.get_space()
-        space.select_hyperslab((row,), (1,))
-        found = np.empty(1)
-        time.id.read(h5s.create_simple((1,)), space, found)
-        return float(found[0]) if abs(found[0]) <= LARGEST_VALUE else None
-    return None
+        rows, space = time.shape[0], time.get_space()
+        count = min(rows, 2)
+        space.select_hyperslab((0,), (count,), (max(rows - 1, 1),))
+        found = np.empty(count)
+        time.read(h5s.create_simple((count,)), space, found)
+        first, last = (float(value) if abs(value) <= LARGEST_VALUE else None for value in (found[0], found[-1]))
+        return first, last
+    return None, None
 
 
-def _text(item: Any, name: str) -> str:
-    """An attribute; empty where there is none that can be read. Low-level: `attrs` costs three times as long."""
+def _text(item: Any, name: str, of: bytes = b".") -> str:
+    """An attribute of a member; empty where there is none that can be read. Low-level: `attrs` costs three times as
+    much, and to open the member as much again."""
     key = name.encode()
     with suppress(*DAMAGE):
-        if h5a.exists(item, key):
-            attribute = h5a.open(item, key)
+        if h5a.exists(item, key, obj_name=of):
+            attribute = h5a.open(item, key, obj_name=of)
             if attribute.get_storage_size() <= LONGEST:
                 value = np.empty(attribute.shape, attribute.dtype)
                 attribute.read(value)
