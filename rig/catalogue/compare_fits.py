@@ -89,7 +89,8 @@ def _fit_rows(found: History) -> Iterator[tuple[str, ...]]:
     for k, fit in enumerate(found.fits, 1):
         for name, p in fit.entry["parameters"].items():
             known = (digits(p["value"], p["std"]), digits(2 * p["std"], p["std"]))
-            rest = (p["unit"], f"{fit.entry['rmse']:.3g}", str(len(fit.entry["recordings"])), fit.source)
+            rmse = "" if fit.entry["rmse"] is None else f"{fit.entry['rmse']:.3g}"
+            rest = (p["unit"], rmse, str(len(fit.entry["recordings"])), fit.source)
             yield (str(k), date_of(fit.began), name, *known, *rest)
 
 

@@ -3,20 +3,20 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from identification.thruster.thrust_forms import Model
+from identification.thruster.thrust_forms import FORMS, Model
 from rig.catalogue.asking import Place, with_catalogue
 from rig.catalogue.entry import UNREADABLE, Entry
 from rig.catalogue.fit_history import DatedFit, History, history
 from rig.catalogue.selection import Filter, named, related, selected
 from rig.errors import ConfigError, RecordingError
-from rig.fit.answer import Answer, fit_files
+from rig.fit.answer import FIT_FORMAT, Answer, fit_files
 from rig.fit.as_json import answer_json
-from rig.fit.comparison import of_model, read_fit, repeats
+from rig.fit.comparison import group_of_json, of_model, read_fit, repeats
 
 WHAT_IT_HOLDS: Final = "what it holds was used"
 """In the note of a fit to a recording that was aborted or tripped."""
@@ -28,6 +28,11 @@ class Wanted(NamedTuple):
     thruster: str = ""
     model: Model = "C V|V|"
     against: str = "command_voltage"
+
+    @property
+    def name(self) -> str:
+        """Of the model, as a fit has it: by the rotation rate it has another."""
+        return FORMS[self.model, self.against == "rotation_rate"].name
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,8 +79,8 @@ def _source(entries: Sequence[Entry], folder: Path) -> Source:
     thrusters = tuple(dict.fromkeys(each.thruster for each in entries))
     if first.what == "fits":
         return Source(first.path, first.began, document=folder / first.path, thrusters=thrusters)
-    paths = {each.id or each.path: folder / each.path for each in reversed(entries)}
-    return Source(first.path, first.began, recordings=tuple(reversed(paths.values())), thrusters=thrusters)
+    paths = {each.id or each.path: folder / each.path for each in entries}
+    return Source(first.path, first.began, recordings=tuple(paths.values()), thrusters=thrusters)
 
 
 def sources_of(folder: Path, cache: Path, wanted: Filter) -> list[Source]:
@@ -84,9 +89,9 @@ def sources_of(folder: Path, cache: Path, wanted: Filter) -> list[Source]:
     def work(connection: sqlite3.Connection) -> list[Source]:
         recordings = [each for each in selected(connection, wanted) if each.kind != "vehicle"]
         groups: dict[tuple[str, str], list[Entry]] = {}
-        for each in {each.id or each.path: each for each in reversed(recordings)}.values():
+        for each in recordings:
             alone = each.path if not each.campaign else ""
-            groups.setdefault((str(Path(each.path).parent / alone), each.campaign), []).insert(0, each)
+            groups.setdefault((str(Path(each.path).parent / alone), each.campaign), []).append(each)
         fits = selected(connection, replace(wanted, what="fits"))
         orphans = [each for each in fits if not related(connection, each)]
         return [_source(group, folder.resolve()) for group in (*groups.values(), *([each] for each in orphans))]
@@ -103,7 +108,7 @@ def compared(sources: Sequence[Source], wanted: Wanted) -> History:
             _add(done, source, wanted)
         except RecordingError as error:
             done.remarks.append(f"left out: {source.name}: {error}")
-    return history(wanted.thruster, wanted.model, done.fits, repeats(done.answers), done.remarks)
+    return history(wanted.thruster, wanted.name, done.fits, repeats(done.answers), done.remarks)
 
 
 def _common(sources: Sequence[Source]) -> str:
@@ -117,32 +122,31 @@ def _common(sources: Sequence[Source]) -> str:
 
 def _add(done: Fitted, source: Source, wanted: Wanted) -> None:
     """Raises RecordingError for what allows no fit."""
-    for entry, answer in _entries(source, wanted):
-        twice = next((name for name in entry["recordings"] if name in done.seen), None)
-        if twice is not None:
-            done.remarks.append(
-                f"left out: {source.name}: recording {twice} is in {done.seen[twice]} too, and is counted once"
-            )
-        elif entry.get("voltage", wanted.against) != wanted.against:
-            done.remarks.append(
-                f"left out: {source.name}: fitted over {entry['voltage']}, the others over {wanted.against}"
-            )
-        else:
-            done.seen |= dict.fromkeys(entry["recordings"], source.name)
-            done.fits.append(DatedFit(source.name, source.began, entry))
-            done.answers += [answer] if answer is not None else []
-            done.remarks += [note for note in (answer.notes if answer is not None else ()) if WHAT_IT_HOLDS in note]
-
-
-def _entries(source: Source, wanted: Wanted) -> Iterator[tuple[dict[str, Any], Answer | None]]:
-    """The one of the thruster and model. Raises RecordingError."""
     answers = fit_files(source.recordings, wanted.model, wanted.against) if source.document is None else ()
     document = answer_json(answers) if source.document is None else read_fit(source.document)
+    entry = _entry(document, wanted)
+    twice = next((name for name in entry["recordings"] if name in done.seen), None)
+    if twice is not None:
+        raise RecordingError(f"recording {twice} is in {done.seen[twice]} too, and is counted once")
+    if entry.get("voltage", wanted.against) != wanted.against:
+        raise RecordingError(f"fitted over {entry['voltage']}, the others over {wanted.against}")
+    done.seen |= dict.fromkeys(entry["recordings"], source.name)
+    done.fits.append(DatedFit(source.name, source.began, entry))
+    done.answers += answers
+    done.remarks += [note for answer in answers for note in answer.notes if WHAT_IT_HOLDS in note]
+
+
+def _entry(document: Mapping[str, Any], wanted: Wanted) -> Mapping[str, Any]:
+    """The one of the thruster and model, with all that is asked of it. Raises RecordingError."""
     try:
         entries = [each for each in document["fits"] if each["thruster"] == wanted.thruster]
-        found = of_model(entries, wanted.model)
-    except (KeyError, TypeError, AttributeError) as error:
-        raise RecordingError(f"not as a fit is written ({error!r})") from error
+        found = of_model(entries, wanted.name)
+        if found is not None:
+            group_of_json(found, wanted.thruster)
+            facts = [(p["value"], p["std"], p["unit"]) for p in found["parameters"].values()]
+            found = {"recordings": entries[0]["recordings"], "rmse": None, **found} if facts else None
+    except (KeyError, TypeError, ValueError, AttributeError) as error:
+        raise RecordingError(f"a fit in it is not as {FIT_FORMAT} has it ({error!r})") from error
     if found is None:
-        raise RecordingError(f"has no {wanted.model} of {wanted.thruster or 'a thruster without a name'}")
-    yield {"recordings": entries[0]["recordings"], **found}, next(iter(answers), None)
+        raise RecordingError(f"has no {wanted.name} of {wanted.thruster or 'a thruster without a name'}")
+    return found

@@ -16,7 +16,17 @@ from rig.catalogue.selection import named, related
 
 MOST: Final = 20
 """Lines of one kind that are shown; the JSON has all."""
-LINES: Final = ("thruster", "kind", "campaign", "outcome", "operator", "bench", "said", "reason")
+LINES: Final = {
+    "thruster": "thruster",
+    "kind": "kind",
+    "campaign": "campaign",
+    "outcome": "outcome",
+    "operator": "operator",
+    "bench": "bench",
+    "said": "in short",
+    "reason": "why",
+}
+"""Field of an entry -> how it is called."""
 ATTRIBUTES: Final = ("facility", "notes", "software", "attempt", "continues")
 """Of a recording, shown where it has them."""
 
@@ -140,13 +150,13 @@ def _facts(entry: Entry) -> Iterator[str]:
     yield f"  {'file':<10} {entry.path}"
     if entry.began is not None:
         yield f"  {'began':<10} {date_of(entry.began, 'seconds')} UTC" + (
-            "" if entry.stated else ", by what is around it"
+            "" if entry.stated else ", by its recordings or the date of its file"
         )
     if entry.duration is not None:
         yield f"  {'duration':<10} {spent(entry.duration)}"
-    for name in LINES:
+    for name, title in LINES.items():
         if text := getattr(entry, name):
-            yield f"  {name:<10} {' '.join(text.split())}"
+            yield f"  {title:<10} {' '.join(text.split())}"
     if entry.what == "calibrations":
         yield f"  {'text':<10} {entry.facts.get('calibration', '')}"
     if statement := entry.facts.get("statement"):

@@ -85,13 +85,14 @@ def _twins(path: str, identity: str, found: Mapping[str, Any]) -> Iterator[Entry
 
 def _diagnoses(path: str, identity: str, found: Mapping[str, Any]) -> Iterator[Entry]:
     effects = [str(each["effect"]) for each in found["findings"]]
+    headline = str(found.get("headline") or ", ".join(effects))
     yield Entry(
         "diagnoses",
         path,
         id=identity,
         thruster=str(found["thruster"]),
         outcome=str(found["verdict"]),
-        said=str(found.get("headline") or ", ".join(effects)),
+        said=headline if headline != found["verdict"] else str(found.get("statement", "")),
         facts={"verdict": str(found["verdict"]), "effects": effects, "statement": str(found.get("statement", ""))},
         recordings=_texts(found["recordings"]),
     )
