@@ -8,7 +8,15 @@ from datetime import UTC, datetime
 from math import isfinite
 from typing import Any, Final
 
-WHAT: Final = ("recordings", "campaigns", "fits", "twins", "diagnoses", "calibrations")
+ONE: Final = {
+    "recordings": "recording",
+    "campaigns": "campaign",
+    "fits": "fit",
+    "twins": "twin",
+    "diagnoses": "diagnosis",
+    "calibrations": "calibration",
+}
+WHAT: Final = tuple(ONE)
 """What `--what` takes."""
 UNREADABLE: Final = "unreadable"
 """Outcome of a file that tells nothing; `reason` says why."""

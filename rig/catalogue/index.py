@@ -28,7 +28,9 @@ HINDERED: Final = frozenset(
     {sqlite3.SQLITE_PERM, sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_IOERR}
     | {sqlite3.SQLITE_FULL, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_NOLFS, sqlite3.SQLITE_PROTOCOL}
 )
-"""Primary result codes of SQLite that say that the place does not do."""
+"""Primary result codes of SQLite that say that the place does not do;"""
+FAULTS: Final = (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
+"""those that say that the index is at fault."""
 COLUMNS: Final = tuple(each.name for each in fields(Entry) if each.name not in ("path", "facts", "recordings"))
 SCHEMA: Final = (
     "CREATE TABLE files (path BLOB PRIMARY KEY, size INTEGER, mtime_ns INTEGER)",
@@ -44,8 +46,8 @@ SCHEMA: Final = (
 """An index made with any other is made anew: it is older or later than this program, or another's."""
 
 
-class Foreign(sqlite3.DatabaseError):
-    """A SQLite file that is no index of this version."""
+class Damaged(sqlite3.DatabaseError):
+    """An index that can't be used: damaged, or a SQLite file of another program or version."""
 
 
 def with_index(folder: Path, cache: Path, work: Callable[[sqlite3.Connection], T], say: Callable[[str], None]) -> T:
@@ -78,33 +80,31 @@ def _with_index(place: Path, work: Callable[[sqlite3.Connection], T], say: Calla
         place.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
     if os.path.lexists(place) and not stat.S_ISREG(place.lstat().st_mode):
         raise OSError("it is no regular file; remove it")
+    with suppress(Damaged):
+        return _worked(place, work)
+    with _locked(place.parent):  # of two that both found it damaged the later one uses what the first has made
+        try:
+            return _worked(place, work)
+        except Damaged as error:
+            say(f"the index {place} was {error}: made anew")
+        for name in (place, place.with_name(place.name + "-journal")):
+            name.unlink(missing_ok=True)
+        return _worked(place, work)
+
+
+def _worked(place: Path, work: Callable[[sqlite3.Connection], T]) -> T:
+    """Raises Damaged where the index itself is at fault."""
     try:
         with closing(_connected(place)) as connection:
             return work(connection)
+    except UnicodeDecodeError as error:
+        raise Damaged("damaged, a text of it is none") from error
     except sqlite3.DatabaseError as error:
-        if not _is_damage(error):
+        code = getattr(error, "sqlite_errorcode", None)  # none: of Python's module, for a text that is no UTF-8
+        if isinstance(error, Damaged) or (code is not None and code & 0xFF not in FAULTS):
             raise
-        say(f"the index {place} was {error}: made anew")
-    _remove(place)
-    with closing(_connected(place)) as connection:
-        return work(connection)
-
-
-def _is_damage(error: sqlite3.DatabaseError) -> bool:
-    """Whether the index itself is at fault. A text that is no UTF-8 is an error of Python's, without SQLite's code."""
-    code = getattr(error, "sqlite_errorcode", None)
-    return isinstance(error, Foreign) or code is None or code & 0xFF in (sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_NOTADB)
-
-
-def _remove(place: Path) -> None:
-    """Of two processes that both found it damaged the later one leaves what the first has made: SQLite would take the
-    journal of the one for that of the other (How To Corrupt An SQLite Database File, section 2.4)."""
-    with _locked(place.parent):
-        with suppress(sqlite3.DatabaseError), closing(_connected(place)) as connection:
-            if connection.execute("PRAGMA quick_check").fetchone() == ("ok",):
-                return
-        for name in (place, place.with_name(place.name + "-journal")):
-            name.unlink(missing_ok=True)
+        told = " ".join(str(error).split())
+        raise Damaged(f"damaged ({told[:80]})") from error
 
 
 @contextmanager
@@ -130,7 +130,7 @@ def _connected(place: Path | str) -> sqlite3.Connection:
                 for statement in SCHEMA:
                     connection.execute(statement)
             elif made != list(SCHEMA):
-                raise Foreign("not of this program and version")
+                raise Damaged("not of this program and version")
     except BaseException:
         connection.close()
         raise
@@ -186,4 +186,4 @@ def entry_of(row: Mapping[str, Any], recordings: tuple[str, ...] = ()) -> Entry:
         known = {name: row[name] for name in COLUMNS}
         return Entry(path=os.fsdecode(row["path"]), facts=facts, recordings=recordings, **known)
     except (TypeError, ValueError) as error:
-        raise Foreign(f"damaged ({error})") from None
+        raise Damaged(f"damaged ({error})") from None

@@ -10,7 +10,7 @@ from typing import Any, Final
 import click
 
 from rig.catalogue.asking import CACHE, JSON, REBUILD, SINCE, UNTIL, aligned, entry_json, spent, tell, with_catalogue
-from rig.catalogue.entry import UNREADABLE, WHAT, Entry, date_of
+from rig.catalogue.entry import ONE, UNREADABLE, WHAT, Entry, date_of
 from rig.catalogue.selection import Filter, counted, selected
 
 SHORT: Final = 8
@@ -87,7 +87,10 @@ def list_command(
     found, unreadable = with_catalogue(folder, cache, work, rebuild=rebuild)
     nothing = f"no {what} in {folder}"
     tell(json_path, lambda: list_json(folder, wanted, found), lambda: list_text(what, found) or nothing)
-    click.echo(f"{len(found)} {what}" + (", the newest" if len(found) == limit else ""), err=True)
+    click.echo(
+        f"{len(found)} {ONE[what] if len(found) == 1 else what}" + (", the newest" if len(found) == limit else ""),
+        err=True,
+    )
     if unreadable and outcome != UNREADABLE:
         click.echo(f"{unreadable} can't be read; why: rig list --what {what} --outcome {UNREADABLE}", err=True)
 

@@ -15,12 +15,19 @@ from rig.catalogue.entry import UNCLOSED, Entry
 from rig.catalogue.index import COLUMNS, entry_of
 from rig.errors import ConfigError
 
-QUIET: Final = 60.0
-"""s without a change after which a file that says `running` is not being written: a recorder writes four times a s."""
-STATE: Final = (
-    "CASE WHEN outcome = 'running' AND (SELECT mtime_ns FROM files WHERE files.path = e.path) < :quiet_ns "
-    "THEN :unclosed ELSE outcome END"
+QUIET: Final = {"recordings": 60.0, "campaigns": 3600.0}
+"""s without a change after which what says `running` is taken to have been cut: a recorder writes four times a s, a
+ledger once a step, and not while an operator mounts the next thruster."""
+CUT: Final = (
+    "outcome = 'running' AND (SELECT mtime_ns FROM files WHERE files.path = e.path) "
+    "< CASE what WHEN 'campaigns' THEN :quiet_campaigns ELSE :quiet_recordings END"
 )
+SHOWN: Final = {
+    "outcome": f"CASE WHEN {CUT} THEN :unclosed ELSE outcome END AS outcome",
+    "reason": "CASE WHEN outcome <> 'running' OR what <> 'recordings' THEN reason "
+    f"WHEN {CUT} THEN 'not closed in order; `rig recover` copies it' ELSE 'still being written' END AS reason",
+}
+"""What depends on the time at which it is asked."""
 NO_FACTS: Final = "'{}' AS facts"
 
 
@@ -80,10 +87,11 @@ def _entries(
     connection: sqlite3.Connection, where: str, values: dict[str, Any], newest: int | None = None, *, facts: bool = True
 ) -> Iterator[Entry]:
     connection.row_factory = sqlite3.Row
-    shown = ", ".join(f"{STATE} AS outcome" if name == "outcome" else name for name in COLUMNS)
+    shown = ", ".join(SHOWN.get(name, name) for name in COLUMNS)
     inner = f"SELECT key, path, {shown}, {'facts' if facts else NO_FACTS} FROM entries AS e"  # noqa: S608 - our own
     asked = f"SELECT * FROM ({inner}) WHERE {where} ORDER BY began DESC, path DESC, key DESC LIMIT :newest"  # noqa: S608
-    since = {"quiet_ns": int((time.time() - QUIET) * 1e9), "unclosed": UNCLOSED, "newest": newest or -1}
+    since: dict[str, Any] = {f"quiet_{what}": int((time.time() - quiet) * 1e9) for what, quiet in QUIET.items()}
+    since |= {"unclosed": UNCLOSED, "newest": newest or -1}
     rows = connection.execute(asked, values | since).fetchall()
     yield from map(entry_of, reversed(rows))
 

@@ -11,7 +11,7 @@ from typing import Any, Final
 import click
 
 from rig.catalogue.asking import CACHE, JSON, Place, aligned, entry_json, spent, tell, with_catalogue
-from rig.catalogue.entry import UNREADABLE, Entry, date_of
+from rig.catalogue.entry import ONE, UNREADABLE, Entry, date_of
 from rig.catalogue.selection import named, related
 
 MOST: Final = 20
@@ -131,8 +131,7 @@ def show_json(found: Shown) -> dict[str, Any]:
 def show_text(found: Shown) -> str:
     """What a person reads."""
     first = found.first
-    title = {"recordings": "recording", "diagnoses": "diagnosis"}.get(first.what, first.what[:-1])
-    lines = [f"{title} {first.id or first.path}", *_facts(first)]
+    lines = [f"{ONE[first.what]} {first.id or first.path}", *_facts(first)]
     same = [each for each in found.entries if each is not first and each.what == first.what]
     if first.what in ("fits", "campaigns") or not same:
         lines += [line for each in same for line in ("", *_facts(each))]

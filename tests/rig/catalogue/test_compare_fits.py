@@ -131,6 +131,11 @@ def test_what_can_not_be_compared_is_said(tmp_path, run, found):
     assert "is in 0.json too" in found("0.json", "1.json", again)["notes"][-1]
     by_rate = fit(tmp_path / "rate.json", recordings=["id-7"], voltage="rotation_rate")
     assert "fitted over rotation_rate" in found("0.json", "1.json", by_rate)["notes"][-1]
+    odd = tmp_path / "odd.json"
+    odd.write_text(
+        (tmp_path / "2.json").read_text().replace('"dof": ', '"dof": "many", "was": ').replace("id-2", "id-8")
+    )
+    assert "is not as thruster-rig-fit has it" in found("0.json", "1.json", odd)["notes"][-1]
     assert "--since" in run("0.json", "1.json", "--since", "2026-01-01", status=2).err
 
 

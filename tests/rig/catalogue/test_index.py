@@ -124,6 +124,25 @@ def test_a_damaged_or_foreign_index_is_made_anew_and_that_is_said(tmp_path, cont
     assert asked(tmp_path) == before
 
 
+def test_an_index_with_wrong_bytes_is_no_reason_to_fail(tmp_path):
+    """Pages that are spoilt are seen; a letter of a text that became another is not, until its file changes."""
+    for k in range(5):
+        recording(tmp_path / f"{k}.h5", f"id-{k}")
+    fit(tmp_path / "f.json")
+    before, place = everything(tmp_path), tmp_path / NAME
+    whole, rng, said = place.read_bytes(), random.Random(5), []
+    for _ in range(25):
+        spoilt = bytearray(whole)
+        for _ in range(rng.choice([1, 30, 1000])):
+            spoilt[rng.randrange(len(spoilt))] = rng.randrange(256)
+        place.write_bytes(spoilt)
+        asked(tmp_path, said=said)
+        assert everything(tmp_path).keys() == before.keys()
+    assert len(said) > 10
+    place.unlink()
+    assert everything(tmp_path) == before
+
+
 def test_where_the_folder_can_not_be_written_the_index_is_in_the_cache(tmp_path, monkeypatch):
     data, cache, said = tmp_path / "data", tmp_path / "cache", []
     recording(data / "1.h5")
