@@ -43,7 +43,8 @@ SCHEMA: Final = (
     "CREATE INDEX links_of_entry ON links (entry)",
     "CREATE INDEX links_by_id ON links (id)",
 )
-"""An index made with any other is made anew: it is older or later than this program, or another's."""
+READING: Final = 1
+"""Raised when other things are read of a file, so that what was read before is read again."""
 
 
 class Damaged(sqlite3.DatabaseError):
@@ -127,9 +128,9 @@ def _connected(place: Path | str) -> sqlite3.Connection:
         with transaction(connection):
             made = [sql for (sql,) in connection.execute("SELECT sql FROM sqlite_master WHERE sql IS NOT NULL")]
             if not made:
-                for statement in SCHEMA:
+                for statement in (*SCHEMA, f"PRAGMA user_version = {READING}"):
                     connection.execute(statement)
-            elif made != list(SCHEMA):
+            elif made != list(SCHEMA) or connection.execute("PRAGMA user_version").fetchone() != (READING,):
                 raise Damaged("not of this program and version")
     except BaseException:
         connection.close()

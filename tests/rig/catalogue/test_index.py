@@ -100,7 +100,9 @@ def test_a_result_has_time_campaign_and_bench_of_its_recordings(tmp_path):
     assert asked(tmp_path, Filter("fits")) == [early]
 
 
-@pytest.mark.parametrize("content", [b"", b"nonsense" * 1000, b"SQLite format 3\0" + b"\xff" * 5000, "foreign", "torn"])
+@pytest.mark.parametrize(
+    "content", [b"", b"nonsense" * 1000, b"SQLite format 3\0" + b"\xff" * 5000, "foreign", "torn", "later"]
+)
 def test_a_damaged_or_foreign_index_is_made_anew_and_that_is_said(tmp_path, content):
     for k in range(3):
         recording(tmp_path / f"{k}.h5", f"id-{k}")
@@ -110,6 +112,10 @@ def test_a_damaged_or_foreign_index_is_made_anew_and_that_is_said(tmp_path, cont
         place.unlink()
         with sqlite3.connect(place) as connection:
             connection.execute("CREATE TABLE bookmarks (url)")
+        connection.close()
+    elif content == "later":
+        with sqlite3.connect(place) as connection:
+            connection.execute("PRAGMA user_version = 1000")
         connection.close()
     elif content == "torn":
         data = bytearray(place.read_bytes())
@@ -157,7 +163,7 @@ def test_where_the_folder_can_not_be_written_the_index_is_in_the_cache(tmp_path,
     assert "nothing is kept" in said[-1]
 
 
-def test_two_processes_at_once(tmp_path):
+def test_three_processes_at_once(tmp_path):
     for k in range(60):
         recording(tmp_path / f"{k}.h5", f"id-{k}")
     (tmp_path / NAME).write_bytes(b"nonsense" * 1000)
