@@ -1,9 +1,9 @@
 """What stands before the rows of a recording, many recordings at a time: for a catalogue of thousands.
 
 `load(path, rows=0)` reads every attribute of every channel (25 ms of a processor for a file of eight channels), in a
-child for each file (nearly as long again). Here the few that a list shows are read, of many files in one child. The child has
-the limits of decision 14, and each of its files is closed to links as there; when it dies, each file of its batch gets
-a child of its own, so that the one to blame is named and the others are read.
+child for each file (nearly as long again). Here the few that a list shows are read, of many files in one child. The
+child has the limits of decision 14, and each of its files is closed to links as there; when it dies, each file of its
+batch gets a child of its own, so that the one to blame is named and the others are read.
 """
 
 from __future__ import annotations
