@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -68,6 +69,16 @@ class Acquisition:
     """s between two rows by the device's own clock, which the whole stream has."""
     clock_drift_std: float | None = None
     """Of that clock against the run's, relative."""
+
+
+def calibration_text(stream: str, channel: str, facts: Mapping[str, object]) -> str:
+    """A cell and the facts of its calibration as one text; its role in the recording is no part of it.
+
+    >>> calibration_text("cell", "thrust", {"gain_std": 0.1, "role": "primary"})
+    'cell/thrust {"gain_std": 0.1}'
+    """
+    known = {key: value for key, value in facts.items() if key != "role"}
+    return f"{stream}/{channel} {json.dumps(known, sort_keys=True, default=str)}"
 
 
 @dataclass(frozen=True, eq=False)

@@ -104,6 +104,11 @@ COMMANDS: Final = {
     "recover": Entry(
         "rig.recording.recover:recover_command", "Copy a recording that was not closed in order into a plain file."
     ),
+    "list": Entry("rig.catalogue.list_command:list_command", "Recordings, campaigns and results of a folder."),
+    "show": Entry("rig.catalogue.show_command:show_command", "All that is known of one of them."),
+    "compare-fits": Entry(
+        "rig.catalogue.compare_fits:compare_fits_command", "Has a thruster changed? Its fits in order of time."
+    ),
 }
 
 

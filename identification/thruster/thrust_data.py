@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from identification.estimation.even_noise import MIN_SAMPLES
-from identification.recording import Channel, Floats, Recording
+from identification.recording import Channel, Floats, Recording, calibration_text
 from identification.steady_state.points import FALLBACK, Points, find_windows, reduce_to_points, voltage_channel
 from identification.steady_state.steady import settled_estimates
 
@@ -116,8 +115,7 @@ def calibration_of(thrust: Channel) -> str:
     >>> calibration_of(Channel("thrust", "cell", "thrust", "N", none, none, calibration=facts))
     'cell/thrust {"gain_std": 0.1}'
     """
-    facts = {key: value for key, value in thrust.calibration.items() if key != "role"}
-    return f"{thrust.stream}/{thrust.name} {json.dumps(facts, sort_keys=True, default=str)}"
+    return calibration_text(thrust.stream, thrust.name, thrust.calibration)
 
 
 def flow_of(recording: Recording, times: Floats, points: Points | None) -> Flow | None:

@@ -180,7 +180,8 @@ def dynamics_json(found: DynamicsFit | Unusable) -> dict[str, Any]:
     }
 
 
-def _difference(d: Difference) -> dict[str, Any]:
+def difference_json(d: Difference) -> dict[str, Any]:
+    """One coefficient of one side against the other."""
     return {
         "first": d.first,
         "second": d.second,
@@ -209,7 +210,7 @@ def alike_json(found: Alike) -> dict[str, Any]:
         "common": [number(x) for x in found.test.common],
         "different_thrusters": list(found.odd),
         "rest_p": None if found.rest is None else number(found.rest.p_value),
-        "pairs": [_difference(d) for d in found.pairs],
+        "pairs": [difference_json(d) for d in found.pairs],
         "repeatability": None
         if repeat is None
         else {"relative_std": number(repeat.std), "dof": number(repeat.dof), "p": number(repeat.p_value)},
@@ -224,7 +225,7 @@ def changed_json(found: Changed) -> dict[str, Any]:
         "changes": [
             {
                 "thruster": c.difference.second,
-                **{k: v for k, v in _difference(c.difference).items() if k not in {"first", "second"}},
+                **{k: v for k, v in difference_json(c.difference).items() if k not in {"first", "second"}},
                 "p_adjusted": number(c.adjusted_p),
                 "changed": c.changed,
                 "smallest_seen": number(c.smallest),

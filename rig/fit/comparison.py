@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -123,8 +123,8 @@ def read_fit(path: Path) -> dict[str, Any]:
     return document
 
 
-def _old_group(entry: Mapping[str, Any], thruster: str) -> Group | None:
-    """From a fit's JSON; one written before the covariance was in it has its standard deviations only."""
+def group_of_json(entry: Mapping[str, Any], thruster: str) -> Group | None:
+    """`group_of` from a fit's JSON; one written before the covariance was in it has its standard deviations only."""
     found = entry["parameters"]
     values = np.array([_float(p["value"]) for p in found.values()])
     stds = np.array([_float(p["std_statistical"]) for p in found.values()])
@@ -158,11 +158,17 @@ def _find(document: Mapping[str, Any], fit: ThrustFit) -> tuple[Mapping[str, Any
     if ours:
         name = sorted(ours)[0]
         return None, f"{fit.thruster}: recording {name} is in both fits; a recording cannot differ from itself"
+    found = of_model(entries, fit.model)
+    return found, "" if found else f"{fit.thruster}: the earlier fit has no {fit.model}, only {entries[0]['model']}"
+
+
+def of_model(entries: Iterable[Mapping[str, Any]], model: str) -> Mapping[str, Any] | None:
+    """Of a thruster's entries in a fit's JSON the one of that model, which may be an alternative of another."""
     for entry in entries:
         for one in (entry, *entry.get("alternatives", ())):
-            if one["model"] == fit.model:
-                return {"calibration": entry.get("calibration", ""), **one}, ""
-    return None, f"{fit.thruster}: the earlier fit has no {fit.model}, only {entries[0]['model']}"
+            if one["model"] == model:
+                return {"calibration": entry.get("calibration", ""), **one}
+    return None
 
 
 def changed(answers: Sequence[Answer], path: Path) -> Changed:
@@ -175,7 +181,7 @@ def changed(answers: Sequence[Answer], path: Path) -> Changed:
         for answer in answers:
             entry, why = _find(document, answer.fit)
             new = group_of(answer.fit)
-            old = None if entry is None else _old_group(entry, answer.fit.thruster)
+            old = None if entry is None else group_of_json(entry, answer.fit.thruster)
             if old is not None and new is not None:
                 both.append((with_repeatability(old, repeat), with_repeatability(new, repeat)))
             else:

@@ -19,7 +19,7 @@ import signal
 import struct
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Final, NoReturn, TypeVar
@@ -49,9 +49,21 @@ def apart(work: Callable[[], T], path: Path) -> T:
     Raises what `work` raises, and RecordingError where it needed too much or died. Elsewhere than on Linux, where a
     bench does not run but its recordings are read, it is done here; what is followed and believed is chosen as well.
     """
+    return _apart(work, path.stat().st_size, str(path))
+
+
+def apart_for_all(work: Callable[[], T], paths: Sequence[Path]) -> T:
+    """The same for work that reads a little of each of many files: none may use more than the largest justifies.
+
+    Raises RecordingError, which does not know which file it was.
+    """
+    sizes = (path.stat().st_size for path in paths if path.is_file())
+    return _apart(work, max(sizes, default=0), f"one of {len(paths)} files")
+
+
+def _apart(work: Callable[[], T], size: int, name: str) -> T:
     if sys.platform != "linux":
         return work()
-    size = path.stat().st_size
     seconds = SECONDS + math.ceil(size / BYTES_PER_SECOND)
     memory = MEMORY + MEMORY_PER_BYTE * size
     answer = os.memfd_create("recording", os.MFD_CLOEXEC)
@@ -61,11 +73,11 @@ def apart(work: Callable[[], T], path: Path) -> T:
             _child(work, answer, seconds, memory)
         status = _awaited(child, seconds * PATIENCE)
         if status != 0:
-            raise RecordingError(f"{path} is damaged, or was made to harm: {_reason(status, seconds, memory)}")
+            raise RecordingError(f"{name} is damaged, or was made to harm: {_reason(status, seconds, memory)}")
         with suppress(struct.error):  # nothing was written
             found: T = _result(_unpacked(answer))
             return found
-        raise RecordingError(f"{path} is damaged: reading it ended without an answer")
+        raise RecordingError(f"{name} is damaged: reading it ended without an answer")
     finally:
         os.close(answer)
 
@@ -75,6 +87,14 @@ def open_no_more() -> None:
     if sys.platform != "linux":
         return
     resource.setrlimit(resource.RLIMIT_NOFILE, (0, resource.getrlimit(resource.RLIMIT_NOFILE)[1]))
+
+
+def open_again() -> None:
+    """A child that has closed its file may open the next one."""
+    if sys.platform != "linux":
+        return
+    hard = resource.getrlimit(resource.RLIMIT_NOFILE)[1]
+    resource.setrlimit(resource.RLIMIT_NOFILE, (hard, hard))
 
 
 def _child(work: Callable[[], object], answer: int, seconds: int, memory: int) -> NoReturn:

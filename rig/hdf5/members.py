@@ -48,7 +48,7 @@ def table(group: h5py.Group, name: str) -> h5py.Dataset | None:
 
 def numeric_columns(group: h5py.Group) -> dict[str, h5py.Dataset]:
     """Datasets of a stream that are one-dimensional and numeric, `time` among them."""
-    return {name: item for name, item in members(group) if isinstance(item, h5py.Dataset) and _is_column(item)}
+    return {name: item for name, item in members(group) if isinstance(item, h5py.Dataset) and is_column(item)}
 
 
 def measured(raw: NDArray[Any], missing: Any) -> tuple[NDArray[np.float64], int]:
@@ -61,7 +61,8 @@ def measured(raw: NDArray[Any], missing: Any) -> tuple[NDArray[np.float64], int]
     return value, int(damaged.sum())
 
 
-def _is_column(item: h5py.Dataset) -> bool:
+def is_column(item: h5py.Dataset) -> bool:
+    """Whether a dataset is one-dimensional and numeric, and its values are in its file."""
     try:
         return item.ndim == 1 and item.dtype.kind in "iufb" and _is_justified(item)
     except DAMAGE:

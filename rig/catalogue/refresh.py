@@ -1,0 +1,91 @@
+"""Bringing an index up to date: only files that came or changed are read."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import islice
+from pathlib import Path
+from typing import Final, NamedTuple, TypeVar
+
+from rig.catalogue import index
+from rig.catalogue.entry import Entry
+from rig.catalogue.reading import files
+from rig.catalogue.reading.campaigns import read_campaign
+from rig.catalogue.reading.documents import read_document
+from rig.catalogue.reading.recordings import read_recordings
+
+T = TypeVar("T")
+
+BATCH: Final = 128
+"""Files that one child reads, and that are kept together: a rebuild that is killed goes on where it was."""
+RELATED: Final = "FROM links JOIN entries AS r ON r.id = links.id AND r.what = 'recordings' WHERE links.entry = e.key"
+RELATE: Final = (
+    "UPDATE entries AS e SET began = stated",
+    f"UPDATE entries AS e SET began = (SELECT max(r.stated) {RELATED}) WHERE began IS NULL",  # noqa: S608 - our own
+    f"UPDATE entries AS e SET began = (SELECT min(r.stated) {RELATED}) WHERE what = 'campaigns'",  # noqa: S608
+    "UPDATE entries AS e SET began = (SELECT mtime_ns / 1e9 FROM files WHERE files.path = e.path) WHERE began IS NULL",
+    *(
+        f"UPDATE entries AS e SET {name} = ifnull((SELECT max(r.{name}) {RELATED}), '') "  # noqa: S608
+        "WHERE what IN ('fits', 'twins', 'diagnoses')"
+        for name in ("kind", "campaign", "operator", "bench")
+    ),
+    f"UPDATE entries AS e SET kind = ifnull((SELECT max(r.kind) {RELATED}), ''), "  # noqa: S608
+    f"operator = ifnull((SELECT max(r.operator) {RELATED}), '') WHERE what = 'campaigns'",
+)
+"""What a result does not say of itself is that of the recordings it is of, where they are among the files."""
+
+
+class Refreshed(NamedTuple):
+    """What was done."""
+
+    files: int
+    read: int
+    forgotten: int
+
+
+def refresh(connection: sqlite3.Connection, folder: Path) -> Refreshed:
+    """Until index and files agree, as the files were when they were looked at."""
+    known, there = index.stamps(connection), files.found(folder)
+    gone = known.keys() - there.keys()
+    new = sorted(path for path, stamp in there.items() if known.get(path) != stamp)
+    with index.transaction(connection):
+        index.forget(connection, gone)
+    for batch in _batches(_by_kind(new)):
+        said = list(_read(folder, batch))
+        with index.transaction(connection):
+            for path, entries in said:
+                index.keep(connection, path, there[path], entries)
+    if gone or new:
+        with index.transaction(connection):
+            for statement in RELATE:
+                connection.execute(statement)
+    return Refreshed(len(there), len(new), len(gone))
+
+
+def empty(connection: sqlite3.Connection) -> None:
+    """Everything forgotten, for a rebuild."""
+    with index.transaction(connection):
+        connection.execute("DELETE FROM files")
+
+
+def _by_kind(paths: Iterable[str]) -> list[str]:
+    return sorted(paths, key=lambda path: path.endswith(files.RECORDINGS))
+
+
+def _batches(items: Iterable[T]) -> Iterator[list[T]]:
+    left = iter(items)
+    while batch := list(islice(left, BATCH)):
+        yield batch
+
+
+def _read(folder: Path, paths: Sequence[str]) -> Iterator[tuple[str, list[Entry]]]:
+    """Of each file what it says."""
+    recordings = [path for path in paths if path.endswith(files.RECORDINGS)]
+    for path in paths:
+        if path.endswith(files.DOCUMENTS):
+            yield path, read_document(folder, path)
+        elif not path.endswith(files.RECORDINGS):
+            yield path, read_campaign(folder, path)
+    if recordings:
+        yield from read_recordings(folder, recordings)
