@@ -107,7 +107,9 @@ COMMANDS: Final = {
     "list": Entry("rig.catalogue.list_command:list_command", "Recordings, campaigns and results of a folder."),
     "show": Entry("rig.catalogue.show_command:show_command", "All that is known of one of them."),
     "compare-fits": Entry(
-        "rig.catalogue.compare_fits:compare_fits_command", "Has a thruster changed? Its fits in order of time."
+        "rig.catalogue.compare_fits:compare_fits_command",
+        "Has a thruster changed? Its fits in order of time.",
+        group="identify",
     ),
 }
 
