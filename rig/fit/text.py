@@ -47,9 +47,8 @@ def answer_text(answer: Answer) -> str:
             known = [text if text != "not determined" else "-" for text in numbers]
             errors = [_small(x, "{:.2g} %") for x in (row.percent, row.percent_uncorrected)]
             lines.append(FORM.format(row.name, *known, row.unit, *errors, row.verdict).rstrip())
-    lines.append(
-        "  error: std in % of the value (eq. 4.11), without the calibration; (white): if samples were independent"
-    )
+    lines.append("  error: std in % of the value, without the calibration; (white): if samples were independent")
+    lines.append("  (eq. 4.11 of G. Indiveri's PhD thesis, University of Genova 1998)")
     lines += ["", *_models(answer.candidates), *_without(answer), ""]
     lines += [f"  - {text}" for text in (*verdicts(answer.fit, answer.alternatives), *answer.notes)]
     if answer.candidates:
