@@ -1,0 +1,147 @@
+"""The first sections of a campaign's page: how it ended, and all thrusters with C ± U and what is said of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from math import isfinite
+
+from identification.thruster.thrust import ThrustFit
+from identification.thruster.thrust_report import digits, misfit
+from rig.campaign_report.answers import Told
+from rig.campaign_report.budget import COVERAGE, Budget, budgets
+from rig.campaign_report.folder import Campaign
+from rig.fit.report.comparisons import alike_sentences
+from rig.report import regression_figures
+from rig.report.page import Picture, Remark, Section, Table, Tone, columns, sentences
+from rig.report.regression_figures import Interval
+from rig.report.style import prose, unit_text
+
+TONES: dict[str, Tone] = {"completed": "good", "aborted": "doubt", "tripped": "bad", "cut": "bad"}
+NOTHING = "–"
+
+
+def lead(campaign: Campaign, told: Sequence[Told]) -> str:
+    """What a reader in a hurry takes away."""
+    found = [each for each in told if each.answer is not None]
+    done = len(campaign.thrusters) - len(campaign.missing)
+    text = f"{ended(campaign)}: {done} of {len(campaign.thrusters)} thrusters measured to the end"
+    wrong = [each.thruster for each in found if each.answer is not None and misfit(each.answer.fit)]
+    if wrong:
+        return f"{text}; the model does NOT fit {', '.join(wrong)}, see there before its numbers are used."
+    return f"{text}{'' if found else '; no thruster has a fit'}."
+
+
+def ended(campaign: Campaign) -> str:
+    """How it ended, as the beginning of a sentence."""
+    if campaign.wrong:
+        return "Read without its ledger"
+    words = {"completed": "Completed", "aborted": "ABORTED", "tripped": "TRIPPED", "cut": "CUT"}
+    return words.get(campaign.outcome, campaign.outcome.upper())
+
+
+def course_section(campaign: Campaign) -> Section:
+    """How it ended, which thrusters lack, what is wrong with files, and every run."""
+    head = ("thruster", "recording", "recorded", "ended", "why")
+    rows = tuple(
+        (run.thruster, run.path.name, run.recording.created if run.recording else NOTHING, run.outcome, run.cause)
+        for run in campaign.runs
+    )
+    parts = (*sentences(_course(campaign)), Table("Runs in the order in which they were begun", head, rows,
+                                                  columns(head, *head)))  # fmt: skip
+    return Section("How it went", parts)
+
+
+def _course(campaign: Campaign) -> Iterator[Remark]:
+    if campaign.wrong:
+        yield Remark(campaign.wrong, "bad")
+    cause = f": {campaign.cause}" if campaign.cause else ""
+    yield Remark(f"{ended(campaign)}{cause}.", TONES.get(campaign.outcome, "doubt"))
+    if campaign.missing:
+        goes_on = "" if campaign.wrong else f"; `rig resume {campaign.folder.name}` goes on with it"
+        yield Remark(f"Not measured to the end: {', '.join(campaign.missing)}{goes_on}.", "bad")
+    if campaign.resumed:
+        times = "once" if campaign.resumed == 1 else f"{campaign.resumed} times"
+        yield Remark(f"The campaign was gone on with {times} after it had been cut.")
+    for run in campaign.runs:
+        if run.wrong:
+            left_out = "" if run.used else "; nothing of it is in the figures below"
+            yield Remark(f"{run.thruster}: {run.wrong}{left_out}.", "bad")
+
+
+def results_section(told: Sequence[Told]) -> Section:
+    """All thrusters: C ± U, what else the fit found, and the verdict."""
+    head = ("thruster", "coefficient", f"value ± U (k = {COVERAGE:g})", "unit", "U / %", "tare / N", "points", "RMSE / N",
+            "χ²/dof", "verdict", "diagnosis")  # fmt: skip
+    rows = tuple(row for each in told for row in _rows(each))
+    table = Table(
+        f"Thrust coefficients with their expanded uncertainty U = k u, coverage factor k = {COVERAGE:g} (about 95 %)",
+        head, rows, columns(head, "thruster", "coefficient", "unit", "verdict", "diagnosis"),
+    )  # fmt: skip
+    wrong = sentences(remark for each in told for remark in _warnings(each))
+    answers = [each.answer for each in told if each.answer is not None]
+    beside = (*alike_sentences(answers), *_side_by_side(told)) if len(answers) > 1 else ()
+    return Section("Results", (table, *wrong, *beside), _models(told))
+
+
+def _models(told: Sequence[Told]) -> str:
+    forms = dict.fromkeys(each.answer.fit.model for each in told if each.answer is not None)
+    return f"Thrust = {'; '.join(forms)} + tare, one tare for each recording." if forms else "No thruster has a fit."
+
+
+def _rows(told: Told) -> Iterator[tuple[str, ...]]:
+    head = told.diagnosis.headline if told.diagnosis is not None else "not made"
+    if told.answer is None:
+        yield (told.thruster, *(NOTHING,) * 8, "no fit", NOTHING)
+        return
+    fit = told.answer.fit
+    tares = list(fit.tare.values())
+    tare = digits(tares[0].value, tares[0].std) if len(tares) == 1 else f"{len(tares)} of them"
+    judged = NOTHING if fit.chi2_per_dof is None else f"{fit.chi2_per_dof:.2f}"
+    known = {each.name: each for each in budgets(fit, told.recordings)}
+    for name, p in fit.parameters.items():
+        value = with_expanded(known[name]) if name in known else digits(p.value, p.std)
+        percent = f"{100 * known[name].expanded / abs(p.value):.2g}" if name in known and p.value else NOTHING
+        yield (
+            told.thruster, prose(name), value, unit_text(p.unit), percent, tare, str(fit.estimate.rows.y.size),
+            f"{fit.rmse:.3g}", judged, verdict(fit), head,
+        )  # fmt: skip
+
+
+def with_expanded(budget: Budget) -> str:
+    """`0.41201 ± 0.00043`: the value with its expanded uncertainty, to the second digit of u."""
+    return f"{digits(budget.value, budget.u)} ± {digits(budget.expanded, budget.u)}"
+
+
+def verdict(fit: ThrustFit) -> str:
+    """In two words, whether the model fits its points."""
+    if misfit(fit):
+        return "does NOT fit"
+    judged = fit.estimate.underfit
+    if judged is None or judged.dof <= 0:
+        return "not judged"
+    return "doubtful" if judged.underfitted else "fits"
+
+
+def _warnings(told: Told) -> Iterator[Remark]:
+    """Beside the table that would be read alone."""
+    if told.answer is None:
+        yield Remark(f"{told.thruster}: no fit, for {told.why_no_fit}.", "bad")
+        return
+    if wrong := misfit(told.answer.fit):
+        files = " ".join(path.name for path in told.paths)
+        yield Remark(prose(f"{told.thruster}: {wrong}; next: `rig diagnose {files}` (what the model leaves out)."), "bad")
+
+
+def _side_by_side(told: Sequence[Told]) -> tuple[Picture, ...]:
+    found = [(each.thruster, b) for each in told if each.answer for b in budgets(each.answer.fit, each.recordings)]
+    if len(found) < 2:
+        return ()
+    alone = all(b.name == found[0][1].name for _, b in found)
+    rows = [
+        Interval(name if alone else f"{name} {prose(b.name)}", b.value, b.value - b.expanded, b.value + b.expanded)
+        for name, b in found
+        if isfinite(b.value)
+    ]
+    plot = regression_figures.forest(rows, f"coefficient / ({unit_text(found[0][1].unit)})")
+    caption = "Bars are ± U, k = 2; the load cell's calibration is in them, and common to all that were measured with it."
+    return (Picture("Thrusters side by side", plot, caption),)
