@@ -47,7 +47,8 @@ COMMANDS: Final = {
     "fit": Entry("rig.fit.command:fit_command", "Fit tau = C V|V| to recordings."),
     "plot": Entry("rig.plot.command:plot_command", "One figure of a recording, as PNG, SVG or PDF."),
     "report": Entry(
-        "rig.campaign_report.command:report_command", "One page of a whole campaign: results, uncertainty, figures, verdicts."
+        "rig.campaign_report.command:report_command",
+        "One page of a whole campaign: results, uncertainty, figures, verdicts.",
     ),
     "diagnose": Entry(
         "rig.diagnose.command:diagnose_command", "Find, name and model the physics that C V|V| leaves out."

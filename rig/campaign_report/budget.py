@@ -75,8 +75,10 @@ def _budget(fit: ThrustFit, i: int, name: str, p: Parameter, recordings: Sequenc
     tare = _through_tares(fit, i)
     points = fit.estimate.rows.y.size
     parts = [
-        Contribution("scatter", "A", sqrt(max(p.std_statistical**2 - tare**2, 0.0)), f"{points} {fit.rmse_of}"),
-        Contribution("tare", "A", tare, f"{len(fit.tare)} fitted with it"),
+        Contribution(
+            "scatter about the curve", "A", sqrt(max(p.std_statistical**2 - tare**2, 0.0)), f"{points} {fit.rmse_of}"
+        ),
+        Contribution("tare", "A", tare, "fitted with the coefficient"),
     ]
     missing = []
     if p.std_calibration > 0:

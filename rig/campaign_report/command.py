@@ -97,7 +97,7 @@ def refuse_running(folder: Path) -> None:
         )
 
 
-def page_text(folder: Path, wanted: Wanted, say: Callable[[str], None] = lambda text: None) -> str:
+def page_text(folder: Path, wanted: Wanted, say: Callable[[str], None]) -> str:
     """The page of the campaign in `folder` as HTML. Raises RigError. `say`: told what takes its time."""
     from rig.campaign_report import answers
     from rig.campaign_report.folder import campaign_in

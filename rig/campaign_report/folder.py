@@ -105,8 +105,10 @@ def _runs(facts: Sequence[Fact], folder: Path) -> Iterable[Run]:
             continue
         path = file_inside(folder, Path(fact["recording"]).stem, ".h5")
         end = ends.get(path.name)
-        told = ("cut", "nobody wrote its end down") if end is None else (end["outcome"], end["cause"])
-        yield _run(fact["thruster"], path, *told, closed="" if end is None else end["sha256"])
+        if end is None:
+            yield _run(fact["thruster"], path, "cut", "nobody wrote its end down", "")
+        else:
+            yield _run(fact["thruster"], path, end["outcome"], end["cause"], end["sha256"])
 
 
 def _run(thruster: str, path: Path, outcome: str, cause: str, closed: str) -> Run:

@@ -42,7 +42,8 @@ def campaign_page(
         versions_section(campaign),
         signature_section(),
     )
-    return Page(f"Campaign {campaign.name}", lead(campaign, told), sections, contents=True)
+    day = min((r.created[:10] for r in campaign.recordings if r.created), default="")
+    return Page(f"Campaign {campaign.name}{', ' if day else ''}{day}", lead(campaign, told), sections, contents=True)
 
 
 def earlier_section(changes: Sequence[Changed], faults: Sequence[str]) -> Section:

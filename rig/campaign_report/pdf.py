@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
@@ -12,6 +13,9 @@ MISSING = (
     "weasyprint sets the PDF and is not installed here: pip install 'thruster-rig[pdf]', or print the HTML page from a "
     "browser"
 )
+
+_PLAIN = re.compile(r"var\(--\w+, (#[0-9a-f]{6})\)")
+"""A colour of a figure with the one it has on white paper: weasyprint knows no variables inside a figure."""
 
 
 def require_pdf(option: str) -> None:
@@ -30,7 +34,7 @@ def write_pdf(page: str, path: Path) -> None:
             "libpango-1.0-0 libpangoft2-1.0-0), or print the HTML page from a browser"
         ) from error
     path.parent.mkdir(parents=True, exist_ok=True)
-    weasyprint.HTML(string=page, url_fetcher=_nothing).write_pdf(str(path), pdf_variant="pdf/ua-1")
+    weasyprint.HTML(string=_PLAIN.sub(r"\1", page), url_fetcher=_nothing).write_pdf(str(path), pdf_variant="pdf/ua-1")
 
 
 def _nothing(url: str) -> dict[str, object]:

@@ -16,7 +16,7 @@ from rig.report.style import MODEL, MUTED, NARROW, SERIES, Plot, labels, legend_
 
 @dataclass(frozen=True, eq=False)
 class Tares:
-    """The cell's reading at rest in one recording: s since it began, N, and the half width of its 95 % interval, (n,)."""
+    """The cell's reading at rest in one recording: s since it began, N, half width of 95 %, (n,)."""
 
     time: Floats
     value: Floats

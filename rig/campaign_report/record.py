@@ -8,6 +8,7 @@ from typing import Final
 import numpy as np
 
 from identification.recording import Channel, Recording
+from identification.thruster.thrust_report import digits
 from rig.campaign_report.folder import Campaign
 from rig.report import page as pages
 from rig.report.page import Blanks, Remark, Section, Table, Verbatim, columns, sentences
@@ -51,7 +52,8 @@ def _range(channel: Channel | None) -> str:
     value = channel.value[np.isfinite(channel.value)] if channel is not None else np.zeros(0)
     if not value.size:
         return "–"
-    return f"{value.mean():.4g} ({value.min():.4g} to {value.max():.4g})".replace("-", "−")
+    mean = digits(float(value.mean()), float(value.std()))
+    return f"{mean} ({value.min():.4g} to {value.max():.4g})".replace("-", "−")
 
 
 def notes_section(campaign: Campaign) -> Section:
@@ -94,9 +96,7 @@ def calibration_section(campaign: Campaign) -> Section:
     return Section("Calibration", (*table, *sentences(told)))
 
 
-def _calibration_row(
-    name: str, channel: Channel, facts: Mapping[str, object], recording: Recording
-) -> tuple[str, ...]:
+def _calibration_row(name: str, channel: Channel, facts: Mapping[str, object], recording: Recording) -> tuple[str, ...]:
     gain = facts.get("gain_std")
     noise = "–" if channel.noise_std is None else f"{channel.noise_std:.3g} {unit_text(channel.unit)}"
     rest = "; ".join(f"{key}: {value}" for key, value in facts.items() if key != "gain_std")

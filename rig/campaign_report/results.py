@@ -9,26 +9,52 @@ from identification.thruster.thrust import ThrustFit
 from identification.thruster.thrust_report import digits, misfit
 from rig.campaign_report.answers import Told
 from rig.campaign_report.budget import COVERAGE, Budget, budgets
-from rig.campaign_report.folder import Campaign
+from rig.campaign_report.folder import Campaign, Run
 from rig.fit.report.comparisons import alike_sentences
 from rig.report import regression_figures
-from rig.report.page import Picture, Remark, Section, Table, Tone, columns, sentences
+from rig.report.page import Part, Picture, Remark, Section, Table, Tone, columns, sentences
 from rig.report.regression_figures import Interval
 from rig.report.style import prose, unit_text
 
 TONES: dict[str, Tone] = {"completed": "good", "aborted": "doubt", "tripped": "bad", "cut": "bad"}
 NOTHING = "–"
+FITS, DOUBTFUL, WRONG, OPEN = "fits", "doubtful", "does NOT fit", "not judged"
+"""What is said of a model: at 5 % and at 0.1 % of the chi-square test; without one nothing can be."""
 
 
 def lead(campaign: Campaign, told: Sequence[Told]) -> str:
     """What a reader in a hurry takes away."""
-    found = [each for each in told if each.answer is not None]
     done = len(campaign.thrusters) - len(campaign.missing)
-    text = f"{ended(campaign)}: {done} of {len(campaign.thrusters)} thrusters measured to the end"
-    wrong = [each.thruster for each in found if each.answer is not None and misfit(each.answer.fit)]
+    cause = f", {campaign.cause}" if campaign.cause else ""
+    lacking = f", not {', '.join(campaign.missing)}" if campaign.missing else ""
+    text = f"{ended(campaign)}{cause}: {done} of {len(campaign.thrusters)} thrusters measured to the end{lacking}"
+    fits = [each.answer.fit for each in told if each.answer is not None]
+    wrong = [fit.thruster for fit in fits if misfit(fit)]
+    doubtful = [fit.thruster for fit in fits if verdict(fit) == DOUBTFUL]
     if wrong:
-        return f"{text}; the model does NOT fit {', '.join(wrong)}, see there before its numbers are used."
-    return f"{text}{'' if found else '; no thruster has a fit'}."
+        text += f"; the model does NOT fit {', '.join(wrong)}: see there before its numbers are used"
+    if doubtful:
+        text += f"; whether it fits {', '.join(doubtful)} is doubtful"
+    if not fits:
+        return f"{text}; no thruster has a fit."
+    return f"{text}. {_span(told)}"
+
+
+def _span(told: Sequence[Told]) -> str:
+    """The first coefficient of all thrusters, in a sentence."""
+    known = [found[0] for each in told if (found := of(each))]
+    if not known:
+        return "No uncertainty can be stated."
+    name, unit = prose(known[0].name), unit_text(known[0].unit)
+    if len(known) == 1:
+        return f"{name} = {with_expanded(known[0])} {unit} (k = {COVERAGE:g})."
+    low, high = min(known, key=lambda b: b.value), max(known, key=lambda b: b.value)
+    return f"{name} lies between {with_expanded(low)} and {with_expanded(high)} {unit} (k = {COVERAGE:g})."
+
+
+def of(told: Told) -> tuple[Budget, ...]:
+    """The budgets of a thruster's coefficients; none without a fit."""
+    return () if told.answer is None else budgets(told.answer.fit, told.recordings)
 
 
 def ended(campaign: Campaign) -> str:
@@ -42,13 +68,15 @@ def ended(campaign: Campaign) -> str:
 def course_section(campaign: Campaign) -> Section:
     """How it ended, which thrusters lack, what is wrong with files, and every run."""
     head = ("thruster", "recording", "recorded", "ended", "why")
-    rows = tuple(
-        (run.thruster, run.path.name, run.recording.created if run.recording else NOTHING, run.outcome, run.cause)
-        for run in campaign.runs
-    )
-    parts = (*sentences(_course(campaign)), Table("Runs in the order in which they were begun", head, rows,
-                                                  columns(head, *head)))  # fmt: skip
-    return Section("How it went", parts)
+    rows = tuple((run.thruster, run.path.name, _when(run), run.outcome, run.cause) for run in campaign.runs)
+    table = Table("Runs in the order in which they were begun", head, rows, columns(head, *head))
+    return Section("How it went", (*sentences(_course(campaign)), table))
+
+
+def _when(run: Run) -> str:
+    """As people write it; the recordings of the rig are stamped in UTC."""
+    created = run.recording.created if run.recording is not None else ""
+    return created[:19].replace("T", " ") + " UTC" if created.endswith("+00:00") else created or NOTHING
 
 
 def _course(campaign: Campaign) -> Iterator[Remark]:
@@ -70,16 +98,16 @@ def _course(campaign: Campaign) -> Iterator[Remark]:
 
 def results_section(told: Sequence[Told]) -> Section:
     """All thrusters: C ± U, what else the fit found, and the verdict."""
-    head = ("thruster", "coefficient", f"value ± U (k = {COVERAGE:g})", "unit", "U / %", "tare / N", "points", "RMSE / N",
-            "χ²/dof", "verdict", "diagnosis")  # fmt: skip
+    head = ("thruster", f"coefficient ± U (k = {COVERAGE:g})", "U / %", "tare / N", "points", "RMSE / N", "χ²/dof",
+            "verdict", "diagnosis")  # fmt: skip
     rows = tuple(row for each in told for row in _rows(each))
+    words = columns(head, *head[:2], "verdict", "diagnosis")
     table = Table(
-        f"Thrust coefficients with their expanded uncertainty U = k u, coverage factor k = {COVERAGE:g} (about 95 %)",
-        head, rows, columns(head, "thruster", "coefficient", "unit", "verdict", "diagnosis"),
-    )  # fmt: skip
+        f"Thrust coefficients with their expanded uncertainty U = {COVERAGE:g} u (about 95 %)", head, rows, words
+    )
     wrong = sentences(remark for each in told for remark in _warnings(each))
     answers = [each.answer for each in told if each.answer is not None]
-    beside = (*alike_sentences(answers), *_side_by_side(told)) if len(answers) > 1 else ()
+    beside: tuple[Part, ...] = (*alike_sentences(answers), *_side_by_side(told)) if len(answers) > 1 else ()
     return Section("Results", (table, *wrong, *beside), _models(told))
 
 
@@ -91,20 +119,23 @@ def _models(told: Sequence[Told]) -> str:
 def _rows(told: Told) -> Iterator[tuple[str, ...]]:
     head = told.diagnosis.headline if told.diagnosis is not None else "not made"
     if told.answer is None:
-        yield (told.thruster, *(NOTHING,) * 8, "no fit", NOTHING)
+        yield (told.thruster, *(NOTHING,) * 6, "no fit", NOTHING)
         return
     fit = told.answer.fit
     tares = list(fit.tare.values())
     tare = digits(tares[0].value, tares[0].std) if len(tares) == 1 else f"{len(tares)} of them"
     judged = NOTHING if fit.chi2_per_dof is None else f"{fit.chi2_per_dof:.2f}"
-    known = {each.name: each for each in budgets(fit, told.recordings)}
+    cut = (
+        ""
+        if any(run.outcome == "completed" for run in told.runs)
+        else f" what a run holds that was {told.runs[-1].outcome}"
+    )
+    end = (tare, str(fit.estimate.rows.y.size), f"{fit.rmse:.3g}", judged, f"{verdict(fit)}{cut}", head)
+    known = {each.name: each for each in of(told)}
     for name, p in fit.parameters.items():
         value = with_expanded(known[name]) if name in known else digits(p.value, p.std)
         percent = f"{100 * known[name].expanded / abs(p.value):.2g}" if name in known and p.value else NOTHING
-        yield (
-            told.thruster, prose(name), value, unit_text(p.unit), percent, tare, str(fit.estimate.rows.y.size),
-            f"{fit.rmse:.3g}", judged, verdict(fit), head,
-        )  # fmt: skip
+        yield (told.thruster, f"{prose(name)} = {value} {unit_text(p.unit)}", percent, *end)
 
 
 def with_expanded(budget: Budget) -> str:
@@ -115,11 +146,11 @@ def with_expanded(budget: Budget) -> str:
 def verdict(fit: ThrustFit) -> str:
     """In two words, whether the model fits its points."""
     if misfit(fit):
-        return "does NOT fit"
+        return WRONG
     judged = fit.estimate.underfit
     if judged is None or judged.dof <= 0:
-        return "not judged"
-    return "doubtful" if judged.underfitted else "fits"
+        return OPEN
+    return DOUBTFUL if judged.underfitted else FITS
 
 
 def _warnings(told: Told) -> Iterator[Remark]:
@@ -129,11 +160,13 @@ def _warnings(told: Told) -> Iterator[Remark]:
         return
     if wrong := misfit(told.answer.fit):
         files = " ".join(path.name for path in told.paths)
-        yield Remark(prose(f"{told.thruster}: {wrong}; next: `rig diagnose {files}` (what the model leaves out)."), "bad")
+        yield Remark(
+            prose(f"{told.thruster}: {wrong}; next: `rig diagnose {files}` (what the model leaves out)."), "bad"
+        )
 
 
 def _side_by_side(told: Sequence[Told]) -> tuple[Picture, ...]:
-    found = [(each.thruster, b) for each in told if each.answer for b in budgets(each.answer.fit, each.recordings)]
+    found = [(each.thruster, b) for each in told for b in of(each)]
     if len(found) < 2:
         return ()
     alone = all(b.name == found[0][1].name for _, b in found)
@@ -143,5 +176,7 @@ def _side_by_side(told: Sequence[Told]) -> tuple[Picture, ...]:
         if isfinite(b.value)
     ]
     plot = regression_figures.forest(rows, f"coefficient / ({unit_text(found[0][1].unit)})")
-    caption = "Bars are ± U, k = 2; the load cell's calibration is in them, and common to all that were measured with it."
+    caption = (
+        "Bars are ± U, k = 2; the load cell's calibration is in them, and common to all that were measured with it."
+    )
     return (Picture("Thrusters side by side", plot, caption),)

@@ -4,20 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
+from math import floor, log10
 
 from identification.estimation.tails import student_quantile
 from identification.mismatch.compare.reported_runs import runs_of
-from identification.thruster.thrust_report import digits, sentence, verdicts
+from identification.thruster.thrust_report import digits, verdicts
 from rig.campaign_report.answers import Told
-from rig.campaign_report.budget import COVERAGE, Budget, budgets
+from rig.campaign_report.budget import COVERAGE, Budget
 from rig.campaign_report.pictures import tare_picture, tares
-from rig.campaign_report.results import verdict, with_expanded
+from rig.campaign_report.results import DOUBTFUL, FITS, OPEN, WRONG, of, verdict, with_expanded
 from rig.diagnose.recording_names import told_by_name
 from rig.diagnose.report.page import short, what_section, where_section
 from rig.diagnose.report.words import words
 from rig.fit.report.page import tone
 from rig.fit.report.pictures import measured_and_fitted, residuals_by_level, residuals_in_order
-from rig.report.page import Remark, Section, Table, columns, sentences
+from rig.report.page import Part, Remark, Section, Table, columns, sentences
 from rig.report.style import prose, unit_text
 
 MOST_EVENTS = 40
@@ -27,36 +28,59 @@ MOST_EVENTS = 40
 def thruster_section(told: Told, folder: str) -> Section:
     """Everything about one thruster; `folder`: name of the campaign's, for what can be typed."""
     if told.answer is None:
-        parts = (*sentences([Remark(f"No fit, for {told.why_no_fit}.", "bad")]), *_events(told))
-        return Section(told.thruster, parts)
+        none = sentences([Remark(f"No fit, for {told.why_no_fit}.", "bad")])
+        return Section(told.thruster, (*none, *_events(told)))
     fit = told.answer.fit
     said = (*verdicts(fit, told.answer.alternatives), *told.answer.notes)
-    known = budgets(fit, told.recordings)
-    parts = (
+    known = of(told)
+    parts: tuple[Part, ...] = (
         *sentences(Remark(prose(text), tone(text)) for text in said),
-        *(budget_table(each) for each in known),
-        *sentences(_beside_budget(known)),
         measured_and_fitted(fit),
         residuals_by_level(fit),
+        *(budget_table(each) for each in known),
+        *sentences(_beside_budget(known)),
         residuals_in_order(fit),
         *tare_picture(fit),
         *sentences(_drift(told)),
         diagnosis_section(told, folder),
         *_events(told),
     )
-    return Section(told.thruster, parts, prose(f"{verdict(fit).capitalize()}. {sentence(fit)}"))
+    return Section(told.thruster, parts, _found(told, known))
+
+
+def _found(told: Told, known: tuple[Budget, ...]) -> str:
+    """The model with its coefficients, and whether it fits, in a sentence."""
+    assert told.answer is not None
+    fit = told.answer.fit
+    values = [f"{prose(b.name)} = {with_expanded(b)} {unit_text(b.unit)} (k = {COVERAGE:g})" for b in known]
+    judged = {FITS: "The model fits its points", DOUBTFUL: "Whether the model fits its points is doubtful"}
+    judged |= {WRONG: "The model does NOT fit its points", OPEN: "Whether the model fits its points is not judged"}
+    over = f"RMSE {fit.rmse:.3g} N over {fit.estimate.rows.y.size} {fit.rmse_of}"
+    return f"{judged[verdict(fit)]}: thrust = {', '.join([f'{fit.model} + tare', *values])}; {over}."
 
 
 def budget_table(budget: Budget) -> Table:
     """Contributions, combined and expanded, in the unit of the coefficient and in % of the variance."""
     unit = unit_text(budget.unit)
-    head = ("source", "type", f"standard uncertainty / ({unit})", "% of the variance", "known from")
+    places = max(2 - floor(log10(budget.u)), 0) if budget.u > 0 else 6
+    head = (
+        "source",
+        "type",
+        f"standard uncertainty / ({unit})",
+        "of the value / %",
+        "of the variance / %",
+        "known from",
+    )
+
+    def row(source: str, kind: str, u: float, share: str, basis: str) -> tuple[str, ...]:
+        relative = f"{100 * u / abs(budget.value):.3f}" if budget.value else ""
+        return (source, kind, f"{u:.{places}f}", relative, share, basis)
+
     rows = [
-        (part.source, part.kind, f"{part.u:.3g}", f"{budget.share(part):.1f}", part.basis)
-        for part in budget.contributions
+        row(part.source, part.kind, part.u, f"{budget.share(part):.1f}", part.basis) for part in budget.contributions
     ]
-    rows.append(("combined, u", "", f"{budget.u:.3g}", "100.0", _freedom(budget)))
-    rows.append((f"expanded, U = {COVERAGE:g} u", "", f"{budget.expanded:.3g}", "", f"{with_expanded(budget)} {unit}"))
+    rows.append(row("combined, u", "", budget.u, "100.0", _freedom(budget)))
+    rows.append(row(f"expanded, U = {COVERAGE:g} u", "", budget.expanded, "", f"{with_expanded(budget)} {unit}"))
     caption = f"Uncertainty budget of {prose(budget.name)}"
     return Table(caption, head, tuple(rows), columns(head, "source", "type", "known from"))
 
@@ -101,10 +125,14 @@ def diagnosis_section(told: Told, folder: str) -> Section:
     names = {recording.recording_id: path.name for recording, path in zip(told.recordings, told.paths, strict=True)}
     d = told_by_name(told.diagnosis, names)
     runs = runs_of(d, [replace(r, recording_id=names[r.recording_id]) for r in told.recordings])
-    where = where_section(d, runs).parts if d.mismatch else ()
+    if not d.mismatch:
+        return Section(
+            "Diagnosis", sentences([*short(d), *map(words, d.notes), f"All of it: {whole}"]), words(d.statement)
+        )
     found = [part for section in what_section(d, runs) for part in section.parts]
-    parts = (*sentences(short(d)), *where, *found, *sentences([*map(words, d.notes), f"All of it: {whole}"]))
-    return Section("Diagnosis", parts, words(f"{d.headline}. {d.statement}"))
+    parts = (*sentences(short(d)), *where_section(d, runs).parts, *found)
+    last = sentences([*map(words, d.notes), f"All of it: {whole}"])
+    return Section("Diagnosis", (*parts, *last), words(f"{d.headline[:1].upper()}{d.headline[1:]}. {d.statement}"))
 
 
 def _events(told: Told) -> tuple[Section, ...]:

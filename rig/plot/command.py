@@ -60,7 +60,9 @@ def plotted(paths: Sequence[Path], what: Sequence[str]) -> Plot:
     recordings = [load(path) for path in expand(paths)]
     thrusters = list(dict.fromkeys(recording.thruster for recording in recordings))
     if len(thrusters) > 1:
-        raise RecordingError(f"one figure is of one thruster, and these are of {', '.join(thrusters)}; give one at once")
+        raise RecordingError(
+            f"one figure is of one thruster, and these are of {', '.join(thrusters)}; give one at once"
+        )
     if whole and whole[0] in FITTED:
         return FITTED[whole[0]](recordings)
     return over_time(shown(recordings) if whole else [named(name, recordings) for name in what])

@@ -74,7 +74,7 @@ def over_time(panels: Sequence[Panel]) -> Plot:
 
 
 def _draw(axes: Axes, channel: Channel, end: float, dash: str, colour: str) -> None:
-    """A command holds from its row to the next, the last one to the end; what was measured is a line through its rows."""
+    """A command holds from its row to the next and at last to the end; what was measured is a line."""
     good = np.isfinite(channel.value)
     if channel.quantity == "command_voltage":
         t, y = np.append(channel.time[good], end), np.append(channel.value[good], channel.value[good][-1])

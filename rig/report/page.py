@@ -17,9 +17,10 @@ from functools import cache
 from importlib.metadata import version
 from itertools import count
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from markupsafe import Markup, escape
 
 from rig.report.style import PALETTE, WIDE, Plot, svg
 from rig.visible_text import visible
@@ -114,7 +115,7 @@ class Section:
     """A heading, a sentence under it, and what belongs to it; sections may hold sections."""
 
     title: str
-    parts: tuple[Section | Sentences | Table | Picture | Verbatim | Blanks, ...]
+    parts: tuple[Part, ...]
     lead: str = ""
     kind: str = "section"
 
@@ -126,6 +127,9 @@ class Section:
         't1-what-was-found'
         """
         return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-") or "section"
+
+
+Part: TypeAlias = Section | Sentences | Table | Picture | Verbatim | Blanks
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,7 +148,17 @@ def _template() -> Template:
     environment = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["coded"] = _coded
     return environment.get_template("page.html.jinja")
+
+
+def _coded(text: str) -> Markup:
+    """A sentence, escaped, with what stands between backticks as code: what can be typed.
+
+    >>> str(_coded("<b>, type `rig fit <FILE>`"))
+    '&lt;b&gt;, type <code>rig fit &lt;FILE&gt;</code>'
+    """
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))  # noqa: S704 - escaped in this line
 
 
 def html(page: Page) -> str:

@@ -131,7 +131,7 @@ def tone(verdict: str) -> Tone:
 
 
 def parameter_table(fit: ThrustFit) -> Table:
-    """Of the model asked for alone: on a phone each row is a card, and the first curve shall not be twelve cards away."""
+    """Of the model asked for alone: on a phone each row is a card, and the curve shall not stand behind twelve."""
     return _parameters("Parameters; std holds scatter and calibration", (fit,))
 
 
