@@ -79,7 +79,7 @@ def report_command(
     text = page_text(folder, wanted, partial(click.echo, err=True))
     path = output if output is not None else folder / REPORT_FILE
     try:
-        _write(path, text)
+        keep(path, text)
         click.echo(f"report: {path}")
         if pdf is not None:
             write_pdf(text, pdf)
@@ -119,8 +119,8 @@ def _undiagnosed(told: Sequence[Told], why: str) -> tuple[Told, ...]:
     return tuple(replace(each, why_no_diagnosis=why) for each in told)
 
 
-def _write(path: Path, text: str) -> None:
-    """Whole or not at all: a page that was there stays until the new one is complete."""
+def keep(path: Path, text: str) -> None:
+    """To a file, whole or not at all: a page that was there stays until the new one is complete. Raises OSError."""
     path.parent.mkdir(parents=True, exist_ok=True)
     draft = path.with_name(f".{path.name}.draft")
     draft.write_text(text, encoding="utf-8", newline="\n")

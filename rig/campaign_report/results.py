@@ -35,6 +35,8 @@ def lead(campaign: Campaign, told: Sequence[Told]) -> str:
         text += f"; the model does NOT fit {', '.join(wrong)}: see there before its numbers are used"
     if doubtful:
         text += f"; whether it fits {', '.join(doubtful)} is doubtful"
+    if wronged := dict.fromkeys(run.thruster for run in campaign.runs if run.wrong):
+        text += f"; a recording of {', '.join(wronged)} is damaged or was changed"
     if not fits:
         return f"{text}; no thruster has a fit."
     return f"{text}. {_span(told)}"
@@ -125,17 +127,27 @@ def _rows(told: Told) -> Iterator[tuple[str, ...]]:
     tares = list(fit.tare.values())
     tare = digits(tares[0].value, tares[0].std) if len(tares) == 1 else f"{len(tares)} of them"
     judged = NOTHING if fit.chi2_per_dof is None else f"{fit.chi2_per_dof:.2f}"
-    cut = (
-        ""
-        if any(run.outcome == "completed" for run in told.runs)
-        else f" what a run holds that was {told.runs[-1].outcome}"
+    end = (
+        tare,
+        str(fit.estimate.rows.y.size),
+        f"{fit.rmse:.3g}",
+        judged,
+        "; ".join([verdict(fit), *_reserves(told)]),
+        head,
     )
-    end = (tare, str(fit.estimate.rows.y.size), f"{fit.rmse:.3g}", judged, f"{verdict(fit)}{cut}", head)
     known = {each.name: each for each in of(told)}
     for name, p in fit.parameters.items():
         value = with_expanded(known[name]) if name in known else digits(p.value, p.std)
         percent = f"{100 * known[name].expanded / abs(p.value):.2g}" if name in known and p.value else NOTHING
         yield (told.thruster, f"{prose(name)} = {value} {unit_text(p.unit)}", percent, *end)
+
+
+def _reserves(told: Told) -> Iterator[str]:
+    """What is to be known of the recordings before their numbers are used."""
+    if not any(run.outcome == "completed" for run in told.runs):
+        yield f"its run was {told.runs[-1].outcome}"
+    if any(run.wrong for run in told.runs):
+        yield "a recording is damaged or was changed"
 
 
 def with_expanded(budget: Budget) -> str:

@@ -63,26 +63,20 @@ def budget_table(budget: Budget) -> Table:
     """Contributions, combined and expanded, in the unit of the coefficient and in % of the variance."""
     unit = unit_text(budget.unit)
     places = max(2 - floor(log10(budget.u)), 0) if budget.u > 0 else 6
-    head = (
-        "source",
-        "type",
-        f"standard uncertainty / ({unit})",
-        "of the value / %",
-        "of the variance / %",
-        "known from",
-    )
+    head = ("source", f"u / ({unit})", "u / % of the value", "share of the variance / %", "known from")
 
-    def row(source: str, kind: str, u: float, share: str, basis: str) -> tuple[str, ...]:
+    def row(source: str, u: float, share: str, basis: str) -> tuple[str, ...]:
         relative = f"{100 * u / abs(budget.value):.3f}" if budget.value else ""
-        return (source, kind, f"{u:.{places}f}", relative, share, basis)
+        return (source, f"{u:.{places}f}", relative, share, basis)
 
     rows = [
-        row(part.source, part.kind, part.u, f"{budget.share(part):.1f}", part.basis) for part in budget.contributions
+        row(f"{part.source} (type {part.kind})", part.u, f"{budget.share(part):.1f}", part.basis)
+        for part in budget.contributions
     ]
-    rows.append(row("combined, u", "", budget.u, "100.0", _freedom(budget)))
-    rows.append(row(f"expanded, U = {COVERAGE:g} u", "", budget.expanded, "", f"{with_expanded(budget)} {unit}"))
-    caption = f"Uncertainty budget of {prose(budget.name)}"
-    return Table(caption, head, tuple(rows), columns(head, "source", "type", "known from"))
+    rows.append(row("combined", budget.u, "100.0", _freedom(budget)))
+    rows.append(row(f"expanded, U = {COVERAGE:g} u", budget.expanded, "", f"{with_expanded(budget)} {unit}"))
+    caption = f"Uncertainty budget of {prose(budget.name)}: standard uncertainties u, combined and expanded"
+    return Table(caption, head, tuple(rows), columns(head, "source", "known from"))
 
 
 def _freedom(budget: Budget) -> str:

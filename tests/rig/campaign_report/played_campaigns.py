@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import count
 from pathlib import Path
 
@@ -14,7 +14,6 @@ from rig.recording.recorder import Recorder
 from rig.recording.recorder_link import RecorderLink
 from rig.stages.campaign import run
 from rig.stages.recording_header import Stamp
-from rig.stages.session import Session
 from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
@@ -41,12 +40,12 @@ duration = 1.0
 max_drift = 1.0
 [plan]
 kind = "levels"
-voltages = [8.0, -8.0, 12.0, -12.0, 16.0, -16.0, 6.0, -6.0]
+voltages = [8.0, -8.0, 12.0, -12.0, 16.0, -16.0]
 zero_every = 2
 slew = 24.0
 [plan.dwell]
 kind = "fixed"
-duration = 1.5
+duration = 1.0
 """
 MOUNT = '[mount]\ncommand = ["cp", "/dev/null", "{bench_dir}/{thruster}.mounted"]\n'
 
@@ -59,7 +58,6 @@ class World:
     folder: Path
     broken: str = ""
     """Thruster at whose 12 V the load cell falls silent; empty: none."""
-    session: Session | None = field(default=None)
 
     @property
     def wires(self):
@@ -89,7 +87,9 @@ def files(folder: Path, limit: float = 300.0) -> Path:
     return folder / "campaign.toml"
 
 
-def played(folder: Path, name: str = "tunnel-20260112-101500", broken: str = "", seed: int = 1, day: int = 12) -> Path:
+def played(
+    folder: Path, name: str = "tunnel-20260112-101500", broken: str = "", seed: int = 1, day: str = "12"
+) -> Path:
     """The campaign's folder, of a run that came to its end or was ended by a silent load cell."""
     config = load_campaign(files(folder))
     settings = load_world(ROOT / "benches" / "simulated" / "world.toml")
