@@ -3,25 +3,9 @@
 import numpy as np
 import pytest
 
-from identification.recording import Channel, Recording, Step
 from rig.campaign_report.budget import COVERAGE, budgets
 from rig.fit.answer import fit_recordings
-
-LEVELS = (0.0, 5.0, 10.0, 15.0, 8.0, 12.0)
-
-
-def recording(name="a", calibration=None, measured=None):
-    """Holds of 4 s at 50 Hz, all of one direction: C and tare go together. `measured`: calibration of the voltage."""
-    rng, t = np.random.default_rng(1), np.arange(0.0, 4.0 * len(LEVELS), 0.02)
-    V = np.repeat(LEVELS, 200)
-    F = 0.4 * V * np.abs(V) + 1.5 + rng.normal(0, 0.1, t.size)
-    steps = tuple(Step(i, "hold", V, 4.0 * i, 4.0 * i + 4.0) for i, V in enumerate(LEVELS))
-    quantity = "command_voltage" if measured is None else "motor_voltage"
-    channels = (
-        Channel("u", "motor", quantity, "V", t, V, calibration=measured or {}),
-        Channel("f", "cell", "thrust", "N", t, F, calibration=calibration or {}),
-    )
-    return Recording(name, "T1", channels, steps)
+from tests.rig.campaign_report.hold_recordings import ONE, recording
 
 
 def budget(*recordings):
@@ -41,7 +25,7 @@ def test_contributions_sum_to_what_the_fit_states():
 
 def test_the_part_of_the_tare_is_what_would_go_if_it_were_known():
     """Weighted least squares of the same points: with the tare fitted, and with the tare taken from above."""
-    fit, found = budget(recording())
+    fit, found = budget(recording(levels=ONE))
     rows = fit.estimate.rows
     H, weight = rows.H, 1 / rows.std_error**2
     both = np.linalg.inv(H.T @ (weight[:, None] * H))

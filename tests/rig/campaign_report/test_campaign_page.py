@@ -3,6 +3,7 @@
 import json
 import re
 import shutil
+from itertools import pairwise
 
 import pytest
 from click.testing import CliRunner
@@ -15,8 +16,10 @@ from rig.fit.command import fit_command
 from tests.rig.campaign_report.played_campaigns import NOTES
 from tests.rig.report_reading import read
 
-SECTIONS = ("Results", "How it went", "T1", "T3", "Earlier campaigns", "Environment", "Operator and notes", "Calibration",
-            "Configuration", "Versions and provenance", "Signature")  # fmt: skip
+SECTIONS = (
+    *("Results", "How it went", "T1", "T3", "Earlier campaigns", "Environment", "Operator and notes", "Calibration"),
+    *("Configuration", "Versions and provenance", "Signature"),
+)
 QUICK = Wanted(None)
 
 
@@ -41,8 +44,7 @@ def test_all_sections_are_there_their_headings_in_order(whole):
     found = headings(whole)
     assert tuple(name for level, name in found if level == 2) == SECTIONS
     assert [level for level, _ in found].count(1) == 1
-    levels = [level for level, _ in found]
-    assert all(after <= before + 1 for before, after in zip(levels, levels[1:], strict=False)), "no level is left out"
+    assert all(after <= before + 1 for (before, _), (after, _) in pairwise(found)), "no level is left out"
 
 
 def test_it_is_self_contained_and_readable_without_eyes(whole):
@@ -118,8 +120,6 @@ def test_a_recording_that_was_changed_after_it_was_closed_is_told(completed, tmp
     text = read(page(folder)).text
     assert "T1.h5 is not what was closed" in text
     assert "a recording of T1 is damaged or was changed" in text
-    assert "does NOT fit" in text, "what is left of it, and what that is worth"
-    assert "next: rig diagnose T1.h5" in text
 
 
 def test_a_folder_whose_ledger_is_damaged_is_told_by_its_recordings(completed, tmp_path):

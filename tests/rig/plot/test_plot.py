@@ -1,4 +1,4 @@
-"""`rig plot`: each kind of figure as each kind of file, the same bytes each time, and what can't be drawn in a sentence."""
+"""`rig plot`: each figure as each kind of file, the same bytes each time; what can't be drawn is a sentence."""
 
 from pathlib import Path
 
@@ -26,7 +26,7 @@ def run(*words):
 
 
 @pytest.mark.parametrize("ending", BEGINS)
-@pytest.mark.parametrize("what", ["thrust", "residuals", "timeseries", "thrust.thrust"])
+@pytest.mark.parametrize("what", ["thrust", "residuals", "timeseries", "load_cell.thrust"])
 def test_each_figure_as_each_file(tmp_path, what, ending):
     source = write(tmp_path / "T1.h5")
     words = (source, "--what", what, "-o")
@@ -43,7 +43,7 @@ def test_each_figure_as_each_file(tmp_path, what, ending):
 def test_several_channels_stand_above_one_another(tmp_path):
     source = write(tmp_path / "T1.h5")
     out = tmp_path / "figure.svg"
-    assert run(source, "--what", "thrust.thrust", "command_voltage", "-o", out).exit_code == 0
+    assert run(source, "--what", "load_cell.thrust", "command_voltage", "-o", out).exit_code == 0
     text = out.read_text(encoding="utf-8")
     assert "command voltage / V" in text
     assert "thrust / N" in text

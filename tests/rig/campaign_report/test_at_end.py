@@ -1,0 +1,88 @@
+"""What a campaign's end writes by itself: when it does, how long it may take, and that it changes nothing else."""
+
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from rig.campaign_report.answers import TimeIsUp, Told
+from rig.campaign_report.at_end import in_time, write
+from rig.campaign_report.folder import Run
+from rig.campaign_report.results import lead, results_section
+from rig.fit.answer import fit_recordings
+from rig.operate.last_page import unsafe, write_page
+from tests.rig.campaign_report.hold_recordings import recording
+from tests.rig.console.feeds import running
+from tests.rig.report_reading import read
+
+DONE = replace(running("done"), outcome="completed", stop_confirmed=True)
+
+
+def told(name="T1", bend=1.0):
+    found = replace(recording(name, bend=bend), thruster=name)
+    (answer,) = fit_recordings([found])
+    return Told(name, (Run(name, Path(f"{name}.h5"), "completed", "", found),), answer)
+
+
+def test_only_what_the_model_does_not_fit_is_diagnosed_while_there_is_time():
+    good, bad, late = told("T1"), told("T2", bend=0.8), told("T3", bend=0.8)
+    clock = iter([0.0, 1.0, 1.0, 99.0])
+    first, second, third = in_time([good, bad, late], "folder", 60.0, lambda: next(clock))
+    assert first.diagnosis is None
+    assert first.why_no_diagnosis.startswith("its model fits its points")
+    assert second.diagnosis is not None
+    assert third.diagnosis is None
+    assert third.why_no_diagnosis.startswith("there was no time for it at the campaign's end")
+    assert "`rig report folder`" in third.why_no_diagnosis
+    shown = repr(results_section([first, second, third]))
+    assert "does NOT fit" in shown
+    assert "next: `rig diagnose T2.h5`" in shown
+    assert second.diagnosis.headline in shown
+
+
+def test_a_search_ends_when_its_time_is_over():
+    from identification.mismatch.observer import UNWATCHED, Interrupted
+
+    clock = iter([1.0, 3.0])
+    watching = TimeIsUp(UNWATCHED, 2.0, lambda: next(clock))
+    watching.stage("select")
+    watching.trying("this")
+    with pytest.raises(Interrupted):
+        watching.trying("that")
+
+
+def test_the_head_of_the_page_names_what_does_not_fit(completed):
+    from rig.campaign_report.folder import campaign_in
+
+    campaign = campaign_in(completed)
+    assert "the model does NOT fit T2" in lead(campaign, [told("T1"), told("T2", bend=0.8)])
+
+
+def test_the_page_is_written_into_the_folder(completed, tmp_path):
+    folder = shutil.copytree(completed, tmp_path / completed.name)
+    assert read(write(folder).read_text(encoding="utf-8")).text.count("Not made: its model fits its points") == 2
+    assert not list(folder.glob(".*")), "no draft is left"
+
+
+@pytest.mark.parametrize(
+    ("last", "gone", "why"),
+    [
+        (DONE, True, ""),
+        (replace(DONE, outcome="tripped", stop_confirmed=None), True, ""),
+        (DONE, False, "the controller is still there"),
+        (replace(DONE, stop_confirmed=False), True, "the propeller was not seen to stop"),
+        (running("hold"), True, "the controller ended without telling that the propeller rests"),
+    ],
+)
+def test_nothing_is_written_while_a_motor_may_turn(last, gone, why):
+    assert unsafe(last, gone=gone) == why
+
+
+def test_a_page_that_can_not_be_written_is_one_line(tmp_path, capsys):
+    write_page(DONE, tmp_path, gone=True)
+    out, err = capsys.readouterr()
+    assert out == ""
+    assert err.count("\n") == 1
+    assert "rig: no report: RecordingError:" in err
+    assert f"`rig report {tmp_path}` writes it" in err
