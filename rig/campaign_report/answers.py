@@ -38,6 +38,8 @@ class Told:
     why_no_fit: str = ""
     diagnosis: Diagnosis | None = None
     why_no_diagnosis: str = ""
+    cut_short: bool = False
+    """The search of the diagnosis was ended with what it had: its verdict is not its last word."""
 
     @property
     def recordings(self) -> tuple[Recording, ...]:
@@ -74,6 +76,8 @@ class TimeIsUp:
     def __init__(self, inner: Observer, end: float, now: Callable[[], float] = monotonic) -> None:
         """`end`: s, on the clock of `now`."""
         self._inner, self._end, self._now = inner, end, now
+        self.over = False
+        """Whether the search was ended."""
 
     def stage(self, name: str) -> None:
         self._inner.stage(name)
@@ -83,6 +87,7 @@ class TimeIsUp:
         from identification.mismatch.observer import Interrupted
 
         if self._now() > self._end:
+            self.over = True
             raise Interrupted
         self._inner.trying(what)
 
@@ -106,10 +111,11 @@ def _diagnosed(told: Told, seconds: float, watched: Watched) -> Told:
 
     try:
         with watched() as inner:
-            found = traced(told.recordings, observer=TimeIsUp(inner, monotonic() + seconds)).diagnosis
+            timed = TimeIsUp(inner, monotonic() + seconds)
+            found = traced(told.recordings, observer=timed).diagnosis
     except RecordingError as error:
         return replace(told, why_no_diagnosis=str(error))
-    return replace(told, diagnosis=found)
+    return replace(told, diagnosis=found, cut_short=timed.over)
 
 
 def earlier(folder: Path) -> list[Path]:

@@ -25,7 +25,7 @@ from rig.campaign_report.folder import campaign_in
 from rig.campaign_report.page import campaign_page
 from rig.report.page import html
 
-SEARCH: Final = 30.0
+SEARCH: Final = 20.0
 """s for the diagnoses of all thrusters together: somebody waits for his terminal."""
 NICENESS: Final = 10
 """The next campaign may begin on this machine while the page of the last is made."""

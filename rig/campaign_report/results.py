@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator, Sequence
 from math import isfinite
 
@@ -119,7 +120,8 @@ def _models(told: Sequence[Told]) -> str:
 
 
 def _rows(told: Told) -> Iterator[tuple[str, ...]]:
-    head = told.diagnosis.headline if told.diagnosis is not None else "not made"
+    cut = " (its search was cut short)" if told.cut_short else ""
+    head = f"{told.diagnosis.headline}{cut}" if told.diagnosis is not None else "not made"
     if told.answer is None:
         yield (told.thruster, *(NOTHING,) * 6, "no fit", NOTHING)
         return
@@ -171,7 +173,7 @@ def _warnings(told: Told) -> Iterator[Remark]:
         yield Remark(f"{told.thruster}: no fit, for {told.why_no_fit}.", "bad")
         return
     if wrong := misfit(told.answer.fit):
-        files = " ".join(path.name for path in told.paths)
+        files = shlex.join(path.name for path in told.paths)
         yield Remark(
             prose(f"{told.thruster}: {wrong}; next: `rig diagnose {files}` (what the model leaves out)."), "bad"
         )

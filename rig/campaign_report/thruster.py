@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from collections.abc import Iterator
 from dataclasses import replace
 from math import floor, log10
@@ -23,6 +24,11 @@ from rig.report.style import prose, unit_text
 
 MOST_EVENTS = 40
 """Warnings, trips and errors that are listed; the recording has all."""
+
+CUT_SHORT = (
+    "The search had no more time and ended with what it had: this is not its last word. The command below has no "
+    "limit; `rig report --diagnosis-time` sets that of this page."
+)
 
 
 def thruster_section(told: Told, folder: str) -> Section:
@@ -111,7 +117,7 @@ def _drift(told: Told) -> Iterator[Remark]:
 
 def diagnosis_section(told: Told, folder: str) -> Section:
     """What physics the model leaves out, in short; the whole of it is a page of its own."""
-    files = " ".join(f"{folder}/{path.name}" for path in told.paths)
+    files = shlex.join(f"{folder}/{path.name}" for path in told.paths)
     whole = f"`rig diagnose {files} --report diagnosis.html`"
     if told.diagnosis is None:
         why = told.why_no_diagnosis or "it was left out"
@@ -119,12 +125,13 @@ def diagnosis_section(told: Told, folder: str) -> Section:
     names = {recording.recording_id: path.name for recording, path in zip(told.recordings, told.paths, strict=True)}
     d = told_by_name(told.diagnosis, names)
     runs = runs_of(d, [replace(r, recording_id=names[r.recording_id]) for r in told.recordings])
+    cut = [Remark(CUT_SHORT, "doubt")] if told.cut_short else []
     if not d.mismatch:
         return Section(
-            "Diagnosis", sentences([*short(d), *map(words, d.notes), f"All of it: {whole}"]), words(d.statement)
+            "Diagnosis", sentences([*cut, *short(d), *map(words, d.notes), f"All of it: {whole}"]), words(d.statement)
         )
     found = [part for section in what_section(d, runs) for part in section.parts]
-    parts = (*sentences(short(d)), *where_section(d, runs).parts, *found)
+    parts = (*sentences([*cut, *short(d)]), *where_section(d, runs).parts, *found)
     last = sentences([*map(words, d.notes), f"All of it: {whole}"])
     return Section("Diagnosis", (*parts, *last), words(f"{d.headline[:1].upper()}{d.headline[1:]}. {d.statement}"))
 

@@ -19,8 +19,11 @@ no_report_option = click.option(
 
 
 def write_page(last: Snapshot, folder: Path, *, gone: bool) -> None:
-    """One line: where the page is, or why there is none. `gone`: the controller has ended. Raises nothing."""
-    why = unsafe(last, gone=gone) or _written(folder)
+    """Tells where the page is, or why there is none. `gone`: the controller has ended. Raises nothing."""
+    why = unsafe(last, gone=gone)
+    if not why:
+        click.echo("writing the report; Ctrl+C leaves it out")
+        why = _written(folder)
     if why:
         click.echo(f"rig: no report: {why}; `rig report {folder}` writes it", err=True)
     else:

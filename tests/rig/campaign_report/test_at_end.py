@@ -1,15 +1,18 @@
 """What a campaign's end writes by itself: when it does, how long it may take, and that it changes nothing else."""
 
 import shutil
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
-from rig.campaign_report.answers import TimeIsUp, Told
+from identification.mismatch.observer import UNWATCHED, Interrupted
+from rig.campaign_report.answers import TimeIsUp, Told, diagnosed
 from rig.campaign_report.at_end import in_time, write
 from rig.campaign_report.folder import Run
 from rig.campaign_report.results import lead, results_section
+from rig.campaign_report.thruster import thruster_section
 from rig.fit.answer import fit_recordings
 from rig.operate.last_page import unsafe, write_page
 from tests.rig.campaign_report.hold_recordings import recording
@@ -42,14 +45,21 @@ def test_only_what_the_model_does_not_fit_is_diagnosed_while_there_is_time():
 
 
 def test_a_search_ends_when_its_time_is_over():
-    from identification.mismatch.observer import UNWATCHED, Interrupted
-
     clock = iter([1.0, 3.0])
     watching = TimeIsUp(UNWATCHED, 2.0, lambda: next(clock))
     watching.stage("select")
     watching.trying("this")
+    assert not watching.over
     with pytest.raises(Interrupted):
         watching.trying("that")
+    assert watching.over
+
+
+def test_an_answer_that_was_cut_short_is_told_as_one():
+    (found,) = diagnosed([told("T2", bend=0.8)], 0.0, lambda: nullcontext(UNWATCHED), lambda text: None)
+    assert found.cut_short
+    assert "(its search was cut short)" in repr(results_section([found]))
+    assert "this is not its last word" in repr(thruster_section(found, "folder"))
 
 
 def test_the_head_of_the_page_names_what_does_not_fit(completed):
@@ -82,7 +92,7 @@ def test_nothing_is_written_while_a_motor_may_turn(last, gone, why):
 def test_a_page_that_can_not_be_written_is_one_line(tmp_path, capsys):
     write_page(DONE, tmp_path, gone=True)
     out, err = capsys.readouterr()
-    assert out == ""
+    assert out == "writing the report; Ctrl+C leaves it out\n"
     assert err.count("\n") == 1
     assert "rig: no report: RecordingError:" in err
     assert f"`rig report {tmp_path}` writes it" in err
