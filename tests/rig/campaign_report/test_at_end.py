@@ -1,5 +1,6 @@
 """What a campaign's end writes by itself: when it does, how long it may take, and that it changes nothing else."""
 
+import os
 import shutil
 from contextlib import nullcontext
 from dataclasses import replace
@@ -10,10 +11,14 @@ import pytest
 from identification.mismatch.observer import UNWATCHED, Interrupted
 from rig.campaign_report.answers import TimeIsUp, Told, diagnosed
 from rig.campaign_report.at_end import in_time, write
+from rig.campaign_report.command import REPORT_FILE
 from rig.campaign_report.folder import Run
 from rig.campaign_report.results import lead, results_section
 from rig.campaign_report.thruster import thruster_section
+from rig.cli import main
 from rig.fit.answer import fit_recordings
+from rig.link.live_runs import Run as LiveRun
+from rig.link.live_runs import register
 from rig.operate.last_page import unsafe, write_page
 from tests.rig.campaign_report.hold_recordings import recording
 from tests.rig.console.feeds import running
@@ -96,3 +101,19 @@ def test_a_page_that_can_not_be_written_is_one_line(tmp_path, capsys):
     assert err.count("\n") == 1
     assert "rig: no report: RecordingError:" in err
     assert f"`rig report {tmp_path}` writes it" in err
+
+
+def test_a_campaign_that_is_going_on_has_no_page_yet(tmp_path, capsys):
+    announced = register(LiveRun(os.getpid(), "no socket", str(tmp_path.resolve()), "campaign", "bench"))
+    try:
+        assert main(["report", str(tmp_path)]) == 2
+    finally:
+        announced.unlink()
+    assert "is still going on; its report is written when it has ended" in capsys.readouterr().err
+
+
+def test_the_page_is_written_by_a_process_of_its_own(completed, tmp_path, capsys):
+    folder = shutil.copytree(completed, tmp_path / completed.name)
+    write_page(DONE, folder, gone=True)
+    assert capsys.readouterr().out.splitlines()[-1] == f"report: {folder / REPORT_FILE}"
+    assert (folder / REPORT_FILE).read_text(encoding="utf-8").startswith("<!DOCTYPE html>")
