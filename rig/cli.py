@@ -77,6 +77,12 @@ COMMANDS: Final = {
         "measure",
     ),
     "fit": Entry("rig.fit.command:fit_command", "Fit tau = C V|V| to recordings.", "identify"),
+    "plot": Entry("rig.plot.command:plot_command", "One figure of a recording, as PNG, SVG or PDF.", "identify"),
+    "report": Entry(
+        "rig.campaign_report.command:report_command",
+        "One page of a whole campaign: results, uncertainty, figures, verdicts.",
+        "identify",
+    ),
     "diagnose": Entry(
         "rig.diagnose.command:diagnose_command", "Find, name and model the physics that C V|V| leaves out.", "diagnose"
     ),

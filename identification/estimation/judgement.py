@@ -88,7 +88,8 @@ class Judgement:
             out.append(f"{judged.corrected.statement}; taken as independent: {judged.plain.statement}")
         if self.sigma is not None:
             found = f"{self.sigma.corrected:.3g} (uncorrected {self.sigma.plain:.3g})"
-            out.append(f"sigma = {found} was estimated from the residual (eq. 4.12): it cannot judge the fit as well")
+            source = "was estimated from the residual (Indiveri 1998, eq. 4.12)"
+            out.append(f"sigma = {found} {source}: it cannot judge the fit as well")
         return (*out, *(() if self.whiteness is None else (self.whiteness.statement,)))
 
 
@@ -201,7 +202,7 @@ class Reduced:
         names = ", ".join(self.remaining.fit.names)
         if not self.dropped:
             return f"every parameter is significant: {names}"
-        return f"dropped as not significant (eq. 4.11): {', '.join(self.dropped)}; what remains: {names}"
+        return f"dropped as not significant (Indiveri 1998, eq. 4.11): {', '.join(self.dropped)}; what remains: {names}"
 
 
 def reduce_model(

@@ -31,7 +31,8 @@ class Significance:
     def statement(self) -> str:
         if self.significant:
             return f"significant: relative error {self.percent:.3g} % is below {self.threshold:.3g} %"
-        return f"not significant: relative error {self.percent:.3g} % is not below {self.threshold:.3g} % (eq. 4.11)"
+        left = f"relative error {self.percent:.3g} % is not below {self.threshold:.3g} %"
+        return f"not significant: {left} (Indiveri 1998, eq. 4.11)"
 
 
 def significance(value: float, std: float, dof: float = float("inf"), alpha: float = ALPHA) -> Significance:

@@ -35,11 +35,11 @@ def verdicts(fit: DynamicsFit) -> Iterator[str]:
     if fit.with_gamma:
         g = fit.significance["gamma"]
         yield (
-            f"gamma is significant (relative error {g.percent:.2g} %, eq. 4.11): without it the RMSE is "
+            f"gamma is significant (relative error {g.percent:.2g} %, Indiveri 1998, eq. 4.11): without it the RMSE is "
             f"{fit.rmse_without_gamma:.3g} rev/s instead of {fit.rmse:.3g}; the motor itself pulls the rotor to k V"
         )
     else:
-        yield "gamma (k V - n) was tried and dropped as not significant (eq. 4.11)"
+        yield "gamma (k V - n) was tried and dropped as not significant (Indiveri 1998, eq. 4.11)"
     late = fit.significance["delay"]
     word = "significant" if late.significant else "not significant"
     yield f"delay from command to motor {1000 * late.value:.2g} ± {1000 * late.std:.2g} ms: {word}"

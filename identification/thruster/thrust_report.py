@@ -124,7 +124,7 @@ def verdicts(fit: ThrustFit, alternatives: Sequence[ThrustFit] = ()) -> Iterator
         how = (
             f"correlation of neighbouring {fit.rmse_of} allowed for" if fit.estimate.noise else "taken as uncorrelated"
         )
-        yield f"fit not judged: noise was estimated from the residual itself (eq. 4.12; {how})"
+        yield f"fit not judged: noise was estimated from the residual itself (Indiveri 1998, eq. 4.12; {how})"
     else:
         yield judged.statement
         if fit.estimate.excess_std:

@@ -59,7 +59,7 @@ class InertiaFit:
             unit = unit_of(name, self.axis)
             known = significance(value, std).significant
             text = f"{value:.4g} ± {std:.2g} {unit}" if np.isfinite(std) else "not determined"
-            weak = "" if known or not np.isfinite(std) else ", not significant (eq. 4.11)"
+            weak = "" if known or not np.isfinite(std) else ", not significant (Indiveri 1998, eq. 4.11)"
             out.append(f"{self.axis}: {name} = {text}{weak} ({self.method})")
         out.extend(f"{self.axis}: {v.statement}" for v in self.validation)
         return (*out, *self.verdicts)

@@ -64,7 +64,7 @@ def verdict(name: str, value: float, std: float) -> str:
     """What a parameter says, in a few words.
 
     >>> verdict("k2", 420.0, 5.0), verdict("k", 3.0, 4.0), verdict("buoyancy[1]", -40.0, 1.0)
-    ('significant', 'not told apart from 0 (eq. 4.11)', 'floats')
+    ('significant', 'not told apart from 0 (Indiveri 1998, eq. 4.11)', 'floats')
     >>> verdict("eta_hull", 0.7, 0.02), verdict("m", -3.0, 1.0)
     ('70 % of the calibrated thrust', 'negative: no body has that')
     """
@@ -78,7 +78,7 @@ def verdict(name: str, value: float, std: float) -> str:
     if name.startswith("buoyancy"):
         return ("sinks" if value > 0 else "floats") if seen else "not told apart from neutral"
     if name in ("m", "k", "k2", "current_north", "current_east"):
-        return "significant" if seen else "not told apart from 0 (eq. 4.11)"
+        return "significant" if seen else "not told apart from 0 (Indiveri 1998, eq. 4.11)"
     return _efficiency(value, std)
 
 

@@ -233,7 +233,7 @@ def _parameters(fit: DragFit) -> tuple[str, ...]:
             if not np.isfinite(std):
                 out.append(f"{fit.axis}: {name} is not determined")
                 continue
-            word = "" if significance(value, std).significant else ", not significant (eq. 4.11)"
+            word = "" if significance(value, std).significant else ", not significant (Indiveri 1998, eq. 4.11)"
             out.append(f"{fit.axis}: {name} = {value:.4g} ± {std:.2g} {unit}{word}")
     return tuple(out)
 

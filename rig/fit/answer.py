@@ -149,6 +149,11 @@ def _by_rate(quantity: str) -> bool:
     return quantity == "rotation_rate"
 
 
+def is_driven(recording: Recording) -> bool:
+    """False for the end of a run that was cut before its last tare: it holds that tare and nothing to fit."""
+    return not recording.steps or any(step.phase in ("hold", "sine", "ramp") for step in recording.steps)
+
+
 def fit_files(
     paths: Iterable[Path],
     model: Model = "C V|V|",

@@ -43,9 +43,8 @@ def answer_text(answer: Answer) -> str:
     """Sentence, table, models side by side, verdicts, rotor."""
     lines = [sentence(answer.fit), *_misfit(answer), ""]
     lines += _parameters((answer.fit, *answer.alternatives))
-    lines.append(
-        "  error: std in % of the value (eq. 4.11), without the calibration; (white): if samples were independent"
-    )
+    lines.append("  error: std in % of the value, without the calibration; (white): if samples were independent")
+    lines.append("  (eq. 4.11 of G. Indiveri's PhD thesis, University of Genova 1998)")
     lines += ["", *_models(answer.candidates), *_without(answer), ""]
     lines += [f"  - {text}" for text in (*verdicts(answer.fit, answer.alternatives), *answer.notes)]
     if answer.candidates:

@@ -17,6 +17,7 @@ import click
 from rig.campaign.config import CampaignConfig
 from rig.errors import ConfigError, LinkError, RecordingError, RigError
 from rig.link.live_runs import live_runs, lock_bench
+from rig.operate.last_page import no_report_option
 from rig.operate.measured import Measured, measured, recording_of
 from rig.operate.run import console_screen, follow, progress_bar, require_mountable, start_controller
 from rig.recording.ledger import FILE_NAME, Fact, Ledger, file_facts, finished_runs, read
@@ -36,7 +37,8 @@ class Remainder:
 @click.command("resume")
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--headless", is_flag=True, help="A progress bar instead of the console.")
-def resume_command(folder: Path, headless: bool) -> int:
+@no_report_option
+def resume_command(folder: Path, headless: bool, report: bool) -> int:
     """Go on with the campaign in FOLDER at the first step that is not measured."""
     folder = folder.resolve()
     if any(Path(run.folder) == folder for run in live_runs()):
@@ -55,7 +57,7 @@ def resume_command(folder: Path, headless: bool) -> int:
     click.echo(told(rest, config))
     front = progress_bar(start=True) if headless else console_screen()
     run, _process = start_controller(config.path, folder, rest.thrusters)
-    return follow(run, front)
+    return follow(run, front, report=report)
 
 
 def remainder(facts: Sequence[Fact], folder: Path, config: CampaignConfig) -> Remainder:

@@ -20,6 +20,7 @@ from rig.link.front_end_messages import Request, Snapshot
 from rig.link.live_runs import Run, find_run, live_runs
 from rig.link.sockets import Peer, connect
 from rig.operate.headless import Headless, check_alive, operator_terminal
+from rig.operate.last_page import no_report_option, write_page
 
 if TYPE_CHECKING:
     from rig.campaign.config import CampaignConfig
@@ -45,13 +46,15 @@ LOG_NAME = "controller.log"
     "--output", type=click.Path(path_type=Path), help="Folder for the campaign's folder (default: the campaign's)."
 )
 @click.option("--thruster", "thrusters", multiple=True, help="Only this thruster of the campaign; may be repeated.")
-def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: tuple[str, ...]) -> int:
+@no_report_option
+def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: tuple[str, ...], report: bool) -> int:
     """Run CAMPAIGN on its bench: console, recording, table of the fits."""
     config = require_runnable(campaign, thrusters, headless=headless)
     if not headless and not sys.stdout.isatty():
         raise RigError("rig run opens the console, which needs a terminal; use --headless where there is none")
     front = progress_bar(start=True) if headless else console_screen()
-    return run_campaign(campaign, campaign_folder(output or config.output, config.name), thrusters, front)
+    folder = campaign_folder(output or config.output, config.name)
+    return run_campaign(campaign, folder, thrusters, front, report=report)
 
 
 def require_runnable(campaign: Path, thrusters: tuple[str, ...], *, headless: bool) -> CampaignConfig:
@@ -77,11 +80,13 @@ def require_mountable(config: CampaignConfig, thrusters: Sequence[str], *, headl
         )
 
 
-def run_campaign(campaign: Path, folder: Path, thrusters: tuple[str, ...], front: FrontEnd) -> int:
-    """Start a controller in `folder` and attend it to its end; the exit status."""
+def run_campaign(
+    campaign: Path, folder: Path, thrusters: tuple[str, ...], front: FrontEnd, *, report: bool = False
+) -> int:
+    """Start a controller in `folder` and attend it to its end; the exit status. `report`: with the campaign's page."""
     run, process = start_controller(campaign, folder, thrusters)
     try:
-        return follow(run, front)
+        return follow(run, front, report=report)
     finally:
         process.poll()  # one that has ended leaves nothing behind: more runs may follow in this process
 
@@ -89,12 +94,13 @@ def run_campaign(campaign: Path, folder: Path, thrusters: tuple[str, ...], front
 @click.command("console")
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
 @click.option("--headless", is_flag=True, help="Follow with a progress bar instead.")
-def console_command(folder: Path | None, headless: bool) -> int:
+@no_report_option
+def console_command(folder: Path | None, headless: bool, report: bool) -> int:
     """Attach to a run that is going on: the one in FOLDER, or the only one on this machine."""
     if not headless and not sys.stdout.isatty():
         raise RigError("rig console needs a terminal; use --headless where there is none")
     front = progress_bar(start=False) if headless else console_screen()
-    return follow(find_run(folder), front)
+    return follow(find_run(folder), front, report=report)
 
 
 @click.command("stop")
@@ -184,8 +190,11 @@ FrontEnd = Callable[[Peer, str], Left]
 """Takes the link and the command line that attaches once more."""
 
 
-def follow(run: Run, front: FrontEnd) -> int:
-    """Attach a front end until it ends or detaches; then the table, where the files are, and the exit status."""
+def follow(run: Run, front: FrontEnd, *, report: bool = False) -> int:
+    """Attach a front end until it ends or detaches; then the table, where the files are, and the exit status.
+
+    `report`: then also the campaign's page, which changes nothing of that status.
+    """
     peer = connect(Path(run.socket), "the controller")
     again = f"rig console {run.folder}"
     try:
@@ -197,8 +206,12 @@ def follow(run: Run, front: FrontEnd) -> int:
     if left.detached:
         click.echo(f"the run goes on in {run.folder}; attach again with: {again}")
         return 0
-    _await_end(run.pid)
-    return _conclude(check_alive(left.last), Path(run.folder))
+    gone = _await_end(run.pid)
+    last = check_alive(left.last)
+    status = _conclude(last, Path(run.folder))
+    if report:
+        write_page(last, Path(run.folder), gone=gone)
+    return status
 
 
 def progress_bar(*, start: bool) -> FrontEnd:
@@ -231,10 +244,14 @@ def _conclude(last: Snapshot, folder: Path) -> int:
     return 1
 
 
-def _await_end(pid: int) -> None:
+def _await_end(pid: int) -> bool:
+    """Whether the process has ended in time."""
     deadline = time.monotonic() + END_TIMEOUT
-    while _exists(pid) and time.monotonic() < deadline:
+    while there := _exists(pid):
+        if time.monotonic() >= deadline:
+            break
         time.sleep(0.05)
+    return not there
 
 
 def _exists(pid: int) -> bool:

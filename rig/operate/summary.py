@@ -13,6 +13,7 @@ from identification.recording import Recording
 from identification.thruster.thrust import ThrustFit
 from identification.thruster.thrust_report import misfit
 from rig.errors import RecordingError
+from rig.fit.answer import is_driven
 from rig.fit.command import Answer, answer_json, fit_recordings
 from rig.hdf5 import load
 from rig.visible_text import console
@@ -57,7 +58,7 @@ def fitted(paths: Iterable[Path]) -> list[tuple[Answer, list[Path]]]:
         except RecordingError as error:
             click.echo(f"no fit: {error}")
             continue
-        if _moves(recording):
+        if is_driven(recording):
             groups.setdefault(recording.thruster, []).append((path, recording))
     answers = []
     for group in groups.values():
@@ -68,11 +69,6 @@ def fitted(paths: Iterable[Path]) -> list[tuple[Answer, list[Path]]]:
             continue
         answers.append((answer, [path for path, _ in group]))
     return answers
-
-
-def _moves(recording: Recording) -> bool:
-    """False for the end of a run that was cut before its last tare: it holds that tare and nothing driven."""
-    return not recording.steps or any(step.phase in ("hold", "sine", "ramp") for step in recording.steps)
 
 
 def table(answers: Sequence[Answer]) -> Table:

@@ -17,9 +17,10 @@ from functools import cache
 from importlib.metadata import version
 from itertools import count
 from pathlib import Path
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined, Template
+from markupsafe import Markup, escape
 
 from rig.report.style import PALETTE, WIDE, Plot, svg
 from rig.visible_text import visible
@@ -101,12 +102,29 @@ class Picture:
         return self.plot.wide is not None and self.plot.wide[0] >= WIDE[0]
 
 
+@dataclass(frozen=True, slots=True)
+class Verbatim:
+    """A text as it is, line by line, such as a configuration file; closed on a screen until it is asked for."""
+
+    caption: str
+    text: str
+    kind: str = "verbatim"
+
+
+@dataclass(frozen=True, slots=True)
+class Blanks:
+    """Lines to be filled in by hand on paper. `fields`: what belongs on each."""
+
+    fields: tuple[str, ...]
+    kind: str = "blanks"
+
+
 @dataclass(frozen=True, eq=False)
 class Section:
     """A heading, a sentence under it, and what belongs to it; sections may hold sections."""
 
     title: str
-    parts: tuple[Section | Sentences | Table | Listing | Picture, ...]
+    parts: tuple[Part, ...]
     lead: str = ""
     kind: str = "section"
 
@@ -118,6 +136,9 @@ class Section:
         't1-what-was-found'
         """
         return re.sub(r"[^a-z0-9]+", "-", self.title.lower()).strip("-") or "section"
+
+
+Part: TypeAlias = Section | Sentences | Table | Listing | Picture | Verbatim | Blanks
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +157,17 @@ def _template() -> Template:
     environment = Environment(
         loader=FileSystemLoader(HERE), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
     )
+    environment.filters["coded"] = _coded
     return environment.get_template("page.html.jinja")
+
+
+def _coded(text: str) -> Markup:
+    """A sentence, escaped, with what stands between backticks as code: what can be typed.
+
+    >>> str(_coded("<b>, type `rig fit <FILE>`"))
+    '&lt;b&gt;, type <code>rig fit &lt;FILE&gt;</code>'
+    """
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))  # noqa: S704 - escaped in this line
 
 
 def html(page: Page) -> str:
@@ -149,8 +180,25 @@ def html(page: Page) -> str:
         return re.sub(r'( id="|href="#|url\(#)', lambda found: found[1] + prefix, text)
 
     style = (HERE / "page.css").read_text(encoding="utf-8")
-    text = _template().render(page=page, palette=PALETTE, style=style, drawn=drawn, program=program())
-    return visible(text) + "\n"
+    anchors = _anchors(page)
+    known = {"palette": PALETTE, "style": style, "drawn": drawn, "program": program()}
+    return visible(_template().render(page=page, anchor=lambda part: anchors[id(part)], **known)) + "\n"
+
+
+def _anchors(page: Page) -> dict[int, str]:
+    """Of each section by its `id()`: its anchor, numbered where an earlier one has the same title."""
+    found: dict[int, str] = {}
+
+    def walk(sections: Iterable[object]) -> None:
+        for section in sections:
+            if isinstance(section, Section):
+                taken, name = set(found.values()), section.anchor
+                more = (f"{name}-{i}" for i in count(2))
+                found[id(section)] = name if name not in taken else next(each for each in more if each not in taken)
+                walk(section.parts)
+
+    walk(page.sections)
+    return found
 
 
 def write(page: Page, path: Path) -> None:

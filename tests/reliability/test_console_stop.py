@@ -32,7 +32,7 @@ ENOUGH = 2.3
 @contextmanager
 def at_console(bench: LiveBench, run: Run) -> Iterator[tuple[subprocess.Popen[bytes], Terminal]]:
     """`rig console` on that run; it has started the motor, which holds 10 V."""
-    with on_terminal(RIG, "console", run.folder) as (process, terminal):
+    with on_terminal(RIG, "console", run.folder, "--no-report") as (process, terminal):
         start_from(terminal, bench)
         yield process, terminal
 
@@ -172,7 +172,7 @@ def test_console_leaves_an_unattended_run_and_another_comes(tmp_path):
             terminal.press(b"\t\r")
             terminal.until(b"attach again with: rig console")
         assert first.returncode == 0
-        with on_terminal(RIG, "console", run.folder) as (second, terminal):
+        with on_terminal(RIG, "console", run.folder, "--no-report") as (second, terminal):
             terminal.until(b"COMPLETED")
             terminal.press(b"d")
             terminal.until(b"recordings, fits and logs")

@@ -109,10 +109,11 @@ def thruster_section(answer: Answer, *, alone: bool = False) -> Section:
     return Section(
         "The fit" if alone else fit.thruster or "Thruster",
         (
-            parameter_table(answer),
+            parameter_table(fit),
             judgement,
             *pictures(fit),
             *models_section(answer.candidates),
+            *other_models(answer.alternatives),
             *rotor_section(answer.dynamics),
             *points_table(fit),
         ),
@@ -129,18 +130,27 @@ def tone(verdict: str) -> Tone:
     return next((sign for words, sign in SIGNS if words in verdict), "")
 
 
-def parameter_table(answer: Answer) -> Table:
-    """The model asked for first, the others below it."""
+def parameter_table(fit: ThrustFit) -> Table:
+    """Of the model asked for alone: on a phone each row is a card, and the curve shall not stand behind twelve."""
+    return _parameters("Parameters; std holds scatter and calibration", (fit,))
+
+
+def other_models(alternatives: Sequence[ThrustFit]) -> tuple[Table, ...]:
+    """Parameters of the models beside the one asked for, folded; nothing without such models."""
+    return (_parameters("Parameters of the other models", alternatives, folded=True),) if alternatives else ()
+
+
+def _parameters(caption: str, fits: Sequence[ThrustFit], *, folded: bool = False) -> Table:
     head = ("parameter", "model", "value ± std", "95 % interval", "unit", "relative error", "verdict", "RMSE / N")
     rows = []
-    for fit in (answer.fit, *answer.alternatives):
+    for fit in fits:
         for row in table(fit):
             found = value_and_interval(row.value, row.std, row.low, row.high)
             error = f"{row.percent:.2g} %" if np.isfinite(row.percent) else "–"
             rmse = f"{fit.rmse:.4g}" if row.name in fit.parameters else ""
             rows.append((prose(row.name), fit.model, *found, unit_text(row.unit), error, row.verdict, rmse))
     words = columns(head, "parameter", "model", "unit", "verdict")
-    return Table("Parameters; std holds scatter and calibration", head, tuple(rows), words)
+    return Table(caption, head, tuple(rows), words, folded)
 
 
 def points_table(fit: ThrustFit) -> tuple[Table, ...]:

@@ -27,31 +27,11 @@ QUANTITY = {
 
 def pictures(fit: ThrustFit) -> tuple[Picture, ...]:
     """Fit, residuals over voltage and over time, normal plot, singular values."""
-    x = QUANTITY[fit.voltage_quantity]
-    model = _curve(fit)
-    band = _scatter_band(fit, model.x)
-    thin = _thinning(fit)
-    kept = f" One sample in {thin} is drawn." if thin > 1 else ""
-    few = fit.estimate.rows.std_error is not None and fit.estimate.rows.y.size <= regression_figures.MANY
-    bars = " Bars are 95 % intervals of each point." if few else ""
-    order = normal_order(fit.estimate)
-    solved = fit.estimate.fit
+    order, solved = normal_order(fit.estimate), fit.estimate.fit
     out = [
-        Picture(
-            "Measured and fitted thrust",
-            regression_figures.fit_band(_measured(fit), model, x, _less(fit)),
-            f"The band holds scatter and calibration; where it is not seen it is narrower than the line.{bars}{kept}",
-        ),
-        Picture(
-            "Residuals over what explains the thrust",
-            regression_figures.residuals(_residuals(fit), x, "residual / N", band),
-            "A shape here is physics that the model leaves out. The band is what scatter alone leaves open.",
-        ),
-        Picture(
-            "Residuals in the order of measurement",
-            regression_figures.residuals(_residuals(fit, over_time=True), _time_label(fit), "residual / N", wide=True),
-            "A trend or a wave here is drift, warming up or slow noise.",
-        ),
+        measured_and_fitted(fit),
+        residuals_by_level(fit),
+        residuals_in_order(fit),
         Picture(
             "Singular values of the regressor",
             regression_figures.singular_values(solved.singular_values, solved.condition),
@@ -64,6 +44,38 @@ def pictures(fit: ThrustFit) -> tuple[Picture, ...]:
             3, Picture("Normal plot", regression_figures.normal_plot(order), _normal_caption(fit, order.ordered.size))
         )
     return tuple(out)
+
+
+def measured_and_fitted(fit: ThrustFit) -> Picture:
+    """Thrust less tare over what explains it, the fitted curve, and its 95 % band of scatter and calibration."""
+    thin = _thinning(fit)
+    kept = f" One sample in {thin} is drawn." if thin > 1 else ""
+    few = fit.estimate.rows.std_error is not None and fit.estimate.rows.y.size <= regression_figures.MANY
+    bars = " Bars are 95 % intervals of each point." if few else ""
+    return Picture(
+        "Measured and fitted thrust",
+        regression_figures.fit_band(_measured(fit), _curve(fit), QUANTITY[fit.voltage_quantity], _less(fit)),
+        f"The band holds scatter and calibration; where it is not seen it is narrower than the line.{bars}{kept}",
+    )
+
+
+def residuals_by_level(fit: ThrustFit) -> Picture:
+    """What the model leaves, over what explains the thrust, with the band of the fit's own scatter."""
+    x = QUANTITY[fit.voltage_quantity]
+    return Picture(
+        "Residuals over what explains the thrust",
+        regression_figures.residuals(_residuals(fit), x, "residual / N", _scatter_band(fit, _curve(fit).x)),
+        "A shape here is physics that the model leaves out. The band is what scatter alone leaves open.",
+    )
+
+
+def residuals_in_order(fit: ThrustFit) -> Picture:
+    """What the model leaves, in the order in which it was measured."""
+    return Picture(
+        "Residuals in the order of measurement",
+        regression_figures.residuals(_residuals(fit, over_time=True), _time_label(fit), "residual / N", wide=True),
+        "A trend or a wave here is drift, warming up or slow noise.",
+    )
 
 
 def _normal_caption(fit: ThrustFit, drawn: int) -> str:

@@ -127,7 +127,7 @@ def campaign(folder: Path, *, console: bool) -> Iterator[Live]:
     with contextlib.ExitStack() as stack:
         bench = stack.enter_context(live_bench(folder, edit_bench=edited_bench))
         (folder / "campaign.toml").write_text(campaign_text())
-        words = ["run", str(folder / "campaign.toml"), "--output", str(folder / "out")]
+        words = ["run", str(folder / "campaign.toml"), "--output", str(folder / "out"), "--no-report"]
         terminal = None
         if console:
             front, terminal = stack.enter_context(on_terminal(RIG, *words))

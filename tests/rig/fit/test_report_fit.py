@@ -106,7 +106,15 @@ def test_one_direction_only_leaves_a_dash():
     up = Channel("u", "motor", "command_voltage", "V", u.time, np.abs(u.value))
     push = Channel("f", "cell", "thrust", "N", f.time, np.abs(f.value))
     page = page_of(Recording("up", "T1", (up, push)))
-    assert ("C−", "C+/C-", "–", "–") in [row[:4] for row in page.sections[0].parts[0].rows]
+    (others,) = [part for part in page.sections[0].parts if part.kind == "table" and "other models" in part.caption]
+    assert ("C−", "C+/C-", "–", "–") in [row[:4] for row in others.rows]
+
+
+def test_a_phone_shows_the_first_curve_behind_the_parameters_of_one_model():
+    parts = page_of(recording(rate=False)).sections[0].parts
+    before = [part for part in parts[: [part.kind for part in parts].index("picture")] if part.kind == "table"]
+    assert [row[0] for part in before for row in part.rows] == ["C", "tare"]
+    assert [part.folded for part in parts if part.kind == "table" and "other models" in part.caption] == [True]
 
 
 def test_few_points_have_no_normal_plot():
