@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, nan
 
 from drivers.errors import LinkError
@@ -78,6 +78,8 @@ class Loop:
     """Sees what is recorded; None: nobody watches."""
     host: Callable[[], HostClocks] = lambda: STILL
     """The machine's other clocks. In virtual time it neither sleeps nor is set."""
+    busy: Callable[[], str] = lambda: ""
+    """What this machine has to say for samples that come late; nothing in virtual time."""
     notice: Callable[[str], None] | None = None
     """Hears what an analyst should know of the machine."""
     signals: deque[Request] = field(default_factory=deque)
@@ -212,13 +214,19 @@ class Loop:
                 f"the motor did not take a command: {self._command_error}", "link", now, self.bench.config.motor
             )
         if self._lapse:
-            return Trip(self._lapse, "late", now)
+            return self._told(Trip(self._lapse, "late", now))
         if not self.unattended and self.clients.last_lease is not None and not self.clients.attending:
             return Trip("the operator is gone: the last front end has closed its connection", "lease", now)
         newest = {one.channel: self.readings.newest(one.channel) for one in self.guarded_channels}
         vitals = self._vitals(now)
         trip = guard.check(self.guarded_channels, newest, vitals, self.allowed)
-        return trip or self.motor_watch.trip or (self._paces.advance(vitals, samples) if self._paces else None)
+        trip = trip or self.motor_watch.trip or (self._paces.advance(vitals, samples) if self._paces else None)
+        return self._told(trip)
+
+    def _told(self, trip: Trip | None) -> Trip | None:
+        """With what the machine may have done to it, which changes nothing else."""
+        busy = self.busy() if trip is not None and trip.source in ("stale", "late", "rate") else ""
+        return replace(trip, cause=f"{trip.cause}; {busy}") if trip is not None and busy else trip
 
     def _vitals(self, now: float) -> Vitals:
         links = {name: instrument.health() for name, instrument in self.bench.instruments.items()}

@@ -13,6 +13,7 @@ from rig.campaign.bench import build
 from rig.campaign.config import CampaignConfig
 from rig.control.clocks import MonotonicClock, host_clocks
 from rig.control.loop import IDLE
+from rig.control.machine_load import busy
 from rig.errors import RigError
 from rig.link.clients import Clients
 from rig.link.sockets import listen, socket_path
@@ -42,7 +43,7 @@ def open_session(campaign: CampaignConfig, folder: Path, thrusters: tuple[str, .
     own_log = LineWriter((folder / LOG_NAME).open("ab"), sync=False)
     parts = (build(campaign.bench), recorder, ledger, own_log, clients, MonotonicClock())
     session = begin(campaign, folder, thrusters, parts, before, watch)
-    session.loop.host = host_clocks
+    session.loop.host, session.loop.busy = host_clocks, busy
     session.status.files.extend(recordings_before(before, folder))
     return session
 

@@ -151,6 +151,17 @@ def test_saturated_nan_and_silent_sensor_trip(tmp_path):
             assert trips[0][0] - begun <= 0.2 + 0.04
 
 
+def test_a_machine_that_is_busy_is_said_of_what_came_late_and_of_nothing_else(tmp_path):
+    for name, value, told in [("saturated", 1e9, False), ("silent", None, True)]:
+        folder = tmp_path / name
+        folder.mkdir()
+        with driven(folder) as (world, turn, trips):
+            world.session.loop.busy = lambda: "this machine is busy"
+            world.cell.spoil = lambda _, value=value: value
+            turn(2.0)
+            assert trips[0][2].endswith("; this machine is busy") is told
+
+
 def test_dead_link_trips(tmp_path):
     with driven(tmp_path) as (world, turn, trips):
         world.cell.error = "the cable was pulled"
