@@ -11,9 +11,7 @@ BUSY: Final = 1.5
 ours."""
 
 
-def busy(
-    load: Callable[[], tuple[float, float, float]] = os.getloadavg, processors: int = os.cpu_count() or 1
-) -> str:
+def busy(load: Callable[[], tuple[float, float, float]] = os.getloadavg, processors: int = os.cpu_count() or 1) -> str:
     """A clause for the cause of a trip; empty where the machine is idle enough.
 
     >>> busy(lambda: (8.2, 5.0, 3.0), 2)

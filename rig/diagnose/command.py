@@ -36,12 +36,20 @@ NOTHING = Wanted()
 WHAT = "expected one or more recordings (*.h5) of one thruster"
 
 
-def recordings_in(paths: Iterable[Path], who: str = "rig diagnose") -> list[Path]:
-    """The files meant by files and folders; a folder stands for its *.h5. Raises RecordingError."""
+def recordings_in(paths: Iterable[Path], who: str = "rig diagnose", *, told: bool = True) -> list[Path]:
+    """The files meant by files and folders, of a damaged one and its copy the copy. Raises RecordingError.
+
+    `told`: which copies are taken is said on stderr.
+    """
+    return rather_recovered(named(paths, who), told=told)
+
+
+def named(paths: Iterable[Path], who: str = "rig diagnose") -> list[Path]:
+    """The files meant by files and folders, a folder for its *.h5; none is looked into. Raises RecordingError."""
     found = list(chain.from_iterable(_in(Path(path)) for path in paths))
     if not found:
         raise RecordingError(f"{who}: no recording was given; {WHAT}")
-    return rather_recovered(found)
+    return found
 
 
 def _in(path: Path) -> list[Path]:
@@ -94,8 +102,9 @@ def diagnose_files(
     from rig.twin.reading import read_twin
     from rig.twin.writing import stamped
 
-    files, held = recordings_in(paths), recordings_in(holdout) if holdout else []
-    refuse_both(files, held)
+    given, kept_back = named(paths), named(holdout) if holdout else []
+    refuse_both(given, kept_back)
+    files, held = rather_recovered(given), rather_recovered(kept_back)
     baseline = None if twin is None else read_twin(twin)
     if before and baseline is None:
         raise RecordingError("--before is of the recordings behind a twin, and there is no --twin; give one")
@@ -253,7 +262,6 @@ def diagnose_command(
         wanted = wanted_of(**outputs)
         vehicle = VehicleFiles(thrusters, installation, mass, mass_std, axis or "")
         traces: list[Trace] = []
-        files = tuple(recordings_in(files))
         with observed(shown=not wanted.alone) as observer:
             found = diagnose_files(
                 files,
@@ -268,7 +276,8 @@ def diagnose_command(
                 observer=observer,
                 before=before,
             )
-        tell(found, wanted, read(recordings_in(files)) if wanted.report is not None else (), (*files, *holdout))
+        shown = read(recordings_in(files, told=False)) if wanted.report is not None else ()
+        tell(found, wanted, shown, (*files, *holdout))
         for trace in traces:
             explain(trace, wanted, (*files, *holdout))
     except (RigError, OSError) as error:

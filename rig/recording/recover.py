@@ -27,8 +27,8 @@ def recover_command(file: Path, output: Path | None) -> None:
     click.echo(f"{out}: {sum(loss.kept for loss in losses)} rows in {len(losses)} streams")
 
 
-def rather_recovered(paths: Sequence[Path]) -> list[Path]:
-    """The files without those of which a recovered copy is among them; each that is left aside is said on stderr.
+def rather_recovered(paths: Sequence[Path], *, told: bool = True) -> list[Path]:
+    """The files without those of which a recovered copy is among them; `told`: each left aside is said on stderr.
 
     Raises RecordingError for what is no recording.
     """
@@ -39,7 +39,7 @@ def rather_recovered(paths: Sequence[Path]) -> list[Path]:
     found = {path: identity_of(path) for path in paths}
     copies = {name: path for path, (name, opened_as) in found.items() if opened_as == "plain" and name}
     damaged = {path: name for path, (name, opened_as) in found.items() if opened_as != "plain" and name in copies}
-    for path, name in damaged.items():
+    for path, name in damaged.items() if told else ():
         click.echo(f"{path.name} was not closed in order: its recovered copy {copies[name].name} is taken", err=True)
     return [path for path in paths if path not in damaged]
 
