@@ -271,10 +271,8 @@ class Plan:
                 f"step {step.number} ({step.phase}) commands {step.peak:g} V, but {whose} allows at most "
                 f"{max_voltage:g} V: lower the plan's levels",
             )
-        require(
-            self.slew <= slew,
-            f"slew is {self.slew:g} V/s, but {whose} allows at most {slew:g} V/s: lower slew",
-        )
+        sentence = f"slew is {self.slew:g} V/s, but {whose} allows at most {slew:g} V/s: lower slew"
+        require(self.slew <= slew, sentence)
 
 
 def _said(move: Move) -> str:
