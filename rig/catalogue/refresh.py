@@ -23,14 +23,14 @@ RELATED: Final = "FROM links JOIN entries AS r ON r.id = links.id AND r.what = '
 RELATE: Final = (
     "UPDATE entries AS e SET began = stated",
     f"UPDATE entries AS e SET began = (SELECT max(r.stated) {RELATED}) WHERE began IS NULL",  # noqa: S608 - our own
-    f"UPDATE entries AS e SET began = (SELECT min(r.stated) {RELATED}) WHERE what = 'campaigns'",  # noqa: S608
+    f"UPDATE entries AS e SET began = (SELECT min(r.stated) {RELATED}) WHERE what = 'campaigns'",  # noqa: S608 - our own
     "UPDATE entries AS e SET began = (SELECT mtime_ns / 1e9 FROM files WHERE files.path = e.path) WHERE began IS NULL",
     *(
-        f"UPDATE entries AS e SET {name} = ifnull((SELECT max(r.{name}) {RELATED}), '') "  # noqa: S608
+        f"UPDATE entries AS e SET {name} = ifnull((SELECT max(r.{name}) {RELATED}), '') "  # noqa: S608 - our own
         "WHERE what IN ('fits', 'twins', 'diagnoses')"
         for name in ("kind", "campaign", "operator", "bench")
     ),
-    f"UPDATE entries AS e SET kind = ifnull((SELECT max(r.kind) {RELATED}), ''), "  # noqa: S608
+    f"UPDATE entries AS e SET kind = ifnull((SELECT max(r.kind) {RELATED}), ''), "  # noqa: S608 - our own
     f"operator = ifnull((SELECT max(r.operator) {RELATED}), '') WHERE what = 'campaigns'",
 )
 """What a result does not say of itself is that of the recordings it is of, where they are among the files."""

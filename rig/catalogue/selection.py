@@ -89,7 +89,7 @@ def _entries(
     connection.row_factory = sqlite3.Row
     shown = ", ".join(SHOWN.get(name, name) for name in COLUMNS)
     inner = f"SELECT key, path, {shown}, {'facts' if facts else NO_FACTS} FROM entries AS e"  # noqa: S608 - our own
-    asked = f"SELECT * FROM ({inner}) WHERE {where} ORDER BY began DESC, path DESC, key DESC LIMIT :newest"  # noqa: S608
+    asked = f"SELECT * FROM ({inner}) WHERE {where} ORDER BY began DESC, path DESC, key DESC LIMIT :newest"  # noqa: S608 - our own
     since: dict[str, Any] = {f"quiet_{what}": int((time.time() - quiet) * 1e9) for what, quiet in QUIET.items()}
     since |= {"unclosed": UNCLOSED, "newest": newest or -1}
     rows = connection.execute(asked, values | since).fetchall()

@@ -52,6 +52,8 @@ class Journal:
         self.rows.append(StepRow(index, phase, value, start, end))
         if phase in ("hold", "sine"):
             self._last = self.rows[-1]
+        elif step.swept:  # it is no row of its own that could be marked, and the hold before it is not meant
+            self._last = None
 
     def void_last(self) -> StepRow | None:
         """Mark what was measured last as bad, by a row of its own; returns that row, None where there is none."""

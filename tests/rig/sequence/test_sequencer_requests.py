@@ -7,9 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_sequencer import FIXED, PERIOD, PROOF, SHORT, SLEW, TRIP, Ran, World, asks, in_state, run
 
-from rig.campaign.plan import FixedDwell, Plan, TareConfig
+from rig.campaign.plan import FixedDwell, Plan, Step, TareConfig
 from rig.campaign.shapes import Ramp, Sine
 from rig.link.front_end_messages import Request
+from rig.sequence.journal import Journal
 from rig.sequence.sequencer import Sequencer
 from rig.sequence.ticks import Tick
 
@@ -246,3 +247,13 @@ def test_what_means_nothing_before_the_first_hold_says_so():
     ran = run(SHORT, FIXED, at={3: asks("accept", "extend", "back", "bad")})
     for kind in ("accept", "extend", "back", "bad"):
         assert ran.said(f"{kind} ignored")
+
+
+def test_a_mark_after_a_sweep_never_falls_on_the_hold_before_it():
+    journal = Journal()
+    hold = Step(1, "hold", 4.0, 1.0, 1.0)
+    sweep = Step(2, "ramp", -4.0, 2.0, 2.0, from_voltage=4.0, swept=True)
+    journal.row("hold", hold, 4.0, 0.0, 1.0)
+    journal.row("ramp", sweep, -4.0, 1.0, 3.0)
+    assert journal.void_last() is None
+    assert [row.phase for row in journal.rows] == ["hold", "ramp"]
