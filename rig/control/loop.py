@@ -110,6 +110,8 @@ class Loop:
     _paces: Paces | None = None
     _sent: float | None = None
     """V of the last tick; None: nothing was sent."""
+    _sent_ns: int = 0
+    """When the last command went to the motor controller's driver."""
 
     def __post_init__(self) -> None:
         config = self.bench.config
@@ -151,7 +153,7 @@ class Loop:
         decision = decide(Inputs(now, tuple(samples), requests, trip, rotation, thrust_rest))
         sent = self._send(motor, decision, now) if motor is not None else decision.volts
         self._sent = sent
-        self._record(samples, sent, now_ns)
+        self._record(samples, sent, self._sent_ns if motor is not None and sent is not None else now_ns)
         self._show(now)
         self.clock.sleep_until_ns(self._due_ns)
 
@@ -263,6 +265,7 @@ class Loop:
         if volts is None:
             return
         self._note_command(volts, now)
+        self._sent_ns = self.clock.now_ns()
         try:
             motor.command(volts)
         except LinkError as error:
@@ -276,17 +279,17 @@ class Loop:
         elif self.driven_since is None:
             self.driven_since = now
 
-    def _record(self, samples: list[Sample], volts: float | None, now_ns: int) -> None:
+    def _record(self, samples: list[Sample], volts: float | None, sent_ns: int) -> None:
         since = self.recording_since_ns
         if since is None:
             return
         rows = [sample for sample in samples if sample.t_ns >= since]
         if self._recorded_command != (volts,):
             self._recorded_command = (volts,)
-            rows.append(Sample(COMMAND_STREAM, now_ns, (nan if volts is None else volts,)))
+            rows.append(Sample(COMMAND_STREAM, sent_ns, (nan if volts is None else volts,)))
         self.recorder.rows(rows)
         if self.watcher is not None:
-            self.watcher.rows(rows, now_ns * 1e-9)
+            self.watcher.rows(rows, sent_ns * 1e-9)
 
     def _show(self, now: float) -> None:
         since = self.recording_since_ns

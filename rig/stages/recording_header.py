@@ -20,8 +20,8 @@ BYTES_PER_VALUE = 8
 OVERHEAD_BYTES = 2**20
 """Layout, chunks begun and not filled, events."""
 OBEYED_STD = 0.002
-"""s from a command's row until it is obeyed, which nothing measures: the tick's own work, and two frames of 1 ms of an
-adapter on USB (USB 2.0, section 5.3.3)."""
+"""s from a command's row (when it went to the driver) until it is obeyed, which nothing measures: two frames of 1 ms of
+an adapter on USB (USB 2.0, section 5.3.3)."""
 COMMAND_CHANNEL = ChannelSpec(
     "command_voltage", "command_voltage", "V", delay_std=OBEYED_STD,
     description="what the motor controller was told; rows are changes; NaN: nothing was sent (watchdog proof)",

@@ -231,6 +231,23 @@ def test_commands_go_into_the_recording_as_changes(tmp_path):
         assert [volts for _, volts in world.motor.sent] == [0.0, 0.0, 3.0, 0.0]
 
 
+def test_a_command_is_stamped_when_it_leaves_and_not_when_its_tick_began(tmp_path):
+    with driven(tmp_path) as (world, _, __):
+        session, loop = world.session, world.session.loop
+        session.recorder.streams = ("load_cell", "motor", "command")
+        loop.begin_recording(world.clock.now_ns())
+
+        def slow(_: Inputs) -> Decision:
+            world.clock.stall(0.010)
+            return Decision(3.0)
+
+        began = world.clock.now_ns()
+        loop.tick(session.motor, slow)
+        world.recorder.step(0.0)
+        (row,) = [r for r in world.recorder.of(Rows) if r.stream == 2]
+        assert row.t_ns[0] == began + 10_000_000
+
+
 def test_requests_of_signals_and_front_ends_come_once_and_in_order(tmp_path):
     with virtual(tmp_path) as world:
         session, seen = world.session, []
