@@ -13,6 +13,7 @@ import numpy as np
 
 from sim_devices.bench.control import clear, fault, obey
 from sim_devices.bench.devices import say, serial_device, turnaround
+from sim_devices.bench.punctual import give_way, on_time
 from sim_devices.bench.settings import BenchSettings, DeviceOptions, load, script
 from sim_devices.bench.truth_log import TruthLog, header_fields, state_fields
 from sim_devices.instruments.motor_tap import MotorTap
@@ -90,7 +91,9 @@ class Bench:
         return (time.monotonic_ns() - self._start_ns) * 1e-9
 
     def run(self, stop: Callable[[], bool]) -> None:
-        """Live until `stop()` is true."""
+        """Live until `stop()` is true, ahead of what else the machine does where that is permitted."""
+        self.turn(self.now())
+        on_time()
         while not stop():
             self.turn(self.now())
             wait(self.ports, self.control, min(max(self._due() - self.now(), 0.0), LONGEST_SLEEP))
@@ -98,6 +101,7 @@ class Bench:
     def turn(self, t: float) -> None:
         """Bring everything up to t (s)."""
         if t - self._heard_at > STALL:
+            give_way()
             self._listen(t)
         self._run_script(t)
         self._advance(t)
