@@ -77,6 +77,9 @@ class Finding:
     """Whether it is of the stand, the cell or a channel: what is measured has it, the thruster's thrust has not."""
     since: Literal["", "changed", "not shown before"] = ""
     """Beside a twin: new since its own recordings, or nothing that those could have shown; empty: nobody asked."""
+    before: Mapping[str, Value] = field(default_factory=dict)
+    """Of an effect that a twin or a simulation has in the same form: its values there. Empty: it has it not, or has it
+    in addition."""
 
     def __post_init__(self) -> None:
         if self.bic_gain <= 0:

@@ -14,6 +14,7 @@ NOT_WHITE = (
     "should"
 )
 MISSING = "Missing from the model:"
+CHANGED = "Changed:"
 IN_MEASUREMENT = "In the measurement, not in the thruster:"
 MOST_REFUSED = 3
 """Names in a sentence: all of them are in the answer."""
@@ -62,11 +63,12 @@ def graded(f: Finding) -> str:
 
 
 def missing(told: Sequence[tuple[Finding, str]]) -> list[str]:
-    """Findings as they are told: those of the thruster first, and apart those of the stand, the cell and channels."""
-    of_thruster = [text for f, text in told if not f.in_measurement]
-    of_measurement = [text for f, text in told if f.in_measurement]
-    first = [MISSING, *of_thruster] if of_thruster else []
-    return [*first, *([IN_MEASUREMENT, *of_measurement] if of_measurement else [])]
+    """Findings as they are told: what the model lacks, what it has with other values, and apart from these what is of
+    the stand, the cell and channels."""
+    groups: dict[str, list[str]] = {MISSING: [], CHANGED: [], IN_MEASUREMENT: []}
+    for f, text in told:
+        groups[IN_MEASUREMENT if f.in_measurement else CHANGED if f.before else MISSING].append(text)
+    return [part for head, texts in groups.items() if texts for part in (head, *texts)]
 
 
 def beyond_noise(error: float, noise: float) -> float:

@@ -102,6 +102,8 @@ def _finding(f: Finding) -> Iterator[str]:
     yield from _para(f.statement, "  ")
     if f.parameters:
         yield from _para(_values({v.told or name: v for name, v in f.parameters.items()}), "  ")
+    if f.before:
+        yield from _para(f"before: {_values({v.told or name: v for name, v in f.before.items()})}", "  ")
     evidence = (rarity(f.p_value), sureness(f), f"BIC better by {f.bic_gain:.4g}")
     yield from _para(", ".join(part for part in evidence if part), "  ")
     if f.grade != "all":

@@ -56,36 +56,53 @@ def with_twin(
     if before is None:
         return draft
     known = before.origin
-    findings = tuple(_relative(f, before, known) for f in draft.findings)
+    model, was = estimate.fit.model, given_values(before)
+    anew = {(t.id, t.form) for t in model.terms if model.given_for(t) is not None}
+    effects = {effect for effect, _ in anew}
+    findings = tuple(_relative(f, before, (f.effect, f.form) in anew, was) for f in draft.findings)
     changed = changed_constant(before, estimate, data, known, draft.model["C"].unit)
     if changed is not None and (findings or beside) and _little(changed):
         draft = replace(draft, notes=(*draft.notes, f"{changed.statement} {PART_OF_IT}"))
     elif changed is not None:
         findings = (*findings, changed)
-    was = given_values(before)
     of_twin = ", ".join(dict.fromkeys(t.effect for t in before.terms))
     return replace(
         draft,
         findings=findings,
         baseline_model=f"{known} ({draft.baseline_model}{' with ' + of_twin if of_twin else ''})",
         baseline={**draft.baseline, **was},
-        model_terms=(*(t.effect for t in before.terms), *draft.model_terms),
-        model={**was, **_renamed(draft.model, was)},
+        model_terms=(*(t.effect for t in before.terms), *(e for e in draft.model_terms if e not in effects)),
+        model={**was, **_renamed(draft.model, was, effects)},
     )
 
 
-def _relative(finding: Finding, before: Twin, known: str) -> Finding:
-    """What is found of an effect that the baseline has already comes on top of it."""
+def _relative(finding: Finding, before: Twin, anew: bool, was: Mapping[str, Value]) -> Finding:
+    """What is found of an effect that the baseline has already is a change of it, or comes on top of it."""
     if all(term.effect != finding.effect for term in before.terms):
         return finding
-    return replace(finding, statement=f"On top of what {known} has: {finding.statement}")
+    if not anew:
+        return replace(finding, statement=f"On top of what {before.origin} has: {finding.statement}")
+    then = {name: was[f"{finding.effect}.{name}"] for name in finding.parameters}
+    values = ", ".join(_then(name, value) for name, value in then.items())
+    return replace(
+        finding, statement=f"{finding.statement} {_sentence(before.origin)} has it with {values}.", before=then
+    )
 
 
-def _renamed(found: Mapping[str, Value], was: Mapping[str, Value]) -> dict[str, Value]:
+def _sentence(text: str) -> str:
+    return text[:1].upper() + text[1:]
+
+
+def _then(name: str, then: Value) -> str:
+    unit = "" if then.unit in ("", "1") else f" {then.unit}"
+    return f"{then.told or name.replace('_', ' ')} {then.value:.4g}{unit}"
+
+
+def _renamed(found: Mapping[str, Value], was: Mapping[str, Value], anew: Collection[str]) -> dict[str, Value]:
     out = {}
     for name, value in found.items():
         effect, dot, parameter = name.partition(".")
-        out[f"{effect}#2{dot}{parameter}" if name in was else name] = value
+        out[f"{effect}#2{dot}{parameter}" if name in was and effect not in anew else name] = value
     return out
 
 
@@ -127,7 +144,8 @@ def changed_constant(twin: Twin, estimate: Estimate, data: Data, known: str, uni
     share = 100 * (value - was) / abs(was)
     says = f"Thrust constant: {value:.4g} {unit} where {known} has {was:.4g} ({share:+.2g} %, {abs(z):.0f} sigma)."
     parameters = {"C": Value(value, std, unit), "before": Value(was, was_std, unit)}
-    return Finding("thrust_constant", "", says, parameters, p, bic_gain, 1.0, ())
+    then = {"C": parameters["before"]}
+    return Finding("thrust_constant", "", says, parameters, p, bic_gain, 1.0, (), before=then)
 
 
 def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], before: Twin | None) -> Twin:

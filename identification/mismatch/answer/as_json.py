@@ -100,6 +100,7 @@ def _finding(f: Finding) -> dict[str, object]:
         "channels": list(f.channels),
         "recording": f.recording or None,
         "since": f.since or None,
+        "before": _values(f.before),
         "rivals": [r.effect for r in f.rivals],
         "rival_details": [
             {

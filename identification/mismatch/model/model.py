@@ -32,6 +32,18 @@ class Model:
     terms: tuple[Term, ...] = ()
     given: tuple[Given, ...] = ()
 
+    @property
+    def held(self) -> tuple[Given, ...]:
+        """Of the baseline, what acts: a term that is fitted anew takes the place of the one given."""
+        return tuple(g for g in self.given if not any(self.given_for(t) is g for t in self.terms))
+
+    def given_for(self, term: Term) -> Given | None:
+        """What the baseline has of the same effect in the same textbook form, once: `term` is then a change of it."""
+        if term not in ORDER:
+            return None
+        known = [g for g in self.given if (g.term.id, g.term.form) == (term.id, term.form)]
+        return known[0] if len(known) == 1 else None
+
     def plus(self, term: Term) -> Model:
         return replace(self, terms=tuple(sorted((*self.terms, term), key=_place)))
 
@@ -59,7 +71,7 @@ def acting(model: Model, theta: Theta, scale: Scale) -> list[Acting]:
     found = [(term, values, scale) for term, values in zip(model.terms, theta.terms, strict=True)]
     if not model.given:
         return found
-    return sorted([(g.term, g.values, g.scale) for g in model.given] + found, key=lambda each: _place(each[0]))
+    return sorted([(g.term, g.values, g.scale) for g in model.held] + found, key=lambda each: _place(each[0]))
 
 
 def reduced(model: Model, theta: Theta, without: Collection[Term]) -> tuple[Model, Theta]:

@@ -207,6 +207,6 @@ def _dynamics(model: Model, theta: Theta, largest: float) -> list[Dynamics]:
 
 def _every(model: Model, theta: Theta, largest: float) -> list[tuple[Term, tuple[float, ...], float]]:
     """Terms given and found, with the driver that their values refer to."""
-    given = [(each.term, each.values, each.scale.driver) for each in model.given]
+    given = [(each.term, each.values, each.scale.driver) for each in model.held]
     found = zip(model.terms, theta.terms, strict=True)
     return [*given, *((term, values, largest) for term, values in found)]

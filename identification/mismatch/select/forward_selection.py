@@ -122,8 +122,13 @@ def beginning(
     data, theta = start(histories)
     data, theta, first = given(data, theta) if given is not None else (data, theta, Model())
     data = replace(data, bands=bands)
-    terms = available(data, without)
+    terms = tuple(t for t in available(data, without) if _beside(first, t))
     return data, terms, baseline(data, theta, terms, first)
+
+
+def _beside(known: Model, term: Term) -> bool:
+    """Whether a term may be sought beside the baseline: what that has of an effect changes in its own form."""
+    return all(term.id != g.term.id or term.form == g.term.form for g in known.given)
 
 
 def resumed(found: Selected, estimate: Estimate, rng: np.random.Generator, watch: Observer = UNWATCHED) -> Selected:

@@ -26,7 +26,7 @@ from identification.mismatch.select.family_wise import (
     surrogate_scores,
 )
 from identification.mismatch.select.likeliest_trials import likeliest_jumps, likeliest_rings
-from identification.physics.term import Term
+from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 
 VALLEYS = 3
@@ -39,6 +39,8 @@ MOST_RINGS = 4
 """Frequencies of a ringing stand that are tried beside the term's own, the likeliest first."""
 TICKS = (-1, 1, 2, 3)
 """Delays that are tried, in ticks of the command: whole ones look alike."""
+CHANGE = 0.02
+"""By which a value of the baseline is moved, relative to it."""
 SLOW_TICK = 0.5
 """s: a command that changes no faster does not tick on."""
 
@@ -92,7 +94,7 @@ class Screening:
 
 def refined(fit: Fit, data: Data, weights: Weights, term: Term, values: tuple[float, ...]) -> tuple[float, ...]:
     """The best trial closely round `values`, for terms that have such."""
-    trials = term.finer(values, data.scale)
+    trials = () if fit.model.given_for(term) else term.finer(values, data.scale)
     if not trials:
         return values
     if term.traits.delay:
@@ -140,7 +142,7 @@ def directions(
     rate: list[list[Floats]] = [[] for _ in data.histories]
     ticks: list[list[Floats]] = [[] for _ in base_ticks]
     for term in terms:
-        first = term.parameters(data.scale)[0]
+        first, changed = term.parameters(data.scale)[0], fit.model.given_for(term) is not None
         for trial in _trials(term, fit, data, weights, basis) if trials is None else trials:
             bigger, theta = fit.more(term, trial)
             new_thrust, new_rate = raw(bigger, theta, data, with_rate=with_rate)
@@ -152,7 +154,7 @@ def directions(
                 column.append(new - base)
             used.append(term)
             values.append(trial)
-            sided.append(first.neutral in (first.low, first.high))
+            sided.append(not changed and first.neutral in (first.low, first.high))
     if not used:
         return Directions((), (), (), np.empty((fit.residual.size, 0)), np.empty(0))
     columns = weights.whiten(
@@ -188,7 +190,13 @@ def _unit(found: Directions, before: Floats) -> Directions:
 
 
 def _trials(term: Term, fit: Fit, data: Data, weights: Weights, basis: Floats) -> list[tuple[float, ...]]:
-    """The term's own; for a jump of the zero, for a delay and for ringing also those that the data point to."""
+    """The term's own; for a jump of the zero, for a delay and for ringing also those that the data point to.
+
+    Of one that the baseline has: each of its values moved a little.
+    """
+    was = fit.model.given_for(term)
+    if was is not None:
+        return _moved(was.values, term.parameters(data.scale))
     found = list(term.trials(data.scale))
     if term.traits.delay:  # ticks of a ramp meet the samples as before only when whole ones have passed
         found += [(k * tick,) for tick in {h.tick for h in data.histories if h.tick < SLOW_TICK} for k in TICKS]
@@ -197,6 +205,15 @@ def _trials(term: Term, fit: Fit, data: Data, weights: Weights, basis: Floats) -
     if term.traits.frequency and weights.ticks:
         found += likeliest_rings(fit, data, term, MOST_RINGS)
     return found
+
+
+def _moved(values: tuple[float, ...], known: tuple[Parameter, ...]) -> list[tuple[float, ...]]:
+    out = []
+    for j, (value, p) in enumerate(zip(values, known, strict=True)):
+        step = CHANGE * max(abs(value), 0.02 * (p.high - p.low))
+        moved = value + step if value + step <= p.high else value - step
+        out.append((*values[:j], moved, *values[j + 1 :]))
+    return out
 
 
 def screen(fit: Fit, found: Directions, rng: np.random.Generator, allowed: Floats | None = None) -> Screening:

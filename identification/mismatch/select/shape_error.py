@@ -29,7 +29,7 @@ def corrections(fitted: Fit, data: Data, weights: Weights) -> list[Floats]:
 
 def of_twin(fitted: Fit, data: Data, weights: Weights) -> list[Floats]:
     """The same of each term that a twin gave, as much less as its shape is trusted more than that of one found."""
-    every = fitted.model.given
+    every = fitted.model.held
     less = [(replace(fitted.model, given=every[:i] + every[i + 1 :]), fitted.theta) for i in range(len(every))]
     share = policy.compare.TWIN_SHAPE_ERROR / policy.select.SHAPE_ERROR
     return [share * change for change in _changes(less, fitted, data, weights)]

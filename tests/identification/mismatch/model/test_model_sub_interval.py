@@ -116,8 +116,8 @@ def test_what_a_twin_gives_is_passed_on_as_what_is_found(moving):
 
 def test_a_lag_on_top_of_a_given_one_passes_ticks_on_as_one_of_both_times(moving):
     data = moving[0]
-    theta = Theta(C, ((0.02,),), (0.0,))
-    both = Model((LAG,), (Given(LAG, (0.08,), data.scale),))
+    theta = Theta(C, (), (0.0,))
+    both = Model((), tuple(Given(LAG, (tau,), data.scale) for tau in (0.08, 0.02)))
     one, _ = raw(Model((LAG,)), Theta(C, ((0.1,),), (0.0,)), data, with_rate=False)
     two, _ = raw(both, theta, data, with_rate=False)
     smooth = [
