@@ -89,4 +89,14 @@ def _truth(found: Drawn, case: Case) -> dict[str, Any]:
     on = found.bench
     chain = {"name": on.name, "host": asdict(on.host), "loop_rate": on.loop_rate, "filter_time": on.cell.filter_time}
     chain |= {"devices": {name: asdict(options) for name, options in on.devices.items()}}
-    return truth(case) | {"bench": chain, "thruster": asdict(case.thruster)}
+    told, (run,) = truth(case), case.runs
+    effects = [_on_its_clock(effect, run.start) for effect in told["effects"]]
+    return told | {"effects": effects, "bench": chain, "thruster": asdict(case.thruster)}
+
+
+def _on_its_clock(effect: Mapping[str, Any], start: float) -> dict[str, Any]:
+    """The bench had run for `start` s when the recording began: an instant is told by the recording's clock."""
+    known = dict(effect["parameters"])
+    if "start" in known:
+        known["start"] -= start
+    return {**effect, "parameters": known}

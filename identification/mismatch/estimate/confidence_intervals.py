@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from math import log, sqrt
+from math import hypot, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,17 +52,18 @@ class Interval:
 
 
 def intervals(fitted: Fit, data: Data, weights: Weights, terms: Collection[Term]) -> dict[Term, tuple[Interval, ...]]:
-    """Of all parameters of those of its `terms`."""
+    """Of all parameters of those of its `terms`. Of a delay no closer than what the recordings say of their own."""
     out = {}
     for term in fitted.model.terms:
         if term in terms:
             known = enumerate(term.parameters(data.scale), fitted.layout.of(term).start)
-            out[term] = tuple(_interval(fitted, data, weights, j, p) for j, p in known)
+            unsure = QUANTILE * max(h.delay_std for h in data.histories) if term.traits.delay else 0.0
+            out[term] = tuple(_interval(fitted, data, weights, j, p, unsure) for j, p in known)
     return out
 
 
-def _interval(fitted: Fit, data: Data, weights: Weights, j: int, known: Parameter) -> Interval:
-    """Of theta's parameter `j`."""
+def _interval(fitted: Fit, data: Data, weights: Weights, j: int, known: Parameter, unsure: float = 0.0) -> Interval:
+    """Of theta's parameter `j`; `unsure`: how far it may be off, whatever the residual says."""
     _, _, step = bounds_of(fitted.model, data, fitted.theta)
     value = float(fitted.theta.vector[j])
     wanted = JUMPS if known.jumps else QUANTILE
@@ -70,7 +71,7 @@ def _interval(fitted: Fit, data: Data, weights: Weights, j: int, known: Paramete
     profiles = [Profile(fitted, data, weights, j, jumps=known.jumps) for _ in range(2)]
     ends = (_end(p, wanted, value, bound, first) for p, bound in zip(profiles, (known.low, known.high), strict=True))
     # a level so near counts as half beyond a spread threshold, wholly beyond a sharp one
-    far = [abs(end - value) + 0.5 * known.blur for end in ends]
+    far = [hypot(abs(end - value) + 0.5 * known.blur, unsure) for end in ends]
     return Interval(max(value - far[0], known.low), min(value + far[1], known.high))
 
 

@@ -45,11 +45,18 @@ class Estimate:
 def fit_without(estimate: Estimate, term: Term, data: Data, hopeless: float = np.inf) -> Fit:
     """The model without one of its terms, refitted with the same noise; once for all who ask as closely.
 
+    Without a delay the clocks begin as far apart as it was: ticks make a hollow of each delay, and a fit that began in
+    another one would stay there.
+
     `hopeless`: chi-square of which it is enough to know that it is more.
     """
 
     def made() -> Fit:
-        return fit(*estimate.fit.less(term), data, estimate.weights, hopeless=hopeless, near=estimate.fit)
+        model, theta = estimate.fit.less(term)
+        if term.traits.delay:
+            (delay,) = estimate.fit.values[term]
+            theta = replace(theta, shift=min(max(delay, -data.most_shift), data.most_shift))
+        return fit(model, theta, data, estimate.weights, hopeless=hopeless, near=estimate.fit)
 
     found: Fit = data.predictor.once(("without", term, hopeless), made, estimate, data)
     return found

@@ -45,6 +45,19 @@ def level_variance(scatter: float, quantum: float) -> float:
     return quantum**2 * float(np.interp(scatter / quantum**2, noise**2 + 1 / 12 - common, common, right=0.0))
 
 
+def rounding_wave(scatter: float, quantum: float) -> float:
+    """N, the largest wave that rounding makes of readings that pass over steps evenly: of b, k = 1. `scatter`: N^2,
+    variance of samples about what moves, s^2 + q^2/12 there.
+
+    >>> [round(rounding_wave(s**2 + 1 / 12, 1.0), 3) for s in (0.0, 0.1, 1.0)]
+    [0.318, 0.261, 0.0]
+    """
+    if not quantum > 0:
+        return 0.0
+    s = max(scatter / quantum**2 - 1 / 12, 0.0)
+    return float(quantum / np.pi * np.exp(-2 * np.pi**2 * s))
+
+
 def rounding_errors(h: History, C: float) -> Floats:
     """(M, k) N: what readings of the thrust C V|V| may be off by as they were rounded, each column one standard
     deviation and common to readings that are alike; none where noise hides it."""

@@ -144,7 +144,10 @@ def _likeliest(
 
 
 def _passes(candidate: OrderCandidate, alarm: float, in_turns: bool) -> bool:
-    """A ratio that is no whole one must be much clearer, where angles are the propeller's."""
+    """A ratio that is no whole one must be much clearer, where angles are the propeller's; a wave of several turns is
+    none of the rotor."""
+    if in_turns and candidate.ratio < policy.periodic.FEWEST_A_TURN:
+        return False
     whole = not in_turns or _is_whole(candidate)
     return candidate.p_value < (alarm if whole else policy.periodic.ODD_ORDER_SHARE * alarm)
 

@@ -16,6 +16,7 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
+from identification.mismatch.noise.rounding_error import rounding_wave
 from identification.mismatch.periodic.full_rate import scale_std_of, series_of, with_scale
 from identification.mismatch.periodic.periodic_disturbances import Line, find_lines
 from identification.mismatch.periodic.resonances import find_bands
@@ -63,11 +64,20 @@ def run(fitted: Fit, data: Data, originals: Sequence[History]) -> Cleaned:
 def _lines(fitted: Fit, data: Data, series: Sequence[Series]) -> tuple[Line, ...]:
     has_rate = all("rotation_rate" in (h.driver_quantity, *h.others) for h in data.histories)
     unit: Literal["rev", "V s"] = "rev" if has_rate else "V s"
-    lines = find_lines(series, turns_unit=unit, ring=_ring(fitted, data))
+    least = max(_of_rounding(s, h) for s, h in zip(series, data.histories, strict=True))
+    lines = tuple(
+        line for line in find_lines(series, turns_unit=unit, ring=_ring(fitted, data)) if line.amplitude > least
+    )
     if not lines or not data.with_rate:
         return lines
     scale_std = scale_std_of(fitted, data)
     return tuple(with_scale(line, scale_std, series) for line in lines)
+
+
+def _of_rounding(series: Series, history: History) -> float:
+    """N: a wave no larger may be made by the steps of the reading, over which the thrust passes as the plan has it."""
+    left = series.residual[np.isfinite(series.residual)]
+    return rounding_wave(float(np.var(left)), history.quantum) if left.size else 0.0
 
 
 def _ring(fitted: Fit, data: Data) -> tuple[float, float, float] | None:

@@ -103,6 +103,18 @@ LOWEST_ORDER = Threshold(
     unit="Hz at the highest speed",
     reason="Slower than a turn or so nothing is locked to a rotor.",
 )
+FEWEST_A_TURN = Threshold(
+    0.3,
+    unit="periods a turn",
+    reason=(
+        "The slowest that a rotor makes by itself is the whirl in its bearings, 0.42 to 0.48 times a turn (Muszynska, "
+        "Rotordynamics, 2005, ch. 4): what comes more seldom is the plan's, or noise."
+    ),
+    evidence=(
+        "wide_near_steps and wide_quantised of draw 2027-06-06: 0.136 and 0.036 periods a turn in two of 204 clean "
+        "recordings."
+    ),
+)
 STEADY_SPEED = Threshold(
     0.05,
     unit="share of its speed",

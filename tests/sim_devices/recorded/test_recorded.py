@@ -93,6 +93,21 @@ def test_a_case_is_recorded_and_sealed(tmp_path):
     assert "asymmetry" not in json.dumps([found.attributes, [event.text for event in found.events]])
 
 
+def test_an_instant_is_sealed_by_the_clock_of_the_recording(tmp_path):
+    """The bench runs for a second or two before a recording begins."""
+    asked = {"token": "abc", "seed": [5], "bench": "tunnel", "effects": ["zero_offset"], "strength": 500.0}
+    conceal(asked | {"plan": "interleaved", "duration": 40.0}, tmp_path, record_in_virtual_time)
+    (effect,) = json.loads((tmp_path / "sealed" / "abc.json").read_text(encoding="utf-8"))["effects"]
+    found = load(tmp_path / "open" / "abc" / "0.h5")
+    thrust, command = found.first_of("thrust"), found.first_of("command_voltage")
+    F = thrust.value - np.median(thrust.value)
+    volts = command.value[np.maximum(np.searchsorted(command.time, thrust.time, side="right") - 1, 0)]
+    left = F - F @ (volts * np.abs(volts)) / np.sum(volts**4) * volts * np.abs(volts)
+    jump = [np.var(left[:k]) * k + np.var(left[k:]) * (left.size - k) for k in range(20, left.size - 20)]
+    at = thrust.time[20 + int(np.argmin(jump))]
+    assert at == pytest.approx(effect["parameters"]["start"], abs=0.2)
+
+
 def test_a_run_that_does_not_come_to_its_end_is_said_in_the_seal(tmp_path):
     def broken(*_):
         raise RuntimeError("the run ended tripped: too hot")

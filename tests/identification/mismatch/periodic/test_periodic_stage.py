@@ -135,3 +135,11 @@ def test_the_scale_of_turns_has_the_error_of_the_rate_and_a_line_inherits_it():
     fixed = replace(line, kind="fixed", ratio=None, ratio_std=None, rival=line)
     told = with_scale(fixed, 0.001, series)
     assert (told.frequency_std, told.rival.ratio_std) == (0.1, found.ratio_std)
+
+
+@pytest.mark.parametrize(("digit", "kept"), [(0.0, 1), (8.0, 0)])
+def test_a_wave_that_the_steps_of_a_reading_can_make_is_no_line(digit, kept):
+    data, estimate = known_noise({}, [noisy(change=hum(size=0.5))])
+    coarse = tuple(replace(h, quantum=digit) for h in data.histories)
+    found = stage.run(estimate.fit, replace(data, histories=coarse), coarse)
+    assert len(found.lines) == kept
