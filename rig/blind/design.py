@@ -39,6 +39,8 @@ FIELD_EFFECTS: Final = range(2, 7)
 """Effects of field size in one recording; each number of them is a label: 20 seeds are 100 cases."""
 MORE_PER_SEED, UNCHANGED_PER_SEED = 3.0, 1.5
 """Second recordings with one effect more and with none: 20 seeds are 60 and 30."""
+CHANGED_PER_SEED = 3.0
+"""Second recordings in which one of the effects has another amount: 20 seeds are 60."""
 FIRST_EFFECTS: Final = range(2, 6)
 """Effects of field size in the first recording of a difference."""
 
@@ -243,20 +245,24 @@ def _recorded(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -
 
 
 def _composites(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -> Iterator[tuple[float, Job]]:
-    """Several effects of field size at once; and a thruster with such a composite again, with one more or none."""
+    """Several effects of field size at once; and a thruster with such a composite again, with one more, with another
+    amount of one, or as it was."""
     known = [effect for effect in world.field if effect in catalogue]
     more = [effect for effect in world.added if effect in catalogue]
     for count in FIELD_EFFECTS:
         for place, job in _many("field", f"{count}_effects", seeds if count <= len(known) else 0, {}):
             yield place, Job(job.id, {"field": _some(known, count, _rng(job, draw))}, job.orders)
     fewest = FIRST_EFFECTS[0] <= len(known)
-    for label, per_seed in (("one_more", MORE_PER_SEED), ("nothing", UNCHANGED_PER_SEED)):
+    labels = (("one_more", MORE_PER_SEED), ("nothing", UNCHANGED_PER_SEED), ("changed", CHANGED_PER_SEED))
+    for label, per_seed in labels:
         for place, job in _many("difference", label, int(np.ceil(per_seed * seeds)) if fewest else 0, {}):
             rng = _rng(job, draw)
             first = _some(known, min(int(rng.choice(FIRST_EFFECTS)), len(known)), rng)
             spec: dict[str, Any] = {"field": first, "more": "", "strength": STRENGTHS["clear"]}
             if label == "one_more":
                 spec["more"] = str(rng.choice([effect for effect in more if effect not in first]))
+            if label == "changed":
+                spec["changed"] = str(rng.choice(first))
             yield place, Job(job.id, spec, job.orders)
 
 

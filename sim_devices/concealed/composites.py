@@ -1,4 +1,5 @@
-"""Several effects at once, as much of each as the field has; and the same thruster again, with one effect more or none.
+"""Several effects at once, as much of each as the field has; and the same thruster again, with one effect more, with
+another amount of one, or as it was.
 
 Amounts are drawn here, and the strength at which an oracle sees each effect beside the others follows from them: the
 other way round than in `draw.case`.
@@ -17,6 +18,7 @@ from sim_devices.concealed.cases.needs import NEEDS_DRIFT, NEEDS_FLOW, NEEDS_ROT
 from sim_devices.concealed.cases.plans import KINDS
 from sim_devices.concealed.cases.shapes import SHAPES, shape
 from sim_devices.concealed.draw import TRIES, Rng, bare, one_run
+from sim_devices.concealed.visibility.amounts import changed_at
 from sim_devices.concealed.visibility.oracle import OutOfReach, added_at, measured
 
 ADDED: Final = tuple(e for e in SHAPES if e not in NEEDS_FLOW | NEEDS_DRIFT | NEEDS_ROTATION | {"thruster_interaction"})
@@ -62,24 +64,28 @@ def difference(
     noise: str = "",
     sampling: float = 0.0,
     duration: float = 0.0,
+    changed: str = "",
 ) -> Difference:
     """A composite of `effects`, and the thruster again with `more` beside them at `strength` sigma; "" is nothing.
 
-    The plan of the second run is drawn. Raises OutOfReach when no pair of TRIES shows it so, ValueError for a name that
-    is not known.
+    `changed`: one of `effects` instead, of which the second run has less or more, as is seen at `strength`. The plan of
+    the second run is drawn. Raises OutOfReach when no pair of TRIES shows it so, ValueError for a name that is not
+    known.
     """
     if more and (more not in ADDED or more in effects):
         raise ValueError(f"more: expected one of {', '.join(e for e in ADDED if e not in effects)}, got {more!r}")
+    if changed and (more or changed not in effects):
+        raise ValueError(f"changed: expected one of {', '.join(effects)} and nothing more, got {changed!r}, {more!r}")
     for _ in range(TRIES):
         first = composite(rng, effects, plan=plan, noise=noise, sampling=sampling, duration=duration)
         try:
-            return Difference(first, _again(first, rng, more, strength))
+            return Difference(first, _again(first, rng, more, strength, changed))
         except OutOfReach:
             continue
-    raise OutOfReach(f"no pair of {TRIES} shows {more} at {strength} sigma; expected a lower strength")
+    raise OutOfReach(f"no pair of {TRIES} shows {more or changed} at {strength} sigma; expected a lower strength")
 
 
-def _again(first: Case, rng: Rng, more: str, strength: float) -> Case:
+def _again(first: Case, rng: Rng, more: str, strength: float, changed: str) -> Case:
     """Another run on another day, of another plan and with another zero. Raises OutOfReach."""
     flows = any(speed for run in first.runs for _, speed in run.flow)
     long = first.runs[0].profile.duration
@@ -89,4 +95,4 @@ def _again(first: Case, rng: Rng, more: str, strength: float) -> Case:
     if more:
         added = Concealed(shape(more, first.scale, rng), 0.0)
         second = added_at(replace(second, effects=(*second.effects, added)), more, strength)
-    return measured(second)
+    return changed_at(measured(second), changed, strength, rng) if changed else measured(second)

@@ -1,4 +1,4 @@
-"""Figures of several effects of field size at once, and of one effect more in a second recording. Pure."""
+"""Figures of several effects of field size at once, and of one more or another amount in a second recording. Pure."""
 
 from __future__ import annotations
 
@@ -32,12 +32,15 @@ def field_goals(scores: Sequence[Score]) -> list[Goal]:
 
 def difference_goals(scores: Sequence[Score]) -> list[Goal]:
     """Of a second recording against the twin of the first."""
-    more, nothing = _labelled(scores, "one_more"), _labelled(scores, "nothing")
+    more, nothing, changed = (_labelled(scores, label) for label in ("one_more", "nothing", "changed"))
     return [
         of_rate("difference, one more: right or among stated rivals", rate(s.right for s in more), least=0.95),
         of_rate("difference, one more: exactly it", rate(s.exact for s in more), least=0.85),
         of_rate("difference, one more: wrong names", rate(s.wrong for s in more), most=0.02),
         of_rate("difference, nothing changed: alarms", rate(not s.right for s in nothing), most=0.03),
+        of_rate("difference, another amount: right or among stated rivals", rate(s.right for s in changed), least=0.95),
+        of_rate("difference, another amount: exactly it", rate(s.exact for s in changed), least=0.85),
+        of_rate("difference, another amount: wrong names", rate(s.wrong for s in changed), most=0.02),
     ]
 
 

@@ -14,8 +14,8 @@ left to chance: `effects`, `strength`, `forms`, `noise`, `plan`, `lie`, `runs`, 
 
 With `field`, a list of effects in the place of `effects`, their amounts are drawn as the field has them
 (`composites.composite`); with `more` as well the thruster is recorded a second time, `more` concealed beside them at
-`strength`, or nothing where it is empty. The seal is then that of the second run: `known` are the effects of both,
-`first` is the truth of the first.
+`strength`, or nothing where it is empty, or with another amount of the effect `changed`. The seal is then that of the
+second run: `known` are the effects of both, as they were; `first` is the truth of the first.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ KINDS: Mapping[str, Any] = {
 """What may be asked for, and of what world."""
 CHOSEN = ("effects", "strength", "forms", "noise", "plan", "lie", "runs", "sampling", "duration", "wiring")
 CHOSEN_OF_COMPOSITES = ("noise", "plan", "sampling", "duration")
-KNOWN = frozenset({"token", "seed", "world", "rivals", "field", "more", *CHOSEN})
+KNOWN = frozenset({"token", "seed", "world", "rivals", "field", "more", "changed", *CHOSEN})
 NEAREST = 5
 """Twins that go into the seal."""
 AGAIN = "again"
@@ -92,7 +92,7 @@ def conceal(asked: Mapping[str, Any], out: Path) -> None:
     told = _recorded(case, folder)
     if second is not None:
         folder = folder / AGAIN
-        known = [c.effect for c in case.effects]
+        known = [c.effect for c in case.effects if c.effect != asked.get("changed")]
         told, case = _recorded(second, folder) | {"known": known, "first": told}, second
     told |= {"asked": dict(asked), "thruster": asdict(case.thruster), "error": None}
     if asked.get("rivals") and case.effects:
@@ -118,7 +118,8 @@ def _cases(asked: Mapping[str, Any], rng: np.random.Generator) -> tuple[Case, Ca
     if "more" not in asked:
         return composite(rng, asked["field"], **chosen), None
     strength = {"strength": asked["strength"]} if "strength" in asked else {}
-    both = difference(rng, asked["field"], asked["more"], **strength, **chosen)
+    changed = str(asked.get("changed", ""))
+    both = difference(rng, asked["field"], asked["more"], **strength, **chosen, changed=changed)
     return both.first, both.second
 
 

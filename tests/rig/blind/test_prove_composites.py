@@ -27,13 +27,17 @@ def test_the_lanes_have_their_labels_and_shares():
     count = {
         label: sum(job.id.startswith(f"{label}/") for job in jobs) for label in {j.id.rsplit("/", 1)[0] for j in jobs}
     }
-    assert count == {"field/2_effects": 20, "field/3_effects": 20, "difference/one_more": 60, "difference/nothing": 30}
+    both = {"difference/one_more": 60, "difference/nothing": 30, "difference/changed": 60}
+    assert count == {"field/2_effects": 20, "field/3_effects": 20, **both}
     for job in jobs:
         assert set(job.spec["field"]) <= {"asymmetry", "dead_band", "heating"}  # fouling is in no catalogue
         if job.id.startswith("field/"):
             assert len(job.spec["field"]) == int(job.id.split("/")[1][0])
         elif job.id.startswith("difference/nothing/"):
             assert job.spec["more"] == ""
+        elif job.id.startswith("difference/changed/"):
+            assert job.spec["more"] == ""
+            assert job.spec["changed"] in job.spec["field"]
         else:
             assert job.spec["more"] in {"exponent", "time_skew", "dead_band"} - set(job.spec["field"])
             assert job.spec["strength"] == 15.0
@@ -98,18 +102,23 @@ def test_figures_of_differences():
         again("one_more", one, "exponent"),
         again("nothing", (), said="adequate"),
         again("nothing", (), "thrust_constant"),
+        again("changed", one, "heating"),
+        again("changed", one, "heating", "dead_band"),
     ]
-    assert [s.good for s in scores] == [True, True, False, False, False, True, False]
+    assert [s.good for s in scores] == [True, True, False, False, False, True, False, True, False]
     found = {g.what.removeprefix("difference, "): (g.value, g.n) for g in difference_goals(scores)}
     assert found == {
         "one more: right or among stated rivals": (0.8, 5),
         "one more: exactly it": (0.4, 5),
         "one more: wrong names": (0.2, 5),
         "nothing changed: alarms": (0.5, 2),
+        "another amount: right or among stated rivals": (1.0, 2),
+        "another amount: exactly it": (0.5, 2),
+        "another amount: wrong names": (0.0, 2),
     }
     besides = {g.what: (g.value, g.n) for g in composite_besides((), scores)}
     assert besides["difference, one more: exactly it, and no rival stated"] == (0.2, 5)
-    assert besides["difference: a thrust constant that is said to have changed"] == (pytest.approx(2 / 7), 7)
+    assert besides["difference: a thrust constant that is said to have changed"] == (pytest.approx(2 / 9), 9)
 
 
 def test_what_the_first_could_not_show_is_claimed_where_nothing_else_is():

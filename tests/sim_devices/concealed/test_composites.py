@@ -11,6 +11,7 @@ from sim_devices.concealed.cases.field_size import warm_change
 from sim_devices.concealed.cases.shapes import shape
 from sim_devices.concealed.sealing.on_disc import KINDS, conceal
 from sim_devices.concealed.visibility.oracle import added_at, measured, with_amount
+from sim_devices.concealed.visibility.projection import Projection, signals
 from sim_devices.tables import WorldError
 
 SHORT = {"duration": 90.0, "sampling": 25.0, "plan": "interleaved"}
@@ -77,6 +78,27 @@ def test_nothing_more_is_the_same_thruster_again():
     both = concealed.difference(rng(2), TWO, "", **SHORT)
     assert [e.parameters for e in both.second.effects] == [e.parameters for e in both.first.effects]
     assert not np.array_equal(both.second.runs[0].profile.volts, both.first.runs[0].profile.volts)
+
+
+@pytest.mark.parametrize("effect", ["asymmetry", "winding_resistance"])
+def test_another_amount_of_one_is_seen_as_asked_and_the_other_stays(effect):
+    both = concealed.difference(rng(2), TWO, "", 15.0, noise="white", changed=effect, **SHORT)
+    (before,), (now,) = ([e for e in case.effects if e.effect == effect] for case in (both.first, both.second))
+    (other,), (same,) = ([e for e in case.effects if e.effect != effect] for case in (both.first, both.second))
+    factor = now.amount / before.amount
+    assert 1.019 <= max(factor, 1 / factor) <= 2.5
+    assert now.seen >= 0.95 * 15.0
+    assert same.amount == other.amount
+    old = signals(with_amount(both.second, effect, before.amount))
+    seen = Projection(both.second, old).strength(signals(both.second), old)
+    assert now.seen == pytest.approx(seen, rel=1e-6), "the strength is that of the change"
+
+
+def test_a_change_that_nobody_could_see_is_out_of_reach():
+    with pytest.raises(concealed.OutOfReach, match="shows asymmetry"):
+        concealed.difference(rng(2), TWO, "", 1e7, noise="white", changed="asymmetry", **SHORT)
+    with pytest.raises(ValueError, match="changed: expected one of asymmetry"):
+        concealed.difference(rng(2), TWO, "", changed="dead_band", **SHORT)
 
 
 def test_an_effect_that_is_added_leaves_the_noise_and_the_others_alone():
