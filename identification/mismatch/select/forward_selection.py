@@ -10,6 +10,7 @@ import numpy as np
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.at_bounds import at_bound
+from identification.mismatch.estimate.clock_hollows import STEP
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data, price
@@ -30,7 +31,7 @@ from identification.mismatch.select.screening import (
     screen,
 )
 from identification.mismatch.select.shape_error import allowed, corrections
-from identification.mismatch.select.stepwise import RivalTerm, Standing, forward, pruned
+from identification.mismatch.select.stepwise import RivalTerm, Standing, accept_threshold, forward, pruned
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.term import Term
 from identification.run_history.history import History
@@ -242,6 +243,11 @@ class Thruster:
     def rarer(self, term: Term, other: Term) -> bool:
         """Never against a twin: what most thrusters have all the time is no likelier to have come since."""
         return self.data.constant_before is None and term.traits.rare and not other.traits.rare
+
+    def begun_better(self, estimate: Estimate, other: Estimate) -> bool:
+        """The clocks stood in a wrong hollow, and a delay that was tried led to the right one."""
+        moved = abs(other.fit.theta.shift - estimate.fit.theta.shift) > STEP
+        return moved and estimate.fit.deviance - other.fit.deviance > accept_threshold(1)
 
     def merged(
         self, estimate: Estimate, standing: Mapping[Term, SwapTest], best: tuple[float, Fit] | None

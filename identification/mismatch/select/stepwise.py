@@ -104,6 +104,9 @@ class System(Protocol[T, F, S, Judged]):
     def rarer(self, term: T, other: T, /) -> bool:
         """Whether `other` is the ordinary one of two, and is named where both do as well."""
 
+    def begun_better(self, state: S, other: S, /) -> bool:
+        """Whether the same terms are fitted better in `other`, where a search for one more had led and it fell away."""
+
     def merged(
         self, state: S, standing: Mapping[T, Standing[F, T]], best: tuple[float, F] | None, /
     ) -> tuple[float, F] | None:
@@ -171,15 +174,20 @@ def _lasting(
     found: Sequence[tuple[Candidate[T], F]],
     seen: Collection[frozenset[T]],
 ) -> S | None:
-    """The larger model, pruned; of additions that are dropped again the next best. None where none lasts."""
+    """The larger model, pruned; of additions that are dropped again the next best, unless the model they were added to
+    is better for it. None where none lasts."""
     while found:
         larger = system.enlarged(state, _best(system, found))
         smaller = pruned(system, larger)
-        if frozenset(smaller.fit.values) not in seen:
+        if frozenset(smaller.fit.values) not in seen or _is_better(system, state, smaller):
             return smaller
         refused = set(larger.fit.values) - set(state.fit.values)
         found = [each for each in found if each[0].term not in refused]
     return None
+
+
+def _is_better(system: System[T, F, S, Judged], state: S, other: S) -> bool:
+    return set(other.fit.values) == set(state.fit.values) and system.begun_better(state, other)
 
 
 def _best(system: System[T, F, S, Judged], found: Sequence[tuple[Candidate[T], F]]) -> F:

@@ -131,6 +131,10 @@ class Vehicle:
         """No effect of a vehicle is rarer than its rivals."""
         return False
 
+    def begun_better(self, _state: State, _other: State) -> bool:
+        """A vehicle has no clocks that a term leads elsewhere."""
+        return False
+
     def merged(
         self, _: State, _standing: Mapping[VehicleTerm, Standing[Fit, VehicleTerm]], best: tuple[float, Fit] | None
     ) -> tuple[float, Fit] | None:

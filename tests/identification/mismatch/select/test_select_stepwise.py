@@ -70,6 +70,8 @@ class Columns:
     pressed: frozenset[Column] = frozenset()
     hidden: Column | None = None
     rare: frozenset[Column] = frozenset()
+    led: Column | None = None
+    """One that leads to a better fit of what it was added to, and falls away."""
 
     def fit(self, *terms):
         J = np.column_stack([self.columns[t] for t in terms]) if terms else np.empty((ROWS, 0))
@@ -97,6 +99,9 @@ class Columns:
     def rarer(self, term, other):
         return term in self.rare and other not in self.rare
 
+    def begun_better(self, state, other):
+        return self.led is not None and other.fit.chi2 < state.fit.chi2
+
     def unhidden(self, state, judged):
         if self.hidden is None or self.hidden in state.fit.values:
             return None
@@ -106,7 +111,8 @@ class Columns:
         return self.fit(*(t for t in state.fit.values if t != term))
 
     def nearly_without(self, state, term, hopeless):
-        return self.without(state, term)
+        less = self.without(state, term)
+        return less if term != self.led else Fit(less.layout, less.values, state.fit.residual, less.std)
 
     def replaced(self, state, other):
         return State(other)
@@ -131,6 +137,20 @@ RNG = np.random.default_rng(0)
 
 def wave(k):
     return E[k]
+
+
+def test_a_term_that_leads_the_rest_to_a_better_fit_is_not_replaced_by_the_next_best():
+    """As a delay that the clocks can take up: C, which does a part of what it did, is not added in its place."""
+    columns = {A: wave(0), C: (wave(0) + wave(2)) / np.sqrt(2)}
+    _, rounds, _ = forward(led := Columns(9 * wave(0), columns, led=A), led.state(), 9, RNG)
+    assert rounds[0].after == ()
+
+    class Deaf(Columns):
+        def begun_better(self, state, other):
+            return False
+
+    _, rounds, _ = forward(deaf := Deaf(9 * wave(0), columns, led=A), deaf.state(), 9, RNG)
+    assert rounds[0].after == (C,)
 
 
 def test_columns_are_added_by_what_they_gain_until_none_pays():
