@@ -11,8 +11,9 @@ from sim_devices.concealed.cases.definition import Case
 from sim_devices.concealed.visibility.oracle import OutOfReach, with_amount
 from sim_devices.concealed.visibility.projection import Projection, signals
 
-LEAST, MOST = 1.02, 2.5
-"""Factors between which an amount changes, or their inverses."""
+LEAST, MOST = 1.1, 2.5
+"""Factors between which an amount changes, or their inverses: a diagnosis may trust a known form to a hundredth of what
+it does, and nobody asks about less than a tenth."""
 CLOSE = 0.02
 """Of the factor's logarithm."""
 
