@@ -7,7 +7,7 @@ from textwrap import wrap
 
 from identification.mismatch.diagnosis import Equation
 
-TITLE = "The model, to type in (numpy's names; units as recorded; d(a)/dt from a(0) on):"
+TITLE = "The model, to type in (numpy's names; units as recorded; d(x)/dt from x(0) on, in steps of 1 ms):"
 
 
 def typed(equations: Sequence[Equation], width: int) -> Iterator[str]:

@@ -19,16 +19,22 @@ def equations_of(twin: Twin, tares: Mapping[str, float], recorded: Collection[st
     told = _told(twin, frozenset(recorded))
     V = "n" if twin.driver_quantity == "rotation_rate" else "V"
     return (
-        Equation(f"{V} = {twin.driver_quantity}"),
+        Equation(f"{V} = {twin.driver_quantity}  # {_driver(twin, V)}"),
         *_of(told, "command"),
         *_rotor([lines for stage, lines in told if stage == "rotor"], V),
-        Equation(f"F = {twin.C:.6g} * x * abs(x)"),
+        Equation(f"F = {twin.C:.6g} * x * abs(x)  # N; x: the rotor's rate, as the {V} that would keep it"),
         *_of(told, "hydro", "stand"),
         *_tares(tares),
         *_of(told, "cell"),
         *(each for line in twin.lines for each in _periodic(line, twin.highest_driver)),
         Equation("thrust = F + tare"),
     )
+
+
+def _driver(twin: Twin, name: str) -> str:
+    unit = "rev/s" if name == "n" else "V"
+    between = "held until its next row" if twin.driver_quantity == "command_voltage" else "straight from row to row"
+    return f"{unit}, {between}; recorded up to {twin.highest_driver:.4g}"
 
 
 Told = Sequence[tuple[Stage, tuple[Equation, ...]]]
@@ -61,7 +67,8 @@ def _rotor(told: Sequence[tuple[Equation, ...]], V: str) -> Iterator[Equation]:
 
 def _tares(tares: Mapping[str, float]) -> Iterator[Equation]:
     for name, tare in tares.items():
-        yield Equation(f"tare = {tare:.6g}" + (f"  # run {name}" if len(tares) > 1 else ""))
+        whose = f"run {name}" if len(tares) > 1 else "this run"
+        yield Equation(f"tare = {tare:.6g}  # N, of {whose}; none of the thruster's")
 
 
 def _periodic(line: TwinLine, highest_driver: float) -> Iterator[Equation]:

@@ -95,7 +95,10 @@ def test_a_model_that_a_rate_drives_with_a_line_that_turns_with_it():
     )
     run = replace(RUN, driver_quantity="rotation_rate", driver=n)
     assert typed(model)["thrust"] == pytest.approx(predicted(model, run), abs=CLOSE * SCALE.thrust)
-    assert equations_of(model, {})[:2] == (Equation("n = rotation_rate"), Equation("x = n"))
+    assert equations_of(model, {})[:2] == (
+        Equation("n = rotation_rate  # rev/s, straight from row to row; recorded up to 12"),
+        Equation("x = n"),
+    )
 
 
 def test_a_thrust_that_follows_the_measured_rate_of_a_rotor_that_lags():
@@ -112,12 +115,12 @@ def test_a_thrust_that_follows_the_measured_rate_of_a_rotor_that_lags():
 def test_each_line_says_whose_it_is_and_each_run_has_its_tare():
     model = twin(("dead_band", "shrink"), ("motor_lag", "first_order"), lines=(FIXED,))
     assert equations_of(model, {"a": 0.5, "b": -0.25}) == (
-        Equation("V = command_voltage"),
+        Equation("V = command_voltage  # V, held until its next row; recorded up to 12"),
         Equation("V = sign(V) * maximum(abs(V) - 1.31, 0)", "dead_band"),
         Equation("d(x)/dt = (V - x) / 0.12, x(0) = V(0)", "motor_lag"),
-        Equation("F = 0.5 * x * abs(x)"),
-        Equation("tare = 0.5  # run a"),
-        Equation("tare = -0.25  # run b"),
+        Equation("F = 0.5 * x * abs(x)  # N; x: the rotor's rate, as the V that would keep it"),
+        Equation("tare = 0.5  # N, of run a; none of the thruster's"),
+        Equation("tare = -0.25  # N, of run b; none of the thruster's"),
         Equation("F = F + 1.3 * sin(2 * pi * 7.3 * t - 0.4)", "periodic_disturbance"),
         Equation("thrust = F + tare"),
     )
