@@ -82,11 +82,22 @@ def _relative(finding: Finding, before: Twin, anew: bool, was: Mapping[str, Valu
         return finding
     if not anew:
         return replace(finding, statement=f"On top of what {before.origin} has: {finding.statement}")
-    then = {name: was[f"{finding.effect}.{name}"] for name in finding.parameters}
+    then = _had(before, finding, was)
     values = ", ".join(_then(name, value) for name, value in then.items())
     return replace(
         finding, statement=f"{finding.statement} {_sentence(before.origin)} has it with {values}.", before=then
     )
+
+
+def _had(before: Twin, finding: Finding, was: Mapping[str, Value]) -> dict[str, Value]:
+    """The twin's own values of that effect in that form: where it has another form too, one of them is `effect#2`."""
+    at, out = 1, dict[str, Value]()
+    for term in before.terms:
+        known = term.term.parameters(term.scale)
+        if (term.effect, term.form) == (finding.effect, finding.form):
+            out = {p.name: was[name] for p, name in zip(known, before.names[at : at + len(known)], strict=True)}
+        at += len(known)
+    return out
 
 
 def _sentence(text: str) -> str:

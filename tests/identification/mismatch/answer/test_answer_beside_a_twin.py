@@ -17,10 +17,11 @@ from identification.mismatch.answer.periodic_findings import (
     with_lines,
 )
 from identification.mismatch.answer.report_assembly import values_of
+from identification.mismatch.compare.saved_model_baseline import given
 from identification.mismatch.periodic.periodic_disturbances import Line
 from identification.mismatch.periodic.rotor_angle import Part
 from identification.mismatch.value import Value, Where
-from identification.twin import Twin
+from identification.twin import Twin, TwinTerm, names_of
 from tests.identification.diagnosed_runs import dead_band
 from tests.identification.mismatch.answer.answered import BAND, UNEVEN, draft, finding
 from tests.identification.mismatch.small import known_noise, short
@@ -179,3 +180,15 @@ def test_against_a_twin_its_terms_are_in_the_model_and_the_same_effect_comes_on_
     alone = with_twin(draft(), estimate, data, runs, None)
     assert (alone.findings, alone.baseline_model) == ((), "C V|V|")
     assert alone.twin is not None
+
+
+def test_a_change_is_of_the_form_that_is_found_where_the_twin_has_two(fitted):
+    runs, data, estimate = fitted
+    own = twin().terms[0]
+    terms = (TwinTerm("dead_band", "jump", {"half_width": 0.5}, own.scale), own)
+    before = replace(twin(), terms=terms, names=names_of(terms), covariance=((0.0,) * 3,) * 3)
+    changed = replace(estimate.fit, model=replace(estimate.fit.model, given=given(before)))
+    found = replace(finding(), form="shrink", before={})
+    told = with_twin(draft(findings=(found,)), replace(estimate, fit=changed), data, runs, before)
+    assert told.findings[0].before["half_width"].value == own.values[0] != 0.5
+    assert "The twin T has it with half width" in told.findings[0].statement
