@@ -18,6 +18,7 @@ from rig.campaign.config import BenchConfig, CampaignConfig, CanBusConfig, Limit
 from rig.campaign.loading import BENCH_ELSEWHERE, CAMPAIGN_ELSEWHERE, DWELLS, PLAN_ELSEWHERE
 from rig.campaign.plan import Plan, TareConfig
 from rig.campaign.shapes import SHAPES
+from rig.campaign.waits import CoolDown
 from rig.cli import main
 from rig.console.app import STOP_KEYS, ConsoleApp
 from rig.console.dialogs import LeaveDialog, NoteDialog
@@ -52,6 +53,7 @@ TABLES = (
     ("`[campaign]`", CampaignConfig, tuple(name for name in CAMPAIGN_ELSEWHERE if name != "bench")),
     ("`[tare]`", TareConfig, ()),
     ("`[plan]`", Plan, PLAN_ELSEWHERE),
+    ("`[plan.cool_down]`", CoolDown, ()),
     ("`[watch]`", WatchConfig, ()),
     *((f"`{kind}`:", found.options, ()) for kind, found in KINDS.items()),
     *((f"`{kind}`:", SHAPES[kind], ()) for kind in ("staircase", "levels", "ramp", "sine")),

@@ -23,6 +23,7 @@ from rig.campaign.config import (
 from rig.campaign.limits import guarded_channels
 from rig.campaign.plan import Dwell, FixedDwell, Plan, SteadyDwell, TareConfig
 from rig.campaign.shapes import SHAPES, Shape
+from rig.campaign.waits import CoolDown
 from rig.errors import ConfigError
 from rig.names import require_name
 from rig.toml_tables import Table, construct, decode, joined, read_toml, refuse_unknown, table_at, typed, values
@@ -33,7 +34,7 @@ BENCH_ELSEWHERE = ("path", "text", "devices", "can", "limits", "mount", "overrid
 """Fields of BenchConfig that are no keys of `[bench]`."""
 CAMPAIGN_ELSEWHERE = ("path", "text", "bench", "plan", "tare", "watch", "overrides")
 """Fields of CampaignConfig that are no keys of `[campaign]`."""
-PLAN_ELSEWHERE = ("shape", "dwell", "coast_time", "tare")
+PLAN_ELSEWHERE = ("shape", "dwell", "coast_time", "tare", "cool_down")
 """Fields of Plan that are no keys of `[plan]`; the keys of its shape are."""
 DWELLS: Mapping[str, type[Dwell]] = {"fixed": FixedDwell, "steady": SteadyDwell}
 
@@ -80,6 +81,7 @@ def load_campaign(path: Path) -> CampaignConfig:
     for thruster in campaign.thrusters:
         require_name(path, "campaign.thrusters", thruster)
     _require_twins(campaign)
+    _require_thermometer(campaign)
     if campaign.expected_C is not None:
         _require_above_zero(path, "campaign.expected_C", campaign.expected_C, "N/V^2")
     if campaign.flow_speed is not None and not math.isfinite(campaign.flow_speed):
@@ -106,12 +108,14 @@ def _choice(choices: Mapping[str, T], table: Table, path: Path, prefix: str) -> 
 def _plan(path: Path, table: Table, tare: TareConfig, coast_time: float) -> Plan:
     _, shape, rest = _choice(SHAPES, table, path, "plan")
     own = [field.name for field in fields(shape)]
-    pacing = values(Plan, rest, path, "plan", elsewhere=PLAN_ELSEWHERE, also=(*own, "dwell"))
+    pacing = values(Plan, rest, path, "plan", elsewhere=PLAN_ELSEWHERE, also=(*own, "dwell", "cool_down"))
     made: Shape = decode(shape, {key: value for key, value in rest.items() if key in own}, path, "plan")
     # a sweep or a sine has no holds; the dwell it is given is never used
     held = "dwell" in table or shape not in (SHAPES["ramp"], SHAPES["sine"])
     dwell = _dwell(path, table_at(path, table, "dwell", "plan")) if held else FixedDwell(1.0)
     parts = {"shape": made, "dwell": dwell, "tare": tare, "coast_time": coast_time}
+    if "cool_down" in table:
+        pacing["cool_down"] = decode(CoolDown, table_at(path, table, "cool_down", "plan"), path, "plan.cool_down")
     return construct(Plan, parts | pacing, path, "plan")
 
 
@@ -138,6 +142,25 @@ def _require_twins(campaign: CampaignConfig) -> None:
                 f"{campaign.path}: watch.twin of {thruster} is {twin}, but there is no such file; "
                 "`rig diagnose --save-twin` writes one"
             )
+
+
+def _require_thermometer(campaign: CampaignConfig) -> None:
+    """The channel that a cool-down waits for is there, and its freshness is judged as the guard does."""
+    cool = campaign.plan.cool_down
+    if cool is None:
+        return
+    limited = {limit.channel for limit in campaign.bench.limits}
+    known = [
+        name
+        for _, stream in build(campaign.bench).streams()
+        for channel in stream.channels
+        if channel.unit == "degC" and ((name := f"{stream.name}.{channel.name}") in limited or channel.quantity)
+    ]
+    if cool.channel not in known:
+        raise ConfigError(
+            f"{campaign.path}: plan.cool_down.channel is {cool.channel!r}, but must be a channel in degC that has a "
+            f"quantity or a limit; this bench has {', '.join(known) or 'none'}"
+        )
 
 
 def _dwell(path: Path, table: Table) -> Dwell:

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Set
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
+from rig.campaign.dwell import Dwell, FixedDwell, SteadyDwell
 from rig.campaign.shapes import (
     MOST_MOVES,
     Hold,
@@ -19,6 +20,11 @@ from rig.campaign.shapes import (
     require_not_negative,
     steepest,
 )
+from rig.campaign.waits import CoolDown, Wait, wanted
+
+__all__ = [
+    "TARE_AGAIN", "Duration", "Dwell", "FixedDwell", "Phase", "Plan", "SteadyDwell", "Step", "TareConfig",
+]  # fmt: skip
 
 Phase = Literal["tare", "ramp", "hold", "rest", "sine", "free"]
 TARE_AGAIN = -2
@@ -50,11 +56,18 @@ class Step:
     """s after the start of a hold that is left out of its mean (at least; identification finds its own)."""
     swept: bool = False
     """True for a ramp that is itself the measurement: after a pause it is retaken from `from_voltage`."""
+    wait: Wait | None = None
+    """Of a `rest` that waits for more than the propeller."""
 
     @property
     def number(self) -> int:
         """As people count the steps of a plan, from 1, wherever they read it; `index` is from 0, for programs."""
         return self.index + 1
+
+    @property
+    def doing(self) -> str:
+        """Its phase, or `wait`, for people."""
+        return self.phase if self.wait is None else "wait"
 
     @property
     def expected(self) -> float:
@@ -70,57 +83,6 @@ class Step:
     def peak(self) -> float:
         """Largest |command| in V inside this step."""
         return max(abs(self.from_voltage) if self.phase == "ramp" else 0.0, abs(self.voltage) + abs(self.amplitude))
-
-
-@dataclass(frozen=True, slots=True)
-class FixedDwell:
-    """Every hold lasts `duration` s; its first `settle` s are left out of the mean."""
-
-    duration: float
-    settle: float = 0.5
-
-    def __post_init__(self) -> None:
-        require_above_zero("dwell.duration", self.duration, "s")
-        require_not_negative("dwell.settle", self.settle, "s")
-        require(
-            self.settle < self.duration,
-            f"dwell.settle ({self.settle:g} s) must be shorter than dwell.duration ({self.duration:g} s)",
-        )
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Shortest and longest hold in s."""
-        return self.duration, self.duration
-
-
-@dataclass(frozen=True, slots=True)
-class SteadyDwell:
-    """A hold ends once standard error (N) and |drift| (N/s) are small: after `min` s, at `max` s at the latest."""
-
-    min: float
-    max: float
-    max_std_error: float
-    max_drift: float
-    settle: float = 0.5
-
-    def __post_init__(self) -> None:
-        require_above_zero("dwell.min", self.min, "s")
-        require_above_zero("dwell.max", self.max, "s")
-        require_above_zero("dwell.max_std_error", self.max_std_error, "N")
-        require_above_zero("dwell.max_drift", self.max_drift, "N/s")
-        require_not_negative("dwell.settle", self.settle, "s")
-        require(self.min <= self.max, f"dwell.min ({self.min:g} s) must not exceed dwell.max ({self.max:g} s)")
-        require(
-            self.settle < self.min, f"dwell.settle ({self.settle:g} s) must be shorter than dwell.min ({self.min:g} s)"
-        )
-
-    @property
-    def bounds(self) -> tuple[float, float]:
-        """Shortest and longest hold in s."""
-        return self.min, self.max
-
-
-Dwell = FixedDwell | SteadyDwell
 
 
 class Duration(NamedTuple):
@@ -157,7 +119,8 @@ class Plan:
     """A shape with its pacing. Iterating yields the steps of one run: tare, ramps and measurements, zero returns, zero.
 
     Each zero return is a ramp to 0, a rest of at least `rest` s until the propeller is at rest (at most
-    `rest + coast_time` s), and a tare. There is one after every `zero_every` units (0: none) and always one at the end.
+    `rest + coast_time` s), the wait before a tare where there is one, and a tare. There is one after every `zero_every`
+    units (0: none) and always one at the end.
     Raises PlanError on impossible values.
     """
 
@@ -171,9 +134,16 @@ class Plan:
     coast_time: float = 3.0
     """s, longest wait for the propeller to come to rest in a zero return."""
     tare: TareConfig = field(default_factory=TareConfig)
+    settle_water: float = 0.0
+    """s at 0 V before each tare, for the water to come to rest."""
+    settle_reversal: float = 0.0
+    """s at 0 V where the direction changes between two moves without a zero return; 0: none."""
+    cool_down: CoolDown | None = None
 
     def __post_init__(self) -> None:
         require_above_zero("slew", self.slew, "V/s")
+        require_not_negative("settle_water", self.settle_water, "s")
+        require_not_negative("settle_reversal", self.settle_reversal, "s")
         require(self.repeats >= 1, f"repeats must be at least 1, but is {self.repeats}")
         require(self.zero_every >= 0, f"zero_every must be at least 0 (0: no zero returns), but is {self.zero_every}")
         require_not_negative("rest", self.rest, "s")
@@ -206,17 +176,21 @@ class Plan:
 
     def _sequence(self) -> Iterator[Step]:
         units = tuple(self.shape.units(self.repeats))
-        at = 0.0
-        yield self._tare_step()
+        at = way = 0.0
+        yield from self._tared(self.cool_down)
         for count, unit in enumerate(units, start=1):
             for move in unit:
                 start, end = ends(move)
+                if self.settle_reversal and start * way < 0:
+                    yield from self._travel(at, 0.0)
+                    yield _waiting(Wait(self.settle_reversal))
+                    at = 0.0
                 yield from self._travel(at, start)
                 yield self._measure(move)
-                at = end
+                at, way = end, end or start or way
             if count == len(units) or (self.zero_every and count % self.zero_every == 0):
-                yield from self._zero_return(at)
-                at = 0.0
+                yield from self._zero_return(at, None if count == len(units) else self.cool_down)
+                at = way = 0.0
 
     def _travel(self, start: float, end: float) -> Iterator[Step]:
         if start != end:
@@ -235,9 +209,16 @@ class Plan:
                 seconds = cycles / frequency
                 return Step(0, "sine", offset, seconds, seconds, amplitude=amplitude, frequency=frequency)
 
-    def _zero_return(self, at: float) -> Iterator[Step]:
+    def _zero_return(self, at: float, cool: CoolDown | None) -> Iterator[Step]:
         yield from self._travel(at, 0.0)
         yield Step(0, "rest", 0.0, self.rest, self.rest + self.coast_time)
+        yield from self._tared(cool)
+
+    def _tared(self, cool: CoolDown | None) -> Iterator[Step]:
+        """In water at rest, by a motor that is cool where that is asked for: after the last move it need not be."""
+        wait = wanted(self.settle_water, cool)
+        if wait is not None:
+            yield _waiting(wait)
         yield self._tare_step()
 
     def _tare_step(self) -> Step:
@@ -250,9 +231,12 @@ class Plan:
         sequencer goes by a ramp of its own.
         """
         left = tuple(step for step in self if step.index not in done)
-        if not done or not left or left[0].phase == "tare":
+        if not done or not left:
             return left
-        return (replace(self._tare_step(), index=TARE_AGAIN), *left)
+        while left and left[0].wait is not None:  # the tare has one of its own before it
+            left = left[1:]
+        tared = [replace(step, index=TARE_AGAIN) for step in self._tared(self.cool_down)]
+        return (*(tared[:-1] if left and left[0].phase == "tare" else tared), *left)
 
     def duration(self) -> Duration:
         """Expected and worst duration of one run in s, without the watchdog proof."""
@@ -275,26 +259,13 @@ class Plan:
         require(self.slew <= slew, sentence)
 
 
+def _waiting(wait: Wait) -> Step:
+    return Step(0, "rest", 0.0, *wait.bounds, wait=wait)
+
+
 def _said(move: Move) -> str:
     match move:
         case Wave(_, amplitude, frequency, _):
             return f"a sine of {amplitude:g} V at {frequency:g} Hz"
         case _:
             return f"a sweep at {steepest(move):g} V/s"
-
-
-def places(steps: tuple[Step, ...]) -> tuple[int, ...]:
-    """Where in its plan each step stands; a tare that is none of its steps stands where the one after it does.
-
-    >>> places((Step(TARE_AGAIN, "tare", 0.0, 1.0, 1.0), Step(7, "hold", 4.0, 1.0, 1.0)))
-    (7, 7)
-    """
-    return tuple(next((s.index for s in steps[k:] if s.index >= 0), 0) for k in range(len(steps)))
-
-
-def require_steps(steps: tuple[Step, ...], max_voltage: float) -> None:
-    """Raise PlanError for no steps at all and for a command beyond `max_voltage` V."""
-    require(len(steps) > 0, "the plan has no steps: nothing would be measured")
-    for step in steps:
-        sentence = f"step {step.number} commands {step.peak:g} V, but at most {max_voltage:g} V are allowed"
-        require(step.peak <= max_voltage, sentence)

@@ -14,7 +14,11 @@ from typing import Protocol
 from rig.campaign.config import CampaignConfig, WatchConfig
 from rig.campaign.plan import TareConfig
 from rig.campaign.shapes import require, require_above_zero
+from rig.campaign.waits import CoolDown
 from rig.errors import ConfigError
+
+WATER = ("settle_water", "settle_reversal")
+"""Keys of waits for the water."""
 
 
 class Held(Protocol):
@@ -67,6 +71,11 @@ class Template:
     prove_watchdog: bool = True
     overrides: Mapping[str, str] = field(default_factory=dict)
     watch: WatchConfig = field(default_factory=WatchConfig)
+    settle_water: float = 0.0
+    """s"""
+    settle_reversal: float = 0.0
+    """s"""
+    cool_down: CoolDown | None = None
 
 
 def template_of(campaign: CampaignConfig) -> Template:
@@ -89,6 +98,9 @@ def template_of(campaign: CampaignConfig) -> Template:
         campaign.prove_watchdog,
         campaign.overrides,
         campaign.watch,
+        plan.settle_water,
+        plan.settle_reversal,
+        plan.cool_down,
     )
 
 
@@ -187,7 +199,16 @@ def _watch(watch: WatchConfig, file: Path) -> list[str]:
 
 def _pacing(template: Template) -> list[str]:
     zero = f"zero_every = {template.zero_every}   # holds between zero returns"
-    return [zero, f"rest = {float(template.rest)!r}   # s", f"slew = {float(template.slew)!r}   # V/s"]
+    waits = [f"{key} = {float(value)!r}   # s" for key in WATER if (value := getattr(template, key))]
+    waits += [f"cool_down = {{ {_inline(template.cool_down)} }}"] if template.cool_down is not None else []
+    return [zero, f"rest = {float(template.rest)!r}   # s", f"slew = {float(template.slew)!r}   # V/s", *waits]
+
+
+def _inline(cool: CoolDown) -> str:
+    return (
+        f"channel = {_text(cool.channel)}, below = {float(cool.below)!r}, longest = {float(cool.longest)!r}, "
+        f"otherwise = {_text(cool.otherwise)}"
+    )
 
 
 def _levels(levels: Sequence[Held], template: Template) -> list[str]:

@@ -36,6 +36,8 @@ class Status:
     """s, when the operator started the campaign."""
     output: Output | None = None
     """Of the running sequencer."""
+    paused_for: float = 0.0
+    """s of the campaign, in pauses of an operator: neither gone nor to come."""
     begun: float = 0.0
     """s, when the controller began."""
     sequence: int = 0
@@ -48,6 +50,11 @@ class Status:
         proof = settings_for(self.campaign, "").proof
         self.proof_expected = proof.expected if proof else 0.0
         self.run_expected = self.campaign.plan.duration().expected + self.proof_expected
+
+    def take(self, output: Output) -> None:
+        """What a run's tick has decided; `output` None before its first one."""
+        self.paused_for += output.paused_for - (self.output.paused_for if self.output else 0.0)
+        self.output, self.state = output, output.state
 
     @property
     def thruster(self) -> str:
@@ -82,13 +89,15 @@ class Status:
             since_begin=now - self.begun,
             mounted_by_hand=not self.campaign.bench.mount.command,
             mismatch=self.mismatch,
+            reason=self.output.reason if self.output else "",
+            state_elapsed=self.output.state_elapsed if self.output else 0.0,
         )
 
     def _progress(self, now: float) -> Progress | None:
         if self.started is None:
             return None
         out = self.output
-        elapsed = now - self.started
+        elapsed = now - self.started - self.paused_for
         left = len(self.thrusters) - self.run - (1 if out else 0)
         first = self.proof_expected if self.run == 0 else 0.0
         eta = (out.remaining if out else first) + max(left, 0) * self.run_expected

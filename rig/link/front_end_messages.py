@@ -14,6 +14,7 @@ State = Literal[
     "ramp",
     "hold",
     "rest",
+    "wait",  # zero volts, the water settles or the motor cools down
     "sine",
     "free",
     "paused",  # zero volts, waiting for resume
@@ -137,6 +138,10 @@ class Snapshot:
     """s since the controller began, the clock of `log`."""
     mounted_by_hand: bool = False
     """True: in the state `mount` an operator puts the thruster on the bench, then sends `mounted`. False: a command."""
+    reason: str = ""
+    """In the states `wait` and `paused`: what for, and with what is left, in one sentence."""
+    state_elapsed: float = 0.0
+    """s in this wait or pause so far."""
     mismatch: str = ""
     """Where this run stopped fitting what it was, or its twin, in one line; empty: nowhere, as far as is seen."""
 

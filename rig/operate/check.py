@@ -185,7 +185,7 @@ def print_report(report: CheckReport, screen: Console) -> None:
         to = f"{step.voltage:.2f}" + (f" ± {step.amplitude:g} at {step.frequency:g} Hz" if step.amplitude else "")
         start = step.from_voltage if step.phase == "ramp" else step.voltage
         times = (f"{step.expected:.1f}", f"{step.max_duration:.1f}")
-        table.add_row(str(step.number), step.phase, f"{start:.2f}", to, *times)
+        table.add_row(str(step.number), step.doing, f"{start:.2f}", to, *times)
     screen.print(table)
     screen.print(f"bench          {campaign.bench.name}")
     screen.print(f"thrusters      {', '.join(campaign.thrusters)}")

@@ -23,7 +23,7 @@ STYLES: Final = {
     "error": Style(color="red", bold=True),
 }
 
-MEASURING: Final[tuple[State, ...]] = ("proving", "tare", "ramp", "hold", "rest", "sine", "free")
+MEASURING: Final[tuple[State, ...]] = ("proving", "tare", "ramp", "hold", "rest", "wait", "sine", "free")
 """States in which a step of the plan is under way."""
 
 
@@ -79,6 +79,7 @@ class Narration:
             if progress.steps:
                 where += f" · step {progress.step + 1}/{progress.steps} · {snapshot.command:+.1f} V"
             bar.update(bar.task_ids[0], completed=progress.fraction)
+        where += f" · {snapshot.reason}" if snapshot.reason else ""
         bar.update(bar.task_ids[0], description=where)
 
     def _finished(self, snapshot: Snapshot) -> None:

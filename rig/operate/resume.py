@@ -97,7 +97,7 @@ def told(rest: Remainder, config: CampaignConfig) -> str:
     for thruster in rest.thrusters:
         steps = [step for step in config.plan.after(rest.begun.get(thruster, Measured()).steps) if step.index >= 0]
         cut = thruster in rest.begun
-        to_do.append(f"{thruster} from step {steps[0].number} ({steps[0].phase}) on" if cut else thruster)
+        to_do.append(f"{thruster} from step {steps[0].number} ({steps[0].doing}) on" if cut else thruster)
     return f"finished: {', '.join(rest.finished) or 'none'}; to do: {', '.join(to_do)}"
 
 

@@ -34,8 +34,8 @@ class Journal:
     def row(self, state: State, step: Step, volts: float, start: float, end: float, *, cut: bool = False) -> None:
         """Row of a step that ran from `start` to `end` s; none for an empty one. `volts`: at the end of a ramp.
 
-        A hold, sine or tare that was cut short is `free`, so that nobody takes it for a whole one. The wait of a pause
-        or a stop is `rest`.
+        A hold, sine or tare that was cut short is `free`, so that nobody takes it for a whole one. Waits, of a
+        pause and a stop too, are `rest`.
         """
         if end <= start:
             return
@@ -43,7 +43,7 @@ class Journal:
         match state:
             case "proving":
                 index, phase, value = PROOF_INDEX, "free", volts
-            case "paused" | "stopping":
+            case "paused" | "stopping" | "wait":
                 phase, value = "rest", 0.0
             case "ramp":
                 phase, value = "ramp", volts

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from rig.sequence.sequencer import Sequencer
 
 MEASURING: frozenset[State] = frozenset({"hold", "sine", "free"})
-RUNNING: frozenset[State] = MEASURING | {"proving", "tare", "ramp", "rest"}
+RUNNING: frozenset[State] = MEASURING | {"proving", "tare", "ramp", "rest", "wait"}
 
 
 def obey(run: Sequencer, request: Request, time: float) -> None:
@@ -31,8 +31,7 @@ def obey(run: Sequencer, request: Request, time: float) -> None:
 
 
 def _pause(run: Sequencer, time: float) -> None:
-    run.end_row(time, cut=True)
-    run.zero(time, "paused")
+    run.pause(time, "by the operator")
     run.journal.say(time, "info", f"paused in {run.place}: command 0 V")
 
 
@@ -52,6 +51,10 @@ def _accept(run: Sequencer, time: float) -> None:
 
 
 def _skip(run: Sequencer, time: float) -> None:
+    if run.state == "wait":
+        run.journal.say(time, "warning", f"the wait of {run.place} is broken off on request: {run.waits_for(time)}")
+        run.leave_step(time)
+        return
     run.journal.say(time, "warning", f"{run.place} is left out on request")
     run.journal.given_up.append(run.step.index)
     run.leave_step(time)
@@ -94,7 +97,7 @@ ASKED: Mapping[str, tuple[frozenset[State], Callable[[Sequencer, float], None]]]
         "pause": (RUNNING, _pause),
         "resume": (frozenset({"paused"}), _resume),
         "accept": (MEASURING, _accept),
-        "skip": (MEASURING, _skip),
+        "skip": (MEASURING | {"wait"}, _skip),
         "repeat": (MEASURING | {"tare"}, _repeat),
         "back": (RUNNING - {"proving", "tare"}, _back),
         "extend": (frozenset({"hold"}), _extend),

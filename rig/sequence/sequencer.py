@@ -7,19 +7,23 @@ except to 0 V, where every stop, trip, pause and lapse goes at once. The first c
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from itertools import accumulate
 from math import copysign, isfinite, pi, sin
 from types import MappingProxyType
 
-from rig.campaign.plan import Step, places, require_steps
+from rig.campaign.plan import Step
+from rig.campaign.step_order import places, require_steps
+from rig.campaign.waits import Wait
 from rig.link.front_end_messages import State
-from rig.safety.stopping import Stop, is_rest, turning
+from rig.safety.stopping import Stop, turning
 from rig.safety.watchdog_proof import Proof, Refused
+from rig.sequence import standing
 from rig.sequence.holding import Holding
 from rig.sequence.journal import Journal
 from rig.sequence.requests import obey
 from rig.sequence.taring import Taring
 from rig.sequence.ticks import Outcome, Output, Settings, Tick, settings_for
+from rig.sequence.time_left import TimeLeft
+from rig.sequence.waiting import Waiting
 
 __all__ = ["Sequencer", "settings_for"]
 
@@ -32,10 +36,10 @@ class Sequencer:
 
     def __init__(self, steps: Iterable[Step], settings: Settings) -> None:
         self.steps = tuple(steps)
-        self._settings = settings
+        self.settings = settings
         require_steps(self.steps, settings.max_voltage)
         self._places = places(self.steps)
-        self._after = tuple(accumulate((s.expected for s in reversed(self.steps)), initial=0.0))[-2::-1]
+        self._time_left = TimeLeft(self.steps, settings.proof.expected if settings.proof else 0.0)
         self.state: State = "tare"
         self.position = 0
         self._command = 0.0
@@ -47,8 +51,10 @@ class Sequencer:
         self._rate = settings.slew
         self._approach = False
         self.holding = Holding(0.0, self.steps[0], settings)
-        self._taring = Taring(0.0, 0.0, settings.tare, settings.estimator)
-        self._tare: float | None = None
+        self.taring = Taring(0.0, 0.0, settings.tare, settings.estimator)
+        self.waiting = Waiting(0.0, Wait())
+        self._why_paused, self._paused_for = "", 0.0
+        self.tare: float | None = None
         self._proof: Proof | None = None
         self._prove_before = settings.proofs_before(step.phase for step in self.steps)
         self._time_to_zero: float | None = None
@@ -68,6 +74,7 @@ class Sequencer:
             self._last = tick.time
             self.begin(tick.time)
         self._dt, self._last = tick.time - self._last, tick.time
+        self._paused_for += self._dt if self.state == "paused" else 0.0
         self._interrupt(tick)
         while (handler := HANDLERS.get(self.state)) and handler(self, tick):
             self._dt = 0.0
@@ -78,8 +85,8 @@ class Sequencer:
             return
         if tick.trip:
             self._tripped(tick.time, tick.trip.cause)
-        if self.state not in ("paused", "stopping") and self._dt > self._settings.lapse:
-            cause = f"the control loop gave no tick for {self._dt:.2f} s, {self._settings.lapse:.2f} s are allowed"
+        if self.state not in ("paused", "stopping") and self._dt > self.settings.lapse:
+            cause = f"the control loop gave no tick for {self._dt:.2f} s, {self.settings.lapse:.2f} s are allowed"
             self._tripped(tick.time, cause)
         for request in tick.requests:
             if self.state != "stopping":
@@ -103,6 +110,10 @@ class Sequencer:
         """Which step of the plan that is, for people: they count from 1."""
         return f"step {self._places[self.position] + 1}"
 
+    def waits_for(self, time: float) -> str:
+        """In a wait or a pause: what for."""
+        return self.waiting.reason(time) if self.state == "wait" else self._why_paused
+
     def halt(self, time: float, outcome: Outcome, cause: str) -> None:
         """Command 0 V at once and wait for rest."""
         self.end_row(time, cut=True)
@@ -110,27 +121,36 @@ class Sequencer:
         self._outcome, self._cause = outcome, cause
         self.journal.say(time, "trip" if outcome == "tripped" else "warning", f"{cause}: command 0 V")
 
+    def pause(self, time: float, why: str) -> None:
+        """Command 0 V at once and wait for an operator."""
+        self.end_row(time, cut=True)
+        self.zero(time, "paused")
+        self._why_paused = why
+
     def zero(self, time: float, state: State) -> None:
         self.state, self.since, self._command, self._silent = state, time, 0.0, False
-        self._stop = Stop(time, self._settings.rest_rate, self._settings.coast_time)
+        self._stop = Stop(time, self.settings.rest_rate, self.settings.coast_time)
 
     def begin(self, time: float) -> None:
         """Begin the step at the present position, by an approach ramp where the command is elsewhere."""
         self.since = time
         step = self.step
-        if self._settings.proof is not None and self._prove_before[:1] in (("start",), (step.phase,)):
-            self._proof, self.state = Proof(self._settings.proof), "proving"
+        if self.settings.proof is not None and self._prove_before[:1] in (("start",), (step.doing,)):
+            self._proof, self.state = Proof(self.settings.proof), "proving"
             return
         entry = step.from_voltage if step.swept else step.voltage
         self._approach = (step.phase != "ramp" or step.swept) and abs(self._command - entry) > EPSILON
         if self._approach:
-            self.state, self._target, self._rate = "ramp", entry, self._settings.slew
+            self.state, self._target, self._rate = "ramp", entry, self.settings.slew
             return
         self.state, self._target = step.phase, step.voltage
-        self.holding = Holding(time, step, self._settings)
-        self._taring = Taring(time, step.min_duration, self._settings.tare, self._settings.estimator)
+        if step.wait is not None:
+            self.state, self.waiting = "wait", Waiting(time, step.wait)
+            self.journal.say(time, "info", f"waits at 0 V: {step.wait}")
+        self.holding = Holding(time, step, self.settings)
+        self.taring = Taring(time, step.min_duration, self.settings.tare, self.settings.estimator)
         travel = abs(step.voltage - step.from_voltage)
-        self._rate = travel / step.min_duration if step.swept else self._settings.slew
+        self._rate = travel / step.min_duration if step.swept else self.settings.slew
 
     def next_step(self, time: float) -> None:
         self.end_row(time)
@@ -155,7 +175,7 @@ class Sequencer:
     def finish_step(self, time: float) -> None:
         """End a step that has measured: a hold gives its point."""
         if self.state == "hold":
-            point = self.holding.point(time, self._tare or 0.0)
+            point = self.holding.point(time, self.tare or 0.0)
             if point is not None:
                 self.journal.points.append(point)
             if point is None or not point.steady:
@@ -184,27 +204,6 @@ class Sequencer:
         self.begin(tick.time)
         return True
 
-    def _zeroing(self, tick: Tick) -> bool:
-        """The first tare must be stable; a later one that is not leaves the one before in use."""
-        verdict, mean, text = self._taring.advance(tick.time, tick.thrust)
-        match verdict:
-            case "waiting":
-                return False
-            case "accepted":
-                self._tare = mean
-                self.journal.say(tick.time, "info", text)
-                self.next_step(tick.time)
-            case "failed" if self._tare is None:
-                self.halt(tick.time, "tripped", text)
-            case _:
-                kept = f"; the last tare of {self._tare:.4f} N stays in use" if verdict == "failed" else ""
-                self.journal.say(tick.time, "warning", text + kept)
-                self.end_row(tick.time, cut=True)
-                self.since = tick.time
-                if verdict == "failed":
-                    self.next_step(tick.time)
-        return verdict != "again"
-
     def _ramping(self, tick: Tick) -> bool:
         gap, most = self._target - self._command, self._rate * self._dt
         if abs(gap) <= most + EPSILON:
@@ -220,22 +219,11 @@ class Sequencer:
         self.finish_step(tick.time)
         return True
 
-    def _resting(self, tick: Tick) -> bool:
-        step = self.step
-        elapsed, at_rest = tick.time - self.since + EPSILON, is_rest(tick.rotation, self._settings.rest_rate)
-        if elapsed >= step.max_duration or (elapsed >= step.min_duration and at_rest):
-            if not at_rest:
-                text = f"not at rest after {elapsed:.1f} s at 0 V: {turning(tick.rotation)}"
-                self.journal.say(tick.time, "warning", text)
-            self.next_step(tick.time)
-            return True
-        return False
-
     def _waving(self, tick: Tick) -> bool:
         step = self.step
         elapsed = tick.time - self.since
         value = step.voltage + step.amplitude * sin(2 * pi * step.frequency * elapsed)
-        most = self._settings.slew * self._dt
+        most = self.settings.slew * self._dt
         self._command += min(max(value - self._command, -most), most)
         return self._timed(tick)
 
@@ -257,25 +245,26 @@ class Sequencer:
         return False
 
     def _output(self, time: float) -> Output:
-        step, elapsed = self.step, time - self.since
-        once = self._settings.proof.expected if self._settings.proof else 0.0
-        expected, after = step.expected, self._after[self.position] + once * len(self._prove_before)
-        if self.state == "proving":
-            expected, after = once, expected + after - once
+        in_state = time - self.since
+        elapsed = 0.0 if self.state == "paused" else in_state  # the step is taken again from its beginning
+        left = self._time_left.of_run(self.position, self.state, elapsed, len(self._prove_before))
         return Output(
             volts=None if self._silent else self._command,
             state=self.state,
             step=self._places[self.position],
             steps=self._places[-1] + 1,
             step_elapsed=elapsed,
-            step_expected=expected,
-            remaining=0.0 if self._outcome != "running" else max(expected - elapsed, 0.0) + after,
+            step_expected=self._time_left.of_step(self.position, self.state),
+            remaining=left if self._outcome == "running" else 0.0,
+            reason=self.waits_for(time) if self.state in ("wait", "paused") else "",
+            state_elapsed=in_state if self.state in ("wait", "paused") else 0.0,
+            paused_for=self._paused_for,
             release=self._release,
             points=tuple(self.journal.points),
             rows=tuple(self.journal.rows),
             events=tuple(self.journal.events),
             given_up=tuple(self.journal.given_up),
-            tare=self._tare,
+            tare=self.tare,
             time_to_zero_s=self._time_to_zero,
             outcome=self._outcome,
             cause=self._cause,
@@ -287,10 +276,11 @@ class Sequencer:
 HANDLERS: Mapping[State, Callable[[Sequencer, Tick], bool]] = MappingProxyType(
     {
         "proving": Sequencer._proving,
-        "tare": Sequencer._zeroing,
+        "tare": standing.take_tare,
         "ramp": Sequencer._ramping,
         "hold": Sequencer._hold,
-        "rest": Sequencer._resting,
+        "rest": standing.rest,
+        "wait": standing.wait,
         "sine": Sequencer._waving,
         "free": Sequencer._timed,
         "stopping": Sequencer._stopping,

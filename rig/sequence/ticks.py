@@ -42,6 +42,8 @@ class Settings:
     """None: the watchdog is not proved in this run."""
     proved: bool = False
     """It was in an earlier run of this motor: it is proved again at the first rest alone."""
+    attended: bool = True
+    """Somebody can be asked."""
     estimator: Callable[[], SteadyEstimator] = SteadyMonitor
     """Makes an empty estimator."""
 
@@ -62,6 +64,8 @@ class Tick:
     """rev/s, newest; None: none, or none that is fresh."""
     thrust_rest: bool | None = None
     """Whether the force sensor says that nothing pushes; None: it is no witness."""
+    temperature: float | None = None
+    """degC of the channel that a cool-down waits for; None: none, or none that is fresh."""
     trip: Trip | None = None
     requests: tuple[Request, ...] = ()
     """Those of `rig.sequence.requests` are obeyed, others are ignored."""
@@ -80,6 +84,12 @@ class Output(NamedTuple):
     step_expected: float
     remaining: float
     """s to the end of the run, by plan."""
+    reason: str = ""
+    """Of a wait or a pause: what for."""
+    state_elapsed: float = 0.0
+    """s in this wait or pause."""
+    paused_for: float = 0.0
+    """s in pauses since the run began."""
     release: bool = False
     """True: the motor still turns after a stop, use MotorController.release() as well."""
     points: tuple[Point, ...] = ()
@@ -117,6 +127,7 @@ def settings_for(campaign: CampaignConfig, thruster: str) -> Settings:
         max_std_error=steady.max_std_error if steady else None,
         max_drift=steady.max_drift if steady else None,
         proof=proof_settings(bench, slew) if campaign.prove_watchdog else None,
+        attended=not campaign.unattended,
     )
 
 

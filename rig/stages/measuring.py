@@ -71,13 +71,15 @@ def sequence(session: Session, sequencer: Sequencer, t0_ns: int) -> Output:
     loop, status = session.loop, session.status
     begun = loop.now
     begun_ns = round(begun * 1e9)
+    cool = session.campaign.plan.cool_down
     tares = frozenset(step.index for step in session.campaign.plan if step.phase == "tare") | {TARE_AGAIN}
 
     def decide(inputs: Inputs) -> Decision:
         since_begun = inputs.now - begun
         thrust = loop.thrust_rows(inputs.samples, begun_ns)
         trip = replace(inputs.trip, time=since_begun) if inputs.trip else None
-        tick = Tick(since_begun, thrust, inputs.rotation, inputs.thrust_rest, trip, inputs.requests)
+        degrees = None if cool is None else loop.readings.fresh(cool.channel, inputs.now)
+        tick = Tick(since_begun, thrust, inputs.rotation, inputs.thrust_rest, degrees, trip, inputs.requests)
         output = sequencer.advance(tick)
         _tell_tare(loop.thrust_rest, output, tares)
         _take(session, output, t0_ns, begun)
@@ -102,7 +104,7 @@ def _tell_tare(witness: ThrustRest, output: Output, tares: Set[int]) -> None:
 def _take(session: Session, output: Output, t0_ns: int, begun: float) -> None:
     """Show and record what the sequencer finished in this tick; its times are s since `begun`."""
     status, offset = session.status, begun - t0_ns * 1e-9
-    status.output, status.state = output, output.state
+    status.take(output)
     if output.outcome in ("aborted", "tripped"):
         status.outcome, status.cause = output.outcome, output.cause
     status.stop_confirmed = output.stop_confirmed

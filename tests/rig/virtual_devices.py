@@ -180,6 +180,11 @@ def flow_meter(speed: float) -> Input:
     return Input("flow", "flow_speed", "m/s", speed)
 
 
+def winding(degrees: float) -> Input:
+    """A thermometer in the motor."""
+    return Input("winding", "motor_temperature", "degC", degrees)
+
+
 @dataclass
 class RecorderPeer:
     """The other end of the recorder's link: keeps what comes, and answers as the recorder process does."""

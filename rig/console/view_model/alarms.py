@@ -7,7 +7,7 @@ from typing import Literal
 
 from rig.console.view_model.running_fit import running_fit
 from rig.console.view_model.view import View
-from rig.console.view_model.wording import age
+from rig.console.view_model.wording import age, clock
 from rig.link.front_end_messages import Snapshot
 
 Severity = Literal["none", "info", "warning", "danger"]
@@ -91,9 +91,16 @@ def _running(view: View, snapshot: Snapshot) -> Alarm:
     if snapshot.state == "mount" and snapshot.mounted_by_hand:
         return Alarm("warning", f"Put {snapshot.thruster} on the bench, then press F5. The motor turns after that.")
     if snapshot.state == "paused":
-        return Alarm("warning", "PAUSED at 0 V — press r to resume; the step is taken again.")
+        return Alarm("warning", _paused(snapshot))
     wrong = [f"{r.channel} {r.state.upper()}" for r in snapshot.readings if r.state in ("stale", "limit")]
-    return Alarm("warning", "CHECK: " + ", ".join(wrong)) if wrong else Alarm()
+    if wrong:
+        return Alarm("warning", "CHECK: " + ", ".join(wrong))
+    return Alarm("info", f"WAITING at 0 V — {snapshot.reason}. k goes on now.") if snapshot.state == "wait" else Alarm()
+
+
+def _paused(snapshot: Snapshot) -> str:
+    why = f", {snapshot.reason}" if snapshot.reason else ""
+    return f"PAUSED at 0 V for {clock(snapshot.state_elapsed)}{why} — press r to resume; the step is taken again."
 
 
 def _ended(snapshot: Snapshot) -> Alarm:

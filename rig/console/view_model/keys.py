@@ -71,5 +71,6 @@ def _doing(view: View) -> tuple[tuple[str, str], ...]:
     if snapshot.state == "paused":
         return (("r", "resume"), *leave)
     measuring = snapshot.state in ("hold", "sine", "free")
-    step = (("a", "accept"), ("t", "again"), ("k", "skip")) if measuring else ()
+    step: tuple[tuple[str, str], ...] = (("a", "accept"), ("t", "again"), ("k", "skip")) if measuring else ()
+    step = (("k", "go on now"),) if snapshot.state == "wait" else step
     return (("p", "pause"), *step, *leave)

@@ -29,6 +29,7 @@ STATE_WORDS: Final[dict[State, str]] = {
     "ramp": "ramp",
     "hold": "hold",
     "rest": "rest",
+    "wait": "wait",
     "sine": "sine",
     "free": "free run",
     "paused": "PAUSED",
@@ -36,7 +37,9 @@ STATE_WORDS: Final[dict[State, str]] = {
     "run_done": "run finished",
     "done": "ended",
 }
-TURNING: Final[frozenset[State]] = frozenset({"proving", "ramp", "hold", "rest", "sine", "free", "stopping", "tare"})
+TURNING: Final[frozenset[State]] = frozenset(
+    {"proving", "ramp", "hold", "rest", "wait", "sine", "free", "stopping", "tare"}
+)
 """States in which a run is under way."""
 
 

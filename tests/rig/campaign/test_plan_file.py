@@ -8,6 +8,7 @@ import pytest
 from rig.campaign.config import WatchConfig
 from rig.campaign.loading import load_campaign
 from rig.campaign.plan_file import Level, template_of, write_campaign, write_sine
+from rig.campaign.waits import CoolDown
 from rig.errors import ConfigError, PlanError
 from rig.operate.check import check_campaign
 
@@ -65,6 +66,15 @@ def test_what_the_campaign_is_watched_with_stays(template, tmp_path):
     assert load_campaign(path).watch == watch
     (path,) = write_campaign([Level(1.0, 2.0)], replace(template, watch=WatchConfig(off=True)), tmp_path / "p.toml")
     assert load_campaign(path).watch == WatchConfig(off=True)
+
+
+def test_the_waits_stay(template, tmp_path):
+    cool = CoolDown("motor_thermal.motor_temperature", 50.0, 600.0, "ask")
+    waiting = replace(template, settle_water=60.0, settle_reversal=20.0, cool_down=cool)
+    (path,) = write_campaign([Level(1.0, 2.0)], waiting, tmp_path / "p.toml")
+    plan = load_campaign(path).plan
+    assert (plan.settle_water, plan.settle_reversal, plan.cool_down) == (60.0, 20.0, cool)
+    assert template_of(load_campaign(path)).cool_down == cool
 
 
 def test_a_sine(template, tmp_path):

@@ -49,6 +49,9 @@ SCENES = {
     "mount": Scene((
         running("mount", thruster="T3", command=0.0, points=(), trace=(), mounted_by_hand=True,
                 progress=Progress(0, 0, 0.0, 0.0, 1, 2, 60.0, 241.0, 0.2)),)),
+    "wait": Scene((running("wait", command=0.0, state_elapsed=17.0, reason="water settles: 43 s left; motor "
+                           "temperature 61.2 °C, goes on below 50 °C, at most 9 min more"),)),
+    "paused": Scene((running("paused", command=0.0, state_elapsed=83.0, reason="by the operator"),)),
     "keys": Scene((running(),), keys=("question_mark",)),
     "looks_on": Scene((running(attended=True, clients=2),)),
     "note": Scene((running(),), keys=("n", *"weed on duct")),

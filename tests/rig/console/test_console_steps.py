@@ -26,6 +26,16 @@ async def test_each_key_of_a_step_asks_for_one_thing(key, kind):
         assert desk.kinds() == [kind]
 
 
+async def test_a_wait_and_a_pause_say_what_for_and_how_long():
+    async with sitting(running("wait", command=0.0, reason="water settles: 43 s left")) as desk:
+        assert desk.alarm() == "WAITING at 0 V — water settles: 43 s left. k goes on now."
+        assert "go on now" in desk.text("#keys")
+        await desk.press("k")
+        assert desk.kinds() == ["skip"]
+        await desk.play(running("paused", command=0.0, state_elapsed=83.0, reason="by the operator"))
+        assert desk.alarm().startswith("PAUSED at 0 V for 1:23, by the operator")
+
+
 async def test_the_page_of_keys_has_them_all_and_the_stop_key_works_on_it():
     async with sitting(running()) as desk:
         await desk.press("question_mark")
