@@ -10,12 +10,14 @@ from textual import events
 from textual.app import App, ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Container, Horizontal, Vertical, VerticalScroll
+from textual.filter import LineFilter
 from textual.message import Message
 from textual.widgets import ContentSwitcher
 
 from rig.console.diagnosing import DIAGNOSE, NOT_YET, DiagnosisPanel, answers
 from rig.console.dialogs import LeaveDialog, Leaving, NoteDialog
 from rig.console.feed import Feed
+from rig.console.few_colors import filters_for
 from rig.console.key_help import KeyHelp
 from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
 from rig.console.parting import Parting, begin, refused, settled
@@ -24,6 +26,7 @@ from rig.console.view_model.alarms import call
 from rig.console.view_model.keys import device_gone, key_line, page_of
 from rig.console.view_model.view import View, absorb
 from rig.errors import LinkError
+from rig.link.attention import Bell
 from rig.link.front_end_messages import Request, RequestKind
 
 REDRAW: Final = 0.1
@@ -69,9 +72,12 @@ class ConsoleApp(App[None], inherit_bindings=False):
         clock: Callable[[], float],
         again: str = "rig console",
         diagnose: Sequence[str] = DIAGNOSE,
+        *,
+        silent: bool = False,
+        colors: str = "full",
     ) -> None:
         """`clock` gives s and never goes back; `again` is the command line that attaches once more, `diagnose` one to
-        which a recording is added."""
+        which a recording is added. `silent`: it never rings; `colors`: `full`, `16` or `none`."""
         super().__init__()
         self.HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # columns from which all panels fit at once
         self.VERTICAL_BREAKPOINTS = [(0, "-low"), (32, "-tall")]  # rows
@@ -79,10 +85,11 @@ class ConsoleApp(App[None], inherit_bindings=False):
         self.clock = clock
         self.again = again
         self.diagnose = diagnose
+        self.set_class(colors != "full", "-few-colors")
         self.state = View(now=clock())
         self.chosen = "main"
         self.parting: Parting | None = None
-        self.called = ""
+        self.calls, self.silent, self.terminal_colors = Bell(), silent, colors
 
     def compose(self) -> ComposeResult:
         yield Head()
@@ -133,6 +140,9 @@ class ConsoleApp(App[None], inherit_bindings=False):
     def _ended(self) -> bool:
         return self.state.snapshot is not None and self.state.snapshot.state == "done"
 
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        return filters_for(self.terminal_colors, super().get_line_filters())
+
     def _standing(self) -> bool:
         """False while the application closes: its widgets go before its timers."""
         return bool(self.screen_stack) and len(self.screen_stack[0].query("#keys")) > 0
@@ -158,11 +168,10 @@ class ConsoleApp(App[None], inherit_bindings=False):
         base.set_class(view.condition != "live", "old")
         self._ring(call(view))
 
-    def _ring(self, calls: str) -> None:
+    def _ring(self, wanted: str) -> None:
         """The terminal's bell for what somebody must come for."""
-        if calls and calls != self.called:
+        if self.calls.rings(wanted, self.state.now) and not self.silent:
             self.bell()
-        self.called = calls
 
     def show_plots(self) -> None:
         """The plots that are on the screen, from the view."""

@@ -42,14 +42,22 @@ def run_console(feed: Feed, clock: Callable[[], float] = time.monotonic, again: 
     return attend(feed, clock, again).status
 
 
-def attend(feed: Feed, clock: Callable[[], float] = time.monotonic, again: str = "rig console") -> Sitting:
+def attend(
+    feed: Feed,
+    clock: Callable[[], float] = time.monotonic,
+    again: str = "rig console",
+    *,
+    silent: bool = False,
+    colors: str = "full",
+) -> Sitting:
     """Run the console until the operator leaves. `clock` gives s and never goes back; `again` is the command line that
-    attaches once more, shown before detaching. Closes `feed`."""
-    return asyncio.run(_sit(feed, clock, again))
+    attaches once more, shown before detaching; `silent`: no bell; `colors`: `full`, `16` or
+    `none`. Closes `feed`."""
+    return asyncio.run(_sit(ConsoleApp(feed, clock, again, silent=silent, colors=colors)))
 
 
-async def _sit(feed: Feed, clock: Callable[[], float], again: str) -> Sitting:
-    app = ConsoleApp(feed, clock, again)
+async def _sit(app: ConsoleApp) -> Sitting:
+    feed = app.feed
     loop = asyncio.get_running_loop()
     caught: list[int] = []
 

@@ -13,7 +13,9 @@ from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
 from rich.progress import Progress as Bar
 from rich.style import Style
 
+from rig.link.attention import Bell, wanted_for
 from rig.link.front_end_messages import LogLine, Point, Progress, Snapshot, State
+from rig.operate.screen_options import Look
 from rig.visible_text import console as visible_console
 
 STYLES: Final = {
@@ -35,6 +37,8 @@ class Narration:
     told: int = 0
     """Log lines written so far, by the controller's count."""
     before: Snapshot | None = None
+    bell: Bell | None = field(default_factory=Bell)
+    """None: it never rings."""
     _bar: Bar | None = None
 
     @contextmanager
@@ -56,11 +60,19 @@ class Narration:
     def tell(self, snapshot: Snapshot) -> None:
         """What is new in this snapshot."""
         self._events(snapshot)
+        if self.console.is_terminal and self.bell is not None and self._rings(self.bell, snapshot):
+            self.console.bell()
         if self._bar is None:
             self._finished(snapshot)
         else:
             self._progress(self._bar, snapshot)
         self.before = snapshot
+
+    @staticmethod
+    def _rings(bell: Bell, snapshot: Snapshot) -> bool:
+        """It starts by itself: that it is ready calls nobody."""
+        wanted = wanted_for(snapshot)
+        return bell.rings("" if wanted == "ready" else wanted, snapshot.since_begin)
 
     def say(self, text: str, style: Style | None = None) -> None:
         """One line, however long: a terminal folds it, a log file does not."""
@@ -92,6 +104,12 @@ class Narration:
         last = snapshot.state not in (*MEASURING, "paused") and snapshot.outcome not in ("aborted", "tripped")
         if before.state in MEASURING and (moved or last):
             self.say(step_line(before, was, snapshot.points))
+
+
+def narration_of(look: Look) -> Narration:
+    """On this terminal."""
+    console = visible_console(stderr=True, no_color=True) if look.colors == "none" else visible_console(stderr=True)
+    return Narration(console, bell=Bell() if look.bell else None)
 
 
 def event_line(line: LogLine) -> str:

@@ -20,6 +20,7 @@ from rig.link.live_runs import live_runs, lock_bench
 from rig.operate.last_page import no_report_option
 from rig.operate.measured import Measured, measured, recording_of
 from rig.operate.run import console_screen, follow, progress_bar, require_mountable, start_controller
+from rig.operate.screen_options import look_of, screen_options
 from rig.recording.ledger import FILE_NAME, Fact, Ledger, file_facts, finished_runs, read
 
 
@@ -37,8 +38,9 @@ class Remainder:
 @click.command("resume")
 @click.argument("folder", type=click.Path(path_type=Path))
 @click.option("--headless", is_flag=True, help="A progress bar instead of the console.")
+@screen_options
 @no_report_option
-def resume_command(folder: Path, headless: bool, report: bool) -> int:
+def resume_command(folder: Path, headless: bool, colors: str, bell: bool, report: bool) -> int:
     """Go on with the campaign in FOLDER at the first step that is not measured."""
     folder = folder.resolve()
     if any(Path(run.folder) == folder for run in live_runs()):
@@ -55,7 +57,8 @@ def resume_command(folder: Path, headless: bool, report: bool) -> int:
         require_mountable(config, rest.thrusters, headless=headless)
         keep(rest, folder)
     click.echo(told(rest, config))
-    front = progress_bar(start=True) if headless else console_screen()
+    look = look_of(colors, bell)
+    front = progress_bar(start=True, look=look) if headless else console_screen(look)
     run, _process = start_controller(config.path, folder, rest.thrusters)
     return follow(run, front, report=report)
 

@@ -21,6 +21,8 @@ from rig.link.live_runs import Run, find_run, live_runs
 from rig.link.sockets import Peer, connect
 from rig.operate.headless import Headless, check_alive, operator_terminal
 from rig.operate.last_page import no_report_option, write_page
+from rig.operate.narration import narration_of
+from rig.operate.screen_options import USUAL, Look, look_of, screen_options
 
 if TYPE_CHECKING:
     from rig.campaign.config import CampaignConfig
@@ -46,13 +48,23 @@ LOG_NAME = "controller.log"
     "--output", type=click.Path(path_type=Path), help="Folder for the campaign's folder (default: the campaign's)."
 )
 @click.option("--thruster", "thrusters", multiple=True, help="Only this thruster of the campaign; may be repeated.")
+@screen_options
 @no_report_option
-def run_command(campaign: Path, headless: bool, output: Path | None, thrusters: tuple[str, ...], report: bool) -> int:
+def run_command(
+    campaign: Path,
+    headless: bool,
+    output: Path | None,
+    thrusters: tuple[str, ...],
+    colors: str,
+    bell: bool,
+    report: bool,
+) -> int:
     """Run CAMPAIGN on its bench: console, recording, table of the fits."""
     config = require_runnable(campaign, thrusters, headless=headless)
     if not headless and not sys.stdout.isatty():
         raise RigError("rig run opens the console, which needs a terminal; use --headless where there is none")
-    front = progress_bar(start=True) if headless else console_screen()
+    look = look_of(colors, bell)
+    front = progress_bar(start=True, look=look) if headless else console_screen(look)
     folder = campaign_folder(output or config.output, config.name)
     return run_campaign(campaign, folder, thrusters, front, report=report)
 
@@ -94,12 +106,14 @@ def run_campaign(
 @click.command("console")
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
 @click.option("--headless", is_flag=True, help="Follow with a progress bar instead.")
+@screen_options
 @no_report_option
-def console_command(folder: Path | None, headless: bool, report: bool) -> int:
+def console_command(folder: Path | None, headless: bool, colors: str, bell: bool, report: bool) -> int:
     """Attach to a run that is going on: the one in FOLDER, or the only one on this machine."""
     if not headless and not sys.stdout.isatty():
         raise RigError("rig console needs a terminal; use --headless where there is none")
-    front = progress_bar(start=False) if headless else console_screen()
+    look = look_of(colors, bell)
+    front = progress_bar(start=False, look=look) if headless else console_screen(look)
     return follow(find_run(folder), front, report=report)
 
 
@@ -214,17 +228,17 @@ def follow(run: Run, front: FrontEnd, *, report: bool = False) -> int:
     return status
 
 
-def progress_bar(*, start: bool) -> FrontEnd:
+def progress_bar(*, start: bool, look: Look = USUAL) -> FrontEnd:
     """Nobody can detach here; `start` starts the run when the preflight has passed."""
-    return lambda peer, _: Left(Headless(peer, terminal=operator_terminal()).follow(start))
+    return lambda peer, _: Left(Headless(peer, narration_of(look), operator_terminal()).follow(start))
 
 
-def console_screen() -> FrontEnd:
+def console_screen(look: Look = USUAL) -> FrontEnd:
     """Imported before a controller is started: Ctrl+C in that second leaves nothing behind."""
     from rig.console import SocketFeed, attend
 
     def front(peer: Peer, again: str) -> Left:
-        sitting = attend(SocketFeed(peer), again=again)
+        sitting = attend(SocketFeed(peer), again=again, silent=not look.bell, colors=look.colors)
         return Left(sitting.last, sitting.detached, max(sitting.status - 128, 0))
 
     return front

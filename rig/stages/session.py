@@ -24,6 +24,7 @@ from rig.recording.ledger import Fact, Ledger
 from rig.recording.line_writer import LineWriter
 from rig.recording.recorder_link import RecorderLink
 from rig.safety.stopping import Stop, turning
+from rig.sequence.requests import ASKED
 from rig.stages.recording_header import Stamp, fresh_stamp
 from rig.watch.watch_link import WatchLink
 
@@ -78,12 +79,20 @@ class Session:
         """One tick at zero volts; a stop request or a trip ends the campaign."""
         inputs = self._idle_tick()
         self.note(inputs.requests)
+        self._refuse(inputs.requests)
         stop = next((request for request in inputs.requests if request.kind == "stop"), None)
         if stop is not None:
             raise Stopped("aborted", f"stopped by {stop.text or 'the operator'}")
         if inputs.trip is not None and inputs.trip.source not in PASSING:
             raise Stopped("tripped", inputs.trip.cause)
         return inputs.requests
+
+    def _refuse(self, requests: tuple[Request, ...]) -> None:
+        """What is asked of a run means nothing where none goes on."""
+        for request in requests:
+            if request.kind in ASKED:
+                where = f"in state {self.status.state} no step is under way, and the command is 0 V"
+                self.say("warning", f"{request.kind} ignored: {where}")
 
     def turn_for(self, seconds: float) -> None:
         end = self.loop.now + seconds

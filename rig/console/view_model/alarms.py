@@ -8,6 +8,7 @@ from typing import Literal
 from rig.console.view_model.running_fit import running_fit
 from rig.console.view_model.view import View
 from rig.console.view_model.wording import age, clock
+from rig.link.attention import wanted_for
 from rig.link.front_end_messages import Snapshot
 
 Severity = Literal["none", "info", "warning", "danger"]
@@ -39,18 +40,10 @@ def alarm(view: View) -> Alarm:
 
 
 def call(view: View) -> str:
-    """What an operator who looks elsewhere must hear of; empty: nothing. It rings when this changes."""
-    snapshot = view.snapshot
+    """What an operator who looks elsewhere must hear of; empty: nothing."""
     if alarm(view).severity == "danger":
         return "danger"
-    if snapshot is None:
-        return ""
-    if snapshot.state == "mount" and snapshot.mounted_by_hand:
-        return f"mount {snapshot.thruster}"
-    ready = snapshot.state == "preflight" and all(c.verdict in ("passed", "warning") for c in snapshot.checks)
-    if ready and snapshot.checks:
-        return "ready"
-    return snapshot.state if snapshot.state in ("paused", "done") else ""
+    return wanted_for(view.snapshot) if view.snapshot is not None else ""
 
 
 def _rotation(snapshot: Snapshot) -> str:

@@ -65,10 +65,10 @@ SCENES = {
 }  # fmt: skip
 
 
-def prepare(scene: Scene) -> tuple[ConsoleApp, Callable[[Pilot[None]], Awaitable[None]]]:
+def prepare(scene: Scene, colors: str = "full") -> tuple[ConsoleApp, Callable[[Pilot[None]], Awaitable[None]]]:
     """The application, and what has to be awaited until it shows the scene."""
     feed, clock = PlayedFeed(*scene.snapshots), ManualClock()
-    app = ConsoleApp(feed, clock, "rig console recordings/2026-11-21_1502")
+    app = ConsoleApp(feed, clock, "rig console recordings/2026-11-21_1502", colors=colors)
 
     async def play(pilot: Pilot[None]) -> None:
         await settle(pilot, lambda: app.state.snapshot is scene.snapshots[-1])

@@ -73,6 +73,15 @@ async def test_what_somebody_must_come_for_rings_once(monkeypatch):
     assert rung == ["mount", "paused", "done"]
 
 
+async def test_a_silent_console_never_rings(monkeypatch):
+    rung = []
+    monkeypatch.setattr(ConsoleApp, "bell", lambda app: rung.append(app))
+    async with sitting(running()) as desk:
+        desk.app.silent = True
+        await desk.play(running("done", outcome="completed"))
+    assert rung == []
+
+
 async def test_a_second_console_looks_on_until_it_takes_the_lease():
     async with sitting(running(attended=True, clients=2)) as desk:
         assert "READ-ONLY" in desk.text(".head-state")

@@ -16,6 +16,7 @@ import pytest
 from rich.console import Console
 
 from rig.cli import COMMANDS
+from rig.link.attention import Bell
 from rig.link.front_end_messages import Check, LogLine, Progress, Request
 from rig.link.sockets import Peer, pair
 from rig.operate import headless as headless_module
@@ -47,6 +48,16 @@ def test_the_step_under_way_when_a_run_is_stopped_is_not_called_finished():
     for each in (running(log=(), log_count=0), stopped, running("done", outcome="aborted", log=(), log_count=0)):
         told.tell(each)
     assert out.getvalue() == ""
+
+
+@pytest.mark.parametrize(("bell", "terminal", "rings"), [(True, True, 4), (False, True, 0), (True, False, 0)])
+def test_a_terminal_rings_where_somebody_is_wanted(bell, terminal, rings):
+    out = io.StringIO()
+    told = Narration(Console(file=out, width=80, force_terminal=terminal), bell=Bell() if bell else None)
+    for state, more in (("preflight", {}), ("mount", {"mounted_by_hand": True}), ("hold", {}), ("paused", {}),
+                        ("paused", {}), ("stopping", {"outcome": "tripped"}), ("done", {})):  # fmt: skip
+        told.tell(running(state, log=(), log_count=0, **more))
+    assert out.getvalue().count("\a") == rings
 
 
 def played(terminal: int | None, play: Callable[[Peer], None]) -> tuple[Headless, str]:

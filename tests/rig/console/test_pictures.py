@@ -6,9 +6,20 @@ import pytest
 
 from tests.rig.console.scenes import SCENES, prepare
 
+FEW_COLORS = ("preflight_failed", "mismatch", "limit", "paused", "wait", "stop_not_confirmed", "disconnected", "note",
+              "leave_attended", "end")  # fmt: skip
+"""Scenes that are told by colour where there is one: each has a word or a sign too."""
+
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
 @pytest.mark.parametrize("scene", SCENES)
 def test_picture(snap_compare, scene, size):
     app, play = prepare(SCENES[scene])
     assert snap_compare(app, terminal_size=size, run_before=play)
+
+
+@pytest.mark.parametrize("colors", ["16", "none"])
+@pytest.mark.parametrize("scene", FEW_COLORS)
+def test_picture_with_few_colors(snap_compare, scene, colors):
+    app, play = prepare(SCENES[scene], colors)
+    assert snap_compare(app, terminal_size=(120, 40) if scene == "mismatch" else (80, 24), run_before=play)

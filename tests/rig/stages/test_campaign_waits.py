@@ -102,6 +102,22 @@ def test_a_stop_in_a_wait_ends_the_run(tmp_path):
         assert outcome(world) == ("aborted", "stopped by a test")
 
 
+def test_a_pause_before_a_run_means_nothing_and_says_so(tmp_path):
+    with virtual(tmp_path, mount=()) as world:
+
+        def ask():
+            world.session.loop.signals.extend([Request("pause"), Request("mounted")])
+
+        assert world.session.status.state == "connecting"
+        seen = play(world, [("preflight", 0.0, lambda: world.session.loop.signals.append(Request("pause"))),
+                            ("mount", 0.0, ask)])  # fmt: skip
+        assert outcome(world) == ("completed", "")
+        for state in ("preflight", "mount"):
+            said = f"pause ignored: in state {state} no step is under way, and the command is 0 V"
+            assert said in world.texts
+    assert "paused" not in {s.state for s in seen}
+
+
 def test_progress_and_time_left_leave_a_pause_out(tmp_path):
     with virtual(tmp_path) as world:
 
