@@ -19,11 +19,14 @@ from rig.console.dialogs import LeaveDialog, Leaving, NoteDialog
 from rig.console.feed import Feed
 from rig.console.few_colors import filters_for
 from rig.console.key_help import KeyHelp
+from rig.console.keys_after_enter import KeysAfterEnter
 from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
 from rig.console.parting import Parting, begin, refused, settled
 from rig.console.plots import FitPlot, ResidualPlot, TimePlot
+from rig.console.toasts import place
 from rig.console.view_model.alarms import call
 from rig.console.view_model.keys import device_gone, key_line, page_of
+from rig.console.view_model.log_filter import NEXT, LogFilter
 from rig.console.view_model.view import View, absorb
 from rig.errors import LinkError
 from rig.link.attention import Bell
@@ -62,6 +65,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
         Binding("l", "take_lease", "take the lease"),
         Binding("?", "help", "keys"),
         Binding("n", "note", "note"),
+        Binding("f", "filter", "filter events"),
         Binding("d", "leave", "detach"),
         *(Binding(str(i + 1), f"view('{name}')", name) for i, name in enumerate(VIEWS)),
     ]
@@ -88,6 +92,8 @@ class ConsoleApp(App[None], inherit_bindings=False):
         self.set_class(colors != "full", "-few-colors")
         self.state = View(now=clock())
         self.chosen = "main"
+        self.log_filter: LogFilter = "run"
+        self.after_enter = KeysAfterEnter()
         self.parting: Parting | None = None
         self.calls, self.silent, self.terminal_colors = Bell(), silent, colors
 
@@ -115,7 +121,6 @@ class ConsoleApp(App[None], inherit_bindings=False):
 
     def on_mount(self) -> None:
         self.query_one("#readings").border_title = "live readings"
-        self.query_one("#log").border_title = "events"
         self.query_one("#preflight").border_title = "preflight"
         self.query_one("#results").border_title = "result per thruster: C V|V| fitted to the holds"
         self.query_one("#diagnosis").border_title = "diagnosis: what C V|V| leaves out"
@@ -161,11 +166,12 @@ class ConsoleApp(App[None], inherit_bindings=False):
         base.query_one(ProgressPanel).show(view)
         base.query_one(ReadingsPanel).show(view)
         base.query_one(ResultsPanel).show(view)
-        base.query_one(LogPanel).show(view)
+        base.query_one(LogPanel).show(view, self.log_filter)
         base.query_one("#keys", Panel).put(line := key_line(view), line)
         if isinstance(self.screen, NoteDialog | LeaveDialog | KeyHelp):
             self.screen.show(view)
         base.set_class(view.condition != "live", "old")
+        place(self.screen, below=base.query_one(Head).size.height)
         self._ring(call(view))
 
     def _ring(self, wanted: str) -> None:
@@ -187,6 +193,12 @@ class ConsoleApp(App[None], inherit_bindings=False):
             self.action_stop()
             return True
         return super().post_message(message)
+
+    async def on_event(self, event: events.Event) -> None:
+        """Keys come here first, and those that a widget has not used a second time."""
+        in_note = len(self.screen_stack) > 1 and isinstance(self.screen, NoteDialog)
+        if not self.after_enter.takes(event, in_dialog=in_note):
+            await super().on_event(event)
 
     def action_stop(self) -> None:
         """The stop key: the request goes out here, before anything is drawn."""
@@ -257,6 +269,11 @@ class ConsoleApp(App[None], inherit_bindings=False):
         self.show_text()
         self.call_after_refresh(self.show_plots)
 
+    def action_filter(self) -> None:
+        """F: which events are shown."""
+        self.log_filter = NEXT[self.log_filter]
+        self.show_text()
+
     def action_help(self) -> None:
         self.push_screen(KeyHelp())
         self.call_after_refresh(self.show_text)
@@ -266,6 +283,8 @@ class ConsoleApp(App[None], inherit_bindings=False):
         self.call_after_refresh(self.show_text)
 
     def _keep_note(self, text: str | None) -> None:
+        for key in self.after_enter.let_go():
+            self.post_message(key)
         if text:
             self.action_ask("note", text)
 

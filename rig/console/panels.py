@@ -14,6 +14,7 @@ from textual.widgets import RichLog, Static
 
 from rig.console.view_model import wording
 from rig.console.view_model.alarms import alarm
+from rig.console.view_model.log_filter import BEFORE, TITLES, LogFilter, run_of, wanted
 from rig.console.view_model.tables import checks_table, readings_text, results_table, verdict_summary
 from rig.console.view_model.view import View
 from rig.link.front_end_messages import LogLine, Snapshot
@@ -152,17 +153,26 @@ class LogPanel(RichLog):
     count = 0
     """Events written so far, by the controller's count."""
     lines_known: tuple[LogLine, ...] = ()
+    chosen: tuple[LogFilter, int] = ("run", BEFORE)
+    """Filter, and the run that goes on."""
 
-    def show(self, view: View) -> None:
+    def show(self, view: View, chosen: LogFilter) -> None:
+        """Events that the filter lets through; all again when it was changed."""
+        self.border_title = TITLES[chosen]
         if view.snapshot is None:
             return
+        if self.chosen != (chosen, run_of(view.snapshot)):
+            self.chosen = (chosen, run_of(view.snapshot))
+            self.clear()
+            self.count = 0
         self.lines_known = view.snapshot.log
         if not self.size:  # hidden: `on_resize` writes everything once there is room
             return
         new = min(view.snapshot.log_count - self.count, len(self.lines_known))
         self.count = view.snapshot.log_count
         for line in self.lines_known[len(self.lines_known) - new :] if new > 0 else ():
-            self.write(event_row(line), expand=True)
+            if wanted(line, *self.chosen):
+                self.write(event_row(line), expand=True)
 
     def on_resize(self, _: Resize) -> None:
         """Lines were wrapped for the old width: the next `show` writes them all again."""

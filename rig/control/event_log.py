@@ -37,7 +37,8 @@ class EventLog:
     def say(self, t_ns: int, level: Level, text: str, *, of_bench: bool = False) -> None:
         """`of_bench`: true for every recording of this campaign, and written into each."""
         said = Said(t_ns, level, text)
-        line = LogLine((t_ns - self._begun_ns) * 1e-9, level, text)
+        run = self._status.run if self._status.started is not None else -1
+        line = LogLine((t_ns - self._begun_ns) * 1e-9, level, text, run)
         self._status.say(line)
         self._log.write(f"{line.time:10.3f} {level:<7} {text}")
         if of_bench:

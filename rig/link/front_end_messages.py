@@ -76,6 +76,8 @@ class LogLine:
     """s since the controller began; in the recording's own events since its t0."""
     level: Literal["info", "warning", "trip", "error"]
     text: str
+    run: int = 0
+    """0-based index of the run that it is of; -1 before the campaign was started."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -20,6 +20,7 @@ EVERY_KEY = (
     ("k", "skip: leave the running step out"),
     ("m", "mark as bad what was measured last"),
     ("n", "a note into the recording"),
+    ("f", "filter events: this run, warnings and worse, all"),
     ("g", "diagnose, once the campaign has ended"),
     ("l", "attend, where this console only looks on"),
     ("d, Ctrl+Q", "leave; a dialog says first what that does"),

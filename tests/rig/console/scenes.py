@@ -48,7 +48,9 @@ SCENES = {
     "mismatch": Scene((running(log=(*LOG, MISMATCH), log_count=len(LOG) + 1, mismatch=HEADLINE),)),
     "mount": Scene((
         running("mount", thruster="T3", command=0.0, points=(), trace=(), mounted_by_hand=True,
-                progress=Progress(0, 0, 0.0, 0.0, 1, 2, 60.0, 241.0, 0.2)),)),
+                progress=Progress(0, 0, 0.0, 0.0, 1, 2, 60.0, 241.0, 0.2), log_count=len(LOG) + 1,
+                log=(*LOG, LogLine(60.0, "info", "put T3 on the bench", 1))),)),
+    "warnings": Scene((running(),), keys=("4", "f")),
     "wait": Scene((running("wait", command=0.0, state_elapsed=17.0, reason="water settles: 43 s left; motor "
                            "temperature 61.2 °C, goes on below 50 °C, at most 9 min more"),)),
     "paused": Scene((running("paused", command=0.0, state_elapsed=83.0, reason="by the operator"),)),

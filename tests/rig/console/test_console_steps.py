@@ -9,11 +9,12 @@ import pytest
 
 from rig.console.app import ConsoleApp
 from rig.console.diagnosing import DiagnosisPanel
+from rig.console.dialogs import NoteDialog
 from rig.console.key_help import KeyHelp
 from rig.console.view_model.keys import EVERY_KEY
-from rig.link.front_end_messages import Request
-from tests.rig.console.feeds import campaign, running
-from tests.rig.console.scenes import settle
+from rig.link.front_end_messages import LogLine, Request
+from tests.rig.console.feeds import LOG, campaign, running, snapshot
+from tests.rig.console.scenes import SCENES, prepare, settle, show
 from tests.rig.console.sitting import sitting
 
 
@@ -34,6 +35,81 @@ async def test_a_wait_and_a_pause_say_what_for_and_how_long():
         assert desk.kinds() == ["skip"]
         await desk.play(running("paused", command=0.0, state_elapsed=83.0, reason="by the operator"))
         assert desk.alarm().startswith("PAUSED at 0 V for 1:23, by the operator")
+
+
+PREFLIGHT = tuple(LogLine(0.1 * n, "info", f"preflight: check {n}: passed", -1) for n in range(30))
+BEFORE = LogLine(3.1, "warning", "preflight: thermometer: last calibration 14 months ago", -1)
+TRIP = LogLine(47.0, "trip", "motor.current 41.2 A is above its limit", 0)
+
+
+async def test_f_chooses_which_events_are_shown():
+    log = (*PREFLIGHT, BEFORE, *LOG, TRIP)
+    async with sitting(running(log=log, log_count=len(log)), size=(120, 60)) as desk:
+        await desk.press("4")
+        await desk.draw()
+        shown = desk.text("#log")
+        assert "preflight" not in shown
+        assert "tare: 0.31" in shown
+        assert TRIP.text in shown
+        await desk.press("f")
+        await desk.draw()
+        shown = desk.text("#log")
+        assert BEFORE.text in shown
+        assert "tare: 0.31" not in shown
+        assert TRIP.text in shown
+        await desk.press("f")
+        await desk.draw()
+        shown = desk.text("#log")
+        assert "check 29: passed" in shown
+        assert "tare: 0.31" in shown
+        await desk.press("f")
+        more = (*log, LogLine(48.0, "info", "a new one", 0))
+        await desk.play(running(t=48.0, log=more, log_count=len(more)))
+        assert "a new one" in desk.text("#log")
+        assert "preflight" not in desk.text("#log")
+
+
+async def test_before_the_start_all_events_are_shown_and_the_next_run_has_its_own():
+    async with sitting(snapshot("preflight", log=PREFLIGHT[:5], log_count=5), size=(120, 60)) as desk:
+        await desk.press("4")
+        await desk.draw()
+        assert desk.text("#log").count("preflight: check") == 5
+        second = running().progress
+        log = (*LOG, LogLine(60.0, "info", "put T3 on the bench", 1))
+        await desk.play(running("mount", progress=replace(second, run=1), log=log, log_count=len(log)))
+        assert "put T3" in desk.text("#log")
+        assert "tare: 0.31" not in desk.text("#log")
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40), (200, 60)])
+@pytest.mark.parametrize("scene", ["sweep", "limit", "events"])
+async def test_no_toast_covers_an_event(scene, size):
+    app, play = prepare(SCENES[scene])
+    async with app.run_test(size=size, notifications=True) as pilot:
+        await play(pilot)
+        await pilot.press("t")
+        await settle(pilot, lambda: bool(app.screen.query("Toast")))
+        await show(pilot, app)
+        (toast,) = app.screen.query("Toast")
+        assert toast.region.height == 1
+        assert not toast.region.intersection(app.query_one("#log").content_region)
+        for above in (".alarm", ".head-row"):
+            assert not toast.region.intersection(app.query_one(above).region)
+
+
+@pytest.mark.parametrize("last", ["enter", "escape"])
+async def test_a_key_right_after_the_end_of_a_note_is_for_the_page(last):
+    async with sitting(running()) as desk:
+        await desk.press("n")
+        assert isinstance(desk.app.screen, NoteDialog)
+        for key in ("w", "e", "e", "d", last, "p", "f9"):
+            desk.app.simulate_key(key)
+        await settle(desk.pilot, lambda: "pause" in desk.kinds())
+        assert [request.text for request in desk.feed.sent if request.kind == "note"] == ["weed"] * (last == "enter")
+        assert desk.kinds()[0] == "stop"  # it waits behind nothing
+        assert len(desk.app.screen_stack) == 1
+        await desk.press("n", "x", "enter", "k")
+        assert desk.kinds()[-1] == "skip"
 
 
 async def test_the_page_of_keys_has_them_all_and_the_stop_key_works_on_it():
