@@ -56,7 +56,7 @@ def _rotation(snapshot: Snapshot) -> str:
 def _disconnected(view: View) -> Alarm:
     last = f"figures are {age(view.silence)} old" if view.snapshot is not None else "no data ever came"
     if view.snapshot is not None and view.snapshot.state == "done":
-        return _ended(view.snapshot)
+        return _ended(view, view.snapshot)
     return Alarm(
         "danger",
         f"DISCONNECTED — the controller is gone; {last}. {_unsure(view)}"
@@ -77,10 +77,10 @@ def _running(view: View, snapshot: Snapshot) -> Alarm:
             "warning", f"STOP SENT {age(view.now - view.stop_asked)} ago — the controller has not answered yet."
         )
     if snapshot.state == "stopping" and snapshot.stop_confirmed is None:
-        after = f", {1000 * view.zero_after:.0f} ms after your key" if view.zero_after is not None else ""
+        after = f", {_after_key(view)}" if view.zero_after is not None else ""
         return Alarm("warning", f"STOPPING — command is 0 V{after}; waiting until the measured rotation is at rest.")
     if snapshot.state == "done":
-        return _ended(snapshot)
+        return _ended(view, snapshot)
     if snapshot.state == "mount" and snapshot.mounted_by_hand:
         return Alarm("warning", f"Put {snapshot.thruster} on the bench, then press F5. The motor turns after that.")
     if snapshot.state == "paused":
@@ -96,8 +96,14 @@ def _paused(snapshot: Snapshot) -> str:
     return f"PAUSED at 0 V for {clock(snapshot.state_elapsed)}{why} — press r to resume; the step is taken again."
 
 
-def _ended(snapshot: Snapshot) -> Alarm:
-    rest = " Propeller measured at rest." if snapshot.stop_confirmed else ""
+def _after_key(view: View) -> str:
+    """How long the stop took, as measured from the key to the snapshot that said 0 V."""
+    return f"{1000 * (view.zero_after or 0.0):.0f} ms after your key"
+
+
+def _ended(view: View, snapshot: Snapshot) -> Alarm:
+    rest = f" 0 V {_after_key(view)}." if view.zero_after is not None else ""
+    rest += " Propeller measured at rest." if snapshot.stop_confirmed else ""
     if snapshot.outcome == "completed":
         wrong = _misfit(snapshot)
         return Alarm("warning" if wrong else "info", f"COMPLETED.{rest}{wrong} Press d to leave.")

@@ -73,8 +73,13 @@ def absorb(view: View, snapshot: Snapshot, now: float) -> View:
 def _zero_after(view: View, snapshot: Snapshot, now: float) -> float | None:
     if view.zero_after is not None or view.stop_asked is None:
         return view.zero_after
-    stopped = snapshot.command == 0 and snapshot.state in ("stopping", "run_done", "done")
-    return now - view.stop_asked if stopped else None
+    if view.snapshot is not None and _stopped(view.snapshot):
+        return None  # the key came after the stop: there is nothing to measure
+    return now - view.stop_asked if _stopped(snapshot) else None
+
+
+def _stopped(snapshot: Snapshot) -> bool:
+    return snapshot.command == 0 and snapshot.state in ("stopping", "run_done", "done")
 
 
 def _with_points(known: Mapping[str, tuple[Point, ...]], snapshot: Snapshot) -> Mapping[str, tuple[Point, ...]]:

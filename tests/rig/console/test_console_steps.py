@@ -12,7 +12,7 @@ from rig.console.diagnosing import DiagnosisPanel
 from rig.console.dialogs import NoteDialog
 from rig.console.key_help import KeyHelp
 from rig.console.view_model.keys import EVERY_KEY
-from rig.link.front_end_messages import LogLine, Request
+from rig.link.front_end_messages import LogLine, Progress, Request
 from tests.rig.console.feeds import LOG, campaign, running, snapshot
 from tests.rig.console.scenes import SCENES, prepare, settle, show
 from tests.rig.console.sitting import sitting
@@ -135,6 +135,47 @@ async def test_the_time_from_the_stop_key_to_zero_is_on_the_screen():
         await desk.wait(1.0)
         await desk.play(running("stopping", command=0.0))
         assert "80 ms after your key" in desk.alarm()
+
+
+async def test_no_time_to_zero_is_told_for_a_key_that_came_after_the_stop():
+    async with sitting(running("stopping", command=0.0)) as desk:
+        await desk.press("f9")
+        await desk.play(running("stopping", command=0.0))
+        assert "after your key" not in desk.alarm()
+
+
+ON_TOP = [*((str(n),) for n in range(1, 7)), ("n", "a", "b"), ("d",), ("d", "tab"), ("question_mark",), ("4", "tab")]
+
+
+@pytest.mark.parametrize("size", [(80, 24), (200, 60)])
+@pytest.mark.parametrize("keys", ON_TOP, ids="-".join)
+async def test_the_time_to_zero_is_on_every_page_dialog_and_focused_field(keys, size):
+    async with sitting(running(), size=size) as desk:
+        await desk.press(*keys)
+        await desk.draw()
+        desk.app.simulate_key("f9")
+        assert desk.kinds() == ["stop"]  # before the event loop has turned
+        desk.clock.now += 0.06
+        await desk.play(running("stopping", command=0.0))
+        assert "command is 0 V, 60 ms after your key" in desk.alarm()
+        line = desk.app.screen.query_one(".alarm")
+        assert line.region in desk.app.screen.region
+        assert line.size.width > 40
+        end = running("done", command=0.0, outcome="aborted", cause="stopped by console.", stop_confirmed=True)
+        await desk.play(end)
+        assert "0 V 60 ms after your key. Propeller measured at rest." in desk.alarm()
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40), (200, 60)])
+async def test_the_bars_keep_their_length_on_every_page(size):
+    progress = Progress(1023, 1024, 1234.5, 1300.0, 11, 12, 35999.0, 35999.0, 0.5)
+    async with sitting(running(thruster="SN0412", progress=progress), size=size) as desk:
+        for page in ("1", "2", "3", "4", "1"):
+            await desk.press(page)
+            await desk.draw()
+            bars = [sum(line.count(cell) for cell in "█░") for line in desk.text("#progress").splitlines()]
+            assert bars[0] >= size[0] - 70
+            assert bars[1] >= size[0] - 70
 
 
 async def test_what_somebody_must_come_for_rings_once(monkeypatch):
