@@ -193,6 +193,8 @@ class Loop:
         requests = self.clients.poll(now)
         while self.signals:
             requests.append(self.signals.popleft())
+        if any(request.kind == "stop" for request in requests):
+            self._published = -inf  # whoever pressed the key is told of 0 V in this same tick
         return tuple(requests)
 
     def _begin(self) -> int:

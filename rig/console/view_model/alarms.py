@@ -107,7 +107,8 @@ def _ended(view: View, snapshot: Snapshot) -> Alarm:
     if snapshot.outcome == "completed":
         wrong = _misfit(snapshot)
         return Alarm("warning" if wrong else "info", f"COMPLETED.{rest}{wrong} Press d to leave.")
-    return Alarm("warning", f"{snapshot.outcome.upper() or 'ENDED'} — {snapshot.cause}{rest} Press d to leave.")
+    how, why = snapshot.outcome.upper() or "ENDED", snapshot.cause.rstrip(".")
+    return Alarm("warning", f"{how} — {why}.{rest} Press d to leave.")
 
 
 def _misfit(snapshot: Snapshot) -> str:

@@ -129,7 +129,7 @@ async def test_says_sent_then_stopping_then_confirmed():
         assert "STOPPING" in desk.alarm()
         end = running("done", command=0.0, outcome="aborted", cause="Stopped by console.", stop_confirmed=True)
         await desk.play(end)
-        assert "ABORTED — Stopped by console. Propeller measured at rest." in desk.alarm()
+        assert "ABORTED — Stopped by console. 0 V 0 ms after your key. Propeller measured at rest." in desk.alarm()
 
 
 async def test_stop_not_confirmed_is_loud_on_every_page_and_dialog():

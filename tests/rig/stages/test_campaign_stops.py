@@ -41,6 +41,21 @@ def test_front_end_gone_ends_an_attended_run_in_the_next_tick(tmp_path):
         assert drive_after(world, left[0] + 0.021) == []
 
 
+@pytest.mark.parametrize("later", [0.0, 0.02, 0.04, 0.06, 0.08])
+def test_the_snapshot_of_0_volts_comes_in_the_tick_of_the_stop_whenever_the_last_one_was(tmp_path, later):
+    with virtual(tmp_path) as world:
+        asked: list[float] = []
+
+        def stop():
+            asked.append(world.clock.t_ns * 1e-9)
+            world.session.loop.signals.append(Request("stop", "a test"))
+
+        seen = play(world, [("hold", 6.0, lambda: world.clock.at.append((world.clock.t_ns * 1e-9 + later, stop)))])
+        told = next(s for s in seen if s.state == "stopping")
+        assert told.command == 0.0
+        assert told.since_begin + world.session.status.begun - asked[0] < 0.041
+
+
 def test_starting_is_a_lease_too(tmp_path):
     """A front end that starts an attended campaign and never leases: it lapses after 2 s."""
     with virtual(tmp_path, unattended=False) as world:
