@@ -6,10 +6,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from datetime import timedelta
 from typing import Final
 
 from rich.console import Console
-from rich.progress import BarColumn, TextColumn, TimeRemainingColumn
+from rich.progress import BarColumn, TextColumn
 from rich.progress import Progress as Bar
 from rich.style import Style
 
@@ -51,10 +52,10 @@ class Narration:
             TextColumn("{task.description}", markup=False),
             BarColumn(),
             TextColumn("{task.percentage:3.0f} %"),
-            TimeRemainingColumn(),
+            TextColumn("{task.fields[left]}", markup=False),
         )
         with Bar(*columns, console=self.console, refresh_per_second=5) as self._bar:
-            self._bar.add_task("connecting", total=1.0)
+            self._bar.add_task("connecting", total=1.0, left="")
             yield
 
     def tell(self, snapshot: Snapshot) -> None:
@@ -90,7 +91,8 @@ class Narration:
         if progress is not None:
             if progress.steps:
                 where += f" · step {progress.step + 1}/{progress.steps} · {snapshot.command:+.1f} V"
-            bar.update(bar.task_ids[0], completed=progress.fraction)
+            left = f"about {timedelta(seconds=round(progress.eta))} left"  # by plan: a pause does not make it longer
+            bar.update(bar.task_ids[0], completed=progress.fraction, left=left)
         where += f" · {snapshot.reason}" if snapshot.reason else ""
         bar.update(bar.task_ids[0], description=where)
 

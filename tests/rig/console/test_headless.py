@@ -50,6 +50,16 @@ def test_the_step_under_way_when_a_run_is_stopped_is_not_called_finished():
     assert out.getvalue() == ""
 
 
+def test_the_bar_says_what_is_waited_for_and_the_time_left_by_plan():
+    out = io.StringIO()
+    told = Narration(Console(file=out, width=200, force_terminal=True))
+    with told.shown():
+        told.tell(running("wait", log=(), log_count=0, command=0.0, reason="water settles: 43 s left"))
+    said = out.getvalue()
+    assert "T1 wait · step 24/31 · +0.0 V · water settles: 43 s left" in said
+    assert "about 0:04:01 left" in said
+
+
 @pytest.mark.parametrize(("bell", "terminal", "rings"), [(True, True, 4), (False, True, 0), (True, False, 0)])
 def test_a_terminal_rings_where_somebody_is_wanted(bell, terminal, rings):
     out = io.StringIO()

@@ -18,6 +18,11 @@ def test_picture(snap_compare, scene, size):
     assert snap_compare(app, terminal_size=size, run_before=play)
 
 
+def test_picture_of_a_large_terminal(snap_compare):
+    app, play = prepare(SCENES["sweep"])
+    assert snap_compare(app, terminal_size=(200, 60), run_before=play)
+
+
 @pytest.mark.parametrize("colors", ["16", "none"])
 @pytest.mark.parametrize("scene", FEW_COLORS)
 def test_picture_with_few_colors(snap_compare, scene, colors):
