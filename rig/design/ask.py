@@ -104,7 +104,7 @@ def prepare(options: Options) -> Prepared:
     template = replace(template, expected_C=C)
     require(proof < total, f"--time is {total:g} s, but the watchdog proof alone takes {proof:.1f} s")
     terms = Terms(abs(C or 1.0), options.model == "C+/C-", options.linear, options.dead_band)
-    remarks = _remarks(options, C)
+    remarks = (*_remarks(options, C), *_of_waits(options))
     candidates, short = _candidates(options, bench, top, C)
     course = Course(template.slew, template.zero_every, template.rest, template.tare.duration, template.settle)
     highest = float(np.abs(candidates).max(initial=0.0))
@@ -159,7 +159,7 @@ def _places(options: Options) -> tuple[BenchConfig, Template, float, float]:
         raise ConfigError("give either a campaign to take bench, thrusters and pacing from, or --bench BENCH.toml")
     if options.campaign is not None:
         campaign = load_campaign(options.campaign)
-        bench, template, top = campaign.bench, template_of(campaign), campaign.plan.peak()
+        bench, template, top = campaign.bench, _paced(template_of(campaign)), campaign.plan.peak()
     else:
         assert options.bench is not None
         bench = load_bench(options.bench)
@@ -187,6 +187,11 @@ def _places(options: Options) -> tuple[BenchConfig, Template, float, float]:
     once = proof_settings(bench, template.slew).expected
     proof = PROOFS_OF_A_RUN * once if template.prove_watchdog else 0.0
     return bench, template, proof, wanted
+
+
+def _paced(template: Template) -> Template:
+    """With its waits for the water in the rests, whose time the design knows; its order of levels is its own."""
+    return replace(template, rest=template.rest + template.settle_water, settle_water=0.0, settle_reversal=0.0)
 
 
 def _period(bench: BenchConfig) -> float:
@@ -235,6 +240,14 @@ def _heat(options: Options, top: float) -> float:
     if options.heat is not None:
         return options.heat
     return inf if options.continuous is None or top == 0 else (options.continuous / top) ** 4
+
+
+def _of_waits(options: Options) -> tuple[str, ...]:
+    """What becomes of the waits of a campaign."""
+    plan = load_campaign(options.campaign).plan if options.campaign is not None else None
+    if plan is None or not (plan.settle_water or plan.settle_reversal):
+        return ()
+    return ("settle_water of the campaign is in each rest, none is before the first tare; settle_reversal is left out",)
 
 
 def _remarks(options: Options, C: float | None) -> tuple[str, ...]:

@@ -83,6 +83,7 @@ def next_template(found: Diagnosis, campaign: CampaignConfig, *, attended: bool 
         thrusters=(found.thruster,),
         zero_every=0,
         settle=min(template.settle, 0.5 * shortest),
+        settle_reversal=0.0,  # its power was foretold for levels that follow one another
         unattended=template.unattended and not attended,
     )
 

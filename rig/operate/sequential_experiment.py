@@ -156,9 +156,9 @@ def _expected(campaign: CampaignConfig) -> float:
 
 
 def fixed_cost(campaign: CampaignConfig) -> float:
-    """S of a run beside its sweep: opening, watchdog proof, both tares and the rest before the last."""
+    """S of a run beside its sweep: opening, watchdog proof, both tares, waits before them, the rest before the last."""
     plan = campaign.plan
-    return _expected(campaign) - plan.duration().expected + 2 * campaign.tare.duration + plan.rest
+    return _expected(campaign) - plan.duration().expected + 2 * (campaign.tare.duration + plan.settle_water) + plan.rest
 
 
 def bench_alone(bench: Path, thruster: str, folder: Path) -> CampaignConfig:

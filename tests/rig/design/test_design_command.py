@@ -82,6 +82,20 @@ def test_the_command_writes_a_campaign_that_may_run(tmp_path, capsys):
     assert report.campaign.expected_C == 0.4
 
 
+def test_the_waits_of_a_campaign_take_of_the_time_there_is(tmp_path, capsys):
+    waits = "slew = 12.0\nsettle_water = 8.0\nsettle_reversal = 20.0\nzero_every = 4"
+    campaign = tmp_path / "waits.toml"
+    bench = f'"{BENCH.resolve()}"'
+    campaign.write_text(RIGHT.read_text().replace("slew = 12.0", waits).replace('"right_bench.toml"', bench))
+    plan = tmp_path / "plan.toml"
+    assert main(["design", str(campaign), "--time", "4min", "-o", str(plan)]) == 0
+    assert "settle_water of the campaign is in each rest" in " ".join(capsys.readouterr().out.split())
+    report = check_campaign(plan)
+    assert 200.0 < report.run.expected <= 240.0
+    found = report.campaign.plan
+    assert (found.rest, found.settle_water, found.settle_reversal) == (9.0, 0.0, 0.0)
+
+
 def test_a_bench_alone_will_do(tmp_path, capsys):
     plan = tmp_path / "plan.toml"
     options = ["--time", "120", "--thruster", "T7", "--slew", "10", "--levels", "5,10,-5,-10", "-o", str(plan)]

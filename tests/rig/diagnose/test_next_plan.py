@@ -53,6 +53,14 @@ def test_the_sweep_is_a_campaign_that_rig_check_accepts(campaign, tmp_path):
     assert "# separates exponent from linear_term" in file.read_text()
 
 
+def test_the_sweep_keeps_the_waits_before_tares_and_none_inside(campaign, tmp_path):
+    waits = replace(campaign, plan=replace(campaign.plan, settle_water=30.0, settle_reversal=20.0))
+    (file,) = write_next(FOUND, waits, tmp_path / "next.toml")
+    assert [s.doing for s in load_campaign(file).plan if s.doing in ("wait", "hold", "tare")] == (
+        ["wait", "tare", *["hold"] * 4, "wait", "tare"]
+    )
+
+
 def test_one_file_for_each_flow_speed(campaign, tmp_path):
     moving = NextExperiment("w", (*STEPS, PlanStep(0.0, 3.0, 0.5), PlanStep(10.0, 3.0, 0.5)), 0.9)
     files = write_next(wanting(moving), campaign, tmp_path / "next.toml")

@@ -3,6 +3,8 @@
 from dataclasses import replace
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from test_sequencer import FIXED, PERIOD, PROOF, TRIP, asks, run
 
 from rig.campaign.plan import TARE_AGAIN, FixedDwell, Plan, TareConfig
@@ -158,6 +160,29 @@ def test_stop_and_trip_end_a_wait(how, outcome):
     ran = run(plan(settle_water=WATER), FIXED, at={100: how})
     assert ran.outputs[100].state == "stopping"
     assert (ran.last.outcome, ran.last.volts) == (outcome, 0.0)
+
+
+KINDS = st.sampled_from(["pause", "resume", "skip", "back", "accept", "repeat", "bad"])
+ASKED = st.dictionaries(st.integers(0, 2000), st.lists(KINDS, min_size=1, max_size=2), max_size=12)
+
+
+@settings(max_examples=40, deadline=None)
+@given(ASKED, st.sampled_from([None, 45.0, 61.0]), st.sampled_from(["end", "ask"]))
+def test_whatever_is_asked_and_measured_the_command_of_a_wait_is_zero_and_the_run_ends_at_rest(asked, value, otherwise):
+    wanted = plan(settle_water=2.0, settle_reversal=3.0, cool_down=replace(COOL, longest=4.0, otherwise=otherwise))
+    at = temperatures(lambda t: value)
+    for number, kinds in asked.items():
+        at[number] |= asks(*kinds)
+    for number in range(2001, 8000, 50):
+        at[number] |= asks("resume")
+        at[number + 25] |= asks("skip")
+    ran = run(wanted, FIXED, at=at, ticks=10_000)
+    assert ran.last.done
+    assert ran.last.volts == 0.0
+    assert {o.volts for o in ran.outputs if o.state in ("wait", "paused")} <= {0.0}
+    assert all(o.reason for o in ran.outputs if o.state == "paused")
+    assert all(o.remaining >= 0.0 for o in ran.outputs)
+    assert all(r.command_voltage == 0.0 for r in ran.rows if r.phase == "rest")
 
 
 def test_a_run_that_goes_on_waits_anew_before_its_tare():
