@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection
 from dataclasses import dataclass
+from functools import partial
 from math import hypot, log, sqrt
 
 import numpy as np
@@ -41,6 +42,8 @@ SHORTER = 0.3
 """Of a step that foretold too much: how much of it is tried next."""
 FITTED = 0.2
 """Fall of chi-square at which the other parameters are as good as fitted."""
+MUCH = 1.3
+"""Of the rise that standard errors foretell: above it, whether clocks that stay do better is asked."""
 AS_FORETOLD = 0.7
 """Of the fall foretold: where less comes of a step, the slopes are taken anew."""
 
@@ -68,11 +71,35 @@ def _interval(fitted: Fit, data: Data, weights: Weights, j: int, known: Paramete
     value = float(fitted.theta.vector[j])
     wanted = JUMPS if known.jumps else QUANTILE
     first = max(wanted * float(np.nan_to_num(fitted.std[j])), LEAST_STEP * float(step[j]))
-    profiles = [Profile(fitted, data, weights, j, jumps=known.jumps) for _ in range(2)]
+    profiles = [Rise(fitted, data, weights, j, jumps=known.jumps) for _ in range(2)]
     ends = (_end(p, wanted, value, bound, first) for p, bound in zip(profiles, (known.low, known.high), strict=True))
     # a level so near counts as half beyond a spread threshold, wholly beyond a sharp one
     far = [hypot(abs(end - value) + 0.5 * known.blur, unsure) for end in ends]
     return Interval(max(value - far[0], known.low), min(value + far[1], known.high))
+
+
+class Rise:
+    """The least rise of chi-square where parameter `j` is held elsewhere: of where the clocks follow, and where not.
+
+    In a shift of the clocks the prediction has stairs, an edge at each sample beside a step. A slope foretells none of
+    them, so that clocks which follow may end beyond an edge where those that stay are better.
+    """
+
+    def __init__(self, fitted: Fit, data: Data, weights: Weights, j: int, *, jumps: bool = False) -> None:
+        clocks = (fitted.layout.shift, fitted.layout.rate_shift)
+        profile = partial(Profile, fitted, data, weights, j, jumps=jumps)
+        self.follow = profile()
+        self.stay = profile(still=clocks) if any(fitted.free[clock] and clock != j for clock in clocks) else None
+        self.value = float(fitted.theta.vector[j])
+        self.std = float(np.nan_to_num(fitted.std[j]))
+        self.jumps = jumps
+
+    def __call__(self, value: float) -> float:
+        rise = self.follow(value)
+        foretold = ((value - self.value) / self.std) ** 2 if self.std > 0 else 0.0
+        if self.stay is None or (not self.jumps and rise < MUCH * foretold):
+            return rise
+        return min(rise, self.stay(value))
 
 
 class Profile:
@@ -80,17 +107,21 @@ class Profile:
 
     They follow by Gauss-Newton, each time from where they were last; from the fit where the prediction jumps at `j`.
     One that ended at a bound follows as well, back into what is possible: held there it would be taken for known.
+    Those in `still` are held where the fit has them.
     """
 
-    def __init__(self, fitted: Fit, data: Data, weights: Weights, j: int, *, jumps: bool = False) -> None:
+    def __init__(
+        self, fitted: Fit, data: Data, weights: Weights, j: int, *, jumps: bool = False, still: Collection[int] = ()
+    ) -> None:
         self.fitted, self.data, self.weights, self.j, self.jumps = fitted, data, weights, j, jumps
         self.low, self.high, _ = bounds_of(fitted.model, data, fitted.theta)
         which, columns = self._moving()
         moves = np.linalg.norm(columns, axis=0) * (self.high - self.low)[which] > LEAST_REACH
         mine = which == j
+        others = moves & ~mine & ~np.isin(which, tuple(still))
         self.follow = np.zeros(fitted.free.size, dtype=bool)
-        self.follow[which[moves & ~mine]] = True
-        self.slopes = _Slopes.of(columns[:, moves & ~mine])
+        self.follow[which[others]] = True
+        self.slopes = _Slopes.of(columns[:, others])
         # others per unit of j
         self.drawn = -self.slopes.step(columns[:, mine].sum(axis=1))
 

@@ -41,7 +41,7 @@ def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
             at = converted_samples(fitted.model, fitted.theta, run, F, data.scale.driver)
         residual = h.sample_thrust - at - tare
         speed = fitted.theta.k * x if follows else h.others.get("rotation_rate", x)
-        out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time)))
+        out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time), h.converter))
     return tuple(out)
 
 

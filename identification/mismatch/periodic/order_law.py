@@ -29,8 +29,10 @@ class OrderLaw:
         return (speed / top) ** self.growth * (1.0 if self.ring is None else response(self.ring, order * speed))
 
     def on(self, parts: Sequence[SteadySegment], order: float, top: float) -> list[SteadySegment]:
-        """The stretches, each weighed by what it holds of such a wave."""
-        return [replace(p, weight=self.weight(order, p.speed, top)) for p in parts]
+        """The stretches, each weighed by what its samples hold of such a wave."""
+        return [
+            replace(p, weight=self.weight(order, p.speed, top) * p.converter.response(order * p.speed)) for p in parts
+        ]
 
 
 FORCE = OrderLaw(2)

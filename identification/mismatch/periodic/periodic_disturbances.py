@@ -59,7 +59,7 @@ class Line:
     """Periods per `unit`, of a rotor-locked line."""
     ratio_std: float | None
     amplitude: float
-    """N; of a rotor-locked line at `top`."""
+    """N, of the force before the device that samples it; of a rotor-locked line at `top`."""
     amplitude_std: float
     phase: float | None
     """rad of a sin(2 pi f t + phase) in the first run; None where it differs from stretch to stretch."""
@@ -87,6 +87,11 @@ class Line:
     """Frequencies that were looked at; None of one locked to the rotor: its p-value counts them otherwise."""
     seen: Recurrence | None = None
     """Whether it comes again in other runs, or in other parts of the only one; None where it was not asked."""
+
+    @property
+    def largest(self) -> float:
+        """N, of the waves that the samples show."""
+        return max((float(np.hypot(p.a, p.b)) for p in self.parts), default=0.0)
 
     @property
     def again(self) -> bool:
@@ -205,19 +210,21 @@ def _fitted(
     p = _p_value(ratio(f) / len(runs), len(runs), trials)
     loudest = int(np.argmax([power(r.time, v, f) / s for (_, r), v, s in zip(runs, values, noise, strict=True)]))
     p = max(p, peak_p_value(runs[loudest][1].time, values[loudest], f))
-    parts, precision = [], []
+    parts, waves, precision = [], [], []
     for (i, r), s in zip(runs, noise, strict=True):
         a, b = _coefficients(r.time, clipped(r.residual), f)
+        passed = _passed(r, f)
         parts.append(Part(i, -np.inf, np.inf, a, b))
-        precision.append(r.time.size / (2 * s))
-    sizes = np.hypot([q.a for q in parts], [q.b for q in parts])
+        waves.append(complex(a, -b) / passed)
+        precision.append(abs(passed) ** 2 * r.time.size / (2 * s))
+    sizes = np.abs(waves)
     amplitude = float(np.average(sizes, weights=precision))
     std = float(1 / np.sqrt(np.sum(precision)))
     spread = np.array([np.var(r.time) for _, r in runs])
     f_std = float(1 / (2 * np.pi * amplitude * np.sqrt(np.sum(precision * spread))))
     first_std = float(1 / (sizes[0] * np.sqrt(precision[0])))
     phase_std = float(np.hypot(first_std, 2 * np.pi * f_std * float(np.mean(runs[0][1].time))))
-    phase = float(np.arctan2(parts[0].a, parts[0].b))
+    phase = float(np.angle(waves[0] * 1j))
     says = _fixed_says(f, amplitude, spacing)
     return Line(
         *("fixed", f, f_std, None, None, amplitude, std, phase, phase_std, p, 2 * ratio(f), says),
@@ -225,6 +232,12 @@ def _fitted(
         searched=int(np.ceil(trials)),
         seen=of_frequency(runs, noise, f),
     )
+
+
+def _passed(run: Series, f: float) -> complex:
+    """What its samples hold of a wave of `f` Hz; all of it where they could hold nothing, so that it came later."""
+    response = run.converter.response(f)
+    return response if abs(response) > policy.periodic.LEAST_PASSED else 1.0
 
 
 def _coefficients(time: Floats, value: Floats, f: float) -> tuple[float, float]:

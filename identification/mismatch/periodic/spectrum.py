@@ -6,7 +6,7 @@ the noise is the median of the neighbours, which a line does not move (mean of a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from identification.estimation.tails import fisher_sf
 from identification.mismatch import policy
 from identification.recording import Floats
+from identification.run_history.converter import Converter
 
 OVERSAMPLING = 2
 """Frequencies per 1/T: between two of them at most a tenth of the power is lost."""
@@ -24,6 +25,7 @@ EVEN = 0.05
 """Of the spacing: samples nearer than this to an even grid lie on it."""
 NEAR, FAR = 24, 96
 """Independent neighbours whose median is the noise: the higher of both is taken, so that slopes and peaks count."""
+INSTANT = Converter()
 MEDIAN_WORTH = 0.48
 """Relative efficiency of the median of exponential variates: (ln 2)^2."""
 
@@ -38,6 +40,8 @@ class Series:
     """(n,) N, measured minus predicted; NaN is left out."""
     turns: Floats | None = None
     """(n,) angle turned since the start, never falling: rev, or V s (integral of |x|) where no rate was measured."""
+    converter: Converter = INSTANT
+    """What made the samples of the force."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +61,8 @@ def finite(series: Series) -> Series:
     if series.turns is not None:
         good &= np.isfinite(series.turns)
     good[good] = np.diff(series.time[good], prepend=-np.inf) > 0
-    return Series(series.time[good], series.residual[good], None if series.turns is None else series.turns[good])
+    turns = None if series.turns is None else series.turns[good]
+    return replace(series, time=series.time[good], residual=series.residual[good], turns=turns)
 
 
 def clipped(residual: Floats) -> Floats:

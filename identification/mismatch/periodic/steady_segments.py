@@ -13,6 +13,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from identification.mismatch import policy
 from identification.mismatch.periodic.spectrum import Series, averaged, clipped, smoothed, spacing_of
 from identification.recording import Floats
+from identification.run_history.converter import Converter
 
 SMOOTH = 0.25
 """s, standard deviation of the Gauss mean that is taken off: what a model leaves is slow, and has aliases too."""
@@ -86,6 +87,7 @@ class SteadySegment:
     speeds: Floats
     """Turns per s, QUANTILES of it."""
     colour: Colour
+    converter: Converter
     weight: complex = 1.0
     """What a wave has here of its size and phase at the highest speed."""
 
@@ -148,7 +150,7 @@ def stretches(runs: Sequence[tuple[int, Series]], top: float, lines: Sequence[Fl
                 and np.any(value[s])
             ):
                 speeds = np.quantile(speed[s], QUANTILES)
-                yield SteadySegment(i, r.time[s], r.turns[s], value[s], white[s], speeds, colour)
+                yield SteadySegment(i, r.time[s], r.turns[s], value[s], white[s], speeds, colour, r.converter)
 
 
 def _edges(time: Floats, speed: Floats, top: float) -> list[int]:

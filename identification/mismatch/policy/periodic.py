@@ -40,6 +40,14 @@ LINE_PERIODS = Count(
     unit="periods in a run",
     reason="A wave that came fewer times is told from slow noise by nothing.",
 )
+LEAST_PASSED = Threshold(
+    0.1,
+    unit="1",
+    reason=(
+        "Of a force that window and low pass of its device leave less of than this no wave would be seen: one that is "
+        "came in behind them, or is the alias of a faster one, and is told as large as the samples show it."
+    ),
+)
 LINE_SAMPLES = Count(
     100,
     unit="samples",

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import least_squares
 
-from identification.mismatch.estimate.confidence_intervals import JUMPS, Profile, intervals
+from identification.mismatch.estimate.confidence_intervals import JUMPS, Profile, Rise, intervals
 from identification.mismatch.estimate.estimate import refresh
 from identification.mismatch.estimate.fitting import bounds_of, residual_of
 from identification.mismatch.model.model import Model
@@ -167,3 +167,27 @@ def test_clocks_that_ended_at_their_bound_are_not_taken_for_known():
     assert within >= 27
     assert ended >= 15
     assert narrow < 0.8 * ended
+
+
+def test_clocks_that_followed_beyond_an_edge_are_put_back(monkeypatch):
+    """Each sample beside a step is an edge of the prediction over the shift of the clocks: no slope foretells it."""
+    lag = MotorLag("first_order")
+    data, theta = start([history_of(run(lagging(0.02, 0), seed=0, noise=0.3))])
+    estimate = refresh(Model((lag,)), replace(theta, terms=((0.02,),)), data, None, None)
+    fit, shift = estimate.fit, estimate.fit.layout.shift
+    assert fit.free[shift]
+    rise = Rise(fit, data, estimate.weights, 1)
+    assert rise.stay is not None
+    assert rise.follow.follow[shift]
+    assert not rise.stay.follow[shift]
+    held = Profile(fit, data, estimate.weights, 1, still=(shift, shift + 1))
+    value = fit.theta.vector[1] + fit.std[1]
+    as_it_is = Profile.__call__
+
+    def beyond(self, value):
+        return as_it_is(self, value) + (90.0 if self.follow[shift] else 0.0)
+
+    assert rise(value) == Profile(fit, data, estimate.weights, 1)(value), "clocks follow where they can"
+    assert held(value) > 1.3 * rise(value), "a lag is known better where the clocks are"
+    monkeypatch.setattr(Profile, "__call__", beyond)
+    assert rise(value) == pytest.approx(as_it_is(held, value), rel=0.01)

@@ -1,7 +1,10 @@
 """How a wave of the rotor grows with its speed: told by the speeds, and by a stand that rings."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from identification.mismatch import policy
 from identification.mismatch.answer.periodic_findings import line_finding, twin_line
@@ -12,6 +15,7 @@ from identification.mismatch.periodic.periodic_disturbances import find_lines
 from identification.mismatch.periodic.rotor_angle import turned, wave_of
 from identification.mismatch.periodic.spectrum import Series
 from identification.mismatch.periodic.steady_segments import stretches
+from identification.run_history.converter import Converter
 from identification.run_history.filters import resonant
 from tests.identification.mismatch.small import rng
 
@@ -20,12 +24,16 @@ ALARM = policy.periodic.LINE_FALSE_ALARM
 RING = (1.0, 25.0, 0.1)
 
 
+def _levels(draw):
+    edges = np.concatenate([[0.0], np.cumsum(draw.uniform(2, 6, 90))])
+    return edges, draw.uniform(3, TOP, 90)
+
+
 def turning(seed, size, *, ring=None, noise=1.0):
     """Random levels up to 14 turns/s, three waves a turn of `size(speed)` N at each; a stand that takes them."""
     draw = rng(seed)
     t = np.arange(int(LENGTH * RATE)) / RATE
-    edges = np.concatenate([[0.0], np.cumsum(draw.uniform(2, 6, 90))])
-    speed = draw.uniform(3, TOP, 90)
+    edges, speed = _levels(draw)
     turns = turned(edges, speed, t)
     at = speed[np.searchsorted(edges, t, side="right") - 1]
     wave = size(at) * np.sin(2 * np.pi * 3 * turns + 0.7)
@@ -100,3 +108,54 @@ def test_an_order_that_samples_show_as_another_is_told_by_the_other_speeds():
     seen = {round(abs(2.6 * 9.0 + k * 20.0) / 9.0, 6) for k in range(-5, 6)}
     found = aliases(list(stretches([(0, series)], 9.0)), OrderCandidate(2.6, 0.01, 1e-9), 20.0, 9.0)
     assert {round(each.ratio, 6) for each in found} >= {z for z in seen if 0.2 < z < 12 and abs(z - 2.6) > 0.1}
+
+
+CONVERTER = Converter(window=0.01, low_pass=0.006)
+"""Of a wave of 42 Hz it leaves a half."""
+
+
+def converted(wave):
+    """What the converter shows of `wave`(time): filtered and averaged on a grid twenty times as fine."""
+    step = 1 / (20 * RATE)
+    fine = np.arange(20 * int(LENGTH * RATE)) * step
+    keep = np.exp(-step / CONVERTER.low_pass)
+    slow = lfilter([1 - keep], [1, -keep], wave(fine))
+    half = round(CONVERTER.window / step / 2)
+    total = np.concatenate([[0.0], np.cumsum(slow)])
+    middle = np.arange(fine.size)[::20]
+    begin, end = np.maximum(middle - half, 0), np.minimum(middle + half, fine.size)
+    return (total[end] - total[begin]) / (end - begin)
+
+
+@pytest.mark.parametrize("frequency", [4.76, 13.37, 40.0])
+def test_a_line_is_as_large_as_before_the_device_that_samples_it(frequency):
+    noise = turning(3, lambda n: 0 * n)
+    shown = converted(lambda t: 0.6 * np.sin(2 * np.pi * frequency * t + 1.0))
+    (line,) = find_lines([replace(noise, residual=noise.residual + shown, turns=None, converter=CONVERTER)])
+    assert line.amplitude == pytest.approx(0.6, abs=4 * line.amplitude_std)
+    assert line.phase == pytest.approx(1.0, abs=5 * line.phase_std + 0.1)
+    assert line.largest == pytest.approx(0.6 * abs(CONVERTER.response(frequency)), rel=0.15)
+    assert np.std(line.at(noise.time) - shown) < 0.05, "what is taken out is what the samples show"
+
+
+def test_an_order_is_as_large_as_before_the_device_at_every_speed():
+    noise = turning(4, lambda n: 0 * n)
+    edges, speed = _levels(rng(4))
+    at = lambda t: speed[np.searchsorted(edges, t, side="right") - 1]  # noqa: E731
+    shown = converted(lambda t: 0.8 * (at(t) / TOP) ** 2 * np.sin(2 * np.pi * 3 * turned(edges, speed, t) + 0.7))
+    series = replace(noise, residual=noise.residual + shown, converter=CONVERTER)
+    found = find_locked([(0, series)], ALARM)
+    assert found.law == FORCE
+    assert found.amplitude * (TOP / found.top) ** 2 == pytest.approx(0.8, abs=4 * found.amplitude_std)
+    as_shown = find_locked([(0, replace(series, converter=Converter()))], ALARM)
+    assert as_shown.amplitude < 0.7 * found.amplitude
+    assert as_shown.law_gain < found.law_gain
+
+
+def test_what_the_device_could_not_show_came_in_behind_it():
+    slow = Converter(window=0.05)
+    assert abs(slow.response(20.0)) < 0.01
+    noise = turning(5, lambda n: 0 * n)
+    wave = 0.5 * np.sin(2 * np.pi * 20.0 * noise.time)
+    (line,) = find_lines([replace(noise, residual=noise.residual + wave, turns=None, converter=slow)])
+    assert line.amplitude == pytest.approx(0.5, abs=4 * line.amplitude_std)
