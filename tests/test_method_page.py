@@ -21,6 +21,8 @@ BLOCKS = re.findall(r"^```\n(\d+\. .*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 CLOSE = 0.02
 """Another machine rounds otherwise, and draws are compared with it."""
+CHANCE, CLOSE_CHANCE = re.compile(r"(?<=\(p = )[\d.]+"), 0.2
+"""A share of draws, of which it makes more."""
 COUNTED, CLOSE_COUNT = 100, 0.005
 """Whole numbers from here on are counts of rows and trials, or sums that hardly move."""
 
@@ -52,7 +54,10 @@ def numbers(line: str) -> list[float]:
 
 
 def same(quoted: str, line: str) -> bool:
-    told, there = numbers(quoted), numbers(line)
+    chances, drawn = ([float(p) for p in CHANCE.findall(each)] for each in (quoted, line))
+    if chances != pytest.approx(drawn, rel=CLOSE_CHANCE):
+        return False
+    told, there = (numbers(CHANCE.sub("0", each)) for each in (quoted, line))
     if words(quoted) != words(line) or told != pytest.approx(there, rel=CLOSE):
         return False
     counts = [(a, b) for a, b in zip(told, there, strict=True) if a.is_integer() and a >= COUNTED]
