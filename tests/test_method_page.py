@@ -21,7 +21,7 @@ BLOCKS = re.findall(r"^```\n(\d+\. .*?)^```$", PAGE, re.MULTILINE | re.DOTALL)
 NUMBER = re.compile(r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?![\w])")
 CLOSE = 0.02
 """Another machine rounds otherwise, and draws are compared with it."""
-CHANCE, CLOSE_CHANCE = re.compile(r"(?<=\(p = )[\d.]+"), 0.2
+CHANCE, CLOSE_CHANCE = re.compile(r"(?<=\(p = )[\d.]+"), 0.1
 """A share of draws, of which it makes more."""
 COUNTED, CLOSE_COUNT = 100, 0.005
 """Whole numbers from here on are counts of rows and trials, or sums that hardly move."""

@@ -20,8 +20,9 @@ from rig.campaign.config import (
     WatchConfig,
     twin_path,
 )
+from rig.campaign.dwell import Dwell, FixedDwell, SteadyDwell
 from rig.campaign.limits import guarded_channels
-from rig.campaign.plan import Dwell, FixedDwell, Plan, SteadyDwell, TareConfig
+from rig.campaign.plan import Plan, TareConfig
 from rig.campaign.shapes import SHAPES, Shape
 from rig.campaign.waits import CoolDown
 from rig.errors import ConfigError

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Set
 from dataclasses import dataclass, field, replace
 from typing import Literal, NamedTuple
 
-from rig.campaign.dwell import Dwell, FixedDwell, SteadyDwell
+from rig.campaign.dwell import Dwell
 from rig.campaign.shapes import (
     MOST_MOVES,
     Hold,
@@ -21,10 +21,6 @@ from rig.campaign.shapes import (
     steepest,
 )
 from rig.campaign.waits import CoolDown, Wait, wanted
-
-__all__ = [
-    "TARE_AGAIN", "Duration", "Dwell", "FixedDwell", "Phase", "Plan", "SteadyDwell", "Step", "TareConfig",
-]  # fmt: skip
 
 Phase = Literal["tare", "ramp", "hold", "rest", "sine", "free"]
 TARE_AGAIN = -2

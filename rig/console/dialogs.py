@@ -20,7 +20,7 @@ Leaving = Literal["detach", "stop"]
 class NoteDialog(ModalScreen[str]):
     """Asks for one line; dismissed with it, or with an empty string."""
 
-    BINDINGS: ClassVar[list[BindingType]] = [("escape", "cancel", "cancel")]
+    BINDINGS: ClassVar[list[BindingType]] = [("escape", "cancel", "cancel"), ("enter", "keep", "keep")]
 
     def compose(self) -> ComposeResult:
         yield Head()
@@ -38,8 +38,12 @@ class NoteDialog(ModalScreen[str]):
         for head in self.query(Head):
             head.show(view)
 
-    def on_input_submitted(self, event: Input.Submitted) -> None:
-        self.dismiss(event.value.strip())
+    def on_input_submitted(self, _: Input.Submitted) -> None:
+        self.action_keep()
+
+    def action_keep(self) -> None:
+        """Also where the text field has lost its focus: every Enter closes the dialog."""
+        self.dismiss(self.query_one(Input).value.strip())
 
     def action_cancel(self) -> None:
         self.dismiss("")

@@ -9,7 +9,8 @@ import numpy as np
 
 from identification.experiment_design.run_order import Exposure, exposure
 from identification.experiment_design.thrust_design import Means, Promise, promise
-from rig.campaign.plan import FixedDwell, Plan, Step, TareConfig
+from rig.campaign.dwell import FixedDwell
+from rig.campaign.plan import Plan, Step, TareConfig
 from rig.campaign.shapes import Interleaved, Shape, Staircase
 from rig.design.optimal_levels import Ask, mean_heat
 from rig.design.plan import worth

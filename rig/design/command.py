@@ -10,8 +10,9 @@ from typing import Any
 
 import click
 
+from rig.campaign.dwell import FixedDwell
 from rig.campaign.loading import load_campaign
-from rig.campaign.plan import FixedDwell, Plan
+from rig.campaign.plan import Plan
 from rig.campaign.plan_file import Template, write_campaign
 from rig.campaign.shapes import Levels
 from rig.design.ask import Options, prepare

@@ -16,8 +16,9 @@ from drivers.protocols import Channel, Instrument, MotorController
 from rig.campaign.bench import build
 from rig.campaign.config import BenchConfig, CampaignConfig
 from rig.campaign.disarmed import Disarmed, disarmed, require_armed
+from rig.campaign.dwell import FixedDwell
 from rig.campaign.loading import load_campaign
-from rig.campaign.plan import Duration, FixedDwell, Step
+from rig.campaign.plan import Duration, Step
 from rig.campaign.shapes import Levels
 from rig.errors import ConfigError, PlanError
 from rig.safety.watchdog_proof import PROOFS_OF_A_RUN

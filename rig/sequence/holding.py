@@ -8,10 +8,8 @@ from math import isnan
 from rig.campaign.plan import Step
 from rig.link.front_end_messages import Point
 from rig.sequence.steady import Window
-from rig.sequence.ticks import Settings
+from rig.sequence.ticks import EPSILON, Settings
 
-EPSILON = 1e-9
-"""s, slack for float arithmetic."""
 LOOK_PERIOD = 0.2
 """s between two looks whether it is steady: a look costs some milliseconds."""
 LOOKS = 2

@@ -21,14 +21,11 @@ from rig.sequence.holding import Holding
 from rig.sequence.journal import Journal
 from rig.sequence.requests import obey
 from rig.sequence.taring import Taring
-from rig.sequence.ticks import Outcome, Output, Settings, Tick, settings_for
+from rig.sequence.ticks import EPSILON, Outcome, Output, Settings, Tick, settings_for
 from rig.sequence.time_left import TimeLeft
 from rig.sequence.waiting import Waiting
 
 __all__ = ["Sequencer", "settings_for"]
-
-EPSILON = 1e-9
-"""s and V, slack for float arithmetic."""
 
 
 class Sequencer:

@@ -8,13 +8,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from rig.safety.stopping import is_rest, turning
-from rig.sequence.ticks import Tick
+from rig.sequence.ticks import EPSILON, Tick
 
 if TYPE_CHECKING:
     from rig.sequence.sequencer import Sequencer
-
-EPSILON = 1e-9
-"""s, slack for float arithmetic."""
 
 
 def take_tare(run: Sequencer, tick: Tick) -> bool:

@@ -7,9 +7,7 @@ from typing import Literal, NamedTuple
 
 from rig.campaign.plan import TareConfig
 from rig.sequence.steady import SteadyEstimator, Window
-
-EPSILON = 1e-9
-"""s, slack for float arithmetic."""
+from rig.sequence.ticks import EPSILON
 
 
 class TareStep(NamedTuple):

@@ -9,13 +9,16 @@ from typing import Literal, NamedTuple
 from identification.recording import Step as StepRow
 from identification.steady_state.steady import SteadyMonitor
 from rig.campaign.config import BenchConfig, CampaignConfig
-from rig.campaign.plan import Phase, SteadyDwell, TareConfig
+from rig.campaign.dwell import SteadyDwell
+from rig.campaign.plan import Phase, TareConfig
 from rig.link.front_end_messages import LogLine, Point, Request, State
 from rig.safety.guard import MIN_LATENESS, Trip
 from rig.safety.watchdog_proof import ProofSettings
 from rig.sequence.steady import SteadyEstimator
 
 Outcome = Literal["running", "completed", "aborted", "tripped"]
+EPSILON = 1e-9
+"""s and V, slack for float arithmetic."""
 
 
 @dataclass(frozen=True, slots=True)

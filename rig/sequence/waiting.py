@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Literal
 
 from rig.campaign.waits import CoolDown, Wait
+from rig.sequence.ticks import EPSILON
 
-EPSILON = 1e-9
-"""s, slack for float arithmetic."""
 COOL_FOR = 1.0
 """s below the limit without a break: one value alone may be a wire's."""
 

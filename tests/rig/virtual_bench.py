@@ -12,7 +12,8 @@ from pathlib import Path
 
 from rig.campaign.bench import Bench
 from rig.campaign.config import BenchConfig, CampaignConfig, DeviceConfig, LimitConfig, MountConfig
-from rig.campaign.plan import FixedDwell, Plan, TareConfig
+from rig.campaign.dwell import FixedDwell
+from rig.campaign.plan import Plan, TareConfig
 from rig.campaign.shapes import Levels
 from rig.link.front_end_messages import Request, Snapshot
 from rig.link.sockets import Peer, connect, pair

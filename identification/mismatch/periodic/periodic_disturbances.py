@@ -89,8 +89,8 @@ class Line:
     """Whether it comes again in other runs, or in other parts of the only one; None where it was not asked."""
 
     @property
-    def largest(self) -> float:
-        """N, of the waves that the samples show."""
+    def shown_amplitude(self) -> float:
+        """N, the largest of the waves that the samples show."""
         return max((float(np.hypot(p.a, p.b)) for p in self.parts), default=0.0)
 
     @property

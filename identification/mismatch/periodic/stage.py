@@ -66,7 +66,7 @@ def _lines(fitted: Fit, data: Data, series: Sequence[Series]) -> tuple[Line, ...
     unit: Literal["rev", "V s"] = "rev" if has_rate else "V s"
     least = max(_of_rounding(s, h) for s, h in zip(series, data.histories, strict=True))
     lines = tuple(
-        line for line in find_lines(series, turns_unit=unit, ring=_ring(fitted, data)) if line.largest > least
+        line for line in find_lines(series, turns_unit=unit, ring=_ring(fitted, data)) if line.shown_amplitude > least
     )
     if not lines or not data.with_rate:
         return lines

@@ -7,8 +7,8 @@ import pytest
 from drivers.ports.can_bus import Frame
 from drivers.ports.transcript import read_transcript
 from rig.campaign.bench import build
+from rig.campaign.dwell import FixedDwell, SteadyDwell
 from rig.campaign.loading import load_bench, load_campaign
-from rig.campaign.plan import FixedDwell, SteadyDwell
 from rig.campaign.shapes import Interleaved, Ramp
 from rig.errors import ConfigError
 

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.campaign.plan import FixedDwell, Plan, SteadyDwell, TareConfig
+from rig.campaign.dwell import FixedDwell, SteadyDwell
+from rig.campaign.plan import Plan, TareConfig
 from rig.campaign.shapes import Interleaved, Levels, Ramp, RandomOrder, Sine, Staircase
 from rig.errors import PlanError
 

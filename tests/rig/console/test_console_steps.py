@@ -112,6 +112,17 @@ async def test_a_key_right_after_the_end_of_a_note_is_for_the_page(last):
         assert desk.kinds()[-1] == "skip"
 
 
+@pytest.mark.parametrize("last", ["enter", "escape"])
+async def test_a_note_whose_field_has_lost_its_focus_closes_and_keys_go_on(last):
+    async with sitting(running()) as desk:
+        await desk.press("n", *"weed")
+        desk.app.screen.set_focus(None)
+        await desk.press(last, "p")
+        assert [request.text for request in desk.feed.sent if request.kind == "note"] == ["weed"] * (last == "enter")
+        assert len(desk.app.screen_stack) == 1
+        assert desk.kinds()[-1] == "pause"
+
+
 async def test_the_page_of_keys_has_them_all_and_the_stop_key_works_on_it():
     async with sitting(running()) as desk:
         await desk.press("question_mark")

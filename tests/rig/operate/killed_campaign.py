@@ -17,7 +17,8 @@ from pathlib import Path
 
 from rig.campaign.bench import Bench
 from rig.campaign.config import CampaignConfig, MountConfig
-from rig.campaign.plan import FixedDwell, Plan, TareConfig
+from rig.campaign.dwell import FixedDwell
+from rig.campaign.plan import Plan, TareConfig
 from rig.campaign.shapes import Interleaved
 from rig.link.sockets import Peer, pair
 from rig.operate.resume import keep, remainder

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.recording import Step as Row
-from rig.campaign.plan import FixedDwell, Plan, SteadyDwell, Step, TareConfig
+from rig.campaign.dwell import FixedDwell, SteadyDwell
+from rig.campaign.plan import Plan, Step, TareConfig
 from rig.campaign.shapes import Interleaved, Levels, Ramp, Sine, Staircase
 from rig.errors import PlanError
 from rig.link.front_end_messages import LogLine, Point, Request

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_sequencer import FIXED, PERIOD, PROOF, SHORT, SLEW, TRIP, Ran, World, asks, in_state, run
 
-from rig.campaign.plan import FixedDwell, Plan, Step, TareConfig
+from rig.campaign.dwell import FixedDwell
+from rig.campaign.plan import Plan, Step, TareConfig
 from rig.campaign.shapes import Ramp, Sine
 from rig.link.front_end_messages import Request
 from rig.sequence.journal import Journal

@@ -7,7 +7,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from test_sequencer import FIXED, PERIOD, PROOF, TRIP, asks, run
 
-from rig.campaign.plan import TARE_AGAIN, FixedDwell, Plan, TareConfig
+from rig.campaign.dwell import FixedDwell
+from rig.campaign.plan import TARE_AGAIN, Plan, TareConfig
 from rig.campaign.shapes import Levels
 from rig.campaign.waits import CoolDown
 from rig.errors import PlanError

@@ -1,5 +1,7 @@
 """A campaign on the virtual bench, played from a front end; what came of it."""
 
+from collections.abc import Callable
+
 from rig.link.front_end_messages import Snapshot
 from rig.stages.campaign import run
 from tests.rig.virtual_bench import VirtualBench, starter
@@ -38,3 +40,21 @@ def play(world: VirtualBench, at=(), each=None) -> list[Snapshot]:
 
 def outcome(world: VirtualBench) -> tuple[str, str]:
     return world.session.status.outcome, world.session.status.cause
+
+
+def left_alone(world: VirtualBench, reached: Callable[[], bool]) -> float:
+    """Run a campaign whose only front end starts it and is gone in the tick in which it is `reached`; when, in s."""
+    front, left = world.front(), list[float]()
+    drive = starter(world, front, [])
+
+    def tick(now: float) -> None:
+        if left:
+            return
+        drive(now)
+        if reached():
+            left.append(now)
+            front.close()
+
+    world.clock.each = tick
+    run(world.session)
+    return left[0]

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from rig.campaign.plan import TARE_AGAIN, FixedDwell, Plan, TareConfig
+from rig.campaign.dwell import FixedDwell
+from rig.campaign.plan import TARE_AGAIN, Plan, TareConfig
 from rig.campaign.shapes import Ramp, Sine
 from rig.link.front_end_messages import Request
 from rig.link.recorder_messages import Close, Open

@@ -4,7 +4,8 @@ import sys
 
 import pytest
 
-from rig.campaign.plan import FixedDwell, Plan
+from rig.campaign.dwell import FixedDwell
+from rig.campaign.plan import Plan
 from rig.link.front_end_messages import Request
 from rig.link.recorder_messages import Close, Open
 from rig.recording.ledger import read

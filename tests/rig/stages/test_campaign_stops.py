@@ -7,8 +7,8 @@ import pytest
 from rig.link.front_end_messages import Request
 from rig.link.recorder_messages import Close, Open
 from rig.stages.campaign import run
-from tests.rig.stages.played import outcome, play
-from tests.rig.virtual_bench import VirtualBench, starter, virtual
+from tests.rig.stages.played import left_alone, outcome, play
+from tests.rig.virtual_bench import VirtualBench, virtual
 from tests.rig.virtual_devices import flow_meter, stop_input
 
 
@@ -18,27 +18,10 @@ def drive_after(world: VirtualBench, now: float) -> list[tuple[float, float]]:
 
 def test_front_end_gone_ends_an_attended_run_in_the_next_tick(tmp_path):
     with virtual(tmp_path, unattended=False) as world:
-        left = []
-
-        def leave():
-            left.append(world.clock.t_ns * 1e-9)
-            world.session.loop.clients.connected[0].peer.close()
-
-        front, seen = world.front(), []
-        drive = starter(world, front, seen)
-
-        def tick(now):
-            if not left:
-                drive(now)
-            if world.session.loop.command == 6.0 and not left:
-                left.append(now)
-                front.close()
-
-        world.clock.each = tick
-        run(world.session)
+        left = left_alone(world, lambda: world.session.loop.command == 6.0)
         assert outcome(world)[0] == "tripped"
         assert "the operator is gone" in outcome(world)[1]
-        assert drive_after(world, left[0] + 0.021) == []
+        assert drive_after(world, left + 0.021) == []
 
 
 @pytest.mark.parametrize("later", [0.0, 0.02, 0.04, 0.06, 0.08])

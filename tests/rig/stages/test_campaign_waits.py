@@ -8,9 +8,8 @@ import pytest
 from rig.campaign.waits import CoolDown
 from rig.link.front_end_messages import Request
 from rig.link.recorder_messages import StepRow
-from rig.stages.campaign import run
-from tests.rig.stages.played import outcome, play
-from tests.rig.virtual_bench import PLAN, starter, virtual
+from tests.rig.stages.played import left_alone, outcome, play
+from tests.rig.virtual_bench import PLAN, virtual
 from tests.rig.virtual_devices import winding
 
 COOL = CoolDown("winding.motor_temperature", 50.0, 8.0)
@@ -52,7 +51,8 @@ def cooled(world) -> float:
 
 
 def cool(thermometer) -> None:
-    thermometer.value = 40.0
+    """It says so at once: when its next row would be due depends on the tick in which the run began."""
+    thermometer.value, thermometer.due = 40.0, 0.0
 
 
 @pytest.mark.parametrize("value", [61.2, nan, None], ids=["never cools", "NaN", "stale"])
@@ -79,18 +79,7 @@ def test_the_guard_watches_in_a_wait(tmp_path):
 
 def test_an_operator_who_leaves_in_a_wait_ends_an_attended_run(tmp_path):
     with virtual(tmp_path, plan=WAITS, unattended=False) as world:
-        front, seen, left = world.front(), [], []
-        drive = starter(world, front, seen)
-
-        def tick(now):
-            if not left:
-                drive(now)
-            if world.session.status.state == "wait" and not left:
-                left.append(now)
-                front.close()
-
-        world.clock.each = tick
-        run(world.session)
+        left_alone(world, lambda: world.session.status.state == "wait")
         assert outcome(world)[0] == "tripped"
         assert "the operator is gone" in outcome(world)[1]
         assert not any(volts for _, volts in world.motor.sent)

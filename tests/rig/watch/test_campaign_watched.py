@@ -15,8 +15,9 @@ from drivers.protocols import Channel, Sample, Stream
 from identification.physics.term import Scale
 from identification.twin import TERMS, Twin, TwinNoise, TwinTerm, names_of
 from rig.campaign.config import WatchConfig
+from rig.campaign.dwell import FixedDwell
 from rig.campaign.loading import load_campaign
-from rig.campaign.plan import FixedDwell, Plan
+from rig.campaign.plan import Plan
 from rig.campaign.shapes import Levels
 from rig.errors import ConfigError, LinkError
 from rig.link.front_end_messages import Request

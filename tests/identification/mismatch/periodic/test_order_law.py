@@ -134,7 +134,7 @@ def test_a_line_is_as_large_as_before_the_device_that_samples_it(frequency):
     (line,) = find_lines([replace(noise, residual=noise.residual + shown, turns=None, converter=CONVERTER)])
     assert line.amplitude == pytest.approx(0.6, abs=4 * line.amplitude_std)
     assert line.phase == pytest.approx(1.0, abs=5 * line.phase_std + 0.1)
-    assert line.largest == pytest.approx(0.6 * abs(CONVERTER.response(frequency)), rel=0.15)
+    assert line.shown_amplitude == pytest.approx(0.6 * abs(CONVERTER.response(frequency)), rel=0.15)
     assert np.std(line.at(noise.time) - shown) < 0.05, "what is taken out is what the samples show"
 
 

@@ -2,7 +2,8 @@
 
 import pytest
 
-from rig.campaign.plan import FixedDwell, Plan
+from rig.campaign.dwell import FixedDwell
+from rig.campaign.plan import Plan
 from rig.link.front_end_messages import Request
 from tests.rig.stages.lies.lying_motor import Telemetry
 from tests.rig.stages.played import outcome, play
