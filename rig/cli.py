@@ -56,6 +56,7 @@ COMMANDS: Final = {
     "check": Entry(
         "rig.operate.check:check_command", "Check a campaign and its bench without opening a port.", "measure"
     ),
+    "edit": Entry("rig.operate.edit:edit_command", "Edit a campaign in a form, with its dry run beside it.", "measure"),
     "run": Entry(
         "rig.operate.run:run_command", "Run a campaign on its bench: console, recording, table of the fits.", "measure"
     ),

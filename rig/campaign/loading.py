@@ -27,7 +27,7 @@ from rig.campaign.shapes import SHAPES, Shape
 from rig.campaign.waits import CoolDown
 from rig.errors import ConfigError
 from rig.names import require_name
-from rig.toml_tables import Table, construct, decode, joined, read_toml, refuse_unknown, table_at, typed, values
+from rig.toml_tables import Table, construct, decode, joined, parsed, read_toml, refuse_unknown, table_at, typed, values
 
 T = TypeVar("T")
 
@@ -67,6 +67,15 @@ def load_bench(path: Path) -> BenchConfig:
 def load_campaign(path: Path) -> CampaignConfig:
     """Read a campaign file and the bench file it names. Raises ConfigError, or PlanError for an impossible plan."""
     text, content = read_toml(path, "campaign file")
+    return _campaign(path, text, content)
+
+
+def campaign_of(path: Path, text: str) -> CampaignConfig:
+    """The campaign that `path` would be with `text` in it; the bench file is read. Raises as `load_campaign`."""
+    return _campaign(path, text, parsed(text.replace("\r\n", "\n"), path))
+
+
+def _campaign(path: Path, text: str, content: Table) -> CampaignConfig:
     refuse_unknown(path, "", content, ("campaign", "tare", "plan", "watch", "overrides"))
     table = table_at(path, content, "campaign")
     scalars = values(CampaignConfig, table, path, "campaign", elsewhere=CAMPAIGN_ELSEWHERE, also=("bench",))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +19,9 @@ from rig.campaign.dwell import FixedDwell
 from rig.campaign.loading import load_campaign
 from rig.campaign.plan import Duration, Step
 from rig.campaign.shapes import Levels
+from rig.dry_run.earlier import known_power
+from rig.dry_run.outlook import Outlook, energies_of
+from rig.dry_run.power import PowerCurve
 from rig.errors import ConfigError, PlanError
 from rig.safety.watchdog_proof import PROOFS_OF_A_RUN
 from rig.sequence.sequencer import settings_for
@@ -48,10 +50,16 @@ class CheckReport:
 def check_campaign(path: Path) -> CheckReport:
     """Load and check a campaign; opens nothing. Raises ConfigError or PlanError: one sentence with file and key."""
     campaign = load_campaign(path)
+    report = check_loaded(campaign)
+    require_ports(campaign.bench)
+    return report
+
+
+def check_loaded(campaign: CampaignConfig) -> CheckReport:
+    """All of `check_campaign` but whether the ports are there. Raises ConfigError or PlanError."""
     bench = build(campaign.bench)
     overridden = disarmed(campaign, (stream for _, stream in bench.streams()))
     require_armed(overridden)
-    _require_ports(campaign.bench)
     _require_watchdog(campaign.bench, bench.motor)
     _require_voltages(campaign, bench.motor)
     force = bench.instruments[campaign.bench.force]
@@ -79,7 +87,7 @@ def _ports(bench: BenchConfig) -> Iterator[tuple[str, str]]:
         yield f"devices.{name}.port", port
 
 
-def _require_ports(bench: BenchConfig) -> None:
+def require_ports(bench: BenchConfig) -> None:
     """A port that is a path must exist; a URL or a plain name (COM3, can0) is left to the opening. None serves two."""
     taken: dict[str, str] = {}
     for key, port in _ports(bench):
@@ -170,16 +178,19 @@ def _require_samples(campaign: CampaignConfig, force: Instrument) -> None:
             )
 
 
-def _clock(seconds: float) -> str:
-    if not math.isfinite(seconds):
-        return "for ever"
-    minutes, rest = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    return f"{hours}:{minutes:02d}:{rest:02d}" if hours else f"{minutes}:{rest:02d}"
+def outlook_of(report: CheckReport, powers: Mapping[str, PowerCurve | str]) -> Outlook:
+    """The report's numbers with the energy by what is known of each thruster's power."""
+    energies = energies_of(report.steps, powers)
+    return Outlook(report.steps, report.run, report.total, report.peak_voltage, report.peak_thrust, energies)
 
 
-def print_report(report: CheckReport, screen: Console) -> None:
-    """Steps, durations, peaks."""
+def known_powers(campaign: CampaignConfig) -> dict[str, PowerCurve | str]:
+    """Of each thruster, from the campaign's folder of recordings."""
+    return {name: known_power(campaign.output, name) for name in campaign.thrusters}
+
+
+def print_report(report: CheckReport, screen: Console, powers: Mapping[str, PowerCurve | str] | None = None) -> None:
+    """Steps, durations, holds, peaks, energy by the `powers` that are known."""
     campaign = report.campaign
     table = Table("step", "phase", "from V", "to V", "expected s", "at most s", title=f"{campaign.name}: one run")
     for step in report.steps:
@@ -192,13 +203,8 @@ def print_report(report: CheckReport, screen: Console) -> None:
     screen.print(f"thrusters      {', '.join(campaign.thrusters)}")
     if campaign.flow_speed is not None:
         screen.print(f"flow speed     {campaign.flow_speed:g} m/s, to be set by hand; the preflight compares")
-    screen.print(f"one run        {_clock(report.run.expected)} expected, {_clock(report.run.worst)} at worst")
-    screen.print(f"campaign       {_clock(report.total.expected)} expected, {_clock(report.total.worst)} at worst")
-    screen.print(f"peak voltage   {report.peak_voltage:g} V")
-    if report.peak_thrust is None:
-        screen.print("peak thrust    not checked: the campaign gives no expected_C")
-    else:
-        screen.print(f"peak thrust    {report.peak_thrust:.4g} N expected, from expected_C")
+    for what, told in outlook_of(report, powers or {}).rows():
+        screen.print(f"{what:<14} {told}")
     for each in report.overridden:
         screen.print(f"OVERRIDE       {each.told}")
     screen.print("The campaign may run. Nothing was opened.")
@@ -207,6 +213,7 @@ def print_report(report: CheckReport, screen: Console) -> None:
 @click.command("check")
 @click.argument("campaign", type=click.Path(path_type=Path))
 def check_command(campaign: Path) -> int:
-    """Check CAMPAIGN and its bench without opening a port: steps, durations, peaks, and every limit."""
-    print_report(check_campaign(campaign), console())
+    """Check CAMPAIGN and its bench without opening a port: steps, durations, peaks, energy, and every limit."""
+    report = check_campaign(campaign)
+    print_report(report, console(), known_powers(report.campaign))
     return 0
