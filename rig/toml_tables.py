@@ -142,7 +142,14 @@ def _tuples(value: Any) -> Any:
     return tuple(_tuples(item) for item in value) if isinstance(value, list) else value
 
 
-WORDS = {"str": "text", "float": "a number", "int": "a whole number", "bool": "true or false"}
+WORDS = {
+    "str": "text",
+    "float": "a number",
+    "int": "a whole number",
+    "bool": "true or false",
+    "date": "a date such as 2026-03-01",
+    "datetime.date": "a date such as 2026-03-01",
+}
 
 
 def _type_said(hint: Any) -> str:

@@ -14,7 +14,15 @@ import pytest
 from textual.binding import Binding
 
 from drivers import KINDS
-from rig.campaign.config import BenchConfig, CampaignConfig, CanBusConfig, LimitConfig, MountConfig, WatchConfig
+from rig.campaign.config import (
+    BenchConfig,
+    CalibrationConfig,
+    CampaignConfig,
+    CanBusConfig,
+    LimitConfig,
+    MountConfig,
+    WatchConfig,
+)
 from rig.campaign.loading import BENCH_ELSEWHERE, CAMPAIGN_ELSEWHERE, DWELLS, PLAN_ELSEWHERE
 from rig.campaign.plan import Plan, TareConfig
 from rig.campaign.shapes import SHAPES
@@ -22,6 +30,7 @@ from rig.campaign.waits import CoolDown
 from rig.cli import main
 from rig.console.app import STOP_KEYS, ConsoleApp
 from rig.console.dialogs import LeaveDialog, NoteDialog
+from rig.console.view_model.bench_text import DEVICE_STYLES
 from rig.console.view_model.tables import STATE_STYLES
 from rig.console.view_model.wording import STATE_WORDS
 from rig.operate.check import check_campaign
@@ -50,6 +59,7 @@ TABLES = (
     ("`[can.<name>]`", CanBusConfig, ()),
     ('`[limits."<stream>.<channel>"]`', LimitConfig, ("channel",)),
     ("`[mount]`", MountConfig, ()),
+    ("`[calibration.<device>]`", CalibrationConfig, ()),
     ("`[campaign]`", CampaignConfig, tuple(name for name in CAMPAIGN_ELSEWHERE if name != "bench")),
     ("`[tare]`", TareConfig, ()),
     ("`[plan]`", Plan, PLAN_ELSEWHERE),
@@ -178,7 +188,7 @@ def test_every_key_of_the_console() -> None:
 
 
 def test_every_state_of_the_console() -> None:
-    assert {*STATE_WORDS.values(), *STATE_STYLES} <= words(text("console"))
+    assert {*STATE_WORDS.values(), *STATE_STYLES, *DEVICE_STYLES} <= words(text("console"))
 
 
 def test_every_fault_and_command_of_the_simulated_bench() -> None:

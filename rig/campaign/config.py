@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -36,6 +37,25 @@ class DeviceConfig:
     name: str
     kind: str
     options: Any
+
+
+@dataclass(frozen=True, slots=True)
+class CalibrationConfig:
+    """`[calibration.<device>]`: from when its calibration is, and how long it is good."""
+
+    date: datetime.date
+    valid_until: datetime.date | None = None
+    """The last day."""
+    certificate: str = ""
+    """Number, or where it is."""
+
+    def __post_init__(self) -> None:
+        if self.valid_until is not None and self.valid_until < self.date:
+            raise ValueError(f"valid_until ({self.valid_until}) is before date ({self.date})")
+
+    def days_left(self, today: datetime.date) -> int | None:
+        """Days until it is over, negative when it is; None: nobody said until when."""
+        return None if self.valid_until is None else (self.valid_until - today).days
 
 
 @dataclass(frozen=True, slots=True)
@@ -104,6 +124,8 @@ class BenchConfig:
     consistency: bool = True
     """Whether a run ends when command, rotation, current and thrust contradict each other (rig.safety.consistency)."""
     mount: MountConfig = field(default_factory=MountConfig)
+    calibration: Mapping[str, CalibrationConfig] = field(default_factory=dict)
+    """By the name of the device."""
     overrides: Mapping[str, str] = field(default_factory=dict)
     """`[overrides]`: protection that this file takes away -> why (rig.campaign.disarmed)."""
 

@@ -12,6 +12,7 @@ from drivers import KINDS
 from rig.campaign.bench import build
 from rig.campaign.config import (
     BenchConfig,
+    CalibrationConfig,
     CampaignConfig,
     CanBusConfig,
     DeviceConfig,
@@ -31,7 +32,7 @@ from rig.toml_tables import Table, construct, decode, joined, parsed, read_toml,
 
 T = TypeVar("T")
 
-BENCH_ELSEWHERE = ("path", "text", "devices", "can", "limits", "mount", "overrides")
+BENCH_ELSEWHERE = ("path", "text", "devices", "can", "limits", "mount", "calibration", "overrides")
 """Fields of BenchConfig that are no keys of `[bench]`."""
 CAMPAIGN_ELSEWHERE = ("path", "text", "bench", "plan", "tare", "watch", "overrides")
 """Fields of CampaignConfig that are no keys of `[campaign]`."""
@@ -43,7 +44,7 @@ DWELLS: Mapping[str, type[Dwell]] = {"fixed": FixedDwell, "steady": SteadyDwell}
 def load_bench(path: Path) -> BenchConfig:
     """Read a bench file. Raises ConfigError."""
     text, content = read_toml(path, "bench file")
-    refuse_unknown(path, "", content, ("bench", "can", "devices", "limits", "mount", "overrides"))
+    refuse_unknown(path, "", content, ("bench", "can", "devices", "limits", "mount", "calibration", "overrides"))
     scalars = values(BenchConfig, table_at(path, content, "bench"), path, "bench", elsewhere=BENCH_ELSEWHERE)
     buses = table_at(path, content, "can", optional=True)
     limits = table_at(path, content, "limits", optional=True)
@@ -55,6 +56,7 @@ def load_bench(path: Path) -> BenchConfig:
         devices={name: _device(path, name, table_at(path, devices, name, "devices")) for name in devices},
         limits=tuple(_limit(path, channel, table_at(path, limits, channel, "limits")) for channel in limits),
         mount=decode(MountConfig, table_at(path, content, "mount", optional=True), path, "mount"),
+        calibration=_calibrations(path, table_at(path, content, "calibration", optional=True)),
         overrides=_overrides(path, content),
         **scalars,
     )
@@ -191,6 +193,13 @@ def _device(path: Path, name: str, table: Table) -> DeviceConfig:
     return DeviceConfig(name, kind, decode(found.options, rest, path, prefix))
 
 
+def _calibrations(path: Path, tables: Table) -> dict[str, CalibrationConfig]:
+    at = "calibration"
+    return {
+        name: decode(CalibrationConfig, table_at(path, tables, name, at), path, joined(at, name)) for name in tables
+    }
+
+
 def _limit(path: Path, channel: str, table: Table) -> LimitConfig:
     prefix = joined("limits", channel)
     limit = construct(
@@ -266,6 +275,9 @@ def _require_devices(bench: BenchConfig) -> None:
             raise ConfigError(
                 f"{path}: devices.{name}.bus names {device.options.bus!r}, but there is no [can.{device.options.bus}]"
             )
+    for name in bench.calibration:
+        if name not in bench.devices:
+            raise ConfigError(f"{path}: [calibration.{name}] is of no device of this bench; there are {devices}")
     built = build(bench)
     assert built.motor  # raises ConfigError when it can't turn a propeller
     streams = [stream for _, stream in built.streams()]

@@ -14,6 +14,7 @@ from textual.filter import LineFilter
 from textual.message import Message
 from textual.widgets import ContentSwitcher
 
+from rig.console.bench_page import BenchPanel
 from rig.console.diagnosing import DIAGNOSE, NOT_YET, DiagnosisPanel, answers
 from rig.console.dialogs import LeaveDialog, Leaving, NoteDialog
 from rig.console.feed import Feed
@@ -40,7 +41,7 @@ LEASE: Final = 0.5
 """s between leases. From the screen's own loop on purpose: when the screen hangs, the lease goes stale."""
 STOP_KEYS: Final = ("ctrl+c", "super+c", "f9")
 """super+c is Cmd+C where a terminal passes it on."""
-VIEWS: Final = ("main", "fit", "time", "log", "results", "diagnosis")
+VIEWS: Final = ("main", "fit", "time", "log", "results", "diagnosis", "bench")
 
 
 class ConsoleApp(App[None], inherit_bindings=False):
@@ -117,6 +118,8 @@ class ConsoleApp(App[None], inherit_bindings=False):
                 yield ResultsPanel()
             with VerticalScroll(id="diagnosis"):
                 yield DiagnosisPanel()
+            with VerticalScroll(id="bench"):
+                yield BenchPanel()
         yield Panel(id="keys", markup=False)
 
     def on_mount(self) -> None:
@@ -124,6 +127,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
         self.query_one("#preflight").border_title = "preflight"
         self.query_one("#results").border_title = "result per thruster: C V|V| fitted to the holds"
         self.query_one("#diagnosis").border_title = "diagnosis: what C V|V| leaves out"
+        self.query_one("#bench").border_title = "bench: who is there, and how well it is heard"
         self.run_worker(self._follow())
         self.set_interval(REDRAW, self.show_text)
         self.set_interval(REPLOT, self.show_plots)
@@ -166,6 +170,8 @@ class ConsoleApp(App[None], inherit_bindings=False):
         base.query_one(ProgressPanel).show(view)
         base.query_one(ReadingsPanel).show(view)
         base.query_one(ResultsPanel).show(view)
+        if self.chosen == "bench":
+            base.query_one(BenchPanel).show(view)
         base.query_one(LogPanel).show(view, self.log_filter)
         base.query_one("#keys", Panel).put(line := key_line(view), line)
         if isinstance(self.screen, NoteDialog | LeaveDialog | KeyHelp):
@@ -267,6 +273,8 @@ class ConsoleApp(App[None], inherit_bindings=False):
     def action_view(self, name: str) -> None:
         self.chosen = name
         self.show_text()
+        if name == "bench" and len(self.screen_stack) == 1:
+            self.query_one("#bench").focus()  # the arrow keys scroll it
         self.call_after_refresh(self.show_plots)
 
     def action_filter(self) -> None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from rig.campaign.config import CampaignConfig
-from rig.link.front_end_messages import Check, LogLine, Point, Progress, Reading, Snapshot, State
+from rig.link.front_end_messages import Check, Device, LogLine, Point, Progress, Reading, Snapshot, State
 from rig.sequence.ticks import Output, settings_for
 
 LOG_LINES = 500
@@ -32,6 +32,8 @@ class Status:
     stop_confirmed: bool | None = None
     mismatch: str = ""
     """Of this thruster's run, as the watcher last said; empty: none."""
+    watchdog_measured: float | None = None
+    """s from the last command to rest, in the newest proof of the motor's own watchdog."""
     started: float | None = None
     """s, when the operator started the campaign."""
     output: Output | None = None
@@ -55,6 +57,8 @@ class Status:
         """What a run's tick has decided; `output` None before its first one."""
         self.paused_for += output.paused_for - (self.output.paused_for if self.output else 0.0)
         self.output, self.state = output, output.state
+        if output.time_to_zero_s is not None:
+            self.watchdog_measured = output.time_to_zero_s
 
     @property
     def thruster(self) -> str:
@@ -64,7 +68,14 @@ class Status:
         self.log.append(line)
         self.log_count += 1
 
-    def snapshot(self, now: float, time: float, command: float, readings: tuple[Reading, ...]) -> Snapshot:
+    def snapshot(
+        self,
+        now: float,
+        time: float,
+        command: float,
+        readings: tuple[Reading, ...],
+        devices: tuple[Device, ...] = (),
+    ) -> Snapshot:
         """`now` s monotonic, `time` s since the start of the recording, `command` V."""
         self.sequence += 1
         return Snapshot(
@@ -91,6 +102,7 @@ class Status:
             mismatch=self.mismatch,
             reason=self.output.reason if self.output else "",
             state_elapsed=self.output.state_elapsed if self.output else 0.0,
+            devices=devices,
         )
 
     def _progress(self, now: float) -> Progress | None:

@@ -52,6 +52,51 @@ class Reading:
 
 
 @dataclass(frozen=True, slots=True)
+class StreamHealth:
+    """How one stream of a device comes."""
+
+    name: str
+    nominal: float
+    """rows per s, by the bench file."""
+    rate: float | None
+    """rows per s over the last rows; None: fewer than three came."""
+    age: float | None
+    """s since its newest row; None: none came."""
+
+
+@dataclass(frozen=True, slots=True)
+class Device:
+    """One device of the bench: who it says it is, and how well it is heard."""
+
+    name: str
+    kind: str
+    port: str
+    identity: str
+    """Model and serial number as it said them; empty: it is not open."""
+    fault: str
+    """Why its link is not alive; empty: it is, or the device is not open."""
+    streams: tuple[StreamHealth, ...]
+    received: int = 0
+    """Frames or lines since it was opened; of a bus: those of everybody on it."""
+    bad: int = 0
+    """Of them not understood."""
+    first_bad: str = ""
+    dropped: int = 0
+    """Lost because the loop did not take them in time."""
+    calibrated: str = ""
+    """ISO date of its calibration; empty: the bench file has none."""
+    valid_until: str = ""
+    """ISO date up to which that is good; empty: the bench file does not say."""
+    days_left: int | None = None
+    """Days to `valid_until`, negative: it is over; None: not known."""
+    certificate: str = ""
+    watchdog: str = ""
+    """Of the motor controller: its own command timeout, as it or the bench file says it."""
+    watchdog_measured: float | None = None
+    """s from the last command to measured rest, in the newest proof; None: none was made yet."""
+
+
+@dataclass(frozen=True, slots=True)
 class Point:
     """A finished hold: the mean thrust, tare subtracted, and its standard error honest under autocorrelation."""
 
@@ -146,6 +191,8 @@ class Snapshot:
     """s in this wait or pause so far."""
     mismatch: str = ""
     """Where this run stopped fitting what it was, or its twin, in one line; empty: nowhere, as far as is seen."""
+    devices: tuple[Device, ...] = ()
+    """In the order of the bench file."""
 
 
 RequestKind = Literal[

@@ -11,7 +11,7 @@ from rig.control.readings import Readings
 from rig.link.front_end_messages import Check
 from rig.recording.ledger import file_facts
 from rig.stages.connecting import Links
-from rig.stages.preflight import all_checks, armed_checks, consistency_check, flow_check
+from rig.stages.preflight import all_checks, armed_checks, calibration_checks, consistency_check, flow_check
 from rig.stages.session import Session, Stopped
 
 SETTLE_ROWS = 5
@@ -33,6 +33,7 @@ def preflight(session: Session) -> None:
     links.open_all()
     streams = [stream for _, stream in session.bench.streams()]
     armed = armed_checks(disarmed(session.campaign, streams))
+    armed += calibration_checks(session.campaign.bench.calibration, session.today())
     flow = Flow(session.campaign.flow_speed, session.loop.now + FLOW_PATIENCE)
     if not links.failures:
         session.turn_for(SETTLE_ROWS * max(stream.period_s for stream in streams))

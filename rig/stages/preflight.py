@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
+from datetime import date
 from statistics import fmean
 from typing import Literal
 
 from drivers.protocols import Stream, Watchdog
-from rig.campaign.config import BenchConfig
+from rig.campaign.config import BenchConfig, CalibrationConfig
 from rig.campaign.disarmed import Disarmed
 from rig.control.consistency_watch import ConsistencyWatch
 from rig.control.readings import Readings
@@ -140,6 +141,20 @@ def armed_checks(found: Iterable[Disarmed]) -> list[Check]:
         else Check("override", "warning", each.told)
         for each in found
     ]
+
+
+def calibration_checks(calibrations: Mapping[str, CalibrationConfig], today: date) -> list[Check]:
+    """One line for each device whose calibration the bench file dates. One that is over warns: what is measured can be
+    corrected later."""
+    checks = []
+    for device, calibration in calibrations.items():
+        left, text = calibration.days_left(today), f"of {calibration.date}"
+        text += "" if calibration.valid_until is None else f", valid until {calibration.valid_until}"
+        over = left is not None and left < 0
+        verdict: Verdict = "warning" if over or calibration.date > today else "passed"
+        text += ": over" if over else ": a day to come" if calibration.date > today else ""
+        checks.append(Check(f"{device} calibration", verdict, text))
+    return checks
 
 
 def consistency_check(watch: ConsistencyWatch) -> Check:

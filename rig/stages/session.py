@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from datetime import UTC, date, datetime
 from pathlib import Path
 from typing import Literal
 
@@ -12,6 +13,7 @@ from drivers.protocols import MotorController
 from rig.campaign.bench import Bench
 from rig.campaign.config import CampaignConfig
 from rig.control.clocks import Clock
+from rig.control.devices import Devices
 from rig.control.event_log import EventLog, Level
 from rig.control.loop import IDLE, Decision, Inputs, Loop
 from rig.control.readings import Readings
@@ -71,6 +73,8 @@ class Session:
     """Indices of the steps of this run that earlier recordings hold: it goes on after a cut."""
     stamp: Callable[[], Stamp] = fresh_stamp
     """Of the next recording."""
+    today: Callable[[], date] = lambda: datetime.now(UTC).date()
+    """UTC, against which calibrations are over."""
 
     def say(self, level: Level, text: str, *, of_bench: bool = False) -> None:
         self.event_log.say(self.loop.clock.now_ns(), level, text, of_bench=of_bench)
@@ -211,11 +215,14 @@ def begin(
     status.begun = begun_ns * 1e-9
     event_log = EventLog(status, recorder, log, begun_ns)
 
+    devices = Devices(bench, readings)
+
     def publish(now: float) -> None:
         since = loop.recording_since_ns
         time = 0.0 if since is None else now - since * 1e-9
         if clients.connected:
-            clients.publish(status.snapshot(now, time, loop.command, readings.view(now)))
+            heard = devices.view(now, session.today, status.watchdog_measured)
+            clients.publish(status.snapshot(now, time, loop.command, readings.view(now), heard))
 
     loop = Loop(bench, readings, recorder, ledger, clients, clock, campaign.unattended, publish, watch)
     session = Session(campaign, folder, status, bench, recorder, ledger, log, event_log, loop, before)

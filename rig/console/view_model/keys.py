@@ -7,7 +7,15 @@ from rich.text import Text
 from rig.console.view_model.view import View
 from rig.link.front_end_messages import Snapshot
 
-VIEW_KEYS = (("1", "main"), ("2", "V|V|"), ("3", "time"), ("4", "log"), ("5", "table"), ("6", "physics"))
+VIEW_KEYS = (
+    ("1", "main"),
+    ("2", "V|V|"),
+    ("3", "time"),
+    ("4", "log"),
+    ("5", "table"),
+    ("6", "physics"),
+    ("7", "bench"),
+)
 EVERY_KEY = (
     ("F9, Ctrl+C", "STOP: 0 V now, the campaign ends; everywhere"),
     ("F5", "start; the thruster is on the bench"),
@@ -24,15 +32,15 @@ EVERY_KEY = (
     ("g", "diagnose, once the campaign has ended"),
     ("l", "attend, where this console only looks on"),
     ("d, Ctrl+Q", "leave; a dialog says first what that does"),
-    ("1 to 6", "main, V|V|, time, events, results, diagnosis"),
+    ("1 to 7", "main, V|V|, time, events, results, diagnosis, bench"),
     ("?", "these keys"),
 )
 """For a help page, the most urgent first."""
 
 
 def page_of(view: View, chosen: str) -> str:
-    """`preflight`, `live`, `results` or `diagnosis`: the operator's choice; `main` is the preflight list at first."""
-    if chosen in ("results", "diagnosis"):
+    """`preflight`, `live` or a page of its own: the operator's choice; `main` is the preflight list at first."""
+    if chosen in ("results", "diagnosis", "bench"):
         return chosen
     before = view.snapshot is None or view.snapshot.state in ("connecting", "preflight")
     return "preflight" if before and chosen == "main" else "live"

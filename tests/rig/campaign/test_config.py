@@ -1,5 +1,6 @@
 """Bench and campaign files, right and wrong."""
 
+from datetime import date
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,7 @@ import pytest
 from drivers.ports.can_bus import Frame
 from drivers.ports.transcript import read_transcript
 from rig.campaign.bench import build
+from rig.campaign.config import CalibrationConfig
 from rig.campaign.dwell import FixedDwell, SteadyDwell
 from rig.campaign.loading import load_bench, load_campaign
 from rig.campaign.shapes import Interleaved, Ramp
@@ -35,6 +37,39 @@ def test_example_campaigns_load_and_fit_the_bench(path):
     campaign.plan.require_within(campaign.bench.max_voltage, campaign.bench.slew, "the bench")
     assert campaign.plan.duration().expected > 0
     assert campaign.output == ROOT / "recordings"
+
+
+def with_calibration(folder: Path, table: str) -> Path:
+    path = folder / "bench.toml"
+    path.write_text((ROOT / "benches/simulated/bench.toml").read_text() + f"\n{table}\n")
+    return path
+
+
+def test_calibration_of_a_device(tmp_path):
+    table = '[calibration.load_cell]\ndate = 2026-03-02\nvalid_until = 2027-03-01\ncertificate = "DKD 1"'
+    bench = load_bench(with_calibration(tmp_path, table))
+    assert bench.calibration == {"load_cell": CalibrationConfig(date(2026, 3, 2), date(2027, 3, 1), "DKD 1")}
+    assert bench.calibration["load_cell"].days_left(date(2027, 3, 2)) == -1
+    assert load_bench(ROOT / "benches/simulated/bench.toml").calibration == {}
+
+
+@pytest.mark.parametrize(
+    ("table", "said"),
+    [
+        (
+            "[calibration.cell]\ndate = 2026-03-02",
+            "[calibration.cell] is of no device of this bench; there are load_cell",
+        ),
+        ('[calibration.flow]\ndate = "2026-03-02"', "calibration.flow.date must be a date such as 2026-03-01, but is"),
+        ("[calibration.flow]\ncertificate = 'x'", "missing key calibration.flow.date (a date such as 2026-03-01)"),
+        ("[calibration.flow]\ndate = 2026-03-02\nvalid_until = 2026-03-01", "valid_until (2026-03-01) is before date"),
+        ("[calibration.flow]\ndate = 2026-03-02\nvalid_until = 12", "valid_until must be a date such as 2026-03-01"),
+    ],
+)
+def test_calibration_that_is_refused(tmp_path, table, said):
+    with pytest.raises(ConfigError) as caught:
+        load_bench(with_calibration(tmp_path, table))
+    assert said in str(caught.value)
 
 
 def test_demo_runs_are_short():

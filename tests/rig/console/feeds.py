@@ -8,7 +8,19 @@ from collections.abc import Callable
 from dataclasses import replace
 
 from rig.errors import LinkError
-from rig.link.front_end_messages import Check, LogLine, Point, Progress, Reading, Request, RequestKind, Snapshot, State
+from rig.link.front_end_messages import (
+    Check,
+    Device,
+    LogLine,
+    Point,
+    Progress,
+    Reading,
+    Request,
+    RequestKind,
+    Snapshot,
+    State,
+    StreamHealth,
+)
 
 C = {"T1": 0.402, "T3": 0.387}
 """N/V^2"""
@@ -16,7 +28,6 @@ LEVELS = (4.0, 8.0, 12.0, 16.0, 20.0, -4.0, -8.0, -12.0, -16.0, -20.0, 6.0, -6.0
 """V"""
 HOLD = 4.0
 """s per level, ramps included."""
-DEVICES = "load_cell motor flow thermometer"
 
 
 class ManualClock:
@@ -137,6 +148,20 @@ CHECKS = (
     Check("plan", "passed", "31 steps, about 2:24 per thruster, at most 20.0 V of 24.0 V"),
     Check("watchdog", "passed", "0.5 s, then coast; fed by SET_* commands"),
 )
+DEVICES = (
+    Device("load_cell", "mt_sics", "/dev/ttyUSB0", "Mettler WMS 404C, serial B512345678", "",
+           (StreamHealth("load_cell", 92.0, 91.8, 0.01),), 4321, calibrated="2026-03-02", valid_until="2027-03-01",
+           days_left=100, certificate="DKD 1234"),
+    Device("motor", "vesc_can", "bus0 (/dev/ttyACM0)", "VESC 6 MkVI, id 23, firmware 6.05", "",
+           (StreamHealth("motor", 50.0, 50.1, 0.02), StreamHealth("motor_supply", 50.0, 49.9, 0.02),
+            StreamHealth("motor_thermal", 5.0, 5.0, 0.09)), 5210,
+           watchdog="0.5 s, then coast; fed by SET_* commands", watchdog_measured=1.31),
+    Device("flow", "nortek_nmea", "/dev/ttyUSB1", "Nortek Vectrino", "",
+           (StreamHealth("flow", 4.0, 4.0, 0.14),), 190, 2, "$PNORC1,,,,*2"),
+    Device("thermometer", "keller", "/dev/ttyUSB2", "Keller 33X, serial 4711", "",
+           (StreamHealth("thermometer", 2.0, 2.0, 0.31),), 96, calibrated="2025-09-20", valid_until="2026-09-19",
+           days_left=-63),
+)  # fmt: skip
 LOG = (
     LogLine(0.0, "info", "campaign `tunnel calibration` on bench `Desk-top tunnel`: T1, T3"),
     LogLine(2.4, "info", "watchdog proved: 0.52 s from the last command to 0 A, at rest after 1.31 s"),
@@ -167,6 +192,7 @@ def snapshot(state: State = "preflight", **changes: object) -> Snapshot:
         files=(),
         attended=False,
         clients=1,
+        devices=DEVICES,
     )
     return replace(plain, **changes)  # type: ignore[arg-type]  # names are checked by replace
 

@@ -9,7 +9,7 @@ from textual.pilot import Pilot
 
 from rig.console.app import ConsoleApp
 from rig.link.front_end_messages import LogLine, Progress, Snapshot
-from tests.rig.console.feeds import CHECKS, LOG, ManualClock, PlayedFeed, campaign, running, snapshot
+from tests.rig.console.feeds import CHECKS, DEVICES, LOG, ManualClock, PlayedFeed, campaign, running, snapshot
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,13 @@ STALE = tuple(
     else replace(r, state="limit", value=41.2) if r.channel == "motor.current" else r
     for r in running().readings
 )  # fmt: skip
+
+TROUBLED = (
+    replace(DEVICES[0], fault="its port is gone: /dev/ttyUSB0 was unplugged"),
+    replace(DEVICES[1], watchdog_measured=None, streams=tuple(replace(s, rate=31.0) for s in DEVICES[1].streams)),
+    replace(DEVICES[2], identity="", received=0, bad=0, first_bad=""),
+    replace(DEVICES[3], streams=(replace(DEVICES[3].streams[0], age=4.2),)),
+)
 
 HEADLINE = "thrust -2.6 % (-4.3 N) while running, in both directions, since 32 s"
 MISMATCH = LogLine(
@@ -50,6 +57,8 @@ SCENES = {
         running("mount", thruster="T3", command=0.0, points=(), trace=(), mounted_by_hand=True,
                 progress=Progress(0, 0, 0.0, 0.0, 1, 2, 60.0, 241.0, 0.2), log_count=len(LOG) + 1,
                 log=(*LOG, LogLine(60.0, "info", "put T3 on the bench", 1))),)),
+    "bench": Scene((running(),), keys=("7",)),
+    "bench_trouble": Scene((snapshot("preflight", checks=FAILED, devices=TROUBLED),), keys=("7",)),
     "warnings": Scene((running(),), keys=("4", "f")),
     "wait": Scene((running("wait", command=0.0, state_elapsed=17.0, reason="water settles: 43 s left; motor "
                            "temperature 61.2 °C, goes on below 50 °C, at most 9 min more"),)),

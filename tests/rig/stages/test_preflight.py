@@ -1,12 +1,15 @@
 """What must be green before a propeller may turn."""
 
+from datetime import date
+
 import pytest
 
 from drivers.protocols import Channel, Sample, Stream, Watchdog
-from rig.campaign.config import LimitConfig
+from rig.campaign.config import CalibrationConfig, LimitConfig
 from rig.control.readings import Readings
 from rig.link.front_end_messages import Reading
 from rig.stages.preflight import (
+    calibration_checks,
     device_checks,
     flow_check,
     limit_checks,
@@ -135,3 +138,18 @@ def test_how_long_a_value_stood_still():
     newest = readings.newest("cell.thrust")
     assert newest is not None
     assert (round(newest.same, 3), newest.longest) == (0.1, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("today", "until", "verdict", "end"),
+    [
+        (date(2027, 3, 1), date(2027, 3, 1), "passed", "valid until 2027-03-01"),
+        (date(2027, 3, 2), date(2027, 3, 1), "warning", "valid until 2027-03-01: over"),
+        (date(2026, 3, 1), date(2027, 3, 1), "warning", "valid until 2027-03-01: a day to come"),
+        (date(2040, 1, 1), None, "passed", "of 2026-03-02"),
+    ],
+)
+def test_a_calibration_that_is_over_warns(today, until, verdict, end):
+    (check,) = calibration_checks({"cell": CalibrationConfig(date(2026, 3, 2), until)}, today)
+    assert (check.name, check.verdict) == ("cell calibration", verdict)
+    assert check.text.endswith(end)
