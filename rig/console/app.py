@@ -80,9 +80,11 @@ class ConsoleApp(App[None], inherit_bindings=False):
         *,
         silent: bool = False,
         colors: str = "full",
+        looks_on: bool = False,
     ) -> None:
         """`clock` gives s and never goes back; `again` is the command line that attaches once more, `diagnose` one to
-        which a recording is added. `silent`: it never rings; `colors`: `full`, `16` or `none`."""
+        which a recording is added. `silent`: it never rings; `colors`: `full`, `16` or `none`.
+        `looks_on`: whoever else attends, it does so from `l` on only."""
         super().__init__()
         self.HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # columns from which all panels fit at once
         self.VERTICAL_BREAKPOINTS = [(0, "-low"), (32, "-tall")]  # rows
@@ -91,7 +93,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
         self.again = again
         self.diagnose = diagnose
         self.set_class(colors != "full", "-few-colors")
-        self.state = View(now=clock())
+        self.state = View(now=clock(), looks_on=looks_on)
         self.chosen = "main"
         self.log_filter: LogFilter = "run"
         self.after_enter = KeysAfterEnter()
@@ -220,7 +222,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
     def action_ask(self, kind: RequestKind, text: str = "") -> None:
         """Send a request that needs no answer; say so when it cannot be sent."""
         if self.state.looks_on:
-            self.notify("This console looks on: another one attends. Press l to attend too.", severity="warning")
+            self.notify("This console looks on. Press l to attend.", severity="warning")
             return
         try:
             self.feed.send(Request(kind, text))

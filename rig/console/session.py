@@ -49,14 +49,15 @@ def attend(
     *,
     silent: bool = False,
     colors: str = "full",
+    browser: bool = False,
 ) -> Sitting:
     """Run the console until the operator leaves. `clock` gives s and never goes back; `again` is the command line that
     attaches once more, shown before detaching; `silent`: no bell; `colors`: `full`, `16` or
-    `none`. Closes `feed`."""
-    return asyncio.run(_sit(ConsoleApp(feed, clock, again, silent=silent, colors=colors)))
+    `none`. `browser`: keys come over a pipe from one, and it looks on until `l`. Closes `feed`."""
+    return asyncio.run(_sit(ConsoleApp(feed, clock, again, silent=silent, colors=colors, looks_on=browser), browser))
 
 
-async def _sit(app: ConsoleApp) -> Sitting:
+async def _sit(app: ConsoleApp, browser: bool) -> Sitting:
     feed = app.feed
     loop = asyncio.get_running_loop()
     caught: list[int] = []
@@ -71,7 +72,7 @@ async def _sit(app: ConsoleApp) -> Sitting:
         loop.call_soon_threadsafe(leave)
 
     before = {number: signal.signal(number, on_signal) for number in (signal.SIGHUP, signal.SIGTERM)}
-    threading.Thread(target=_tell_of_hang_up, name="hang-up", daemon=True).start()
+    threading.Thread(target=_tell_of_hang_up, args=(browser,), name="hang-up", daemon=True).start()
     loop.add_signal_handler(signal.SIGINT, app.action_stop)
     try:
         await app.run_async()
@@ -86,10 +87,11 @@ async def _sit(app: ConsoleApp) -> Sitting:
     return Sitting(status, app.state.snapshot, detached and not caught)
 
 
-def _tell_of_hang_up() -> None:
-    """SIGHUP to this process once its terminal is gone, if the kernel has not sent it: it does so to the session's
-    leader alone. Without it the reader of keys would find an end of file for ever, and the screen's writer nobody."""
-    terminal = sys.stdin.fileno() if sys.stdin.isatty() else None
+def _tell_of_hang_up(pipe: bool) -> None:
+    """SIGHUP to this process once its terminal, or the `pipe` that brings its keys, is gone, if the kernel has not sent
+    it: it does so to the leader of a terminal's session alone. Without it the reader of keys would find an end of file
+    for ever, and the screen's writer nobody."""
+    terminal = sys.stdin.fileno() if pipe or sys.stdin.isatty() else None
     if terminal is None:
         return
     gone = select.poll()

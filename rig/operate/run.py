@@ -23,6 +23,7 @@ from rig.operate.headless import Headless, check_alive, operator_terminal
 from rig.operate.last_page import no_report_option, write_page
 from rig.operate.narration import narration_of
 from rig.operate.screen_options import USUAL, Look, look_of, screen_options
+from rig.operate.serve_options import Address, serve_options
 
 if TYPE_CHECKING:
     from rig.campaign.config import CampaignConfig
@@ -106,10 +107,19 @@ def run_campaign(
 @click.command("console")
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
 @click.option("--headless", is_flag=True, help="Follow with a progress bar instead.")
+@serve_options
 @screen_options
 @no_report_option
-def console_command(folder: Path | None, headless: bool, colors: str, bell: bool, report: bool) -> int:
+def console_command(
+    folder: Path | None, headless: bool, at: Address | None, colors: str, bell: bool, report: bool
+) -> int:
     """Attach to a run that is going on: the one in FOLDER, or the only one on this machine."""
+    if at is not None:
+        if headless:
+            raise RigError("--serve shows the console, --headless a progress bar: give one of them")
+        from rig.operate.serving import serve_console
+
+        return serve_console(folder, at, "full" if colors == "auto" else colors, report=report)
     if not headless and not sys.stdout.isatty():
         raise RigError("rig console needs a terminal; use --headless where there is none")
     look = look_of(colors, bell)
@@ -233,12 +243,14 @@ def progress_bar(*, start: bool, look: Look = USUAL) -> FrontEnd:
     return lambda peer, _: Left(Headless(peer, narration_of(look), operator_terminal()).follow(start))
 
 
-def console_screen(look: Look = USUAL) -> FrontEnd:
-    """Imported before a controller is started: Ctrl+C in that second leaves nothing behind."""
+def console_screen(look: Look = USUAL, *, browser: bool = False) -> FrontEnd:
+    """Imported before a controller is started: Ctrl+C in that second leaves nothing behind. `browser`: it looks on."""
     from rig.console import SocketFeed, attend
 
     def front(peer: Peer, again: str) -> Left:
-        sitting = attend(SocketFeed(peer), again=again, silent=not look.bell, colors=look.colors)
+        if browser:
+            peer.send(Request("watch"))  # before the screen comes up: until then it would count as attending
+        sitting = attend(SocketFeed(peer), again=again, silent=not look.bell, colors=look.colors, browser=browser)
         return Left(sitting.last, sitting.detached, max(sitting.status - 128, 0))
 
     return front

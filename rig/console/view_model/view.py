@@ -33,7 +33,7 @@ class View:
     trace: tuple[TraceRow, ...] = ()
     """(s of the recording, V, N) of the running recording."""
     looks_on: bool = False
-    """Another front end attends, and this one asks for nothing but a stop."""
+    """It does not attend, and asks for nothing but a stop."""
     stop_asked: float | None = None
     """s, when the stop key was pressed first; None: not yet."""
     zero_after: float | None = None
@@ -66,7 +66,7 @@ def absorb(view: View, snapshot: Snapshot, now: float) -> View:
         points=_with_points(view.points, snapshot),
         trace=_with_trace(view, snapshot),
         zero_after=_zero_after(view, snapshot, now),
-        looks_on=view.looks_on if view.snapshot is not None else snapshot.clients > 1,
+        looks_on=view.looks_on or (view.snapshot is None and snapshot.clients > 1),
     )
 
 
