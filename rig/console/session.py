@@ -82,9 +82,23 @@ async def _sit(app: ConsoleApp, browser: bool) -> Sitting:
         for number, handler in before.items():
             signal.signal(number, handler)
         signal.alarm(0)
-    detached = app.parting is not None and app.parting.kind == "detach"
+    detached = _goes_on(app)
     status = 128 + caught[0] if caught else max(app.return_code or 0, exit_status(app.state, detached))
     return Sitting(status, app.state.snapshot, detached and not caught)
+
+
+def _goes_on(app: ConsoleApp) -> bool:
+    """Whether the operator has left a campaign that goes on: detached from it, or looked on only."""
+    if app.parting is not None:
+        return app.parting.kind == "detach"
+    view = app.state
+    return (
+        not app.return_code
+        and view.looks_on
+        and view.connected
+        and view.snapshot is not None
+        and view.snapshot.state != "done"
+    )
 
 
 def _tell_of_hang_up(pipe: bool) -> None:

@@ -26,14 +26,14 @@ def serve_console(folder: Path | None, at: Address, colors: str, *, report: bool
     """
     if find_spec("textual_serve") is None:
         raise RigError(MISSING)
-    from rig.serve.address import OPEN, is_loopback, listen
+    from rig.serve.address import listen, warning
     from rig.serve.server import Served, serve
 
     run = find_run(folder)
     with listen(at.host, at.port) as listener:
         address, port = listener.getsockname()[:2]
-        if not is_loopback(address):
-            click.echo(f"rig: {OPEN.format(host=at.host, port=port)}", err=True)
+        if means := warning(at.host, address, port):
+            click.echo(f"rig: {means}", err=True)
         keyboard = sys.stdin.fileno() if sys.stdin.isatty() else None
         click.echo(_welcome(run, more=keyboard is not None))
         served = Served(_seat(run, colors, report=report), f"rig console {run.campaign}", lambda: _ask_to_stop(run),

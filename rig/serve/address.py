@@ -57,6 +57,15 @@ def is_loopback(address: str) -> bool:
     return ipaddress.ip_address(address).is_loopback
 
 
+def warning(host: str, address: str, port: int) -> str:
+    """What it means that `host`, an `address`, is listened at; empty: this machine alone reaches it.
+
+    >>> warning("localhost", "127.0.0.1", 8000), "not encrypted" in warning("0.0.0.0", "0.0.0.0", 8000)
+    ('', True)
+    """
+    return "" if is_loopback(address) else OPEN.format(host=host, port=port)
+
+
 def served_hosts(address: str, port: int, name: str) -> frozenset[str]:
     """What the Host of a request may be that arrived at `address`, on a machine called `name`. A page whose own name
     was made to lead here (DNS rebinding) has another one.

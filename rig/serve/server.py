@@ -88,12 +88,12 @@ class ConsoleServer:
     async def run(self) -> None:
         """Serve until the end; every session's process has ended then."""
         runner = web.AppRunner(self._application(), access_log=None, shutdown_timeout=ENDING)
-        await runner.setup()
-        await web.SockSite(runner, self._listener).start()
         loop = asyncio.get_running_loop()
         loop.add_signal_handler(signal.SIGINT, self.interrupt)
         for number in (signal.SIGTERM, signal.SIGHUP):
             loop.add_signal_handler(number, self.end, number)
+        await runner.setup()
+        await web.SockSite(runner, self._listener).start()
         looking = asyncio.create_task(self._look_at_the_run())
         try:
             await self._over.wait()

@@ -95,10 +95,10 @@ class Page:
     async def press(self, key: str, modifiers: int = 0) -> None:
         """As from a keyboard."""
         word = {"key": key, "code": key if len(key) > 1 else f"Key{key.upper()}", "modifiers": modifiers}
-        code = {"windowsVirtualKeyCode": KEYS[key], "nativeVirtualKeyCode": KEYS[key]}
+        word |= {"windowsVirtualKeyCode": KEYS[key]}
         letter = {"text": key} if len(key) == 1 and not modifiers else {}
-        await self.call("Input.dispatchKeyEvent", type="keyDown" if letter else "rawKeyDown", **word, **code, **letter)
-        await self.call("Input.dispatchKeyEvent", type="keyUp", **word, **code)
+        await self.call("Input.dispatchKeyEvent", type="keyDown", **word, **letter)
+        await self.call("Input.dispatchKeyEvent", type="keyUp", **word)
 
     async def picture(self, path: Path) -> None:
         data = await self.call("Page.captureScreenshot", format="png")
