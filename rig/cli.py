@@ -65,7 +65,9 @@ COMMANDS: Final = {
         "Go on with a campaign that was cut, at its first unfinished thruster.",
         "measure",
     ),
-    "console": Entry("rig.operate.run:console_command", "Attach to a run that is going on.", "measure"),
+    "console": Entry(
+        "rig.serve.command:console_command", "Attach to a run that is going on, here or in a browser.", "measure"
+    ),
     "stop": Entry(
         "rig.operate.run:stop_command", "Stop a run that is going on: zero volts now, close the recording.", "measure"
     ),

@@ -51,7 +51,7 @@ from sim_devices.world.settings import Cell, Supply, Thruster, Tunnel
 
 ROOT = Path(__file__).parents[1]
 HOWTO = ROOT / "docs" / "howto"
-NEW = ("campaign", "console", "simulated-bench", "json", "catalogue")
+NEW = ("campaign", "console", "console-in-a-browser", "simulated-bench", "json", "catalogue")
 HEADER = '[campaign]\nname = "page"\nbench = "bench.toml"\nthrusters = ["T1"]\noutput = "recordings"\n'
 FENCED = re.compile(r"^```(\w*)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 TABLES = (

@@ -1,4 +1,4 @@
-"""rig run, console and stop: start a controller process, attach a front end, and say what came of it."""
+"""rig run and stop: start a controller process, attach a front end, and say what came of it."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from rig.operate.headless import Headless, check_alive, operator_terminal
 from rig.operate.last_page import no_report_option, write_page
 from rig.operate.narration import narration_of
 from rig.operate.screen_options import USUAL, Look, look_of, screen_options
-from rig.operate.serve_options import Address, serve_options
 
 if TYPE_CHECKING:
     from rig.campaign.config import CampaignConfig
@@ -102,29 +101,6 @@ def run_campaign(
         return follow(run, front, report=report)
     finally:
         process.poll()  # one that has ended leaves nothing behind: more runs may follow in this process
-
-
-@click.command("console")
-@click.argument("folder", required=False, type=click.Path(path_type=Path))
-@click.option("--headless", is_flag=True, help="Follow with a progress bar instead.")
-@serve_options
-@screen_options
-@no_report_option
-def console_command(
-    folder: Path | None, headless: bool, at: Address | None, colors: str, bell: bool, report: bool
-) -> int:
-    """Attach to a run that is going on: the one in FOLDER, or the only one on this machine."""
-    if at is not None:
-        if headless:
-            raise RigError("--serve shows the console, --headless a progress bar: give one of them")
-        from rig.operate.serving import serve_console
-
-        return serve_console(folder, at, "full" if colors == "auto" else colors, report=report)
-    if not headless and not sys.stdout.isatty():
-        raise RigError("rig console needs a terminal; use --headless where there is none")
-    look = look_of(colors, bell)
-    front = progress_bar(start=False, look=look) if headless else console_screen(look)
-    return follow(find_run(folder), front, report=report)
 
 
 @click.command("stop")

@@ -1,1 +1,1 @@
-"""The console in a browser: requests of strangers come in, those with the token get a console process each."""
+"""Attaching to a run: `rig console`, and in a browser, where who has the token gets a console process of his own."""

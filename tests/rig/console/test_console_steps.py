@@ -13,7 +13,7 @@ from rig.console.dialogs import NoteDialog
 from rig.console.key_help import KeyHelp
 from rig.console.view_model.keys import EVERY_KEY
 from rig.link.front_end_messages import LogLine, Progress, Request
-from tests.rig.console.feeds import LOG, campaign, running, snapshot
+from tests.rig.console.feeds import LOG, ManualClock, PlayedFeed, campaign, running, snapshot
 from tests.rig.console.scenes import SCENES, prepare, settle, show
 from tests.rig.console.sitting import sitting
 
@@ -260,3 +260,15 @@ async def test_while_something_may_turn_nothing_is_diagnosed():
         await desk.press("g")
         assert any("Once the campaign has ended" in text for text in desk.toasts())
         assert desk.app.query_one("#pages").current == "live"
+
+
+async def test_a_console_of_a_browser_looks_on_also_when_nobody_attends():
+    feed, clock = PlayedFeed(running(attended=True, clients=0)), ManualClock()
+    app = ConsoleApp(feed, clock, looks_on=True)
+    async with app.run_test() as pilot:
+        await settle(pilot, lambda: app.state.snapshot is not None)
+        await pilot.press("p", "f5")
+        assert {request.kind for request in feed.sent} == {"watch"}
+        await pilot.press("l", "p")
+        assert feed.kinds() == ["pause"]
+        assert feed.sent[-2] == Request("lease")

@@ -154,7 +154,7 @@ def seats(folder: str) -> list[int]:
             words = (entry / "cmdline").read_bytes().split(b"\0")
         except OSError:
             continue
-        if b"rig.operate.browser_seat" in words and folder.encode() in words:
+        if b"rig.serve.seat" in words and folder.encode() in words:
             found.append(int(entry.name))
     return found
 
@@ -172,7 +172,7 @@ async def desk(
     said: list[str] = []
     listener = listen("127.0.0.1", 0)
     async with controller(folder, shown or snapshot(attended=True)) as played, stranger() as browser:
-        command = [sys.executable, "-m", "rig.operate.browser_seat", str(folder), "full", "no-report"]
+        command = [sys.executable, "-m", "rig.serve.seat", str(folder), "full", "no-report"]
         asked = stop or (lambda: played.asked.append(Request("stop", "the server")))
         served = Served(command, "rig console of a test", asked, lambda: True, said.append)
         server = ConsoleServer(served, listener)

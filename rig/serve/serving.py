@@ -13,13 +13,12 @@ from rig.link.front_end_messages import Request
 from rig.link.live_runs import Run, find_run
 from rig.link.processes import alive
 from rig.link.sockets import connect
-from rig.operate.serve_options import Address
 
 MISSING = "--serve needs textual-serve, which is not installed here: pip install 'thruster-rig[serve]'"
 SIGNALLED = 128
 
 
-def serve_console(folder: Path | None, at: Address, colors: str, *, report: bool) -> int:
+def serve_console(folder: Path | None, host: str, port: int, colors: str, *, report: bool) -> int:
     """Serve the run in `folder`, or the only one, until it is over; 0, or 128 and the signal that ended the server.
 
     Raises RigError: the extra is not installed, there is no such run, or it can't be listened at that address.
@@ -30,9 +29,9 @@ def serve_console(folder: Path | None, at: Address, colors: str, *, report: bool
     from rig.serve.server import Served, serve
 
     run = find_run(folder)
-    with listen(at.host, at.port) as listener:
-        address, port = listener.getsockname()[:2]
-        if means := warning(at.host, address, port):
+    with listen(host, port) as listener:
+        address, bound = listener.getsockname()[:2]
+        if means := warning(host, address, bound):
             click.echo(f"rig: {means}", err=True)
         keyboard = sys.stdin.fileno() if sys.stdin.isatty() else None
         click.echo(_welcome(run, more=keyboard is not None))
@@ -55,7 +54,7 @@ def _welcome(run: Run, *, more: bool) -> str:
 
 def _seat(run: Run, colors: str, *, report: bool) -> list[str]:
     """Starts one browser's console."""
-    words = [sys.executable, "-m", "rig.operate.browser_seat", run.folder, colors]
+    words = [sys.executable, "-m", "rig.serve.seat", run.folder, colors]
     return words if report else [*words, "no-report"]
 
 

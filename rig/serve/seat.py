@@ -1,4 +1,4 @@
-"""`python -m rig.operate.browser_seat FOLDER COLORS [no-report]`: one browser's console, a child of the web server.
+"""`python -m rig.serve.seat FOLDER COLORS [no-report]`: one browser's console, a child of the web server.
 
 Its standard output is the pipe that its screen goes through; whatever else is said goes to standard error, and the
 server shows it on its own terminal.
