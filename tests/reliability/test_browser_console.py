@@ -69,6 +69,19 @@ async def test_stop_key_of_a_browser_to_command_0(tmp_path, prompt, key):
         assert ended(bench, run) == ("aborted", "stopped by console")
 
 
+async def test_ctrl_c_where_the_server_runs_is_the_stop_key(tmp_path, prompt):
+    """The server stays, and its browser shows how it ended."""
+    with live_bench(tmp_path) as bench:
+        run = bench.start(unattended=False, dwell=20.0)
+        async with at_browser(bench, run) as (pid, screen):
+            pressed = time.monotonic_ns()
+            os.kill(pid, signal.SIGINT)
+            await asyncio.to_thread(bench.until_held, 0.0, 0.3)
+            await screen.until_drawn("ABORTED")
+        prompt(zero_after(bench.truth(), pressed), 0.13, pressed)
+        assert ended(bench, run) == ("aborted", "stopped by rig console --serve")
+
+
 async def lost(screen: Screen, _: int, __: Run) -> None:
     """Its tab is closed."""
     await screen.close()

@@ -100,9 +100,13 @@ class Screen:
     async def press(self, keys: str) -> None:
         await self.socket.send_json(["stdin", keys])
 
+    def sleep(self) -> None:
+        """As a laptop whose lid is closed: it reads nothing more and answers no ping."""
+        self._reading.cancel()
+
     async def close(self) -> None:
         await self.socket.close()
-        await self._reading
+        await asyncio.wait([self._reading])
 
 
 @dataclass
@@ -134,9 +138,9 @@ class Desk:
         async with self.browser.get(self.invite()) as answer:
             assert (answer.status, str(answer.url)) == (200, self.room)
 
-    async def screen(self, **options: object) -> Screen:
+    async def screen(self) -> Screen:
         """A console that has drawn its first screen."""
-        socket = await self.browser.ws_connect(f"{self.room}ws?width=100&height=30", origin=self.origin, **options)
+        socket = await self.browser.ws_connect(f"{self.room}ws?width=100&height=30", origin=self.origin)
         screen = Screen(socket)
         await screen.until_drawn("READ-ONLY")
         return screen
