@@ -7,7 +7,7 @@ from dataclasses import replace
 from typing import ClassVar, Final
 
 from textual import events
-from textual.app import App, ComposeResult
+from textual.app import ComposeResult
 from textual.binding import Binding, BindingType
 from textual.containers import Container, Horizontal, Vertical, VerticalScroll
 from textual.filter import LineFilter
@@ -16,22 +16,20 @@ from textual.widgets import ContentSwitcher
 
 from rig.console.bench_page import BenchPanel
 from rig.console.diagnosing import DIAGNOSE, NOT_YET, DiagnosisPanel, answers
-from rig.console.dialogs import LeaveDialog, Leaving, NoteDialog
+from rig.console.dialogs import LeaveDialog, NoteDialog
 from rig.console.feed import Feed
 from rig.console.few_colors import filters_for
 from rig.console.key_help import KeyHelp
 from rig.console.keys_after_enter import KeysAfterEnter
+from rig.console.leaving import LeavingApp
 from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
-from rig.console.parting import Parting, begin, refused, settled
 from rig.console.plots import FitPlot, ResidualPlot, TimePlot
 from rig.console.toasts import place
 from rig.console.view_model.alarms import call
-from rig.console.view_model.keys import device_gone, key_line, page_of
+from rig.console.view_model.keys import key_line, page_of
 from rig.console.view_model.log_filter import NEXT, LogFilter
 from rig.console.view_model.view import View, absorb
-from rig.errors import LinkError
 from rig.link.attention import Bell
-from rig.link.front_end_messages import Request, RequestKind
 
 REDRAW: Final = 0.1
 """s between looks at the text: as often as snapshots come."""
@@ -44,7 +42,7 @@ STOP_KEYS: Final = ("ctrl+c", "super+c", "f9")
 VIEWS: Final = ("main", "fit", "time", "log", "results", "diagnosis", "bench")
 
 
-class ConsoleApp(App[None], inherit_bindings=False):
+class ConsoleApp(LeavingApp, inherit_bindings=False):
     """One operator's window on one controller."""
 
     CSS_PATH = "console.tcss"
@@ -85,19 +83,15 @@ class ConsoleApp(App[None], inherit_bindings=False):
         """`clock` gives s and never goes back; `again` is the command line that attaches once more, `diagnose` one to
         which a recording is added. `silent`: it never rings; `colors`: `full`, `16` or `none`.
         `looks_on`: whoever else attends, it does so from `l` on only."""
-        super().__init__()
+        super().__init__(feed, clock, View(now=clock(), looks_on=looks_on))
         self.HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # columns from which all panels fit at once
         self.VERTICAL_BREAKPOINTS = [(0, "-low"), (32, "-tall")]  # rows
-        self.feed = feed
-        self.clock = clock
         self.again = again
         self.diagnose = diagnose
         self.set_class(colors != "full", "-few-colors")
-        self.state = View(now=clock(), looks_on=looks_on)
         self.chosen = "main"
         self.log_filter: LogFilter = "run"
         self.after_enter = KeysAfterEnter()
-        self.parting: Parting | None = None
         self.calls, self.silent, self.terminal_colors = Bell(), silent, colors
 
     def compose(self) -> ComposeResult:
@@ -133,23 +127,19 @@ class ConsoleApp(App[None], inherit_bindings=False):
         self.run_worker(self._follow())
         self.set_interval(REDRAW, self.show_text)
         self.set_interval(REPLOT, self.show_plots)
-        self.set_interval(LEASE, self._renew_lease)
-        self._renew_lease()
+        self.set_interval(LEASE, self.renew_lease)
+        self.renew_lease()
 
     async def _follow(self) -> None:
         while (snapshot := await self.feed.receive()) is not None:
-            ended_before = self._ended
+            ended_before = self.ended
             self.state = absorb(self.state, snapshot, self.clock())
-            if self._ended and not ended_before:
+            if self.ended and not ended_before:
                 self.chosen = "results"
-            self._part()
+            self.part()
         self.state = replace(self.state, connected=False)
         if self.parting is not None and self.parting.kind == "detach":
             self.exit()
-
-    @property
-    def _ended(self) -> bool:
-        return self.state.snapshot is not None and self.state.snapshot.state == "done"
 
     def get_line_filters(self) -> Sequence[LineFilter]:
         return filters_for(self.terminal_colors, super().get_line_filters())
@@ -161,7 +151,7 @@ class ConsoleApp(App[None], inherit_bindings=False):
     def show_text(self) -> None:
         """Everything but the plots, from the view."""
         self.state = replace(self.state, now=self.clock())
-        self._part()
+        self.part()
         if not self._standing():
             return
         view, base = self.state, self.screen_stack[0]
@@ -208,32 +198,9 @@ class ConsoleApp(App[None], inherit_bindings=False):
         if not self.after_enter.takes(event, in_dialog=in_note):
             await super().on_event(event)
 
-    def action_stop(self) -> None:
-        """The stop key: the request goes out here, before anything is drawn."""
-        try:
-            self.feed.send(Request("stop", "console"))
-            failed = ""
-        except LinkError as error:
-            failed = str(error)
-        first = self.state.stop_asked
-        self.state = replace(self.state, stop_asked=self.clock() if first is None else first, stop_failed=failed)
-        self.call_later(self.show_text)
-
-    def action_ask(self, kind: RequestKind, text: str = "") -> None:
-        """Send a request that needs no answer; say so when it cannot be sent."""
-        if self.state.looks_on:
-            self.notify("This console looks on. Press l to attend.", severity="warning")
-            return
-        try:
-            self.feed.send(Request(kind, text))
-        except LinkError as error:
-            self.notify(str(error), title=f"{kind}: not sent", severity="error", markup=False)
-            return
-        self.notify(f"asked the controller: {kind} {text}", timeout=2.0, markup=False)
-
     def action_diagnose(self) -> None:
         """G: not while anything may turn, and one at a time."""
-        if not self._ended:
+        if not self.ended:
             self.notify(NOT_YET, severity="warning")
             return
         self.action_view("diagnosis")
@@ -247,30 +214,6 @@ class ConsoleApp(App[None], inherit_bindings=False):
             said.append(answer)
             rest = files[len(said) :]
             panel.tell(said, f"rig diagnose {rest[0]} ..." if rest else "")
-
-    def action_take_lease(self) -> None:
-        """From now on this console attends, beside the one that does."""
-        self.state = replace(self.state, looks_on=False)
-        self._renew_lease()
-        self.show_text()
-
-    def action_go(self) -> None:
-        """F5: start, or the thruster is mounted, whichever the controller waits for."""
-        waits_for: dict[str, RequestKind] = {"preflight": "start", "mount": "mounted"}
-        state = self.state.snapshot.state if self.state.snapshot is not None else ""
-        if state in waits_for:
-            self.action_ask(waits_for[state])
-        else:
-            self.notify("F5 starts a run; the controller waits for no start now.", severity="warning")
-
-    def action_again(self) -> None:
-        """R: in the preflight one device that is not there is tried once more, later a pause ends."""
-        snapshot = self.state.snapshot
-        gone = device_gone(snapshot) if snapshot is not None and snapshot.state == "preflight" else ""
-        if gone:
-            self.action_ask("retry", gone)
-        else:
-            self.action_ask("resume")
 
     def action_view(self, name: str) -> None:
         self.chosen = name
@@ -297,40 +240,3 @@ class ConsoleApp(App[None], inherit_bindings=False):
             self.post_message(key)
         if text:
             self.action_ask("note", text)
-
-    def action_leave(self) -> None:
-        if len(self.screen_stack) > 1:
-            return  # a dialog is open: Escape first
-        if self._ended or not self.state.connected or self.state.looks_on:
-            self.exit()
-            return
-        self.push_screen(LeaveDialog(self.state.snapshot, self.again), self._leave)
-        self.call_after_refresh(self.show_text)
-
-    def _leave(self, leaving: Leaving | None) -> None:
-        if leaving is None:
-            return
-        self.parting = begin(leaving, self.state, self.clock())
-        if leaving == "stop":
-            self.action_stop()
-        else:
-            self.action_ask("detach")
-
-    def _part(self) -> None:
-        """After the operator chose to leave: go once that is settled, stay when the controller refuses."""
-        if self.parting is None:
-            return
-        answer = refused(self.parting, self.state)
-        if answer:
-            self.parting = None
-            self.notify(answer, title="You cannot leave", severity="error", timeout=10.0, markup=False)
-        elif settled(self.parting, self.state):
-            self.exit()
-
-    def _renew_lease(self) -> None:
-        leaving = self.parting is not None and self.parting.kind == "detach"
-        if self.state.connected and not leaving:
-            try:
-                self.feed.send(Request("watch" if self.state.looks_on else "lease"))
-            except LinkError:
-                return  # `receive` reports the end of the link, and the banner says so

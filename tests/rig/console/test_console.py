@@ -90,7 +90,7 @@ async def test_leases_go_out_while_connected_and_not_after():
         assert Request("lease") in desk.feed.sent
         await desk.lose()
         before = len(desk.feed.sent)
-        desk.app._renew_lease()
+        desk.app.renew_lease()
         assert len(desk.feed.sent) == before
 
 

@@ -215,7 +215,7 @@ async def test_a_second_console_looks_on_until_it_takes_the_lease():
         assert "READ-ONLY" in desk.text(".head-state")
         await desk.press("p", "a", "m")
         assert desk.kinds() == []
-        desk.app._renew_lease()
+        desk.app.renew_lease()
         assert desk.feed.sent[-1] == Request("watch")
         await desk.press("l")
         assert desk.feed.sent[-1] == Request("lease")
