@@ -5,7 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from rig.campaign.plan import FixedDwell, Plan
+from rig.campaign.dwell import FixedDwell
+from rig.campaign.plan import Plan
 from rig.campaign.shapes import Interleaved, Levels, Ramp, Sine, Staircase
 from rig.dry_run.command import Level, corners, levels
 

@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 
 from identification.recording import Channel, Recording, Step
+from rig.campaign.dwell import FixedDwell
 from rig.campaign.loading import load_campaign
-from rig.campaign.plan import FixedDwell, Plan, TareConfig
+from rig.campaign.plan import Plan, TareConfig
 from rig.campaign.shapes import Levels
 from rig.dry_run.earlier import known_power
 from rig.dry_run.outlook import energies_of, told_energies

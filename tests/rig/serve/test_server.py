@@ -122,7 +122,7 @@ async def test_it_looks_on_until_l_and_its_keys_arrive(tmp_path):
         await until(lambda: here.controller.clients.attending == 1)
         await screen.press(F5)
         await until(lambda: here.controller.kinds == ["start"])
-        assert '["alive"]' in screen.texts
+        await until(lambda: '["alive"]' in screen.texts)
         await screen.close()
 
 
