@@ -15,16 +15,19 @@ from textual.message import Message
 from textual.widgets import ContentSwitcher
 
 from rig.console.bench_page import BenchPanel
+from rig.console.chooser import Chooser
+from rig.console.choosing import ChoosingApp
 from rig.console.diagnosing import DIAGNOSE, NOT_YET, DiagnosisPanel, answers
 from rig.console.dialogs import LeaveDialog, NoteDialog
 from rig.console.feed import Feed
 from rig.console.few_colors import filters_for
 from rig.console.key_help import KeyHelp
 from rig.console.keys_after_enter import KeysAfterEnter
-from rig.console.leaving import LeavingApp
+from rig.console.keys_in_order import KeysInOrder
 from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
 from rig.console.plots import FitPlot, ResidualPlot, TimePlot
 from rig.console.toasts import place
+from rig.console.view_model.actions import bindings
 from rig.console.view_model.alarms import call
 from rig.console.view_model.keys import key_line, page_of
 from rig.console.view_model.log_filter import NEXT, LogFilter
@@ -39,10 +42,9 @@ LEASE: Final = 0.5
 """s between leases. From the screen's own loop on purpose: when the screen hangs, the lease goes stale."""
 STOP_KEYS: Final = ("ctrl+c", "super+c", "f9")
 """super+c is Cmd+C where a terminal passes it on."""
-VIEWS: Final = ("main", "fit", "time", "log", "results", "diagnosis", "bench")
 
 
-class ConsoleApp(LeavingApp, inherit_bindings=False):
+class ConsoleApp(ChoosingApp, inherit_bindings=False):
     """One operator's window on one controller."""
 
     CSS_PATH = "console.tcss"
@@ -50,23 +52,7 @@ class ConsoleApp(LeavingApp, inherit_bindings=False):
     ENABLE_COMMAND_PALETTE = False
     ALLOW_SELECT = False  # nothing to copy: Ctrl+C is the stop key
     BINDINGS: ClassVar[list[BindingType]] = [
-        Binding("ctrl+q", "leave", "leave", priority=True),
-        Binding("f5", "go", "start"),
-        Binding("p", "ask('pause')", "pause"),
-        Binding("r", "again", "resume, retry"),
-        Binding("a", "ask('accept')", "accept"),
-        Binding("x", "ask('extend')", "extend"),
-        Binding("t", "ask('repeat')", "take again"),
-        Binding("b", "ask('back')", "back"),
-        Binding("k", "ask('skip')", "skip"),
-        Binding("m", "ask('bad')", "mark as bad"),
-        Binding("g", "diagnose", "diagnose"),
-        Binding("l", "take_lease", "take the lease"),
-        Binding("?", "help", "keys"),
-        Binding("n", "note", "note"),
-        Binding("f", "filter", "filter events"),
-        Binding("d", "leave", "detach"),
-        *(Binding(str(i + 1), f"view('{name}')", name) for i, name in enumerate(VIEWS)),
+        Binding(keys, run, name, priority=first) for keys, run, name, first in bindings()
     ]
 
     def __init__(
@@ -91,7 +77,7 @@ class ConsoleApp(LeavingApp, inherit_bindings=False):
         self.set_class(colors != "full", "-few-colors")
         self.chosen = "main"
         self.log_filter: LogFilter = "run"
-        self.after_enter = KeysAfterEnter()
+        self.in_order, self.after_enter = KeysInOrder(self), KeysAfterEnter()
         self.calls, self.silent, self.terminal_colors = Bell(), silent, colors
 
     def compose(self) -> ComposeResult:
@@ -166,7 +152,7 @@ class ConsoleApp(LeavingApp, inherit_bindings=False):
             base.query_one(BenchPanel).show(view)
         base.query_one(LogPanel).show(view, self.log_filter)
         base.query_one("#keys", Panel).put(line := key_line(view), line)
-        if isinstance(self.screen, NoteDialog | LeaveDialog | KeyHelp):
+        if isinstance(self.screen, NoteDialog | LeaveDialog | KeyHelp | Chooser):
             self.screen.show(view)
         base.set_class(view.condition != "live", "old")
         place(self.screen, below=base.query_one(Head).size.height)
@@ -194,6 +180,9 @@ class ConsoleApp(LeavingApp, inherit_bindings=False):
 
     async def on_event(self, event: events.Event) -> None:
         """Keys come here first, and those that a widget has not used a second time."""
+        await self.in_order.handle(event, self._pass_on)
+
+    async def _pass_on(self, event: events.Event) -> None:
         in_note = len(self.screen_stack) > 1 and isinstance(self.screen, NoteDialog)
         if not self.after_enter.takes(event, in_dialog=in_note):
             await super().on_event(event)
@@ -231,8 +220,8 @@ class ConsoleApp(LeavingApp, inherit_bindings=False):
         self.push_screen(KeyHelp())
         self.call_after_refresh(self.show_text)
 
-    def action_note(self) -> None:
-        self.push_screen(NoteDialog(), self._keep_note)
+    async def action_note(self) -> None:
+        await self.push_screen(NoteDialog(), self._keep_note)
         self.call_after_refresh(self.show_text)
 
     def _keep_note(self, text: str | None) -> None:

@@ -10,7 +10,7 @@ from textual.app import App
 
 from rig.console.feed import Feed
 from rig.console.parting import Parting
-from rig.console.view_model.keys import device_gone
+from rig.console.view_model.actions import device_gone
 from rig.console.view_model.view import View
 from rig.errors import LinkError
 from rig.link.front_end_messages import Request, RequestKind

@@ -17,10 +17,10 @@ from textual.widget import Widget
 from textual.widgets import Input, Static
 
 from rig.console.editor.form import Choice, Form, Row
-from rig.console.editor.keys_in_order import KeysInOrder
 from rig.console.editor.preview import CommandPlot, Numbers, Problem
 from rig.console.editor.questions import Keys, Question
 from rig.console.few_colors import filters_for
+from rig.console.keys_in_order import KeysInOrder
 from rig.dry_run.outlook import Assessment
 from rig.editing.draft import Draft
 from rig.editing.fields import Field

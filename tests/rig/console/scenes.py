@@ -64,6 +64,8 @@ SCENES = {
                            "temperature 61.2 °C, goes on below 50 °C, at most 9 min more"),)),
     "paused": Scene((running("paused", command=0.0, state_elapsed=83.0, reason="by the operator"),)),
     "keys": Scene((running(),), keys=("question_mark",)),
+    "palette": Scene((running(),), keys=("colon",)),
+    "palette_not_now": Scene((snapshot("preflight", checks=FAILED),), keys=("colon", *"st")),
     "looks_on": Scene((running(attended=True, clients=2),)),
     "note": Scene((running(),), keys=("n", *"weed on duct")),
     "leave": Scene((running(),), keys=("d",)),

@@ -228,9 +228,3 @@ async def test_survives_every_size(scene):
                 await desk.press(key)
                 await desk.glance()
         assert desk.app.is_running
-
-
-async def test_there_is_no_command_palette():
-    async with sitting(running()) as desk:
-        await desk.press("ctrl+p")
-        assert len(desk.app.screen_stack) == 1

@@ -12,9 +12,10 @@ from rig.console.dialogs import what_leaving_is
 from rig.console.parting import begin, settled
 from rig.console.session import exit_status
 from rig.console.view_model import wording
+from rig.console.view_model.actions import device_gone
 from rig.console.view_model.alarms import alarm
 from rig.console.view_model.axes import reach, thin, ticks
-from rig.console.view_model.keys import device_gone, key_line
+from rig.console.view_model.keys import key_line
 from rig.console.view_model.running_fit import in_words, running_fit, v_abs_v
 from rig.console.view_model.view import TRACE_KEPT, View, absorb
 from rig.link.front_end_messages import Check, Reading

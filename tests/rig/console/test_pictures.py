@@ -7,7 +7,7 @@ import pytest
 from tests.rig.console.scenes import SCENES, prepare
 
 FEW_COLORS = ("preflight_failed", "mismatch", "limit", "paused", "wait", "stop_not_confirmed", "disconnected", "note",
-              "leave_attended", "end", "bench_trouble")  # fmt: skip
+              "leave_attended", "end", "bench_trouble", "palette_not_now")  # fmt: skip
 """Scenes that are told by colour where there is one: each has a word or a sign too."""
 
 

@@ -7,6 +7,7 @@ import time
 import pytest
 from textual.widgets import Input
 
+from rig.console.chooser import Chooser
 from rig.console.dialogs import LeaveDialog, NoteDialog
 from rig.link.front_end_messages import Request
 from tests.rig.console.feeds import campaign, running, snapshot
@@ -58,6 +59,22 @@ async def test_in_the_leave_dialog_whichever_button_has_the_focus(attended, tabs
         assert isinstance(desk.app.screen, LeaveDialog)
         await desk.press("ctrl+c", "f9")
         assert desk.kinds() == ["stop", "stop"]
+
+
+@pytest.mark.parametrize("typed", [(), tuple("pau"), ("down", "down")])
+@pytest.mark.parametrize("key", ["ctrl+c", "f9"])
+async def test_in_the_palette_while_plots_redraw(key, typed):
+    async with sitting(running(), size=(120, 40)) as desk:
+        await desk.press("colon", *typed)
+        for n in range(3):
+            desk.feed.play(running(t=20.0 + n))
+            desk.app.call_later(desk.app.show_plots)
+            desk.app.simulate_key("x")
+            desk.app.simulate_key(key)
+            assert desk.kinds() == ["stop"] * (n + 1)  # no turn of the event loop
+            await desk.pilot.pause()
+        assert isinstance(desk.app.screen, Chooser)
+        assert desk.app.clipboard == ""
 
 
 async def test_with_the_log_focused():
