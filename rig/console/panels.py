@@ -12,6 +12,7 @@ from textual.containers import Horizontal, Vertical
 from textual.events import Resize
 from textual.widgets import RichLog, Static
 
+from rig.console.titles import entitle
 from rig.console.view_model import wording
 from rig.console.view_model.alarms import alarm
 from rig.console.view_model.log_filter import BEFORE, TITLES, LogFilter, run_of, wanted
@@ -27,12 +28,20 @@ class Panel(Static):
     """A Static that remembers what it shows."""
 
     shown: Hashable = None
+    lines: int | None = None
+    """Of a text that is never wrapped; None: whatever it is, it may come to need another height."""
 
     def put(self, made_of: Hashable, renderable: Text | Group) -> None:
         """Show `renderable` unless it was made of the same as what is on the screen."""
-        if made_of != self.shown:
-            self.shown = made_of
-            self.update(renderable)
+        if made_of == self.shown:
+            return
+        self.shown = made_of
+        before, self.lines = self.lines, _lines_of(renderable)
+        self.update(renderable, layout=self.lines is None or self.lines != before)
+
+
+def _lines_of(renderable: Text | Group) -> int | None:
+    return renderable.plain.count("\n") if isinstance(renderable, Text) and renderable.no_wrap else None
 
 
 class StopKey(Static):
@@ -158,7 +167,7 @@ class LogPanel(RichLog):
 
     def show(self, view: View, chosen: LogFilter) -> None:
         """Events that the filter lets through; all again when it was changed."""
-        self.border_title = TITLES[chosen]
+        entitle(self, TITLES[chosen])
         if view.snapshot is None:
             return
         if self.chosen != (chosen, run_of(view.snapshot)):

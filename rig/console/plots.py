@@ -9,6 +9,7 @@ from typing import Final
 from textual_plotext import PlotextPlot
 from textual_plotext.plot import Plot
 
+from rig.console.titles import entitle
 from rig.console.view_model.axes import reach, thin, ticks, to_row
 from rig.console.view_model.running_fit import RunningFit, in_words, running_fit, usable, v_abs_v
 from rig.console.view_model.view import TraceRow, View
@@ -49,8 +50,7 @@ class FitPlot(Curve):
         points = points_of(view)
         fit = running_fit(points)
         legend = "   ● steady  ○ not steady  bars 95 %" if self.size.width >= 64 else "  ● steady ○ not"
-        self.border_title = f"thrust (N) over V|V| (V²){legend}"
-        self.border_subtitle = in_words(fit)
+        entitle(self, f"thrust (N) over V|V| (V²){legend}", in_words(fit))
 
         def draw(plot: Plot) -> None:
             if not points:
@@ -71,8 +71,7 @@ class ResidualPlot(Curve):
     def show(self, view: View) -> None:
         points = points_of(view)
         fit = running_fit(points)
-        self.border_title = "thrust minus fit (N) over V|V| (V²)"
-        self.border_subtitle = "a bend here is something that C V|V| leaves out"
+        entitle(self, "thrust minus fit (N) over V|V| (V²)", "a bend here is something that C V|V| leaves out")
         self.redraw((points, self.size), lambda plot: self._draw(plot, points, fit))
 
     def _draw(self, plot: Plot, points: tuple[Point, ...], fit: RunningFit | None) -> None:
@@ -90,7 +89,7 @@ class TimePlot(Curve):
 
     def show(self, view: View) -> None:
         window = f", last {WINDOW:.0f} s" if self.size.width >= 64 else ""
-        self.border_title = f"thrust (N), command (V, right) over time (s){window}"
+        entitle(self, f"thrust (N), command (V, right) over time (s){window}")
         rows = [row for row in view.trace if row[0] >= view.trace[-1][0] - WINDOW]
         self.redraw((rows[-1] if rows else (), len(rows), self.size), lambda plot: self._draw(plot, rows))
 

@@ -27,7 +27,7 @@ class Terminal:
     def __init__(self, columns: int = 80, rows: int = 24) -> None:
         self.master, self.slave = pty.openpty()
         fcntl.ioctl(self.slave, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
-        self._seen = b""
+        self._seen = bytearray()
         self._news = threading.Condition()
         self._hung_up = threading.Event()
 
@@ -51,7 +51,7 @@ class Terminal:
     def until(self, text: bytes) -> None:
         """Wait until `text` has been drawn."""
         with self._news:
-            assert self._news.wait_for(lambda: text in self._seen, PATIENCE), self._seen[-5000:]
+            assert self._news.wait_for(lambda: text in self._seen, PATIENCE), bytes(self._seen[-5000:])
 
     def press(self, keys: bytes) -> None:
         """As the terminal sends them: F5 is ESC [ 15 ~."""
@@ -73,12 +73,15 @@ class Terminal:
 
 
 @contextmanager
-def on_terminal(code: str, *arguments: str, leading: bool = True) -> Iterator[tuple[subprocess.Popen[bytes], Terminal]]:
-    """Python `code` in a process whose controlling terminal is ours. Leaving waits for its end, and at last kills.
+def on_terminal(
+    code: str, *arguments: str, leading: bool = True, size: tuple[int, int] = (80, 24)
+) -> Iterator[tuple[subprocess.Popen[bytes], Terminal]]:
+    """Python `code` in a process whose controlling terminal is ours, of `size` columns and rows. Leaving waits for its
+    end, and at last kills.
 
     Not `leading`: the terminal is not its session's, and the kernel tells it of no hang-up.
     """
-    terminal = Terminal()
+    terminal = Terminal(*size)
     process = subprocess.Popen(
         [sys.executable, "-c", (TAKE_THE_TERMINAL if leading else "") + code, *arguments],
         stdin=terminal.slave,

@@ -1,0 +1,156 @@
+"""From the stop key to command 0 at the motor, on every screen of the console, many times.
+
+    python benchmarks/console/stop_key.py [--presses 100] [--screen NAME ...] [--size 160x48] [--json OUT]
+
+`rig console` on a pseudo-terminal, a real controller and recorder, a simulated bench in a process of its own, whose
+truth log has the clock of this machine. For each page, each dialog (the note with text in it), and the moment in which
+one opens: the key's bytes are written to the terminal at a random instant of a hold, F9 and Ctrl+C in turn, while the
+plots are drawn again and the recorder stands still as in a flush that takes two seconds. The run begins again by itself
+(`begins_again.py`). Latency: from just before that write to the truth log's command 0. About three seconds a press on
+a quiet machine.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import random
+import select
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
+from benchmarks.console.bench import Truth, running
+from benchmarks.console.screens import Screen, screens
+from rig.link.live_runs import Run
+from tests.reliability.test_console_stop import CTRL_C, F9, RIG
+from tests.reliability.test_motor_stops import recorder_pid
+from tests.rig.console.terminal import Terminal, on_terminal
+
+PROMISE = 0.1
+"""s, p99 of 100 presses (docs/reliability.md, promise 4)."""
+FLUSH = 2.0
+"""s for which the recorder stands still around a press, if command 0 does not come before."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """One screen: ms."""
+
+    screen: str
+    presses: int
+    median: float
+    p99: float
+    worst: float
+    load: float
+
+
+@contextmanager
+def flush_of_two_seconds(recorder: int) -> Iterator[None]:
+    """The recorder writes nothing, answers nothing and takes nothing."""
+    os.kill(recorder, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        os.kill(recorder, signal.SIGCONT)
+
+
+def press(terminal: Terminal, truth: Truth, recorder: int, screen: Screen, key: bytes) -> float | None:
+    """s from the key to command 0; None when the motor was not driven at that instant (a trip came before)."""
+    truth.until_driven()
+    with flush_of_two_seconds(recorder):
+        select.select([], [], [], random.uniform(0.05, 0.35))
+        pressed = time.monotonic_ns()
+        terminal.press(screen.with_the_key + key)
+        latency = truth.zero_after(pressed)
+    before = [value for t, value in truth.changes if t < pressed]
+    if screen.closes:
+        terminal.press(screen.closes)
+    return latency if before[-1] != 0.0 else None
+
+
+def on_screen(screen: Screen, presses: int, size: tuple[int, int]) -> list[float]:
+    """s of each press."""
+    found: list[float] = []
+    with TemporaryDirectory() as folder, running(Path(folder)) as (run, truth, _), console(run, size) as terminal:
+        truth.until_driven()
+        recorder = recorder_pid(run.pid)
+        terminal.press(screen.opens)
+        select.select([], [], [], 1.0)
+        while len(found) < presses:
+            latency = press(terminal, truth, recorder, screen, F9 if len(found) % 2 else CTRL_C)
+            found += [] if latency is None else [latency]
+    return found
+
+
+@contextmanager
+def console(run: Run, size: tuple[int, int]) -> Iterator[Terminal]:
+    """`rig console` on that run, which has drawn its key line."""
+    with on_terminal(RIG, "console", run.folder, "--no-report", size=size) as (process, terminal):
+        try:
+            terminal.until(b"STOP")
+            select.select([], [], [], 1.0)
+            yield terminal
+        finally:
+            _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    process.terminate()
+    try:
+        process.wait(10.0)
+    except subprocess.TimeoutExpired:
+        process.kill()
+
+
+def row_of(name: str, seconds: Sequence[float]) -> Row:
+    p50, p99, most = (1e3 * float(value) for value in np.quantile(seconds, [0.5, 0.99, 1.0]))
+    return Row(name, len(seconds), round(p50, 1), round(p99, 1), round(most, 1), round(os.getloadavg()[0], 1))
+
+
+def as_line(row: Row) -> str:
+    return f"| {row.screen} | {row.presses} | {row.median:.1f} | {row.p99:.1f} | {row.worst:.1f} | {row.load:.1f} |"
+
+
+def arguments() -> argparse.Namespace:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--presses", type=int, default=100, help="of each screen (default: 100)")
+    parser.add_argument("--screen", action="append", choices=list(screens()), help="only this one; may be repeated")
+    parser.add_argument("--size", default="160x48", help="columns x rows of the terminal (default: 160x48)")
+    parser.add_argument("--json", type=Path, help="write the rows there as well")
+    return parser.parse_args()
+
+
+def main() -> int:
+    """1 when a screen breaks the promise."""
+    asked = arguments()
+    columns, rows = map(int, asked.size.split("x"))
+    begun, found, every = time.monotonic(), list[Row](), list[float]()
+    print(f"key to command 0 in ms, terminal of {asked.size}, load {os.getloadavg()[0]:.1f} before\n")
+    print("| screen | presses | median | p99 | worst | load |\n|---|---|---|---|---|---|", flush=True)
+    for name, screen in screens().items():
+        if asked.screen and name not in asked.screen:
+            continue
+        seconds = on_screen(screen, asked.presses, (columns, rows))
+        every += seconds
+        found.append(row_of(name, seconds))
+        print(as_line(found[-1]), flush=True)
+        if asked.json:
+            asked.json.write_text(json.dumps([asdict(row) for row in found], indent=1) + "\n", encoding="utf-8")
+    print(as_line(row_of("all", every)))
+    print(f"\n{len(every)} presses in {time.monotonic() - begun:.0f} s; promise: p99 <= {1e3 * PROMISE:.0f} ms")
+    return int(any(row.p99 > 1e3 * PROMISE for row in found))
+
+
+if __name__ == "__main__":
+    sys.exit(main())
