@@ -46,7 +46,8 @@ def screens() -> dict[str, Screen]:
 
 
 def _bytes(key: str) -> bytes:
-    """As a terminal sends it."""
+    """As a terminal sends it; of several the first."""
+    key = key.split(",", maxsplit=1)[0] or key
     if key.startswith("ctrl+") and len(key) == 6:
         return bytes([ord(key[-1]) & 0x1F])
     return TERMINAL.get(key, key.encode())
