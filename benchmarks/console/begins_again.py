@@ -4,7 +4,7 @@
 
 All in it is the rig's: session, preflight, loop, guard, sequencer, recorder. Only what follows a stop differs: where
 `rig.stages.controller` says goodbye, the next run of the same thruster begins, into a file of its own. Each run shows
-what a console shows late on a day: ten minutes of trace and forty points. SIGTERM ends it.
+what a console shows late on a day: two minutes of trace and forty points. SIGTERM ends it.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from rig.campaign.loading import load_campaign
-from rig.link.front_end_messages import Point
+from rig.link.front_end_messages import Point, TraceRow
 from rig.link.live_runs import Run, lock_bench, register
 from rig.link.sockets import socket_path
 from rig.stages.arming import preflight
@@ -28,12 +28,17 @@ from rig.stages.controller import real_time, stop_on_signals
 from rig.stages.measuring import measure
 from rig.stages.session import Session, Stopped
 
-MINUTES, ROWS_PER_SECOND, POINTS = 10, 20, 40
+MINUTES, ROWS_PER_SECOND, POINTS = 2, 10, 40
 TRACE = tuple(
     (t / ROWS_PER_SECOND, 6.0 * sin(t / 400), 15.0 * sin(t / 400) * abs(sin(t / 400)) + 0.2 * sin(3.7 * t))
     for t in range(-MINUTES * 60 * ROWS_PER_SECOND, 0)
 )
 """(s, V, N) before the run: what a front end is sent of a run that has gone on for as long."""
+
+
+def as_traced(channels: int) -> list[TraceRow]:
+    """`TRACE` as the envelope of so many channels, the command first."""
+    return [(t, V, V, *((N - 0.2, N + 0.2) * (channels - 1))) for t, V, N in TRACE]
 
 
 def earlier_points(thruster: str) -> list[Point]:
@@ -50,7 +55,7 @@ def with_a_past(session: Session) -> Callable[[float], None]:
         begun = loop.recording_since_ns
         if begun is not None and begun not in given[-1:]:
             given.append(begun)
-            rows = [*TRACE, *loop.clients.trace]
+            rows = [*as_traced(len(loop.envelopes.channels)), *loop.clients.trace]
             loop.clients.clear_trace()
             for row in rows:
                 loop.clients.add_trace(row)

@@ -14,6 +14,8 @@ from rig.link.front_end_messages import (
     Reading,
     Snapshot,
     StreamHealth,
+    TracedChannel,
+    TraceRow,
 )
 
 CHANNELS = (("thrust", "N"), ("raw", "1"), ("rotation_rate", "rev/s"), ("current", "A"), ("bus_voltage", "V"),
@@ -23,8 +25,10 @@ HOLD = 10.0
 """s of a hold, its ramp included."""
 RUN = 3600.0
 """s of a thruster's run: 360 holds."""
-TRACE = 0.05
+TRACE = 0.1
 """s between rows of the trace."""
+TRACED = (TracedChannel("command", "command_voltage", "V"),
+          *(TracedChannel(f"daq.{name}", name if name != "raw" else "", unit) for name, unit in CHANNELS))  # fmt: skip
 LOG_LINES = 500
 
 
@@ -37,7 +41,7 @@ class Day:
     sequence: int = 0
     log: list[LogLine] = field(default_factory=list)
     log_count: int = 0
-    rows: list[tuple[float, float, float]] = field(default_factory=list)
+    rows: list[TraceRow] = field(default_factory=list)
     """Of the trace, since the last snapshot."""
     points: list[Point] = field(default_factory=list)
     files: list[str] = field(default_factory=list)
@@ -52,7 +56,7 @@ class Day:
         for hold in range(int(before / HOLD) + 1, int(self.time / HOLD) + 1):
             self._held(hold)
         first, last = int(before / TRACE) + 1, int(self.time / TRACE)
-        self.rows = [((k * TRACE) % RUN, volts(k * TRACE), thrust(k * TRACE)) for k in range(first, last + 1)]
+        self.rows = [traced(k * TRACE) for k in range(first, last + 1)]
         fallen = next((k for k, (a, b) in enumerate(pairwise(self.rows), 1) if b[0] < a[0]), 0)
         self.rows = self.rows[fallen:]
         return new_run
@@ -90,6 +94,7 @@ class Day:
             trace=(), progress=Progress(int(time / HOLD), int(RUN / HOLD), time % HOLD, HOLD, len(self.files) - 1, 4,
                                         self.time, max(4 * RUN - self.time, 0.0), min(self.time / (4 * RUN), 1.0)),
             files=tuple(self.files), outcome="running", attended=False, since_begin=self.time, devices=(device,),
+            channels=TRACED,
         )  # fmt: skip
 
 
@@ -98,6 +103,12 @@ def volts(t: float) -> float:
     hold, within = divmod(t, HOLD)
     before, after = level(hold - 1), level(hold)
     return before + (after - before) * min(within, 1.0)
+
+
+def traced(t: float) -> TraceRow:
+    """Command, then the channels: least and greatest of each."""
+    V, N = volts(t), thrust(t)
+    return (t % RUN, V, V, *(edge for k in range(len(CHANNELS)) for edge in (N + k - 0.3, N + k + 0.3)))
 
 
 def level(hold: float) -> float:

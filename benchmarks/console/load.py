@@ -3,7 +3,7 @@
     python benchmarks/console/load.py [--hours 4] [--minutes 6] [--still 1] [--size 160x48] [--page 1] [--json OUT]
 
 `rig console` on a pseudo-terminal, its stopwatch in it (`watched.py`), fed through the controller's own sockets with
-what a controller sends in that many hours (`day.py`): 288,000 rows of trace, 1,440 holds in four runs, as many events.
+what a controller sends in that many hours (`day.py`): 144,000 rows of trace, 1,440 holds in four runs, as many events.
 They are played in `--minutes`, 40 snapshots a second; then `--still` minutes in real time, ten a second. Redraw: from a
 look at the view to the last byte written because of it. Memory: resident set, every second; its slope over the second
 half of what was played (the caches of the first half are full), per hour of the day, with a standard error from twelve

@@ -211,6 +211,12 @@ class ConsoleApp(ChoosingApp, inherit_bindings=False):
             self.query_one("#bench").focus()  # the arrow keys scroll it
         self.call_after_refresh(self.show_plots)
 
+    def look_at_time(self) -> None:
+        if self.query_one(TimePlot).size:
+            self.show_plots()
+        else:
+            self.action_view("time")
+
     def action_filter(self) -> None:
         """F: which events are shown."""
         self.log_filter = NEXT[self.log_filter]

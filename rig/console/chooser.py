@@ -21,8 +21,8 @@ from rig.console.view_model.palette import Entry, matching
 from rig.console.view_model.view import View
 
 Entries = Callable[[View], tuple[Entry, ...]]
-NAME, BESIDE = 15, 11
-"""Cells per column."""
+WIDEST, BESIDE = 24, 11
+"""Cells of the columns."""
 HINT = "Enter, Escape, arrows. Ctrl+C or F9 stops the motor, here too."
 
 
@@ -77,7 +77,8 @@ class Chooser(ModalScreen[str]):
             return
         same = [entry.value for entry in found] == [entry.value for entry in self.listed]
         at, self.listed = options.highlighted, found
-        options.set_options([row_of(entry) for entry in found])
+        width = min(WIDEST, max((len(entry.name) for entry in self.entries(self.view)), default=0))
+        options.set_options([row_of(entry, width) for entry in found])
         options.highlighted = (at if same else 0) if found else None
 
     def action_move(self, how: str) -> None:
@@ -103,9 +104,9 @@ class Chooser(ModalScreen[str]):
         self.dismiss("")
 
 
-def row_of(entry: Entry) -> Text:
-    """One line: name, key or unit, and what it does or why it can't be done."""
+def row_of(entry: Entry, width: int) -> Text:
+    """One line: a name of `width` cells, key or unit, and what it does or why it can't be done."""
     says, style = (f"not now: {entry.not_now}", "#9a9a9a") if entry.not_now else (entry.says, "")
     row = Text(no_wrap=True, overflow="ellipsis")
-    row.append(f"{entry.name:<{NAME}} ", style if entry.not_now else "bold")
+    row.append(f"{entry.name:<{width}} ", style if entry.not_now else "bold")
     return row.append(f"{entry.beside:<{BESIDE}} ", style).append(says, style)

@@ -10,21 +10,19 @@ from textual_plotext import PlotextPlot
 from textual_plotext.plot import Plot
 
 from rig.console.titles import entitle
-from rig.console.view_model.axes import reach, thin, ticks, to_row
+from rig.console.view_model import traces
+from rig.console.view_model.axes import reach, ticks, to_row
 from rig.console.view_model.running_fit import RunningFit, in_words, running_fit, usable, v_abs_v
-from rig.console.view_model.view import TraceRow, View
+from rig.console.view_model.view import View
+from rig.console.view_model.wording import unit
 from rig.link.front_end_messages import Point
 
-WINDOW: Final = 120.0
-"""s of trace drawn: enough for a dozen holds, and short enough to see one settle."""
 BAR: Final = 1.96
 """Standard errors in an error bar: 95 %."""
 CYAN, GREEN, AMBER, GREY = (90, 200, 250), (127, 216, 143), (240, 192, 64), (170, 170, 170)
 LEFT, RIGHT = 1, 2
 """Plotext's numbers of the y axes, where its signatures ask for a number."""
 Span = tuple[float, float]
-LEAST_THRUST: Final = 1.0
-"""N, smallest span of a thrust axis: noise at rest shall not fill the plot."""
 
 
 class Curve(PlotextPlot):
@@ -85,35 +83,44 @@ class ResidualPlot(Curve):
 
 
 class TimePlot(Curve):
-    """Two strips over the recording's time in s: raw thrust in N above, command in V below."""
+    """Two strips over the recording's time in s: the chosen channel above, the command in V below, from least to
+    greatest in each column."""
 
     def show(self, view: View) -> None:
-        window = f", last {WINDOW:.0f} s" if self.size.width >= 64 else ""
-        entitle(self, f"thrust (N), command (V, right) over time (s){window}")
-        rows = [row for row in view.trace if row[0] >= view.trace[-1][0] - WINDOW]
-        self.redraw((rows[-1] if rows else (), len(rows), self.size), lambda plot: self._draw(plot, rows))
+        entitle(self, traces.title(view, wide=self.size.width >= 64), "c: another channel")
+        made_of = (view.trace[-1:], len(view.trace), traces.plotted(view), self.size)
+        self.redraw(made_of, lambda plot: self._draw(plot, view))
 
-    def _draw(self, plot: Plot, rows: Sequence[TraceRow]) -> None:
-        dots = 2 * self.size.width
-        time, thrust = thin([(t, thrust) for t, _, thrust in rows], dots)
-        command_time, volts = thin([(t, volts) for t, volts, _ in rows], dots)
-        if not time or not volts:
+    def _draw(self, plot: Plot, view: View) -> None:
+        shown = traces.plotted(view)
+        most = 2 * self.size.width
+        command = traces.bands(view, traces.COMMAND, most)
+        found = traces.bands(view, shown.channel, most) if shown is not None else []
+        if shown is None or not found:
             return
-        height, (low, high), (least, most) = (
-            self.size.height,
-            reach(thrust, least=LEAST_THRUST),
-            reach(volts, least=1.0),
+        alone = shown.channel == traces.COMMAND or not command
+        low, high = traces.span_of(found, shown.unit)
+        upper = (low, high) if alone else (low - 0.6 * (high - low), high)  # the channel in the upper five eighths
+        self._strip(plot, found, (low, high), upper, unit(shown.unit))
+        if not alone:
+            least, most_volts = traces.span_of(command, "V")
+            lower = (least, most_volts + 2.2 * (most_volts - least))  # the command in the lower third
+            self._strip(plot, command, (least, most_volts), lower, "V", RIGHT)
+        begin, end = view.trace[0][0], max(view.trace[-1][0], view.trace[0][0] + 10.0)
+        plot.xlim(begin, end)
+        plot.xticks(*ticks(begin, end, 6))
+
+    def _strip(
+        self, plot: Plot, found: Sequence[traces.Band], band: Span, axis: Span, of_unit: str, side: int = LEFT
+    ) -> None:
+        """One channel within `band` of the axis of that side; its highest number has the unit."""
+        plot.ylim(*axis, yside=side)
+        _row_ticks(plot, band, axis, self.size.height, side, "" if of_unit == "1" else f" {of_unit}")
+        times, values = traces.dots(found, (axis[1] - axis[0]) / max(4 * (self.size.height - 3), 4))
+        right = side == RIGHT
+        plot.scatter(
+            times, values, marker="braille", color=AMBER if right else CYAN, yside="right" if right else "left"
         )
-        upper = (low - 0.6 * (high - low), high)  # thrust in the upper five eighths
-        lower = (least, most + 2.2 * (most - least))  # the command in the lower third
-        plot.ylim(*upper)
-        plot.ylim(*lower, yside=RIGHT)
-        _row_ticks(plot, (low, high), upper, height)
-        _row_ticks(plot, (least, most), lower, height, RIGHT)
-        plot.xlim(rows[0][0], max(rows[-1][0], rows[0][0] + 10.0))
-        plot.xticks(*ticks(rows[0][0], max(rows[-1][0], rows[0][0] + 10.0), 6))
-        plot.scatter(command_time, volts, marker="braille", color=AMBER, yside="right")
-        plot.scatter(time, thrust, marker="braille", color=CYAN)
 
 
 def points_of(view: View) -> tuple[Point, ...]:
@@ -137,10 +144,13 @@ def _frame(plot: Plot, points: Sequence[Point], values: Sequence[float], height:
     return _row_ticks(plot, (low, high), (low, high), height)
 
 
-def _row_ticks(plot: Plot, band: Span, axis: Span, height: int, side: int = LEFT) -> Callable[[float], float]:
+def _row_ticks(
+    plot: Plot, band: Span, axis: Span, height: int, side: int = LEFT, of_unit: str = ""
+) -> Callable[[float], float]:
     """Round numbers within `band` of an axis, on the rows where the curve is. Frame and x ticks take three rows."""
     rows = height - 3
     places, labels = ticks(*band, max(4, round(rows / 2 * (band[1] - band[0]) / (axis[1] - axis[0]))))
+    labels[-1:] = [f"{label}{of_unit}" for label in labels[-1:]]
     plot.yticks([to_row(place, *axis, rows) for place in places], labels, yside=side)
     return lambda value: to_row(value, *axis, rows)
 

@@ -17,6 +17,7 @@ from drivers.protocols import MotorController, Sample
 from rig.campaign.bench import COMMAND_STREAM, Bench
 from rig.campaign.limits import guarded_channels
 from rig.control.clocks import Clock
+from rig.control.envelopes import Envelopes
 from rig.control.motor_watch import MotorWatch
 from rig.control.paces import Paces
 from rig.control.readings import Readings
@@ -33,8 +34,6 @@ from rig.watch.watch_link import WatchLink
 
 PUBLISH_PERIOD = 0.1
 """s between snapshots to the front ends."""
-TRACE_PERIOD = 0.05
-"""s between rows of the live trace."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,7 +105,6 @@ class Loop:
     """Last row of the command stream; (None,) while nothing is sent, which is recorded as NaN."""
     _due_ns: int = 0
     _published: float = -inf
-    _traced: float = -inf
     _paces: Paces | None = None
     _sent: float | None = None
     """V of the last tick; None: nothing was sent."""
@@ -124,6 +122,7 @@ class Loop:
         streams = self.readings.streams.values()
         self.guarded_channels = guarded_channels(config.limits, streams, essential, self.thrust_channel)
         self.allowed = guard.allowances(config.loop_rate, self.bench.motor.watchdog.timeout_s)
+        self.envelopes = Envelopes(streams)
         self._lost = LostTime(self.allowed.lateness + 1.0 / config.loop_rate)
         self.readings.watch_sameness(c.channel for c in self.guarded_channels if c.max_frozen is not None)
 
@@ -154,7 +153,7 @@ class Loop:
         sent = self._send(motor, decision, now) if motor is not None else decision.volts
         self._sent = sent
         self._record(samples, sent, self._sent_ns if motor is not None and sent is not None else now_ns)
-        self._show(now)
+        self._show(samples, now)
         self.clock.sleep_until_ns(self._due_ns)
 
     def zero(self, motor: MotorController) -> None:
@@ -293,12 +292,10 @@ class Loop:
         if self.watcher is not None:
             self.watcher.rows(rows, sent_ns * 1e-9)
 
-    def _show(self, now: float) -> None:
-        since = self.recording_since_ns
-        thrust = self.readings.newest(self.thrust_channel)
-        if since is not None and thrust is not None and now - self._traced >= TRACE_PERIOD:
-            self._traced = now
-            self.clients.add_trace((now - since * 1e-9, self.command, thrust.value))
+    def _show(self, samples: list[Sample], now: float) -> None:
+        row = self.envelopes.advance(samples, self._sent, self.recording_since_ns, now)
+        if row is not None:
+            self.clients.add_trace(row)
         if now - self._published >= PUBLISH_PERIOD - self.period_ns * 0.5e-9:
             self._published = now
             self.publish(now)

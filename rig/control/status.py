@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from rig.campaign.config import CampaignConfig
-from rig.link.front_end_messages import Check, Device, LogLine, Point, Progress, Reading, Snapshot, State
+from rig.link.front_end_messages import Check, Device, LogLine, Point, Progress, Reading, Snapshot, State, TracedChannel
 from rig.sequence.ticks import Output, settings_for
 
 LOG_LINES = 500
@@ -75,6 +75,7 @@ class Status:
         command: float,
         readings: tuple[Reading, ...],
         devices: tuple[Device, ...] = (),
+        channels: tuple[TracedChannel, ...] = (),
     ) -> Snapshot:
         """`now` s monotonic, `time` s since the start of the recording, `command` V."""
         self.sequence += 1
@@ -103,6 +104,7 @@ class Status:
             reason=self.output.reason if self.output else "",
             state_elapsed=self.output.state_elapsed if self.output else 0.0,
             devices=devices,
+            channels=channels,
         )
 
     def _progress(self, now: float) -> Progress | None:

@@ -8,11 +8,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from rig.errors import LinkError
-from rig.link.front_end_messages import Request, Snapshot
+from rig.link.front_end_messages import Request, Snapshot, TraceRow
 from rig.link.sockets import Overrun, Peer, accept, remove
 
-TRACE_ROWS = 12_000
-"""10 minutes at 20 rows/s: what a console attached late is given."""
+TRACE_ROWS = 1200
+"""2 minutes at 10 rows/s: what a console attached late is given, and as much as its plot shows."""
+TRACE_AT_ONCE = 60
+"""Rows in one snapshot: two minutes of a large bench are a megabyte, which the loop shall not write in one tick."""
 CLIENT_BOUND = 8 * 2**20
 """Bytes that may wait for a front end that does not read before it is dropped."""
 MAX_CLIENTS = 8
@@ -29,8 +31,6 @@ SILENCE = 30.0
 """s after which a front end that says nothing is dropped: all of ours renew a lease twice a second."""
 OVERDUE = 3.0
 """s of silence after which a front end gives way where there is no room for another: a lease lasts 2 s."""
-
-TraceRow = tuple[float, float, float]
 
 
 @dataclass
@@ -101,8 +101,9 @@ class Clients:
         """Send to everybody; who does not read is dropped, and never holds the loop."""
         for client in list(self.connected):
             try:
-                client.peer.send(replace(snapshot, trace=tuple(client.unsent), clients=self.attending))
-                client.unsent.clear()
+                rows = tuple(client.unsent[:TRACE_AT_ONCE])
+                client.peer.send(replace(snapshot, trace=rows, clients=self.attending))
+                del client.unsent[:TRACE_AT_ONCE]
             except (Overrun, LinkError):
                 self._drop(client)
 

@@ -97,6 +97,20 @@ class Device:
 
 
 @dataclass(frozen=True, slots=True)
+class TracedChannel:
+    """One recorded channel, by the names of the recording."""
+
+    channel: str
+    """`<stream>.<channel>`; `command` is what was sent to the motor."""
+    quantity: str
+    unit: str
+
+
+TraceRow = tuple[float, ...]
+"""(s of the recording, then least and greatest of each channel in the tenth of a second around it); NaN: no sample."""
+
+
+@dataclass(frozen=True, slots=True)
 class Point:
     """A finished hold: the mean thrust, tare subtracted, and its standard error honest under autocorrelation."""
 
@@ -167,8 +181,8 @@ class Snapshot:
     """Newest 500 events of the campaign."""
     log_count: int
     """Events so far, including those that are no longer in `log`."""
-    trace: tuple[tuple[float, float, float], ...]
-    """(t, command V, thrust N raw) at <= 20 rows/s; on attaching: the last 10 minutes of this run."""
+    trace: tuple[TraceRow, ...]
+    """10 rows/s; what a console attached late has missed of this run's last two minutes comes first, bit by bit."""
     progress: Progress | None
     files: tuple[str, ...]
     """Recordings of this campaign so far, the running one last."""
@@ -193,6 +207,8 @@ class Snapshot:
     """Where this run stopped fitting what it was, or its twin, in one line; empty: nowhere, as far as is seen."""
     devices: tuple[Device, ...] = ()
     """In the order of the bench file."""
+    channels: tuple[TracedChannel, ...] = ()
+    """Of `trace`, in the order of its numbers."""
 
 
 RequestKind = Literal[

@@ -222,7 +222,8 @@ def begin(
         time = 0.0 if since is None else now - since * 1e-9
         if clients.connected:
             heard = devices.view(now, session.today, status.watchdog_measured)
-            clients.publish(status.snapshot(now, time, loop.command, readings.view(now), heard))
+            shown = status.snapshot(now, time, loop.command, readings.view(now), heard, loop.envelopes.channels)
+            clients.publish(shown)
 
     loop = Loop(bench, readings, recorder, ledger, clients, clock, campaign.unattended, publish, watch)
     session = Session(campaign, folder, status, bench, recorder, ledger, log, event_log, loop, before)

@@ -107,6 +107,10 @@ def _diagnose(view: View) -> str:
     return "" if ended else "the campaign has not ended"
 
 
+def _channel(view: View) -> str:
+    return "" if view.snapshot is not None and view.snapshot.channels else "no data came yet"
+
+
 def _attend(view: View) -> str:
     if not view.connected:
         return "the controller is gone"
@@ -135,6 +139,7 @@ ACTIONS: Final = (
            not_now=_asks("bad", "no run is under way")),
     Action("note", "n", "note", "a line of text into the recording", not_now=_nobody),
     Action("filter events", "f", "filter", "this run, warnings and worse, all"),
+    Action("channel", "c", "channel", "which one the time plot shows", not_now=_channel),
     Action("diagnose", "g", "diagnose", "once the campaign has ended", not_now=_diagnose),
     Action("attend", "l", "take_lease", "where this console only looks on", not_now=_attend),
     Action("leave", "d, Ctrl+Q", "leave", "a dialog says first what that does", "d", first="ctrl+q"),

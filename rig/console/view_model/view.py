@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final, Literal
 
-from rig.link.front_end_messages import Point, Snapshot
+from rig.link.front_end_messages import Point, Snapshot, TraceRow
 
 FRESH: Final = 0.5
 """s; snapshots come ten times a second, so five in a row are missing when one is older than this."""
-TRACE_KEPT: Final = 600.0
-"""s of trace kept: as much as the controller sends on attaching."""
+TRACE_KEPT: Final = 120.0
+"""s of trace kept and drawn: a dozen holds, and short enough to see one settle; as much as the controller sends."""
 
-TraceRow = tuple[float, float, float]
 Condition = Literal["waiting", "live", "stale", "disconnected"]
 
 
@@ -31,7 +30,9 @@ class View:
     points: Mapping[str, tuple[Point, ...]] = field(default_factory=dict)
     """Finished holds of each thruster seen since this console attached, in order of appearance."""
     trace: tuple[TraceRow, ...] = ()
-    """(s of the recording, V, N) of the running recording."""
+    """Of the running recording; its channels are those of the snapshot."""
+    plotted: str = ""
+    """Channel on the time plot, as the operator chose it; empty: the thrust."""
     looks_on: bool = False
     """It does not attend, and asks for nothing but a stop."""
     stop_asked: float | None = None

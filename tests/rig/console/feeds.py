@@ -20,6 +20,8 @@ from rig.link.front_end_messages import (
     Snapshot,
     State,
     StreamHealth,
+    TracedChannel,
+    TraceRow,
 )
 
 C = {"T1": 0.402, "T3": 0.387}
@@ -109,13 +111,18 @@ def command_at(t: float) -> float:
     return before + (after - before) * min(1.0, within / 0.8)
 
 
-def trace(thruster: str, until: float) -> tuple[tuple[float, float, float], ...]:
-    """10 rows/s from 0 to `until` s."""
+def trace(thruster: str, until: float) -> tuple[TraceRow, ...]:
+    """10 rows/s from 0 to `until` s: command, then the channels of `readings`, each some noise wide."""
     rows = []
     for i in range(int(until * 10)):
-        t = i / 10.0
+        t = i / 10.0 + 0.05
         V = command_at(t)
-        rows.append((t, V, C[thruster] * V * abs(V) + 0.9 * wobble(t)))
+        thrust = C[thruster] * V * abs(V) + 0.9 * wobble(t)
+        values = [(V, V)]
+        for reading in readings(V, thrust):
+            value, wide = reading.value or 0.0, 0.3 if reading.unit == "N" else 0.02
+            values.append((value - wide, value + wide))
+        rows.append((t, *(edge for both in values for edge in both)))
     return tuple(rows)
 
 
@@ -139,6 +146,10 @@ def readings(V: float, thrust: float) -> tuple[Reading, ...]:
     )
 
 
+CHANNELS = (
+    TracedChannel("command", "command_voltage", "V"),
+    *(TracedChannel(reading.channel, reading.quantity, reading.unit) for reading in readings(0.0, 0.0)),
+)
 CHECKS = (
     Check("load_cell", "passed", "Mettler WMS 404C, serial B512345678, 92 samples/s"),
     Check("motor", "passed", "VESC 6 MkVI, id 23, firmware 6.05, command timeout 0.5 s, then coasts"),
@@ -193,6 +204,7 @@ def snapshot(state: State = "preflight", **changes: object) -> Snapshot:
         attended=False,
         clients=1,
         devices=DEVICES,
+        channels=CHANNELS,
     )
     return replace(plain, **changes)  # type: ignore[arg-type]  # names are checked by replace
 

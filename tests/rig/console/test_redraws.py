@@ -8,7 +8,7 @@ from textual.widget import Widget
 
 from rig.console.panels import LogPanel, ProgressPanel, ReadingsPanel
 from rig.console.plots import FitPlot, TimePlot
-from tests.rig.console.feeds import running
+from tests.rig.console.feeds import CHANNELS, running
 from tests.rig.console.sitting import Desk, sitting
 
 WIDE = (160, 48)
@@ -23,7 +23,7 @@ async def test_a_plot_whose_points_are_the_same_is_not_drawn_again():
     now = running(t=47.0)
     async with sitting(now, size=WIDE) as desk:
         fit, time = drawn(desk, FitPlot), drawn(desk, TimePlot)
-        await desk.play(replace(now, time=47.1, trace=((47.1, 3.0, 4.0),)))
+        await desk.play(replace(now, time=47.1, trace=((47.1, *(4.0,) * (2 * len(CHANNELS))),)))
         assert drawn(desk, FitPlot) is fit
         assert drawn(desk, TimePlot) is not time
         await desk.play(running(t=52.0))

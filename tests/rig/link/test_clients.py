@@ -5,7 +5,7 @@ from contextlib import contextmanager
 
 import pytest
 
-from rig.link.clients import FLOOD, MAX_CLIENTS, OVERDUE, PASSED_PER_TICK, SILENCE, Clients
+from rig.link.clients import FLOOD, MAX_CLIENTS, OVERDUE, PASSED_PER_TICK, SILENCE, TRACE_AT_ONCE, Clients
 from rig.link.front_end_messages import Request, Snapshot
 from rig.link.recorder_messages import Ready
 from rig.link.sockets import connect, listen
@@ -107,6 +107,15 @@ def test_trace_for_the_late_and_only_news_for_the_rest(tmp_path):
         clients.publish(snapshot())
         assert [len(s.trace) for s in early.receive()] == [1, 1]
         assert [len(s.trace) for s in late.receive()] == [2]
+        for n in range(2 * TRACE_AT_ONCE):
+            clients.add_trace((0.1 * n, 1.0, 2.0))
+        sent = []
+        for _ in range(3):
+            clients.publish(snapshot())
+            sent.append(early.receive()[0].trace)
+        assert [len(rows) for rows in sent] == [TRACE_AT_ONCE, TRACE_AT_ONCE, 0]
+        assert [row[0] for rows in sent for row in rows] == [0.1 * n for n in range(2 * TRACE_AT_ONCE)]
+        clients.add_trace((99.0, 1.0, 2.0))
         clients.clear_trace()
         clients.publish(snapshot())
         assert early.receive()[0].trace == ()
