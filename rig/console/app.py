@@ -22,7 +22,6 @@ from rig.console.dialogs import LeaveDialog, NoteDialog
 from rig.console.feed import Feed
 from rig.console.few_colors import filters_for
 from rig.console.key_help import KeyHelp
-from rig.console.keys_after_enter import KeysAfterEnter
 from rig.console.keys_in_order import KeysInOrder
 from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
 from rig.console.plots import FitPlot, ResidualPlot, TimePlot
@@ -77,7 +76,7 @@ class ConsoleApp(ChoosingApp, inherit_bindings=False):
         self.set_class(colors != "full", "-few-colors")
         self.chosen = "main"
         self.log_filter: LogFilter = "run"
-        self.in_order, self.after_enter = KeysInOrder(self), KeysAfterEnter()
+        self.in_order = KeysInOrder(self)
         self.calls, self.silent, self.terminal_colors = Bell(), silent, colors
 
     def compose(self) -> ComposeResult:
@@ -180,12 +179,7 @@ class ConsoleApp(ChoosingApp, inherit_bindings=False):
 
     async def on_event(self, event: events.Event) -> None:
         """Keys come here first, and those that a widget has not used a second time."""
-        await self.in_order.handle(event, self._pass_on)
-
-    async def _pass_on(self, event: events.Event) -> None:
-        in_note = len(self.screen_stack) > 1 and isinstance(self.screen, NoteDialog)
-        if not self.after_enter.takes(event, in_dialog=in_note):
-            await super().on_event(event)
+        await self.in_order.handle(event, super().on_event)
 
     def action_diagnose(self) -> None:
         """G: not while anything may turn, and one at a time."""
@@ -227,11 +221,11 @@ class ConsoleApp(ChoosingApp, inherit_bindings=False):
         self.call_after_refresh(self.show_text)
 
     async def action_note(self) -> None:
+        if self.only_looks_on():
+            return  # before the line is typed, not after
         await self.push_screen(NoteDialog(), self._keep_note)
         self.call_after_refresh(self.show_text)
 
     def _keep_note(self, text: str | None) -> None:
-        for key in self.after_enter.let_go():
-            self.post_message(key)
         if text:
             self.action_ask("note", text)

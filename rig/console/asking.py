@@ -49,8 +49,7 @@ class AskingApp(App[None], inherit_bindings=False):
 
     def action_ask(self, kind: RequestKind, text: str = "") -> None:
         """Send a request that needs no answer; say so when it cannot be sent."""
-        if self.state.looks_on:
-            self.notify("This console looks on. Press l to attend.", severity="warning")
+        if self.only_looks_on():
             return
         try:
             self.feed.send(Request(kind, text))
@@ -58,6 +57,12 @@ class AskingApp(App[None], inherit_bindings=False):
             self.notify(str(error), title=f"{kind}: not sent", severity="error", markup=False)
             return
         self.notify(f"asked the controller: {kind} {text}", timeout=2.0, markup=False)
+
+    def only_looks_on(self) -> bool:
+        """Whether nothing may be asked from here; then that is said."""
+        if self.state.looks_on:
+            self.notify("This console looks on. Press l to attend.", severity="warning")
+        return self.state.looks_on
 
     def action_take_lease(self) -> None:
         """From now on this console attends, beside the one that does."""

@@ -275,7 +275,8 @@ async def test_a_console_of_a_browser_looks_on_also_when_nobody_attends():
     app = ConsoleApp(feed, clock, looks_on=True)
     async with app.run_test() as pilot:
         await settle(pilot, lambda: app.state.snapshot is not None)
-        await pilot.press("p", "f5")
+        await pilot.press("p", "f5", "n")
+        assert len(app.screen_stack) == 1  # no line is asked for that could not be kept
         assert {request.kind for request in feed.sent} == {"watch"}
         looked_on = len(feed.sent)
         await pilot.press("l", "p")
