@@ -85,10 +85,19 @@ class Truth:
             timeout,
         )
 
-    def zero_after(self, t_ns: int, timeout: float = 10.0) -> float:
-        """s from `t_ns` to the first command of 0, or to the release by the drive's own watchdog."""
-        self._until(lambda: any(t >= t_ns and value == 0 for t, value in self.changes[-50:]), "command 0", timeout)
-        return next(t - t_ns for t, value in self.changes if t >= t_ns and value == 0) * 1e-9
+    def zero_after(self, t_ns: int, timeout: float = 2.0) -> float | None:
+        """s from `t_ns` to the first command of 0, or to the release by the drive's own watchdog. None where it was 0
+        by then: a trip of the guard came before, and the log was behind."""
+
+        def first() -> int | None:
+            return next((t - t_ns for t, value in self.changes[-50:] if t >= t_ns and value == 0), None)
+
+        self._until(lambda: first() is not None or not self._driven(t_ns), f"command 0 after {t_ns}", timeout)
+        found = first()
+        return found * 1e-9 if found is not None and self._driven(t_ns) else None
+
+    def _driven(self, t_ns: int) -> bool:
+        return [value for t, value in self.changes if t < t_ns][-1] != 0.0
 
     def _until(self, reached: Any, what: str, timeout: float) -> None:
         deadline = time.monotonic() + timeout

@@ -51,8 +51,7 @@ def refresh(connection: sqlite3.Connection, folder: Path) -> Refreshed:
     new = sorted(path for path, stamp in there.items() if known.get(path) != stamp)
     with index.transaction(connection):
         index.forget(connection, gone)
-    for batch in _batches(_by_kind(new)):
-        said = list(_read(folder, batch))
+    for said in _read(folder, new):
         with index.transaction(connection):
             for path, entries in said:
                 index.keep(connection, path, there[path], entries)
@@ -69,23 +68,21 @@ def empty(connection: sqlite3.Connection) -> None:
         connection.execute("DELETE FROM files")
 
 
-def _by_kind(paths: Iterable[str]) -> list[str]:
-    return sorted(paths, key=lambda path: path.endswith(files.RECORDINGS))
-
-
 def _batches(items: Iterable[T]) -> Iterator[list[T]]:
     left = iter(items)
     while batch := list(islice(left, BATCH)):
         yield batch
 
 
-def _read(folder: Path, paths: Sequence[str]) -> Iterator[tuple[str, list[Entry]]]:
-    """Of each file what it says."""
+def _read(folder: Path, paths: Sequence[str]) -> Iterator[list[tuple[str, list[Entry]]]]:
+    """Of each file what it says, in batches; ledgers and results before the recordings."""
     recordings = [path for path in paths if path.endswith(files.RECORDINGS)]
-    for path in paths:
-        if path.endswith(files.DOCUMENTS):
-            yield path, read_document(folder, path)
-        elif not path.endswith(files.RECORDINGS):
-            yield path, read_campaign(folder, path)
+    others = [path for path in paths if not path.endswith(files.RECORDINGS)]
+    for batch in _batches(others):
+        yield [(path, _read_other(folder, path)) for path in batch]
     if recordings:
-        yield from read_recordings(folder, recordings)
+        yield from read_recordings(folder, _batches(recordings))
+
+
+def _read_other(folder: Path, path: str) -> list[Entry]:
+    return read_document(folder, path) if path.endswith(files.DOCUMENTS) else read_campaign(folder, path)

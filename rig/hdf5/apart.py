@@ -18,11 +18,14 @@ import select
 import signal
 import struct
 import sys
+import time
 import traceback
-from collections.abc import Callable, Sequence
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
+from itertools import islice
 from pathlib import Path
-from typing import Any, Final, NoReturn, TypeVar
+from typing import Any, Final, NamedTuple, NoReturn, TypeVar
 
 from rig.errors import RecordingError, RigError
 
@@ -49,37 +52,96 @@ def apart(work: Callable[[], T], path: Path) -> T:
     Raises what `work` raises, and RecordingError where it needed too much or died. Elsewhere than on Linux, where a
     bench does not run but its recordings are read, it is done here; what is followed and believed is chosen as well.
     """
-    return _apart(work, path.stat().st_size, str(path))
+    found: T = _ended(_begin(work, path.stat().st_size, str(path)))
+    return found
 
 
-def apart_for_all(work: Callable[[], T], paths: Sequence[Path]) -> T:
-    """The same for work that reads a little of each of many files: none may use more than the largest justifies.
+def all_apart(
+    works: Iterable[tuple[Callable[[], T], Sequence[Path]]], at_once: int | None = None
+) -> Iterator[T | RecordingError]:
+    """The same for works that each read a little of many files, `at_once` of them at a time (None: one for each
+    processor): what each returns, in order. None may use more than the largest of its files justifies.
 
-    Raises RecordingError, which does not know which file it was.
+    In the place of an answer stands the RecordingError of a child that ended without one, which does not know which
+    file it was; what a work itself raises is raised.
     """
-    sizes = (path.stat().st_size for path in paths if path.is_file())
-    return _apart(work, max(sizes, default=0), f"one of {len(paths)} files")
+    most = at_once or len(os.sched_getaffinity(0)) if sys.platform == "linux" else 1
+    left, begun = iter(works), deque[_Begun]()
+    try:
+        while True:
+            for work, paths in islice(left, most - len(begun)):
+                begun.append(_begin(work, _largest(paths), f"one of {len(paths)} files"))
+            if not begun:
+                return
+            try:
+                yield _ended(begun.popleft())
+            except RecordingError as error:
+                yield error
+    finally:
+        for child in begun:
+            _abandon(child)
 
 
-def _apart(work: Callable[[], T], size: int, name: str) -> T:
+def _largest(paths: Sequence[Path]) -> int:
+    """Bytes of the largest that is there: one may go meanwhile."""
+    sizes = list[int]()
+    for path in paths:
+        with suppress(OSError):
+            sizes.append(path.stat().st_size)
+    return max(sizes, default=0)
+
+
+class _Begun(NamedTuple):
+    """A child at work; elsewhere than on Linux the work itself, still to be done."""
+
+    work: Callable[[], Any]
+    name: str
+    """What it reads."""
+    pid: int
+    answer: int
+    """Descriptor of the memory that it writes its answer to."""
+    seconds: int
+    memory: int
+    until: float
+    """s of the monotonic clock."""
+
+
+def _begin(work: Callable[[], Any], size: int, name: str) -> _Begun:
     if sys.platform != "linux":
-        return work()
+        return _Begun(work, name, 0, -1, 0, 0, 0.0)
     seconds = SECONDS + math.ceil(size / BYTES_PER_SECOND)
     memory = MEMORY + MEMORY_PER_BYTE * size
     answer = os.memfd_create("recording", os.MFD_CLOEXEC)
     try:
-        child = os.fork()
-        if child == 0:
-            _child(work, answer, seconds, memory)
-        status = _awaited(child, seconds * PATIENCE)
-        if status != 0:
-            raise RecordingError(f"{name} is damaged, or was made to harm: {_reason(status, seconds, memory)}")
-        with suppress(struct.error):  # nothing was written
-            found: T = _result(_unpacked(answer))
-            return found
-        raise RecordingError(f"{name} is damaged: reading it ended without an answer")
-    finally:
+        pid = os.fork()
+    except BaseException:
         os.close(answer)
+        raise
+    if pid == 0:
+        _child(work, answer, seconds, memory)
+    return _Begun(work, name, pid, answer, seconds, memory, time.monotonic() + seconds * PATIENCE)
+
+
+def _ended(child: _Begun) -> Any:
+    """What it answered. However this is left, it has ended."""
+    if child.pid == 0:
+        return child.work()
+    try:
+        status = _awaited(child.pid, max(child.until - time.monotonic(), 0.0))
+        if status != 0:
+            reason = _reason(status, child.seconds, child.memory)
+            raise RecordingError(f"{child.name} is damaged, or was made to harm: {reason}")
+        with suppress(struct.error):  # nothing was written
+            return _result(_unpacked(child.answer))
+        raise RecordingError(f"{child.name} is damaged: reading it ended without an answer")
+    finally:
+        os.close(child.answer)
+
+
+def _abandon(child: _Begun) -> None:
+    if child.pid:
+        _awaited(child.pid, 0.0)
+        os.close(child.answer)
 
 
 def open_no_more() -> None:

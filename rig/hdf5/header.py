@@ -8,8 +8,10 @@ batch gets a child of its own, so that the one to blame is named and the others 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
+from itertools import tee
 from pathlib import Path
 from typing import Any, Final, NamedTuple, TypeVar
 
@@ -19,7 +21,7 @@ from h5py import h5a, h5d, h5f, h5g, h5l, h5s
 
 from identification.recording import QUANTITY_UNITS
 from rig.errors import RecordingError
-from rig.hdf5.apart import apart, apart_for_all, open_again, open_no_more
+from rig.hdf5.apart import all_apart, apart, open_again, open_no_more
 from rig.hdf5.layout import text_of
 from rig.hdf5.members import DAMAGE, LARGEST_VALUE, is_column
 from rig.hdf5.opening import open_for_reading, require_file
@@ -76,10 +78,21 @@ class Header(NamedTuple):
 
 def headers(paths: Sequence[Path]) -> list[Header | RecordingError]:
     """Of each path its header, or why it has none. Raises nothing for what a file holds."""
-    try:
-        return apart_for_all(lambda: [_tried(path) for path in paths], paths)
-    except (RecordingError, OSError):  # one of them ended the child, asked too much of it, or has gone
-        return [_alone(path) for path in paths]
+    return next(headers_in_batches([paths]))
+
+
+def headers_in_batches(batches: Iterable[Sequence[Path]]) -> Iterator[list[Header | RecordingError]]:
+    """The same of each batch in order, a child for each, as many at a time as there are processors."""
+    ours, theirs = tee(batches)
+    for paths, found in zip(theirs, all_apart((partial(_all_tried, paths), paths) for paths in ours), strict=True):
+        if isinstance(found, RecordingError):  # one of them ended the child, or asked too much of it
+            yield [_alone(path) for path in paths]
+        else:
+            yield found
+
+
+def _all_tried(paths: Sequence[Path]) -> list[Header | RecordingError]:
+    return [_tried(path) for path in paths]
 
 
 def _tried(path: Path) -> Header | RecordingError:

@@ -10,6 +10,7 @@ from typing import Any, Final
 
 import h5py
 import numpy as np
+from h5py import h5d, h5i
 from numpy.typing import NDArray
 
 DAMAGE: Final = (OSError, RuntimeError, KeyError, ValueError, TypeError, MemoryError, OverflowError)
@@ -72,15 +73,14 @@ def is_column(item: h5py.Dataset) -> bool:
 def _is_justified(item: h5py.Dataset) -> bool:
     """Whether its values are in this file, which is long enough to hold them."""
     try:
-        if item.external or item.is_virtual:
+        made, size = item.id.get_create_plist(), h5i.get_file_id(item.id).get_filesize()
+        layout = made.get_layout()
+        if made.get_external_count() or layout == h5d.VIRTUAL:
             return False
-        stored = min(int(item.id.get_storage_size()), item.file.id.get_filesize())
-        packed = item.id.get_create_plist().get_nfilters() > 0
-        chunk = math.prod(item.chunks or (0,)) * item.dtype.itemsize
-        return bool(
-            item.size * item.dtype.itemsize <= stored * (MOST_DEFLATED if packed else MOST_SPARSE) + chunk
-            and chunk <= max(LARGEST_CHUNK, item.file.id.get_filesize())
-        )
+        stored = min(int(item.id.get_storage_size()), size)
+        chunk = math.prod(made.get_chunk()) * item.dtype.itemsize if layout == h5d.CHUNKED else 0
+        most = MOST_DEFLATED if made.get_nfilters() > 0 else MOST_SPARSE
+        return bool(item.size * item.dtype.itemsize <= stored * most + chunk and chunk <= max(LARGEST_CHUNK, size))
     except DAMAGE:
         return False
 

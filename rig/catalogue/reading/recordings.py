@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
+from itertools import tee
 from pathlib import Path
 from typing import Any, Final
 
@@ -21,16 +22,21 @@ SHORT_ID: Final = 12
 """Digits of a hash that stand for the whole: two in ten million agree by chance with p = 0.2 (2^48 of them)."""
 
 
-def read_recordings(folder: Path, paths: Sequence[str]) -> Iterator[tuple[str, list[Entry]]]:
-    """(path, entries) of each, whatever it holds."""
-    from rig.hdf5 import headers  # numpy and h5py: only where there is a recording to read
+def read_recordings(folder: Path, batches: Iterable[Sequence[str]]) -> Iterator[list[tuple[str, list[Entry]]]]:
+    """Of each batch of paths (path, entries) of each, whatever it holds."""
+    from rig.hdf5 import headers_in_batches  # numpy and h5py: only where there is a recording to read
 
-    for path, header in zip(paths, headers([folder / path for path in paths]), strict=True):
-        if isinstance(header, RecordingError):
-            reason = str(header).removeprefix(str(folder / path)).lstrip(": ")
-            yield path, [Entry("recordings", path, outcome=UNREADABLE, reason=reason)]
-        else:
-            yield path, list(_entries(path, header))
+    ours, theirs = tee(batches)
+    found = headers_in_batches([folder / path for path in paths] for paths in theirs)
+    for paths, of_them in zip(ours, found, strict=True):
+        yield [(path, _said(folder, path, header)) for path, header in zip(paths, of_them, strict=True)]
+
+
+def _said(folder: Path, path: str, header: Any) -> list[Entry]:
+    if not isinstance(header, RecordingError):
+        return list(_entries(path, header))
+    reason = str(header).removeprefix(str(folder / path)).lstrip(": ")
+    return [Entry("recordings", path, outcome=UNREADABLE, reason=reason)]
 
 
 def _entries(path: str, header: Any) -> Iterator[Entry]:

@@ -1,13 +1,15 @@
 """Headers of many recordings in one child: what `load` says, also of odd files, and whoever ends the child is named."""
 
 import os
+import signal
 
 import h5py
 import pytest
 
 from rig.errors import RecordingError
 from rig.hdf5 import header as header_module
-from rig.hdf5 import headers, load
+from rig.hdf5 import headers, headers_in_batches, load
+from rig.hdf5.apart import all_apart
 from rig.hdf5.header import Header
 from tests.rig.hdf5.test_hdf5_damaged import written
 from tests.rig.hdf5.test_hdf5_strangers import bomb, made
@@ -77,3 +79,41 @@ def test_a_bomb_and_what_is_no_recording_hinder_nothing(tmp_path):
     found = headers([good, odd_one, tmp_path / "c.h5", tmp_path])
     assert [isinstance(each, Header) for each in found] == [True, True, False, False]
     assert headers([]) == []
+
+
+def test_batches_in_order_each_in_a_child_of_its_own(tmp_path):
+    paths = [made(tmp_path / f"{k}.h5") for k in range(5)]
+    (tmp_path / "no.h5").write_bytes(b"none")
+    found = list(headers_in_batches([paths[:2], [tmp_path / "no.h5"], paths[2:]]))
+    assert [[isinstance(each, Header) for each in batch] for batch in found] == [[True] * 2, [False], [True] * 3]
+
+
+def test_several_children_work_at_a_time_and_none_is_left_behind(tmp_path):
+    """The first can only answer once the second is at work; the last is abandoned in the middle of its own."""
+    ours, theirs = os.pipe()
+
+    def waits():
+        return os.read(ours, 1)
+
+    def tells():
+        os.write(theirs, b"!")
+        return os.getpid()
+
+    def stays():
+        signal.pause()
+
+    works = all_apart([(waits, []), (tells, []), (stays, [])], at_once=2)
+    assert next(works) == b"!"
+    assert next(works) != os.getpid()
+    works.close()
+    with pytest.raises(ChildProcessError):
+        os.waitpid(-1, os.WNOHANG)
+    os.close(ours)
+    os.close(theirs)
+
+
+def test_a_child_that_ends_without_an_answer_stands_in_its_place(tmp_path):
+    found = list(all_apart([(os.getpid, []), (os.abort, [tmp_path]), (lambda: 3, [])], at_once=2))
+    assert isinstance(found[1], RecordingError)
+    assert "SIGABRT" in str(found[1])
+    assert found[2] == 3
