@@ -17,7 +17,7 @@ from textual.widgets import ContentSwitcher
 from rig.console.bench_page import BenchPanel
 from rig.console.chooser import Chooser
 from rig.console.choosing import ChoosingApp
-from rig.console.diagnosing import DIAGNOSE, NOT_YET, DiagnosisPanel, answers
+from rig.console.diagnosing import DIAGNOSE, DiagnosingApp, DiagnosisPanel
 from rig.console.dialogs import LeaveDialog, NoteDialog
 from rig.console.feed import Feed
 from rig.console.few_colors import filters_for
@@ -25,6 +25,7 @@ from rig.console.key_help import KeyHelp
 from rig.console.keys_in_order import KeysInOrder
 from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
 from rig.console.plots import FitPlot, ResidualPlot, TimePlot
+from rig.console.sweep_dialog import SweepDialog
 from rig.console.toasts import place
 from rig.console.view_model.actions import bindings
 from rig.console.view_model.alarms import call
@@ -43,7 +44,7 @@ STOP_KEYS: Final = ("ctrl+c", "super+c", "f9")
 """super+c is Cmd+C where a terminal passes it on."""
 
 
-class ConsoleApp(ChoosingApp, inherit_bindings=False):
+class ConsoleApp(ChoosingApp, DiagnosingApp, inherit_bindings=False):
     """One operator's window on one controller."""
 
     CSS_PATH = "console.tcss"
@@ -64,15 +65,18 @@ class ConsoleApp(ChoosingApp, inherit_bindings=False):
         silent: bool = False,
         colors: str = "full",
         looks_on: bool = False,
+        begins: bool = False,
+        earlier: Sequence[str] = (),
     ) -> None:
         """`clock` gives s and never goes back; `again` is the command line that attaches once more, `diagnose` one to
         which a recording is added. `silent`: it never rings; `colors`: `full`, `16` or `none`.
-        `looks_on`: whoever else attends, it does so from `l` on only."""
+        `looks_on`: whoever else attends, it does so from `l` on only. `begins`: what it leaves in `next_run` is run;
+        `earlier`: recordings that each of this campaign is diagnosed with."""
         super().__init__(feed, clock, View(now=clock(), looks_on=looks_on))
         self.HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # columns from which all panels fit at once
         self.VERTICAL_BREAKPOINTS = [(0, "-low"), (32, "-tall")]  # rows
         self.again = again
-        self.diagnose = diagnose
+        self.diagnose, self.begins, self.earlier = diagnose, begins, earlier
         self.set_class(colors != "full", "-few-colors")
         self.chosen = "main"
         self.log_filter: LogFilter = "run"
@@ -151,7 +155,7 @@ class ConsoleApp(ChoosingApp, inherit_bindings=False):
             base.query_one(BenchPanel).show(view)
         base.query_one(LogPanel).show(view, self.log_filter)
         base.query_one("#keys", Panel).put(line := key_line(view), line)
-        if isinstance(self.screen, NoteDialog | LeaveDialog | KeyHelp | Chooser):
+        if isinstance(self.screen, NoteDialog | LeaveDialog | KeyHelp | Chooser | SweepDialog):
             self.screen.show(view)
         base.set_class(view.condition != "live", "old")
         place(self.screen, below=base.query_one(Head).size.height)
@@ -181,28 +185,11 @@ class ConsoleApp(ChoosingApp, inherit_bindings=False):
         """Keys come here first, and those that a widget has not used a second time."""
         await self.in_order.handle(event, super().on_event)
 
-    def action_diagnose(self) -> None:
-        """G: not while anything may turn, and one at a time."""
-        if not self.ended:
-            self.notify(NOT_YET, severity="warning")
-            return
-        self.action_view("diagnosis")
-        self.run_worker(self._diagnose(), group="diagnose", exclusive=True)
-
-    async def _diagnose(self) -> None:
-        files = self.state.snapshot.files if self.state.snapshot is not None else ()
-        panel, said = self.query_one(DiagnosisPanel), list[str]()
-        panel.tell(said, f"rig diagnose {files[0]} ..." if files else "no recording was made")
-        async for answer in answers(files, self.diagnose):
-            said.append(answer)
-            rest = files[len(said) :]
-            panel.tell(said, f"rig diagnose {rest[0]} ..." if rest else "")
-
     def action_view(self, name: str) -> None:
         self.chosen = name
         self.show_text()
-        if name == "bench" and len(self.screen_stack) == 1:
-            self.query_one("#bench").focus()  # the arrow keys scroll it
+        if name in ("bench", "diagnosis") and len(self.screen_stack) == 1:
+            self.query_one(f"#{name}").focus()  # the arrow keys scroll it
         self.call_after_refresh(self.show_plots)
 
     def look_at_time(self) -> None:

@@ -9,12 +9,13 @@ import signal
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from types import FrameType
 
 from rig.console.app import ConsoleApp
 from rig.console.feed import Feed
+from rig.console.next_run import NextRun
 from rig.console.view_model.view import View
 from rig.link.front_end_messages import Snapshot
 
@@ -35,6 +36,8 @@ class Sitting:
     """The newest snapshot that came; None: none ever did."""
     detached: bool
     """True: the operator left on purpose and the controller did not refuse."""
+    next_run: NextRun | None = None
+    """The campaign that the operator has asked for at its end."""
 
 
 def run_console(feed: Feed, clock: Callable[[], float] = time.monotonic, again: str = "rig console") -> int:
@@ -50,11 +53,17 @@ def attend(
     silent: bool = False,
     colors: str = "full",
     browser: bool = False,
+    begins: bool = False,
+    earlier: Sequence[str] = (),
 ) -> Sitting:
     """Run the console until the operator leaves. `clock` gives s and never goes back; `again` is the command line that
     attaches once more, shown before detaching; `silent`: no bell; `colors`: `full`, `16` or
-    `none`. `browser`: keys come over a pipe from one, and it looks on until `l`. Closes `feed`."""
-    return asyncio.run(_sit(ConsoleApp(feed, clock, again, silent=silent, colors=colors, looks_on=browser), browser))
+    `none`. `browser`: keys come over a pipe from one, and it looks on until `l`. `begins`: the caller runs what
+    `next_run` names; `earlier`: recordings that each of this campaign is diagnosed with. Closes `feed`."""
+    app = ConsoleApp(
+        feed, clock, again, silent=silent, colors=colors, looks_on=browser, begins=begins, earlier=tuple(earlier)
+    )
+    return asyncio.run(_sit(app, browser))
 
 
 async def _sit(app: ConsoleApp, browser: bool) -> Sitting:
@@ -84,7 +93,7 @@ async def _sit(app: ConsoleApp, browser: bool) -> Sitting:
         signal.alarm(0)
     detached = _goes_on(app)
     status = 128 + caught[0] if caught else max(app.return_code or 0, exit_status(app.state, detached))
-    return Sitting(status, app.state.snapshot, detached and not caught)
+    return Sitting(status, app.state.snapshot, detached and not caught, None if caught else app.next_run)
 
 
 def _goes_on(app: ConsoleApp) -> bool:

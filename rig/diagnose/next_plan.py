@@ -12,8 +12,11 @@ from rig.campaign.plan_file import Level, Template, files_of, template_of, write
 from rig.errors import ConfigError, PlanError
 
 if TYPE_CHECKING:
-    from identification.mismatch.diagnosis import Diagnosis
+    from identification.mismatch.diagnosis import Diagnosis, NextExperiment
     from identification.mismatch.next_experiment.sweeps import Limits
+
+SUFFIX = ": next experiment"
+"""Of the campaign's name, once."""
 
 
 def asked(plan: Path | None, campaign: Path | None) -> CampaignConfig | None:
@@ -68,19 +71,20 @@ def _require_apart(plan: Path, campaign: Path) -> None:
         raise ConfigError(f"{plan}: this is the campaign that the plan is made from; choose another name for --plan")
 
 
-def next_template(found: Diagnosis, campaign: CampaignConfig, *, attended: bool = False) -> Template:
+def next_template(
+    proposed: NextExperiment, thruster: str, campaign: CampaignConfig, *, attended: bool = False
+) -> Template:
     """The campaign's bench and pacing for one thruster; no zero returns but the last, for the steps hold rests.
 
-    `attended`: the run stops when its front end is gone, whatever the campaign allows.
+    `attended`: the run stops when its front end is gone, whatever the campaign allows. Raises ConfigError.
     """
-    assert found.next_experiment is not None
-    require_thruster(campaign, found.thruster)
-    shortest = min(step.duration for step in found.next_experiment.steps)
+    require_thruster(campaign, thruster)
+    shortest = min(step.duration for step in proposed.steps)
     template = template_of(campaign)
     return replace(
         template,
-        name=f"{template.name}: next experiment",
-        thrusters=(found.thruster,),
+        name=f"{template.name.removesuffix(SUFFIX)}{SUFFIX}",
+        thrusters=(thruster,),
         zero_every=0,
         settle=min(template.settle, 0.5 * shortest),
         settle_reversal=0.0,  # its power was foretold for levels that follow one another
@@ -91,9 +95,15 @@ def next_template(found: Diagnosis, campaign: CampaignConfig, *, attended: bool 
 def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path, *, attended: bool = False) -> tuple[Path, ...]:
     """Write the sweep, one file for each flow speed; none when nothing is to be told apart. Raises ConfigError, also
     when the levels are no voltages."""
-    proposed = found.next_experiment
-    if proposed is None:
+    if found.next_experiment is None:
         return ()
+    return write_proposed(found.next_experiment, found.thruster, campaign, path, attended=attended)
+
+
+def write_proposed(
+    proposed: NextExperiment, thruster: str, campaign: CampaignConfig, path: Path, *, attended: bool = False
+) -> tuple[Path, ...]:
+    """The same of a sweep that is there. Raises ConfigError."""
     if proposed.quantity != "command_voltage":
         raise ConfigError(
             "--plan: the recordings have no command in V, so the levels of the next experiment are in "
@@ -111,4 +121,4 @@ def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path, *, attend
         proposed.why,
         f"probability that it decides rightly, as expected: {proposed.expected_power:.2f}",
     )
-    return write_campaign(levels, next_template(found, campaign, attended=attended), path, comment)
+    return write_campaign(levels, next_template(proposed, thruster, campaign, attended=attended), path, comment)

@@ -17,9 +17,10 @@ import click
 from rig.campaign.config import CampaignConfig
 from rig.errors import ConfigError, LinkError, RecordingError, RigError
 from rig.link.live_runs import live_runs, lock_bench
+from rig.operate.front_ends import Console, progress_bar
 from rig.operate.last_page import no_report_option
 from rig.operate.measured import Measured, measured, recording_of
-from rig.operate.run import console_screen, follow, progress_bar, require_mountable, start_controller
+from rig.operate.run import follow, require_mountable, start_controller, then_next
 from rig.operate.screen_options import look_of, screen_options
 from rig.recording.ledger import FILE_NAME, Fact, Ledger, file_facts, finished_runs, read
 
@@ -58,9 +59,10 @@ def resume_command(folder: Path, headless: bool, colors: str, bell: bool, report
         keep(rest, folder)
     click.echo(told(rest, config))
     look = look_of(colors, bell)
-    front = progress_bar(start=True, look=look) if headless else console_screen(look)
+    console = Console(look)
+    front = progress_bar(start=True, look=look) if headless else console.front()
     run, _process = start_controller(config.path, folder, rest.thrusters)
-    return follow(run, front, report=report)
+    return then_next(follow(run, front, report=report), console, report=report)
 
 
 def remainder(facts: Sequence[Fact], folder: Path, config: CampaignConfig) -> Remainder:

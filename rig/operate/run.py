@@ -7,8 +7,7 @@ import re
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Sequence
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,11 +17,11 @@ import click
 from rig.errors import LinkError, RigError
 from rig.link.front_end_messages import Request, Snapshot
 from rig.link.live_runs import Run, find_run, live_runs
-from rig.link.sockets import Peer, connect
-from rig.operate.headless import Headless, check_alive, operator_terminal
+from rig.link.sockets import connect
+from rig.operate.front_ends import Console, FrontEnd, forget_keys, progress_bar
+from rig.operate.headless import Headless, check_alive
 from rig.operate.last_page import no_report_option, write_page
-from rig.operate.narration import narration_of
-from rig.operate.screen_options import USUAL, Look, look_of, screen_options
+from rig.operate.screen_options import look_of, screen_options
 
 if TYPE_CHECKING:
     from rig.campaign.config import CampaignConfig
@@ -64,9 +63,11 @@ def run_command(
     if not headless and not sys.stdout.isatty():
         raise RigError("rig run opens the console, which needs a terminal; use --headless where there is none")
     look = look_of(colors, bell)
-    front = progress_bar(start=True, look=look) if headless else console_screen(look)
     folder = campaign_folder(output or config.output, config.name)
-    return run_campaign(campaign, folder, thrusters, front, report=report)
+    if headless:
+        return run_campaign(campaign, folder, thrusters, progress_bar(start=True, look=look), report=report)
+    console = Console(look)
+    return then_next(run_campaign(campaign, folder, thrusters, console.front(), report=report), console, report=report)
 
 
 def require_runnable(campaign: Path, thrusters: tuple[str, ...], *, headless: bool) -> CampaignConfig:
@@ -174,22 +175,6 @@ def listening(process: subprocess.Popen[bytes], folder: Path, news: float = STAR
     )
 
 
-@dataclass(frozen=True, slots=True)
-class Left:
-    """How a front end ended."""
-
-    last: Snapshot | None
-    """The newest snapshot that came; None: none ever did."""
-    detached: bool = False
-    """The operator left on purpose, and the run goes on."""
-    signal: int = 0
-    """The signal that ended it; 0: none did."""
-
-
-FrontEnd = Callable[[Peer, str], Left]
-"""Takes the link and the command line that attaches once more."""
-
-
 def follow(run: Run, front: FrontEnd, *, report: bool = False) -> int:
     """Attach a front end until it ends or detaches; then the table, where the files are, and the exit status.
 
@@ -214,22 +199,21 @@ def follow(run: Run, front: FrontEnd, *, report: bool = False) -> int:
     return status
 
 
-def progress_bar(*, start: bool, look: Look = USUAL) -> FrontEnd:
-    """Nobody can detach here; `start` starts the run when the preflight has passed."""
-    return lambda peer, _: Left(Headless(peer, narration_of(look), operator_terminal()).follow(start))
+def then_next(status: int, console: Console, *, report: bool) -> int:
+    """After a campaign, the sweep that its diagnosis proposed and the operator asked for, and so on; the last status.
 
-
-def console_screen(look: Look = USUAL, *, browser: bool = False) -> FrontEnd:
-    """Imported before a controller is started: Ctrl+C in that second leaves nothing behind. `browser`: it looks on."""
-    from rig.console import SocketFeed, attend
-
-    def front(peer: Peer, again: str) -> Left:
-        if browser:
-            peer.send(Request("watch"))  # before the screen comes up: until then it would count as attending
-        sitting = attend(SocketFeed(peer), again=again, silent=not look.bell, colors=look.colors, browser=browser)
-        return Left(sitting.last, sitting.detached, max(sitting.status - 128, 0))
-
-    return front
+    Each is a campaign like any other: checked, with a controller of its own, and a preflight that waits for F5.
+    """
+    while (following := console.asked) is not None:
+        console.asked = None
+        click.echo(f"next: {following.campaign}")
+        config = require_runnable(following.campaign, (), headless=False)
+        forget_keys()
+        folder = campaign_folder(following.campaign.parent.parent, config.name)
+        status = run_campaign(following.campaign, folder, (), console.front(following.recordings), report=report)
+        for other in following.others if console.asked is None else ():
+            click.echo(f"of the same sweep, at another flow speed: rig run {other}")
+    return status
 
 
 def _conclude(last: Snapshot, folder: Path) -> int:

@@ -21,7 +21,8 @@ from rig.diagnose.command import diagnose_files
 from rig.diagnose.next_plan import limits_of, write_next
 from rig.errors import RigError
 from rig.operate.flow_setting import SetFlow
-from rig.operate.run import progress_bar, require_runnable, run_campaign
+from rig.operate.front_ends import progress_bar
+from rig.operate.run import require_runnable, run_campaign
 
 if TYPE_CHECKING:
     from identification.mismatch.diagnosis import Diagnosis

@@ -10,8 +10,9 @@ import click
 
 from rig.errors import RigError
 from rig.link.live_runs import find_run
+from rig.operate.front_ends import console_screen, progress_bar
 from rig.operate.last_page import no_report_option
-from rig.operate.run import console_screen, follow, progress_bar
+from rig.operate.run import follow
 from rig.operate.screen_options import look_of, screen_options
 
 HOST: Final = "127.0.0.1"

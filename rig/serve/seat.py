@@ -14,7 +14,8 @@ import click
 
 from rig.errors import RigError
 from rig.link.live_runs import find_run
-from rig.operate.run import console_screen, follow
+from rig.operate.front_ends import console_screen
+from rig.operate.run import follow
 from rig.operate.screen_options import Look, colors_of
 from rig.visible_text import visible_output
 

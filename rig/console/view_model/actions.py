@@ -141,6 +141,8 @@ ACTIONS: Final = (
     Action("filter events", "f", "filter", "this run, warnings and worse, all"),
     Action("channel", "c", "channel", "which one the time plot shows", not_now=_channel),
     Action("diagnose", "g", "diagnose", "once the campaign has ended", not_now=_diagnose),
+    Action("next sweep", "s", "next_sweep", "of a diagnosis, as a campaign; asks first", not_now=_diagnose),
+    Action("interrupt", "Escape", "interrupt", "a diagnosis that is under way", "escape", _diagnose),
     Action("attend", "l", "take_lease", "where this console only looks on", not_now=_attend),
     Action("leave", "d, Ctrl+Q", "leave", "a dialog says first what that does", "d", first="ctrl+q"),
     *(_page(number, page) for number, page in enumerate(PAGES, 1)),

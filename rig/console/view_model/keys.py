@@ -46,7 +46,7 @@ def _doing(view: View) -> tuple[tuple[str, str], ...]:
     if view.looks_on and view.connected:
         return (("attend", "attend"), ("leave", "leave"))
     if snapshot is not None and snapshot.state == "done":
-        return (("diagnose", "diagnose"), ("leave", "leave"))
+        return (("diagnose", "diagnose"), ("next sweep", "next sweep"), ("leave", "leave"))
     if not view.connected:
         return (("leave", "leave"),)
     leave = (("note", "note"), ("leave", "detach"))

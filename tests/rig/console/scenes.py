@@ -8,8 +8,10 @@ from dataclasses import dataclass, replace
 from textual.pilot import Pilot
 
 from rig.console.app import ConsoleApp
+from rig.console.view_model.answers import Answer, answer_of, fault_of
 from rig.link.front_end_messages import LogLine, Progress, Snapshot
 from tests.rig.console.feeds import CHECKS, DEVICES, LOG, ManualClock, PlayedFeed, campaign, running, snapshot
+from tests.rig.console.told import EXPLAINED, ambiguous, message, unexplained
 
 
 @dataclass(frozen=True)
@@ -17,6 +19,10 @@ class Scene:
     snapshots: tuple[Snapshot, ...]
     keys: tuple[str, ...] = ()
     gone: bool = False
+    answers: tuple[Answer, ...] = ()
+    """Of diagnoses that have ended."""
+    doing: str = ""
+    """What a diagnosis that goes on says."""
     silence: float = 0.0
     """s between the last snapshot and the picture."""
 
@@ -42,6 +48,12 @@ MISMATCH = LogLine(
     "warning",
     f"mismatch: {HEADLINE} (between 30 and 36 s), ± 0.3 N; e-value 4.8e+04; look at the propeller and at what drives "
     "it; the zero at rest has not moved with it",
+)
+
+ANSWERS = (
+    answer_of(("recordings/2026-11-21_1502_T1.h5",), message(EXPLAINED)),
+    answer_of(("recordings/2026-11-21_1506_T3.h5",), message(ambiguous("T3"))),
+    answer_of(("recordings/2026-11-21_1511_T2.h5",), message(unexplained("T2"))),
 )
 
 SCENES = {
@@ -72,6 +84,10 @@ SCENES = {
     "leave_attended": Scene((running(attended=True),), keys=("d",)),
     "disconnected": Scene((running(),), gone=True, silence=14.3),
     "stop_not_confirmed": Scene((running("stopping", command=0.0, stop_confirmed=False),)),
+    "diagnosis": Scene(campaign(), keys=("6",), answers=ANSWERS[1:2],
+                       doing="diagnosing T2.h5: 12 s, looking for effects: dead band   (Escape ends it)"),
+    "diagnoses": Scene(campaign(), keys=("6",), answers=(fault_of(("T9.h5",), "T9.h5: no such file"), *ANSWERS)),
+    "next_sweep": Scene(campaign(), keys=("6", "s"), answers=ANSWERS),
     "end": Scene(campaign()),
     "tripped": Scene((running("done", outcome="tripped", stop_confirmed=True, command=0.0,
                               cause="motor.current 41.2 A is above its limit of 40 A."),)),
@@ -85,6 +101,8 @@ def prepare(scene: Scene, colors: str = "full") -> tuple[ConsoleApp, Callable[[P
 
     async def play(pilot: Pilot[None]) -> None:
         await settle(pilot, lambda: app.state.snapshot is scene.snapshots[-1])
+        app.answers, app.begins = scene.answers, True
+        app.tell_of(scene.doing)
         await pilot.press(*scene.keys)
         if scene.gone:
             feed.end()

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
 
 import pytest
 
 from rig.console.app import ConsoleApp
-from rig.console.diagnosing import DiagnosisPanel
 from rig.console.dialogs import NoteDialog
 from rig.console.key_help import KeyHelp
 from rig.console.view_model.keys import EVERY_KEY
 from rig.link.front_end_messages import LogLine, Progress, Request
-from tests.rig.console.feeds import LOG, ManualClock, PlayedFeed, campaign, running, snapshot
+from tests.rig.console.feeds import LOG, ManualClock, PlayedFeed, running, snapshot
 from tests.rig.console.scenes import SCENES, prepare, settle, show
 from tests.rig.console.sitting import sitting
 
@@ -246,28 +244,6 @@ async def test_the_first_console_goes_on_attending_when_others_come():
         await desk.play(running(t=48.0, attended=True, clients=3))
         await desk.press("p")
         assert desk.kinds() == ["pause"]
-
-
-SAYS = (sys.executable, "-c", "import sys; print('explained', sys.argv[1])")
-
-
-async def test_g_diagnoses_each_recording_once_the_campaign_has_ended():
-    ended = replace(campaign()[-1], files=("run/T1.h5", "run/T2.h5"))
-    async with sitting(ended) as desk:
-        desk.app.diagnose = SAYS
-        await desk.press("g")
-        await settle(desk.pilot, lambda: "explained run/T2.h5" in desk.text(DiagnosisPanel))
-        assert "T1.h5" in desk.text(DiagnosisPanel)
-        assert desk.app.query_one("#pages").current == "diagnosis"
-        assert desk.kinds() == []
-
-
-async def test_while_something_may_turn_nothing_is_diagnosed():
-    async with sitting(running()) as desk:
-        desk.app.diagnose = SAYS
-        await desk.press("g")
-        assert any("Once the campaign has ended" in text for text in desk.toasts())
-        assert desk.app.query_one("#pages").current == "live"
 
 
 async def test_a_console_of_a_browser_looks_on_also_when_nobody_attends():
