@@ -55,7 +55,7 @@ class SweepDialog(ModalScreen[int | None]):
                 yield Button("Stay (Escape)", id="stay", compact=True)
                 for k, answer in enumerate(self.answers):
                     yield Button(
-                        f"{does} the sweep of {answer.thruster}", id=f"sweep-{k}", variant="warning", compact=True
+                        f"{does} the sweep of {answer.thruster}", id=f"sweep-{k}", compact=True
                     )
 
     def on_mount(self) -> None:

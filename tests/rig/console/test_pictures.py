@@ -7,11 +7,7 @@ import pytest
 from tests.rig.console.scenes import SCENES, prepare
 
 FEW_COLORS = ("preflight_failed", "mismatch", "limit", "paused", "wait", "stop_not_confirmed", "disconnected", "note",
-<<<<<<< HEAD
-              "leave_attended", "end", "bench_trouble", "palette_not_now")  # fmt: skip
-=======
-              "leave_attended", "end", "bench_trouble", "diagnoses", "next_sweep")  # fmt: skip
->>>>>>> fd6f50a1 (The diagnosis page shows verdict, place, effects with intervals, error, rest and the next sweep; s makes that a campaign, which opens with its preflight)
+              "leave_attended", "end", "bench_trouble", "palette_not_now", "diagnoses", "next_sweep")  # fmt: skip
 """Scenes that are told by colour where there is one: each has a word or a sign too."""
 
 
