@@ -54,9 +54,7 @@ class SweepDialog(ModalScreen[int | None]):
             with Vertical(classes="sweep-buttons"):
                 yield Button("Stay (Escape)", id="stay", compact=True)
                 for k, answer in enumerate(self.answers):
-                    yield Button(
-                        f"{does} the sweep of {answer.thruster}", id=f"sweep-{k}", compact=True
-                    )
+                    yield Button(f"{does} the sweep of {answer.thruster}", id=f"sweep-{k}", compact=True)
 
     def on_mount(self) -> None:
         self.query_one("#stay").focus()
