@@ -23,6 +23,14 @@ LOOK: Final[dict[Place, str]] = {
     "high": "repeat a low and a high level; look at supply, drive and water at full load",
     "bus": "look at the supply and its cables; hold one level and change the supply",
 }
+BRIEF: Final[dict[Place, str]] = {  # beside a fit in 80 columns
+    "zero": "look at the cell's zero",
+    "running": "look at the propeller",
+    "forward": "look at the blades' faces",
+    "reverse": "look at the blades' backs",
+    "high": "repeat a low level",
+    "bus": "look at the supply",
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,6 +66,27 @@ class Alarm:
         return WHERE[self.place]
 
     @property
+    def what(self) -> str:
+        """What is off and by how much: `thrust -3.1 % (-2.4 N)`."""
+        size = f"{self.size:+.2g} N" if self.share is None else f"{100 * self.share:+.2g} % ({self.size:+.2g} N)"
+        return f"{'zero' if self.place == 'zero' else 'thrust'} {size}"
+
+    @property
+    def sigma(self) -> float:
+        """|size| in its standard deviations; inf where that is 0."""
+        return abs(self.size) / self.size_std if self.size_std > 0 else float("inf")
+
+    @property
+    def brief(self) -> str:
+        """What to do first, in a few words."""
+        return BRIEF[self.place]
+
+    @property
+    def advice(self) -> str:
+        """What to do."""
+        return LOOK[self.place]
+
+    @property
     def headline(self) -> str:
         """Short, for one line of a screen.
 
@@ -65,9 +94,7 @@ class Alarm:
         'thrust -3.1 % (-2.4 N) while running, in both directions, since 298 s'
         """
         since = "from the start" if self.from_start else f"since {self.began:.0f} s"
-        what = "zero" if self.place == "zero" else "thrust"
-        size = f"{self.size:+.2g} N" if self.share is None else f"{100 * self.share:+.2g} % ({self.size:+.2g} N)"
-        return f"{what} {size} {self.where}, {since}"
+        return f"{self.what} {self.where}, {since}"
 
     @property
     def statement(self) -> str:
@@ -78,4 +105,4 @@ class Alarm:
         text += f", ± {self.size_std:.1g} N" + (", growing" if self.growing else "")
         if self.rivals:
             text += "; may also be " + " or ".join(WHERE[r] for r in self.rivals)
-        return f"{text}; e-value {self.e_value:.2g}; {LOOK[self.place]}"
+        return f"{text}; e-value {self.e_value:.2g}; {self.advice}"

@@ -23,7 +23,16 @@ from rig.console.feed import Feed
 from rig.console.few_colors import filters_for
 from rig.console.key_help import KeyHelp
 from rig.console.keys_in_order import KeysInOrder
-from rig.console.panels import ChecksPanel, Head, LogPanel, Panel, ProgressPanel, ReadingsPanel, ResultsPanel
+from rig.console.panels import (
+    ChecksPanel,
+    Head,
+    LogPanel,
+    Panel,
+    ProgressPanel,
+    ReadingsPanel,
+    ResultsPanel,
+    StandingPanel,
+)
 from rig.console.plots import FitPlot, ResidualPlot, TimePlot
 from rig.console.sweep_dialog import SweepDialog
 from rig.console.toasts import place
@@ -90,6 +99,7 @@ class ConsoleApp(ChoosingApp, DiagnosingApp, inherit_bindings=False):
                 yield ChecksPanel()
             with Container(id="live", classes="main"):
                 yield ProgressPanel(id="progress")
+                yield StandingPanel(id="standing", markup=False)
                 with Horizontal():
                     with Vertical(id="words"):
                         with VerticalScroll(id="readings"):
@@ -149,6 +159,7 @@ class ConsoleApp(ChoosingApp, DiagnosingApp, inherit_bindings=False):
         base.query_one(Head).show(view)
         base.query_one(ChecksPanel).show(view)
         base.query_one(ProgressPanel).show(view)
+        base.query_one(StandingPanel).show(view)
         base.query_one(ReadingsPanel).show(view)
         base.query_one(ResultsPanel).show(view)
         if self.chosen == "bench":

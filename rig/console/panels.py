@@ -16,6 +16,7 @@ from rig.console.titles import entitle
 from rig.console.view_model import wording
 from rig.console.view_model.alarms import alarm
 from rig.console.view_model.log_filter import BEFORE, TITLES, LogFilter, run_of, wanted
+from rig.console.view_model.running_diagnosis import standing
 from rig.console.view_model.tables import checks_table, readings_text, results_table, verdict_summary
 from rig.console.view_model.view import View
 from rig.link.front_end_messages import LogLine, Snapshot
@@ -100,7 +101,7 @@ def _attendance(view: View) -> str:
 
 
 class ProgressPanel(Panel):
-    """Campaign and step, two lines; a third where the run no longer fits."""
+    """Campaign and step, two lines."""
 
     def show(self, view: View) -> None:
         snapshot, width = view.snapshot, self.content_size.width
@@ -111,9 +112,23 @@ class ProgressPanel(Panel):
         lines = Text(no_wrap=True)
         lines.append(wording.campaign_line(progress, snapshot.thruster, width) + "\n")
         lines.append(wording.step_line(progress, snapshot, width))
-        if snapshot.mismatch:
-            lines.append(f"\nmismatch: {snapshot.mismatch}", LOG_STYLES["warning"])
         self.put(lines.plain, lines)
+
+
+class StandingPanel(Panel):
+    """Whether the run fits so far; where and how it does not, in two lines."""
+
+    def show(self, view: View) -> None:
+        said = standing(view, self.content_size.width)
+        self.set_class(said is None, "nothing")
+        if said is None:
+            return
+        style = "#7fd88f" if said.fits else f"bold {LOG_STYLES['warning']}"
+        text = Text(no_wrap=True, overflow="ellipsis")
+        for n, line in enumerate(said.lines):
+            text.append(("\n" if n else "") + line, style if n == 0 else "")
+        self.set_class(said.fits, "fits")
+        self.put((text.plain, said.fits), text)
 
 
 class ReadingsPanel(Panel):

@@ -12,7 +12,7 @@ from textual_plotext.plot import Plot
 from rig.console.titles import entitle
 from rig.console.view_model import traces
 from rig.console.view_model.axes import reach, ticks, to_row
-from rig.console.view_model.running_fit import RunningFit, in_words, running_fit, usable, v_abs_v
+from rig.console.view_model.running_fit import RunningFit, running_fit, usable, v_abs_v
 from rig.console.view_model.view import View
 from rig.console.view_model.wording import unit
 from rig.link.front_end_messages import Point
@@ -48,7 +48,7 @@ class FitPlot(Curve):
         points = points_of(view)
         fit = running_fit(points)
         legend = "   ● steady  ○ not steady  bars 95 %" if self.size.width >= 64 else "  ● steady ○ not"
-        entitle(self, f"thrust (N) over V|V| (V²){legend}", in_words(fit))
+        entitle(self, f"thrust (N) over V|V| (V²){legend}")
 
         def draw(plot: Plot) -> None:
             if not points:

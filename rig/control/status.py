@@ -7,11 +7,32 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from rig.campaign.config import CampaignConfig
-from rig.link.front_end_messages import Check, Device, LogLine, Point, Progress, Reading, Snapshot, State, TracedChannel
+from rig.link.front_end_messages import (
+    Check,
+    Device,
+    LogLine,
+    Point,
+    Progress,
+    Reading,
+    Snapshot,
+    State,
+    TracedChannel,
+    Watching,
+)
 from rig.sequence.ticks import Output, settings_for
 
 LOG_LINES = 500
 """Newest log lines that travel with every snapshot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """A step of the plan that was measured; times in s of the recording."""
+
+    index: int
+    voltage: float
+    begin: float
+    end: float
 
 
 @dataclass
@@ -30,8 +51,10 @@ class Status:
     outcome: Literal["", "running", "completed", "aborted", "tripped"] = ""
     cause: str = ""
     stop_confirmed: bool | None = None
-    mismatch: str = ""
-    """Of this thruster's run, as the watcher last said; empty: none."""
+    watch: Watching = field(default_factory=Watching)
+    """Of this thruster's run, as the watcher last said."""
+    held: list[Held] = field(default_factory=list)
+    """What was measured of this run, in order."""
     watchdog_measured: float | None = None
     """s from the last command to rest, in the newest proof of the motor's own watchdog."""
     started: float | None = None
@@ -100,7 +123,7 @@ class Status:
             attended=not self.campaign.unattended,
             since_begin=now - self.begun,
             mounted_by_hand=not self.campaign.bench.mount.command,
-            mismatch=self.mismatch,
+            watch=self.watch,
             reason=self.output.reason if self.output else "",
             state_elapsed=self.output.state_elapsed if self.output else 0.0,
             devices=devices,

@@ -17,11 +17,11 @@ from pydantic_core import to_json
 from rig.errors import LinkError
 from rig.link.front_end_messages import Request, Snapshot
 from rig.link.recorder_messages import Ack, Close, Closed, EventRow, Failed, Open, Ready, Rows, StepRow
-from rig.link.watch_messages import Mismatch, Watched
+from rig.link.watch_messages import Judged, Mismatch, Watched
 from rig.visible_text import HIDDEN, visible_texts
 
 ToRecorder = Open | Rows | StepRow | EventRow | Close
-Message = Snapshot | Request | ToRecorder | Ready | Ack | Closed | Failed | Watched | Mismatch
+Message = Snapshot | Request | ToRecorder | Ready | Ack | Closed | Failed | Watched | Mismatch | Judged
 
 KINDS: Final[dict[int, type[Any]]] = {
     1: Snapshot,
@@ -37,6 +37,7 @@ KINDS: Final[dict[int, type[Any]]] = {
     32: Rows,
     40: Watched,
     48: Mismatch,
+    49: Judged,
 }
 NUMBERS: Final = {message: number for number, message in KINDS.items()}
 ADAPTERS: Final[dict[int, TypeAdapter[Any]]] = {

@@ -161,6 +161,29 @@ class Progress:
 
 
 @dataclass(frozen=True, slots=True)
+class Watching:
+    """What the watch says of this run by now (docs/howto/watch.md)."""
+
+    state: Literal["off", "learning", "fits", "mismatch", "failed"] = "off"
+    text: str = ""
+    """What is off and by how much; of `failed`: why the run is not watched."""
+    step: int | None = None
+    """0-based index of the first step that does not fit; None: not known."""
+    low: float | None = None
+    """V, lowest and highest level from then on at which it shows; None: none was held since."""
+    high: float | None = None
+    began: float = 0.0
+    """s of the recording."""
+    from_start: bool = False
+    sigma: float = 0.0
+    """Size in its standard deviations."""
+    brief: str = ""
+    """What to do first, in a few words."""
+    advice: str = ""
+    """What to do."""
+
+
+@dataclass(frozen=True, slots=True)
 class Snapshot:
     """The whole state a front end shows, 10 times a second. Lists that only grow (`points`, `log`) are sent whole,
     so that a console attached late knows everything; `trace` is what came since the last snapshot of this client."""
@@ -203,8 +226,7 @@ class Snapshot:
     """In the states `wait` and `paused`: what for, and with what is left, in one sentence."""
     state_elapsed: float = 0.0
     """s in this wait or pause so far."""
-    mismatch: str = ""
-    """Where this run stopped fitting what it was, or its twin, in one line; empty: nowhere, as far as is seen."""
+    watch: Watching = Watching()
     devices: tuple[Device, ...] = ()
     """In the order of the bench file."""
     channels: tuple[TracedChannel, ...] = ()

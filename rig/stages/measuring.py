@@ -8,7 +8,7 @@ from dataclasses import replace
 from identification.recording import VOID
 from rig.campaign.plan import TARE_AGAIN, Step
 from rig.control.loop import Decision, Inputs
-from rig.control.status import Status
+from rig.control.status import Held, Status
 from rig.link.recorder_messages import Outcome, StepRow
 from rig.recording.ledger import Fact, attempts, kept_steps
 from rig.recording.recorder_link import recording_path
@@ -113,6 +113,8 @@ def _take(session: Session, output: Output, t0_ns: int, begun: float) -> None:
         start, end = row.t_start + offset, row.t_end + offset
         session.recorder.step(StepRow(row.index, row.phase, row.command_voltage, start, end))
         session.measured.add((row.index, row.phase))
+        if row.index >= 0 and row.phase in ("hold", "sine", "rest", "tare"):
+            status.held.append(Held(row.index, row.command_voltage, start, end))
         if row.phase == VOID:
             _forget_point(status, row.index)
         session.ledger.write("step", thruster=status.thruster, index=row.index, phase=row.phase, t_end=end)

@@ -22,6 +22,7 @@ from rig.errors import LinkError
 from rig.link.clients import Clients
 from rig.link.front_end_messages import Request
 from rig.link.recorder_messages import Outcome
+from rig.link.watch_messages import Judged
 from rig.recording.ledger import Fact, Ledger
 from rig.recording.line_writer import LineWriter
 from rig.recording.recorder_link import RecorderLink
@@ -65,6 +66,8 @@ class Session:
     """The motor's own watchdog was proved."""
     watched: bool = False
     """This run is; False once it was said why it is not."""
+    judged: Judged | None = None
+    """What the watcher said last, as it is on the screens."""
     measured: set[tuple[int, str]] = field(default_factory=set)
     """(index, phase) of the steps of this run that were run to their end."""
     given_up: set[int] = field(default_factory=set)

@@ -19,7 +19,7 @@ from rig.campaign.config import CampaignConfig, twin_path
 from rig.errors import LinkError
 from rig.link.recorder_messages import Failed, Rows
 from rig.link.sockets import Overrun, Peer, pair
-from rig.link.watch_messages import Mismatch, Watched, WatchedStream
+from rig.link.watch_messages import Judged, Mismatch, Watched, WatchedStream
 
 PERIOD = 0.25
 """s of rows sent at once: the control loop pays for four messages a second and not for hundreds."""
@@ -42,6 +42,8 @@ class WatchLink:
     """Why the run is not watched; empty while it is."""
     t0_ns: int | None = None
     """Of the run that is watched; None between runs."""
+    judged: Judged | None = None
+    """How the run stood when it was last looked at; None: not yet."""
     _places: dict[str, int] = field(default_factory=dict)
     """Stream -> its index in the watcher's messages; empty between runs."""
     _waiting: dict[str, list[Sample]] = field(default_factory=dict)
@@ -65,6 +67,7 @@ class WatchLink:
         """A run begins: what was learnt of the one before is forgotten."""
         self.failed = "" if not self.peer.closed else self.failed
         self.t0_ns = run.t0_ns
+        self.judged = None
         self._places = {stream.name: index for index, stream in enumerate(run.streams)}
         self._waiting.clear()
         self._send(run)
@@ -105,6 +108,8 @@ class WatchLink:
         for message in messages:
             if isinstance(message, Failed):
                 self.failed = message.text
+            elif isinstance(message, Judged) and message.t0_ns == self.t0_ns:
+                self.judged = message
         if self.peer.closed and not self.failed:
             self.failed = "the watcher process has ended; its log is watcher.log in the campaign's folder"
         return [message for message in messages if isinstance(message, Mismatch)]

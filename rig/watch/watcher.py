@@ -13,6 +13,7 @@ import select
 import signal
 import socket
 import sys
+from math import isfinite
 from pathlib import Path
 
 import numpy as np
@@ -23,7 +24,7 @@ from rig.errors import LinkError, RigError, TwinError
 from rig.link.framing import Message
 from rig.link.recorder_messages import Failed, Rows
 from rig.link.sockets import Peer
-from rig.link.watch_messages import Mismatch, Watched
+from rig.link.watch_messages import Judged, Mismatch, Standing, Watched
 
 NICE = 10
 """Added to its niceness: it yields to the controller and the recorder."""
@@ -48,9 +49,13 @@ class Watcher:
         self._peer.flush()
         for message in self._peer.receive():
             self._take(message)
-        found = self._watch.look() if self._watch is not None else None
-        if found is not None and self._run is not None:
+        if self._watch is None or self._run is None:
+            return
+        before, found = self._watch.stretches, self._watch.look()
+        if found is not None:
             self._peer.send(_said(found, self._run))
+        if self._watch.stretches != before:
+            self._peer.send(_judged(self._watch, self._run))
 
     def _take(self, message: Message) -> None:
         match message:
@@ -120,6 +125,15 @@ def _said(alarm: Alarm, run: Watched) -> Mismatch:
         size=alarm.size,
         e_value=alarm.e_value,
     )
+
+
+def _judged(watch: Watch, run: Watched) -> Judged:
+    alarm = watch.alarm
+    standing = None if alarm is None else Standing(
+        place=alarm.place, what=alarm.what, headline=alarm.headline, began=alarm.began, from_start=alarm.from_start,
+        sigma=alarm.sigma, brief=alarm.brief, advice=alarm.advice,
+    )  # fmt: skip
+    return Judged(run.t0_ns, watch.stretches, isfinite(watch.log_evidence), standing)
 
 
 def main(arguments: list[str] | None = None) -> int:

@@ -5,12 +5,16 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Final
 
 import numpy as np
 
 from identification.estimation.least_squares import Rows, estimate
 from identification.thruster.thrust_report import MISFIT_P
 from rig.link.front_end_messages import Point
+
+COVERAGE: Final = 2
+"""k: standard deviations in what stands behind ±."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,8 +30,10 @@ class RunningFit:
     used: int
     left_out: int
     """Points without a usable standard error."""
+    per_dof: float | None = None
+    """chi-square per degree of freedom; None for two points."""
     misfit: float | None = None
-    """chi-square per degree of freedom, where points scatter more than their standard errors allow at MISFIT_P."""
+    """The same, where points scatter more than their standard errors allow at MISFIT_P."""
 
     def predict(self, v_abs_v: float) -> float:
         """N at V|V| in V^2."""
@@ -62,19 +68,21 @@ def running_fit(points: tuple[Point, ...]) -> RunningFit | None:
     found = estimate(rows)
     fit, judged = found.fit, found.underfit
     std = float(fit.std[0]) if fit.dof > 0 else math.inf
-    poor = judged is not None and judged.dof > 0 and judged.p_value < MISFIT_P
-    misfit = judged.per_dof if judged is not None and poor else None
-    return RunningFit(float(fit.theta[0]), std, float(fit.theta[1]), len(chosen), len(points) - len(chosen), misfit)
+    per_dof = judged.per_dof if judged is not None and judged.dof > 0 else None
+    misfit = per_dof if judged is not None and judged.p_value < MISFIT_P else None
+    left_out = len(points) - len(chosen)
+    return RunningFit(float(fit.theta[0]), std, float(fit.theta[1]), len(chosen), left_out, per_dof, misfit)
 
 
 def in_words(fit: RunningFit | None) -> str:
-    """`C = 0.4012 ± 0.0021 N/V² (n = 12)`, with the digits that its standard deviation allows."""
+    """`C = 0.4012 ± 0.0042 N/V² (k = 2, n = 12), chi²/dof 1.3`, with the digits that its standard deviation allows."""
     if fit is None:
         return "no fit yet: two levels are needed"
     if not math.isfinite(fit.C_std):
         return f"C = {fit.C:.3g} N/V² (n = 2, spread not known yet)"
     digits = decimals(fit.C_std)
-    return f"C = {fit.C:.{digits}f} ± {fit.C_std:.{digits}f} N/V² (n = {fit.used})"
+    judged = f", chi²/dof {fit.per_dof:.2g}" if fit.per_dof is not None else ""
+    return f"C = {fit.C:.{digits}f} ± {COVERAGE * fit.C_std:.{digits}f} N/V² (k = {COVERAGE}, n = {fit.used}){judged}"
 
 
 def decimals(std: float) -> int:

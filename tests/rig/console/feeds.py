@@ -22,6 +22,7 @@ from rig.link.front_end_messages import (
     StreamHealth,
     TracedChannel,
     TraceRow,
+    Watching,
 )
 
 C = {"T1": 0.402, "T3": 0.387}
@@ -224,6 +225,7 @@ def running(state: State = "hold", t: float = 47.0, **changes: object) -> Snapsh
         "progress": Progress(2 * done + 1, 31, t % HOLD, HOLD, 0, 2, t + 9.0, 241.0, 0.19),
         "files": ("recordings/2026-11-21_1502_T1.h5",),
         "outcome": "running",
+        "watch": Watching("fits"),
     }
     return snapshot(state, **{**facts, **changes})
 

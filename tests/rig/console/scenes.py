@@ -9,7 +9,7 @@ from textual.pilot import Pilot
 
 from rig.console.app import ConsoleApp
 from rig.console.view_model.answers import Answer, answer_of, fault_of
-from rig.link.front_end_messages import LogLine, Progress, Snapshot
+from rig.link.front_end_messages import LogLine, Progress, Snapshot, Watching
 from tests.rig.console.feeds import CHECKS, DEVICES, LOG, ManualClock, PlayedFeed, campaign, running, snapshot
 from tests.rig.console.told import EXPLAINED, ambiguous, message, unexplained
 
@@ -55,6 +55,13 @@ ANSWERS = (
     answer_of(("recordings/2026-11-21_1506_T3.h5",), message(ambiguous("T3"))),
     answer_of(("recordings/2026-11-21_1511_T2.h5",), message(unexplained("T2"))),
 )
+DEVIATES = Watching(
+    "mismatch", "thrust -2.6 % (-4.3 N)", step=11, low=-20.0, high=20.0, began=32.0, sigma=14.3,
+    brief="look at the propeller",
+    advice="look at the propeller and at what drives it; the zero at rest has not moved with it",
+)  # fmt: skip
+BENT = tuple(replace(p, thrust=0.92 * p.thrust if p.voltage < 0 else p.thrust) for p in running().points)
+"""Weaker in reverse than `C V|V|` has it."""
 
 SCENES = {
     "preflight": Scene((snapshot("preflight"),)),
@@ -64,7 +71,10 @@ SCENES = {
     "time": Scene((running(),), keys=("3",)),
     "events": Scene((running(),), keys=("4",)),
     "limit": Scene((running(readings=STALE),)),
-    "mismatch": Scene((running(log=(*LOG, MISMATCH), log_count=len(LOG) + 1, mismatch=HEADLINE),)),
+    "mismatch": Scene((running(log=(*LOG, MISMATCH), log_count=len(LOG) + 1, watch=DEVIATES),)),
+    "mismatch_fit": Scene((running(watch=DEVIATES),), keys=("2",)),
+    "mismatch_time": Scene((running(watch=DEVIATES),), keys=("3",)),
+    "misfit": Scene((running(points=BENT, watch=Watching("fits")),), keys=("2",)),
     "mount": Scene((
         running("mount", thruster="T3", command=0.0, points=(), trace=(), mounted_by_hand=True,
                 progress=Progress(0, 0, 0.0, 0.0, 1, 2, 60.0, 241.0, 0.2), log_count=len(LOG) + 1,

@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from textual.widget import Widget
 
-from rig.console.panels import LogPanel, ProgressPanel, ReadingsPanel
+from rig.console.panels import LogPanel, ReadingsPanel, StandingPanel
 from rig.console.plots import FitPlot, TimePlot
+from rig.link.front_end_messages import Watching
 from tests.rig.console.feeds import CHANNELS, running
 from tests.rig.console.sitting import Desk, sitting
 
@@ -44,10 +45,10 @@ async def test_titles_that_are_the_same_refresh_nothing():
 async def test_a_panel_that_comes_to_have_more_lines_gets_the_room():
     now = running()
     async with sitting(now, size=WIDE) as desk:
-        low = desk.app.query_one(ReadingsPanel).size.height, desk.app.query_one(ProgressPanel).size.height
+        low = desk.app.query_one(ReadingsPanel).size.height, desk.app.query_one(StandingPanel).size.height
         more = (*now.readings, replace(now.readings[-1], channel="tank.level", value=1.5))
-        await desk.play(replace(now, readings=more, mismatch="thrust -2.6 % since 32 s"))
-        high = desk.app.query_one(ReadingsPanel).size.height, desk.app.query_one(ProgressPanel).size.height
+        await desk.play(replace(now, readings=more, watch=Watching("mismatch", "thrust -2.6 %")))
+        high = desk.app.query_one(ReadingsPanel).size.height, desk.app.query_one(StandingPanel).size.height
         assert high == (low[0] + 1, low[1] + 1)
         assert "level" in desk.text(ReadingsPanel)
-        assert "mismatch" in desk.text(ProgressPanel)
+        assert "DOES NOT FIT: thrust -2.6 %" in desk.text(StandingPanel)

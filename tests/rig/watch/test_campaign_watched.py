@@ -23,7 +23,7 @@ from rig.errors import ConfigError, LinkError
 from rig.link.front_end_messages import Request
 from rig.link.recorder_messages import Close, Failed, Rows
 from rig.link.sockets import Peer, pair
-from rig.link.watch_messages import Mismatch, Watched, WatchedStream
+from rig.link.watch_messages import Judged, Mismatch, Standing, Watched, WatchedStream
 from rig.recording.ledger import read
 from rig.stages.campaign import run
 from rig.twin.writing import write_twin
@@ -89,9 +89,16 @@ def test_alarm_is_on_the_screens_in_the_events_and_in_the_ledger_and_the_run_goe
         assert facts[0]["time"] < 27.0 + 15.0
         assert abs(facts[0]["began"] - 27.0) < 6.0, "t = 0 is a second after the clock's"
         assert -3.0 < facts[-1]["size_N"] < -0.5, "6 % of 32 N, seen a few holds after it began"
-        shown = [snapshot.mismatch for snapshot in seen if snapshot.mismatch]
-        assert shown
-        assert shown[-1] == seen[-1].mismatch
+        said = [snapshot.watch.state for snapshot in seen]
+        assert sorted(set(said), key=said.index) == ["off", "learning", "fits", "mismatch"]
+        shown = seen[-1].watch
+        assert shown.text.startswith("thrust -")
+        assert (shown.low, shown.high) == (-9.0, 9.0)
+        assert shown.sigma > 3.0
+        assert abs(shown.began - 27.0) < 6.0
+        after = [step.index for step in world.session.status.held if step.end > shown.began + 0.1 and step.voltage]
+        assert shown.step == after[0]
+        assert shown.advice.startswith(shown.brief)
 
 
 def test_clean_campaign_of_two_thrusters_says_nothing_and_begins_anew_with_each(tmp_path):
@@ -122,13 +129,14 @@ def test_alarm_of_a_run_that_is_over_is_in_the_ledger_and_troubles_no_other_run(
                 told.append(next(t0 for t0 in first if t0 is not None))
                 late = Mismatch(told[0], "T1", 9.0, 4.0, "zero", "zero +1 N", "zero +1 N at rest", 1.0, 100.0)
                 watcher._peer.send(late)
+                watcher._peer.send(Judged(told[0], 9, True, Standing("zero", "", "", 4.0, False, 9.0, "", "")))
 
         told: list[int] = []
         seen = play(world, watch)
         assert told
         assert world.session.status.outcome == "completed", "watch.stop stops the run that it is said of"
         assert "mismatch" not in world.texts
-        assert not any(snapshot.mismatch for snapshot in seen)
+        assert not any(snapshot.watch.state == "mismatch" for snapshot in seen)
         facts = [fact for fact in read(tmp_path) if fact["fact"] == "mismatch"]
         assert [(fact["thruster"], fact["late"]) for fact in facts] == [("T1", True)]
 
