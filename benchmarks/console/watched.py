@@ -17,12 +17,11 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from textual.drivers.linux_driver import LinuxDriver
-
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import rig.console.session
 from rig.console.app import ConsoleApp
 from rig.console.feed import SocketFeed
+from rig.console.stop_at_once import OperatorDriver
 from rig.link.live_runs import find_run
 from rig.link.sockets import connect
 
@@ -63,19 +62,19 @@ class Stopwatch:
 WATCH = Stopwatch()
 
 
-class TimedDriver(LinuxDriver):
-    """Textual's own, which notes when it has written."""
+class TimedDriver(OperatorDriver):
+    """The console's own, which notes when it has written."""
 
     def write(self, data: str) -> None:
-        LinuxDriver.write(self, data)
+        OperatorDriver.write(self, data)
         WATCH.written = time.monotonic()
 
 
 async def sit(place: Path) -> None:
     """Until a signal ends it."""
     peer = connect(place if place.is_socket() else Path(find_run(place).socket), "the controller")
+    rig.console.session.OperatorDriver = TimedDriver  # type: ignore[misc]
     app = ConsoleApp(SocketFeed(peer), time.monotonic, silent=True)
-    app.driver_class = TimedDriver
     app.show_text = WATCH.around(app.show_text, WATCH.texts)  # type: ignore[method-assign]
     app.show_plots = WATCH.around(app.show_plots, WATCH.plots)  # type: ignore[method-assign]
     beating = asyncio.create_task(WATCH.beat())

@@ -6,8 +6,10 @@ import asyncio
 import signal
 
 from textual.drivers.web_driver import WebDriver
+from textual.message import Message
 
 from rig.console.app import ConsoleApp
+from rig.console.stop_at_once import stop_at_once
 
 
 class BrowserDriver(WebDriver):
@@ -22,3 +24,7 @@ class BrowserDriver(WebDriver):
         signal.signal(signal.SIGTERM, before)
         if isinstance(self._app, ConsoleApp):
             loop.add_signal_handler(signal.SIGINT, self._app.action_stop)
+
+    def send_message(self, message: Message) -> None:
+        stop_at_once(self._app, message)
+        WebDriver.send_message(self, message)

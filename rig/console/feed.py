@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections import deque
 from typing import Protocol
 
@@ -22,6 +23,11 @@ class Feed(Protocol):
         """Hand the request over before returning. Raises LinkError when it certainly goes nowhere."""
         ...
 
+    def send_from_thread(self, request: Request) -> None:
+        """The same from another thread than the event loop's. Raises LinkError, or says nothing: who must know sends
+        once more from the loop."""
+        ...
+
     def close(self) -> None:
         """Let the controller see the end of file. Safe to call twice."""
         ...
@@ -33,6 +39,8 @@ class SocketFeed:
     def __init__(self, peer: Peer) -> None:
         """Owns `peer` from here on."""
         self._peer = peer
+        self._sending = threading.Lock()
+        """Held while bytes are handed to the kernel, which never blocks."""
         self._snapshots: deque[Snapshot] = deque()
         self._news = asyncio.Event()
         self._watching = False
@@ -51,16 +59,24 @@ class SocketFeed:
     def send(self, request: Request) -> None:
         if self._gone:
             raise LinkError(f"{self._peer.name} is gone: the request `{request.kind}` reaches nobody")
-        self._peer.send(request)
+        with self._sending:
+            self._peer.send(request)
         if self._peer.waiting:
             asyncio.get_running_loop().add_writer(self._peer.fileno(), self._flush)
+
+    def send_from_thread(self, request: Request) -> None:
+        """What the kernel does not take now goes with the next request of the loop."""
+        with self._sending:
+            if not self._gone:
+                self._peer.send(request)
 
     def close(self) -> None:
         if self._closed:
             return
         self._closed = True
-        self._lose()
-        self._peer.close()
+        with self._sending:
+            self._lose()
+            self._peer.close()
 
     def _watch(self) -> None:
         if not self._watching and not self._gone:
@@ -80,7 +96,8 @@ class SocketFeed:
         self._news.set()
 
     def _flush(self) -> None:
-        self._peer.flush()
+        with self._sending:
+            self._peer.flush()
         if not self._peer.waiting:
             asyncio.get_running_loop().remove_writer(self._peer.fileno())
 

@@ -16,6 +16,7 @@ from types import FrameType
 from rig.console.app import ConsoleApp
 from rig.console.feed import Feed
 from rig.console.next_run import NextRun
+from rig.console.stop_at_once import OperatorDriver
 from rig.console.view_model.view import View
 from rig.link.front_end_messages import Snapshot
 
@@ -68,6 +69,8 @@ def attend(
 
 async def _sit(app: ConsoleApp, browser: bool) -> Sitting:
     feed = app.feed
+    if not browser:
+        app.driver_class = OperatorDriver
     loop = asyncio.get_running_loop()
     caught: list[int] = []
 

@@ -48,6 +48,8 @@ class PlayedFeed:
 
     def __init__(self, *snapshots: Snapshot, stopwatch: Callable[[], float] = lambda: 0.0) -> None:
         self.sent: list[Request] = []
+        self.sent_at_once: list[Request] = []
+        """From the thread that reads the keys."""
         self.stop_times: list[float] = []
         """s by the stopwatch, one per stop sent."""
         self._stopwatch = stopwatch
@@ -79,6 +81,9 @@ class PlayedFeed:
         self.sent.append(request)
         if request.kind == "stop":
             self.stop_times.append(self._stopwatch())
+
+    def send_from_thread(self, request: Request) -> None:
+        self.sent_at_once.append(request)
 
     def close(self) -> None:
         self.closed = True

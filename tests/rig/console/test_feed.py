@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import socket
+import threading
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 
@@ -99,3 +100,29 @@ async def test_close_shows_the_controller_the_end_of_file_twice_is_fine():
         controller.receive()
         assert controller.closed
         assert await feed.receive() is None
+
+
+async def test_what_another_thread_sends_comes_whole_between_the_loop_s_own():
+    notes, stops = [Request("note", "x" * 50_000)] * 40, [Request("stop", "console")] * 400
+    async with wire() as (feed, controller):
+        thread = threading.Thread(target=lambda: [feed.send_from_thread(stop) for stop in stops])
+        thread.start()
+        got: list[object] = []
+        for note in notes:
+            feed.send(note)
+            got += controller.receive()
+            await asyncio.sleep(0)
+        thread.join(20.0)
+        while len(got) < len(notes) + len(stops):
+            got += controller.receive()
+            await asyncio.sleep(0)
+        assert [each for each in got if each == stops[0]] == stops
+        assert [each for each in got if each == notes[0]] == notes
+
+
+async def test_another_thread_may_send_when_the_link_is_gone():
+    async with wire() as (feed, controller):
+        feed.close()
+        feed.send_from_thread(Request("stop"))
+        controller.receive()
+        assert controller.closed

@@ -2,14 +2,20 @@
 
 from __future__ import annotations
 
+import select
 import signal
 import subprocess
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
+from rig.link.clients import Clients
+from rig.link.front_end_messages import Request
+from rig.link.sockets import listen
+from tests.rig.console.feeds import running
 from tests.rig.console.terminal import Terminal, on_terminal
 
 
@@ -55,3 +61,29 @@ def test_an_interrupt_from_outside_is_the_stop_key(tmp_path):
         assert process.poll() is None
         process.send_signal(signal.SIGTERM)
     assert (tmp_path / "out").read_text() == "143 True stop"
+
+
+@pytest.mark.parametrize("keys", [b"\x03", b"\x1b[20~"], ids=["ctrl+c", "f9 as xterm sends it"])
+def test_the_stop_key_gets_through_while_the_screen_hangs(tmp_path, keys):
+    """The thread that reads the keys sends it: whatever is drawn, however long."""
+    clients = Clients(listen(tmp_path / "socket"))
+    code = "import runpy; runpy.run_module('tests.rig.console.hanging', run_name='__main__')"
+    with on_terminal(code, str(tmp_path / "socket")) as (process, terminal):
+        until(lambda: clients.poll(0.0) or clients.connected)
+        clients.publish(running())
+        terminal.until(b"it hangs now")
+        clients.poll(0.0)
+        terminal.press(keys)
+        got = until(lambda: clients.poll(0.0))
+        process.kill()
+    clients.close()
+    assert got == [Request("stop", "console")]
+
+
+def until(wanted, timeout=30.0):
+    """What it returns, once that is something."""
+    deadline = time.monotonic() + timeout
+    while not (found := wanted()):
+        assert time.monotonic() < deadline
+        select.select([], [], [], 0.02)
+    return found
