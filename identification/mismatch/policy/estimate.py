@@ -27,9 +27,13 @@ TICK_INTERVAL = Threshold(
     ),
 )
 TICK_DELAY = Threshold(
-    0.02,
+    0.001,
     unit="share of a tick",
-    reason="A shorter delay leaves what the driver does within its ticks where it was, and is not worked out.",
+    reason=(
+        "A shorter delay leaves what the driver does within its ticks where it was, and is not worked out. A rate that "
+        "is read finely shows on which side of a tick each sample is: with 0.02 a motor lag of 0.6 ms was told of a "
+        "delay of 0.7 ms."
+    ),
 )
 PRESSED_AT_BOUND_SIGMA = Threshold(
     2.5,
