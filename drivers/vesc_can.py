@@ -14,7 +14,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from drivers.errors import DeviceError, LinkError
-from drivers.ports.can_bus import CanBus, Frame
+from drivers.ports.can_bus import CanBus
+from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
 from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream, Watchdog
 from drivers.vesc_frames import (

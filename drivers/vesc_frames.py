@@ -10,7 +10,7 @@ from __future__ import annotations
 import struct
 from typing import NamedTuple
 
-from drivers.ports.can_bus import Frame
+from drivers.ports.can_frame import Frame
 
 SET_DUTY, SET_CURRENT, PROCESS_SHORT_BUFFER = 0, 1, 8
 STATUS, STATUS_4, PING, PONG, STATUS_5 = 9, 16, 17, 18, 27

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from drivers import keller, line_stream, mt_sics_lines, nortek_nmea, vesc_frames
-from drivers.ports.can_bus import Frame
+from drivers.ports.can_frame import Frame
 from rig.errors import LinkError
 from rig.link.framing import HEADER, decode, encode
 from rig.link.front_end_messages import Request

@@ -1,9 +1,8 @@
 """One CAN bus shared by several devices, through python-can. With serial_port.py the only place that opens wires.
 
-Traps of python-can 4 that this file knows (seen in can/interfaces/slcan.py and tried):
-a malformed line raises bare ValueError or IndexError out of recv; a byte above 7F raises what looks like a lost port
-(CanOperationError from UnicodeDecodeError) and stays in its buffer, spoiling every later line until flush(); opening
-sleeps 2 s unless told not to; shutdown of a lost port raises before closing it.
+Traps of python-can 4 that this file knows (seen in can/interfaces/slcan.py and tried): it reads an slcan adapter too
+slowly for a full bus, so that slcan_lines.py does; opening one sleeps 2 s unless told not to; shutdown of a lost port
+raises before closing it.
 """
 
 from __future__ import annotations
@@ -16,14 +15,17 @@ import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 import can
 from can.interfaces import VALID_INTERFACES
 from can.interfaces.slcan import slcanBus
 
 from drivers.errors import LinkError
+from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
+from drivers.ports.serial_port import chunk_reader, hurry
+from drivers.ports.slcan_lines import SlcanLines
 from drivers.ports.transcript import Transcript
 from drivers.ports.wire import SerialOverWire, Wire
 from drivers.protocols import LinkHealth
@@ -38,17 +40,6 @@ JOIN_TIMEOUT = 2.0
 """s; forty times what the reader needs to stop."""
 CAPACITY = 100_000
 """Frames kept per device between two drains; 25 s of a full 500 kbit/s bus."""
-
-
-class Frame(NamedTuple):
-    """One frame of a CAN bus: an identifier of 11 bits, or of 29 where it is `extended`, and up to 8 bytes."""
-
-    id: int
-    extended: bool
-    data: bytes
-
-    def __str__(self) -> str:
-        return f"{self.id:08X}#{self.data.hex(' ')}" if self.extended else f"{self.id:03X}#{self.data.hex(' ')}"
 
 
 class CanBus:
@@ -158,17 +149,13 @@ class CanBus:
         port = SerialOverWire(wire)
         bus.serialPortOrig = port  # type: ignore[assignment]  # all that slcanBus asks of a port
 
-        def arrived(t_ns: int, data: bytes) -> None:
-            port.put(data)
-            while port.in_waiting:
-                self._read_one(bus, 0.0, lambda: t_ns)
-
-        wire.connect(arrived)
+        lines = SlcanLines(self._bad)
+        wire.connect(lambda t_ns, data: self._deliver(t_ns, lines.feed(data)))
         bus.set_bitrate(self._bitrate)
         return bus
 
     def _special(self) -> dict[str, Any]:
-        """slcan: no pause after opening, and block in read instead of waking a thousand times a second."""
+        """slcan: no pause after opening."""
         return {"sleep_after_open": 0, "timeout": READ_TIMEOUT} if self._interface == "slcan" else {}
 
     def _lock_port(self) -> int | None:
@@ -187,8 +174,11 @@ class CanBus:
     def _read(self, bus: can.BusABC) -> None:
         end: str | None = f"the reader of {self._channel} stopped on an error of this program (see the log)"
         try:
+            read = self._slcan_reader(bus) if isinstance(bus, slcanBus) else lambda: _received(bus, self._bad)
             while not self._closing.is_set():
-                self._read_one(bus, READ_TIMEOUT, time.monotonic_ns)
+                frames = read()
+                if frames:
+                    self._deliver(time.monotonic_ns(), frames)
             end = None
         except (can.CanError, OSError) as error:
             end = f"{self._channel} was lost ({error}): check adapter, cable and power, then open it again"
@@ -197,31 +187,32 @@ class CanBus:
             for _, inbox in self._inboxes:
                 inbox.end()
 
-    def _read_one(self, bus: can.BusABC, timeout: float, now_ns: Callable[[], int]) -> None:
-        try:
-            message = bus.recv(timeout)
-        except (ValueError, IndexError) as error:
-            self._bad.add(str(error))
-            return
-        except can.CanOperationError as error:
-            if not isinstance(error.__cause__, UnicodeDecodeError):
-                raise
-            bus.flush()  # type: ignore[attr-defined]  # only slcan decodes text, and it has flush()
-            self._bad.add(str(error.__cause__))  # when it is told, what comes next is read
-            return
-        if message is None:
-            return
-        t_ns = now_ns()
-        frame = Frame(message.arbitration_id, message.is_extended_id, bytes(message.data))
-        if message.is_error_frame or message.is_remote_frame or len(frame.data) != message.dlc:
-            self._bad.add(f"{frame} of length {message.dlc}" + (" (error frame)" if message.is_error_frame else ""))
-            return
-        self._received += 1
+    def _slcan_reader(self, bus: slcanBus) -> Callable[[], list[Frame]]:
+        hurry(bus.serialPortOrig)
+        chunk, lines = chunk_reader(bus.serialPortOrig), SlcanLines(self._bad)
+        return lambda: lines.feed(chunk())
+
+    def _deliver(self, t_ns: int, frames: list[Frame]) -> None:
+        """To each device its own of the frames that came together at `t_ns`."""
+        self._received += len(frames)
         if self._transcript is not None:
-            self._transcript.write(t_ns, "<", str(frame).encode())
+            for frame in frames:
+                self._transcript.write(t_ns, "<", str(frame).encode())
         for accept, inbox in self._inboxes:
-            if accept(frame):
-                inbox.put(t_ns, (frame,))
+            if accepted := [frame for frame in frames if accept(frame)]:
+                inbox.put(t_ns, accepted)
+
+
+def _received(bus: can.BusABC, bad: BadRecords) -> list[Frame]:
+    """The next frame of any other adapter; none after READ_TIMEOUT, or where it holds no data."""
+    message = bus.recv(READ_TIMEOUT)
+    if message is None:
+        return []
+    frame = Frame(message.arbitration_id, message.is_extended_id, bytes(message.data))
+    if message.is_error_frame or message.is_remote_frame or len(frame.data) != message.dlc:
+        bad.add(f"{frame} of length {message.dlc}" + (" (error frame)" if message.is_error_frame else ""))
+        return []
+    return [frame]
 
 
 def _shut_down(bus: can.BusABC) -> None:

@@ -155,7 +155,7 @@ class SerialPort(Generic[Record]):
     def _read(self, port: serial.Serial) -> None:
         end: str | None = f"the reader of {self.settings.port} stopped on an error of this program (see the log)"
         try:
-            read = _chunk_reader(port)
+            read = chunk_reader(port)
             while not self._closing.is_set():
                 data = read()
                 if data:
@@ -175,7 +175,7 @@ class SerialPort(Generic[Record]):
             self.inbox.put(t_ns, records)
 
 
-def _chunk_reader(port: serial.Serial) -> Callable[[], bytes]:
+def chunk_reader(port: serial.Serial) -> Callable[[], bytes]:
     """What has arrived, or nothing after READ_TIMEOUT. Raises OSError when the device is gone.
 
     One poll and one read a chunk; pyserial's own read takes four system calls and half as much again in Python.
@@ -212,7 +212,11 @@ def _open_serial(settings: SerialSettings) -> serial.Serial:
         write_timeout=WRITE_TIMEOUT,
         exclusive=True,
     )
-    # 1 ms instead of the 16 ms of FTDI adapters; a pty and most URLs have no such mode
+    hurry(port)
+    return port
+
+
+def hurry(port: serial.Serial) -> None:
+    """1 ms instead of the 16 ms of FTDI adapters; a pty and most URLs have no such mode."""
     with contextlib.suppress(OSError, ValueError, NotImplementedError, AttributeError):
         port.set_low_latency_mode(True)
-    return port

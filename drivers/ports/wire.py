@@ -28,24 +28,11 @@ class Wire(Protocol):
 
 
 class SerialOverWire:
-    """What python-can's slcan wants of a serial port, over a wire: bytes that were `put` wait to be read."""
+    """What python-can's slcan wants of a serial port that it writes to, over a wire."""
 
     def __init__(self, wire: Wire) -> None:
         self._wire = wire
-        self._waiting = bytearray()
         self.write_timeout: float | None = None
-
-    @property
-    def in_waiting(self) -> int:
-        return len(self._waiting)
-
-    def put(self, data: bytes) -> None:
-        self._waiting += data
-
-    def read(self, size: int = 1) -> bytes:
-        data = bytes(self._waiting[:size])
-        del self._waiting[:size]
-        return data
 
     def write(self, data: bytes) -> int:
         self._wire.write(data)
@@ -53,9 +40,6 @@ class SerialOverWire:
 
     def flush(self) -> None:
         """What is written has left already."""
-
-    def reset_input_buffer(self) -> None:
-        self._waiting.clear()
 
     def close(self) -> None:
         self._wire.disconnect()

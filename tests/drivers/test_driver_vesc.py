@@ -12,7 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import DeviceError, LinkError
-from drivers.ports.can_bus import CanBus, Frame
+from drivers.ports.can_bus import CanBus
+from drivers.ports.can_frame import Frame
 from drivers.vesc_can import Options, VescCan
 from drivers.vesc_frames import (
     FaultCode,

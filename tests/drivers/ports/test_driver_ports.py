@@ -8,7 +8,8 @@ import threading
 import pytest
 
 from drivers.errors import LinkError
-from drivers.ports.can_bus import CanBus, Frame
+from drivers.ports.can_bus import CanBus
+from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
 from drivers.ports.lines import LineCutter
 from drivers.ports.serial_port import SerialPort, SerialSettings

@@ -6,7 +6,8 @@ import pytest
 
 from drivers.errors import DeviceError, LinkError
 from drivers.line_stream import LineStream, Options
-from drivers.ports.can_bus import CanBus, Frame
+from drivers.ports.can_bus import CanBus
+from drivers.ports.can_frame import Frame
 from drivers.ports.serial_port import SerialPort, SerialSettings
 
 OPTIONS = Options("nowhere", r"(?P<raw>-?\d+)", rate=80.0, line_characters=11, scale=0.5)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from drivers.ports.can_bus import Frame
+from drivers.ports.can_frame import Frame
 from drivers.ports.transcript import read_transcript
 from rig.campaign.bench import build
 from rig.campaign.config import CalibrationConfig
