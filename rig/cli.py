@@ -37,6 +37,8 @@ GROUPS: Final = {
 }
 """What a person wants to do, in the order of `rig --help`, and its heading there."""
 
+FIRST: Final = "A first campaign: rig init. What a command does and takes: rig COMMAND --help."
+
 COMPLETING: Final = "_RIG_COMPLETE"
 """Set by a shell that asks what the Tab key offers (docs/howto/first-steps.md)."""
 
@@ -62,7 +64,7 @@ COMMANDS: Final = {
     ),
     "resume": Entry(
         "rig.operate.resume:resume_command",
-        "Go on with a campaign that was cut, at its first unfinished thruster.",
+        "Go on with a campaign that was cut, at its first step that is not measured.",
         "measure",
     ),
     "console": Entry(
@@ -114,7 +116,7 @@ COMMANDS: Final = {
         "rig.recording.recover:recover_command", "Copy a recording that was not closed in order into a plain file."
     ),
     "list": Entry("rig.catalogue.list_command:list_command", "Recordings, campaigns and results of a folder."),
-    "show": Entry("rig.catalogue.show_command:show_command", "All that is known of one of them."),
+    "show": Entry("rig.catalogue.show_command:show_command", "All that is known of one recording, campaign or result."),
     "compare-fits": Entry(
         "rig.catalogue.compare_fits:compare_fits_command",
         "Has a thruster changed? Its fits in order of time.",
@@ -167,7 +169,7 @@ class LazyGroup(click.Group):
         return found + click.Command.shell_complete(self, ctx, incomplete)
 
 
-@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]}, epilog=FIRST)
 @click.version_option(package_name="thruster-rig", prog_name="rig")
 def rig() -> None:
     """Calibrate thrusters on a test rig: sequence, record, identify."""

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from sim_devices.bench.bench import Bench
 
 FILE = click.Path(path_type=Path)
+HELP = ("-h", "--help")
 FITS = "fits.json"
 """What `rig run` leaves in a campaign's folder."""
 
@@ -35,17 +36,20 @@ class BenchByDefault(click.Group):
     """A first word that is no command is the world file of `run`."""
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
-        if args and args[0] not in self.commands and args[0] != "--help":
+        if args and args[0] not in self.commands and args[0] not in HELP:
             args = ["run", *args]
         return super().parse_args(ctx, args)
 
 
-@click.group(cls=BenchByDefault)
+@click.group(cls=BenchByDefault, context_settings={"help_option_names": list(HELP)})
 def main() -> None:
-    """A simulated thruster bench on the ports of this machine."""
+    """A simulated thruster bench on the ports of this machine.
+
+    `python -m sim_devices WORLD.toml` starts it: a first word that is no command is the world of `run`.
+    """
 
 
-@main.command()
+@main.command(short_help="Start the bench of WORLD.toml; it lives until Ctrl+C.")
 @click.argument("world", type=FILE)
 @click.option("--links", type=FILE, help="Folder for the links to the ports (default: from the world file).")
 @click.option("--truth", type=FILE, help="Truth log, JSON lines (default: from the world file).")
@@ -103,7 +107,7 @@ def calibrate(world: Path, links: Path | None, seed: int | None, campaign: Path,
     return status or int(not rows or any(abs(row.z) > SUSPICIOUS for row in rows))
 
 
-@main.command()
+@main.command(short_help="Simulate a vehicle: its whole campaign, as recordings.")
 @click.argument("settings", type=FILE)
 @click.argument("out", type=FILE)
 @click.option("--seed", type=click.IntRange(min=0), help="Seed of all noise (default: from the file).")
@@ -140,7 +144,7 @@ def vehicle(settings: Path, out: Path, seed: int | None) -> None:
     raise SystemExit(status)
 
 
-@main.command("concealable")
+@main.command("concealable", short_help="What `conceal` can be asked for, as JSON.")
 def concealable() -> None:
     """What `conceal` can be asked for, as JSON: effects, their forms, lies about channels, kinds of noise, benches."""
     from sim_devices.concealed.sealing.on_disc import KINDS
@@ -149,7 +153,7 @@ def concealable() -> None:
     click.echo(json.dumps({**KINDS, **RECORDED_KINDS}, indent=1))
 
 
-@main.command("conceal")
+@main.command("conceal", short_help="Recordings with concealed effects, the truth apart.")
 @click.argument("spec", type=click.File(encoding="utf-8"))
 @click.argument("out", type=FILE)
 def conceal_cases(spec: TextIO, out: Path) -> None:
@@ -174,7 +178,7 @@ def conceal_cases(spec: TextIO, out: Path) -> None:
         fail(str(error))
 
 
-@main.command("compare")
+@main.command("compare", short_help="A vehicle's truth beside `rig vehicle --json`.")
 @click.argument("true", type=FILE)
 @click.argument("answer", type=FILE)
 def compare_vehicle(true: Path, answer: Path) -> None:
@@ -216,7 +220,7 @@ def live(bench: Bench, stop: Callable[[], bool]) -> None:
         bench.close()
 
 
-@main.command()
+@main.command(short_help="Put another thruster on the bench.")
 @click.argument("control", type=FILE)
 @click.argument("thruster")
 def mount(control: Path, thruster: str) -> None:
@@ -224,7 +228,7 @@ def mount(control: Path, thruster: str) -> None:
     send(control, f"mount {thruster}")
 
 
-@main.command()
+@main.command(short_help="Script a fault, clear it, set the flow, ask for the status.")
 @click.argument("control", type=FILE)
 @click.argument("words", nargs=-1, required=True)
 def tell(control: Path, words: tuple[str, ...]) -> None:

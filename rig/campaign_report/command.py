@@ -39,7 +39,9 @@ class Wanted:
 @click.argument("campaign", type=PATH)
 @click.option("-o", "--output", type=RESULT_FILE, help=f"Page to write.  [default: {REPORT_FILE} in the folder]")
 @click.option("--pdf", type=RESULT_FILE, help="Write the same page as PDF here; needs the extra thruster-rig[pdf].")
-@click.option("--diagnosis/--no-diagnosis", default=True, help="Seconds to a minute for each thruster.")
+@click.option(
+    "--diagnosis/--no-diagnosis", default=True, show_default=True, help="Diagnose each thruster: seconds to a minute."
+)
 @click.option(
     "--diagnosis-time",
     type=click.FloatRange(min=1),

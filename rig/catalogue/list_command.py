@@ -51,9 +51,13 @@ WIDEST: Final = 60
 @click.argument("folder", type=click.Path(path_type=Path), default=Path())
 @click.option("--what", type=click.Choice(WHAT), default=WHAT[0], show_default=True, help="What is listed.")
 @click.option("--thruster", default="", help="Of this thruster.")
-@click.option("--kind", default="", help="tunnel, bollard or vehicle.")
+@click.option("--kind", default="", help="Of this kind: tunnel, bollard or vehicle.")
 @click.option("--campaign", default="", help="Of the campaign of this name.")
-@click.option("--outcome", default="", help="completed, aborted, tripped, running, unclosed, unreadable; or a verdict.")
+@click.option(
+    "--outcome",
+    default="",
+    help="That came out so: completed, aborted, tripped, running, unclosed, unreadable; or a verdict.",
+)
 @SINCE
 @UNTIL
 @click.option("--limit", type=click.IntRange(min=1), help="The newest N only.")

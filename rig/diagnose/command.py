@@ -215,7 +215,7 @@ def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) 
 
 @click.command("diagnose", cls=ListCommand)
 @click.argument("files", nargs=-1, required=True, type=PATH)
-@click.option("--twin", type=PATH, help="Diagnose against this twin instead of C V|V|.")
+@click.option("--twin", type=PATH, help="Diagnose against this twin (--save-twin) instead of C V|V|.")
 @click.option("--any-thruster", is_flag=True, help="The twin may be of another thruster.")
 @click.option(
     "--before",

@@ -18,8 +18,13 @@ from rig.list_option import ListCommand, ListOption
 @click.command("export", cls=ListCommand)
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--to", "word", type=click.Choice(list(TARGETS)), required=True, help="What to write.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="A new file, or folder for csv and parquet.")
-@click.option("--streams", cls=ListOption, multiple=True, help="These streams only; default: all.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="A new file, for csv and parquet a new folder (default: beside FILE, by its name).",
+)
+@click.option("--streams", cls=ListOption, multiple=True, help="These streams only (default: all).")
 def export_command(file: Path, word: str, output: Path | None, streams: tuple[str, ...]) -> None:
     """Write a recording as CSV, Parquet, MATLAB or MCAP: a table per stream, with units."""
     target = target_of(file, word)

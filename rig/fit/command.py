@@ -91,7 +91,10 @@ def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:
 @click.option("--json", "json_path", type=RESULT, help="Write the fit here; - is standard output.")
 @click.option("--report", type=RESULT_FILE, help="Write a page with figures here (HTML).")
 @click.option(
-    "--model", type=click.Choice(list(NAMES)), help="Model to report; by default C V|V| first, the others beside it."
+    "--model",
+    type=click.Choice(list(NAMES)),
+    metavar="MODEL",
+    help="Report this one (default: C V|V|, the others beside it): " + ", ".join(NAMES) + ".",
 )
 @click.option(
     "--against",
@@ -99,7 +102,13 @@ def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:
     help="What explains the thrust; by default the first of these that was recorded.",
 )
 @click.option("--voltage", type=click.Choice(AGAINST), hidden=True, help="The former name of --against.")
-@click.option("--method", type=click.Choice(["wls", "ls"]), default="wls", show_default=True, help="Weighting.")
+@click.option(
+    "--method",
+    type=click.Choice(["wls", "ls"]),
+    default="wls",
+    show_default=True,
+    help="Weights: wls by the standard error of each hold, ls all alike.",
+)
 @click.option(
     "--compare",
     type=click.Path(path_type=Path),

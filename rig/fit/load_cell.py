@@ -21,8 +21,15 @@ GRAVITY: Final = 9.80665
 
 @click.command("calibrate")
 @click.argument("table", type=click.Path(path_type=Path))
-@click.option("--gravity", type=float, default=GRAVITY, show_default=True, help="m/s^2, of the place.")
-@click.option("--weights-std", type=float, default=0.0, show_default=True, help="Relative, of all weights together.")
+@click.option("--gravity", type=float, default=GRAVITY, show_default=True, metavar="M/S^2", help="Of the place.")
+@click.option(
+    "--weights-std",
+    type=float,
+    default=0.0,
+    show_default=True,
+    metavar="SHARE",
+    help="Relative standard uncertainty that all weights share.",
+)
 def calibrate_command(table: Path, gravity: float, weights_std: float) -> int:
     """Calibrate a load cell with known weights.
 

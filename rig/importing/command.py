@@ -195,30 +195,43 @@ def _list_maps(context: click.Context, _parameter: click.Parameter, wanted: bool
 @click.option(
     "--map",
     "map_name",
-    help="name of a shipped map (see --list) or path of a MAP.toml; none for JSON in the words of the recording format",
+    help="Name of a shipped map (--list) or path of a MAP.toml; none for JSON in the words of the recording format.",
 )
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="the recording; default: FILE with .h5")
-@click.option("--set", "assignments", multiple=True, metavar="NAME=NUMBER", help="override a parameter of the map")
-@click.option("--thruster", help="id of the thruster; default: the map's, else what the file's name tells")
-@click.option("--kind", type=click.Choice(["tunnel", "bollard", "vehicle"]), help="override the map's kind")
-@click.option("--where", default="", metavar="FILTER", help="rows wanted of all files: \"mode == 'run' and c3 > 0\"")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="The recording to write (default: FILE with .h5)."
+)
+@click.option(
+    "--set",
+    "assignments",
+    multiple=True,
+    metavar="NAME=NUMBER",
+    help="Override a parameter of the map; may be repeated.",
+)
+@click.option("--thruster", help="Its id (default: the map's, else what FILE's name tells).")
+@click.option("--kind", type=click.Choice(["tunnel", "bollard", "vehicle"]), help="Override the map's kind.")
+@click.option("--where", default="", metavar="FILTER", help="Only these rows, as \"mode == 'run' and c3 > 0\".")
 @click.option(
     "--levels",
     type=click.Choice(LEVELS),
-    help="of all files: each row is a level, its time its start, middle or end; no: each row is a sample of a log",
+    help="Each row is a level, its time its start, middle or end; no: each row is a sample of a log.",
 )
-@click.option("--with", "beside", type=click.Path(path_type=Path), help="a second file, with a clock of its own")
-@click.option("--with-map", help="the map of the second file; default: that of the first")
-@click.option("--with-where", metavar="FILTER", help="its rows that are wanted; default: --where; '': all of them")
-@click.option("--with-levels", type=click.Choice(LEVELS), help="what its rows are; default: --levels")
+@click.option(
+    "--with", "beside", type=click.Path(path_type=Path), metavar="FILE", help="A second file, with a clock of its own."
+)
+@click.option("--with-map", help="Map of the second file (default: that of the first).")
+@click.option("--with-where", metavar="FILTER", help="Only these of its rows (default: --where; '': all).")
+@click.option("--with-levels", type=click.Choice(LEVELS), help="What its rows are (default: --levels).")
 @click.option(
     "--offset",
     default=ESTIMATED,
     show_default=True,
-    help="from the first row of FILE to that of the second, s; clock: by their stamps; auto: estimated",
+    metavar="S|clock|auto",
+    help="From the first row of FILE to that of the second, s; clock: by their stamps; auto: estimated.",
 )
-@click.option("--notes", default="", help="kept in the recording")
-@click.option("--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_maps, help="list shipped maps")
+@click.option("--notes", default="", help="Text that is kept in the recording.")
+@click.option(
+    "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_maps, help="List the shipped maps."
+)
 def import_command(
     *,
     file: Path,

@@ -14,7 +14,10 @@ LONGEST = 180.0
 """s that the page may take; then it is left, with the command that makes it."""
 
 no_report_option = click.option(
-    "--report/--no-report", default=True, help="At the end, write report.html into the campaign's folder."
+    "--report/--no-report",
+    default=True,
+    show_default=True,
+    help="At the end, write report.html into the campaign's folder.",
 )
 
 

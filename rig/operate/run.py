@@ -44,7 +44,9 @@ LOG_NAME = "controller.log"
     "--headless", is_flag=True, help="A progress bar instead of the console; starts when the preflight passed."
 )
 @click.option(
-    "--output", type=click.Path(path_type=Path), help="Folder for the campaign's folder (default: the campaign's)."
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Make the run's own folder in this one (default: `output` of CAMPAIGN).",
 )
 @click.option("--thruster", "thrusters", multiple=True, help="Only this thruster of the campaign; may be repeated.")
 @screen_options
@@ -58,7 +60,12 @@ def run_command(
     bell: bool,
     report: bool,
 ) -> int:
-    """Run CAMPAIGN on its bench: console, recording, table of the fits."""
+    """Run CAMPAIGN on its bench: console, recording, table of the fits.
+
+    THE PROPELLER TURNS once F5 is pressed in the console, or by itself with --headless; F9 or Ctrl+C stops it.
+
+    Exit status 0 completed or left while it goes on, 1 aborted or tripped, 2 nothing was started (one sentence why).
+    """
     config = require_runnable(campaign, thrusters, headless=headless)
     if not headless and not sys.stdout.isatty():
         raise RigError("rig run opens the console, which needs a terminal; use --headless where there is none")
@@ -107,7 +114,11 @@ def run_campaign(
 @click.command("stop")
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
 def stop_command(folder: Path | None) -> int:
-    """Stop a run that is going on: zero volts now, close the recording."""
+    """Stop a run that is going on, the one in FOLDER or the only one on this machine: zero volts now, close the
+    recording.
+
+    Exit status 0 stopped, 1 when no measurement confirms it (cut the power), 2 when there is no run.
+    """
     peer = connect(Path(find_run(folder).socket), "the controller")
     peer.send(Request("stop", "rig stop"))
     last = Headless(peer).follow(start=False)

@@ -31,10 +31,14 @@ def screen_options(command: C) -> C:
         "--colors",
         type=click.Choice(["auto", "full", "16", "none"]),
         default="auto",
+        show_default=True,
         help="Colours of the terminal. auto: by NO_COLOR, COLORTERM and TERM.",
     )
     bell = click.option(
-        "--bell/--no-bell", default=True, help="Ring where somebody is wanted: mounting, start, trip, pause, end."
+        "--bell/--no-bell",
+        default=True,
+        show_default=True,
+        help="Ring where somebody is wanted: mounting, start, trip, pause, end.",
     )
     return colors(bell(command))
 

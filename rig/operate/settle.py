@@ -89,8 +89,16 @@ def _leave(experiment: SequentialExperiment, found: Diagnosis, course: Course, e
 @click.argument("files", nargs=-1, required=True, type=PATH)
 @click.option("--campaign", type=PATH, help="Campaign of the recordings: bench, pacing and tare of what is run.")
 @click.option("--bench", type=PATH, help="Bench alone, where there is no campaign; needs --output.")
-@click.option("--budget", default="20min", show_default=True, help="Time for everything, such as 600, 10min or 1h.")
-@click.option("--output", type=PATH, help="Folder for what is recorded (default: the campaign's).")
+@click.option(
+    "--budget",
+    default="20min",
+    show_default=True,
+    metavar="TIME",
+    help="Time for everything, such as 600, 10min or 1h.",
+)
+@click.option(
+    "--output", type=PATH, help="Record into a folder of its own in this one (default: `output` of the campaign)."
+)
 @click.option(
     "--json", "json_path", type=RESULT, help="Write the last diagnosis and the way to it; - is standard output."
 )

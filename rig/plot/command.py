@@ -29,7 +29,7 @@ WHOLE = ("thrust", "residuals", "timeseries")
     multiple=True,
     default=("thrust",),
     metavar="thrust|residuals|timeseries|CHANNEL...",
-    help="thrust with its fit, its residuals, the usual channels over time, or the channels named.  [default: thrust]",
+    help="Thrust with its fit, its residuals, the usual channels over time, or the channels named.  [default: thrust]",
 )
 @click.option("-o", "--output", required=True, type=RESULT_FILE, help="File to write: .png, .svg or .pdf.")
 def plot_command(recordings: tuple[Path, ...], what: tuple[str, ...], output: Path) -> None:

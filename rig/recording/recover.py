@@ -14,7 +14,9 @@ from rig.recording.ledger import FILE_NAME, read
 
 @click.command("recover", help="Copy a recording that was not closed in order into a plain file; FILE is not changed.")
 @click.argument("file", type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="default: FILE with -recovered before .h5")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="The copy (default: FILE with -recovered before .h5)."
+)
 def recover_command(file: Path, output: Path | None) -> None:
     """Exit status 0; RigError is for the caller (rig.cli) to print."""
     from rig.hdf5 import recover  # h5py only where a file is read

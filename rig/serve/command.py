@@ -22,7 +22,11 @@ PORT: Final = 8000
 @click.command("console")
 @click.argument("folder", required=False, type=click.Path(path_type=Path))
 @click.option("--headless", is_flag=True, help="Follow with a progress bar instead.")
-@click.option("--serve", is_flag=True, help="Show it in a browser instead: prints a link that is good for one.")
+@click.option(
+    "--serve",
+    is_flag=True,
+    help="Show it in a browser instead: prints a link that is good for one. Needs the extra thruster-rig[serve].",
+)
 @click.option(
     "--host", help=f"With --serve: the address to listen at (default: {HOST}, which only this machine reaches)."
 )

@@ -207,11 +207,13 @@ PATH = click.Path(path_type=Path)
 
 @click.command("simulate")
 @click.argument("plan", type=PATH)
-@click.option("--twin", "twin_path", required=True, type=PATH, help="The twin that predicts.")
+@click.option(
+    "--twin", "twin_path", required=True, type=PATH, help="The twin that predicts: JSON of `rig diagnose --save-twin`."
+)
 @click.option("-o", "--output", required=True, type=PATH, help="The recording to write.")
 @click.option("--noise", "seed", type=click.IntRange(min=0), help="Add the twin's noise, drawn from this seed.")
-@click.option("--rate", type=click.FloatRange(0, min_open=True), help="Samples/s; default: as the twin's recordings.")
-@click.option("--flow-speed", "flow", type=float, help="Tunnel flow in m/s; default: the plan's, else none.")
+@click.option("--rate", type=click.FloatRange(0, min_open=True), help="Samples/s (default: as the twin's recordings).")
+@click.option("--flow-speed", "flow", type=float, help="Tunnel flow in m/s (default: the plan's, else none).")
 def simulate_command(
     plan: Path, twin_path: Path, output: Path, seed: int | None, rate: float | None, flow: float | None
 ) -> None:

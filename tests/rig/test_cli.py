@@ -6,9 +6,10 @@ import os
 import subprocess
 import sys
 
+import click
 import pytest
 
-from rig.cli import COMMANDS, COMPLETING, GROUPS, main
+from rig.cli import COMMANDS, COMPLETING, GROUPS, main, rig
 
 HEAVY = ("numpy", "scipy", "h5py", "textual", "can", "pydantic")
 CALL = "import atexit, sys; atexit.register(lambda: print(*sys.modules, file=sys.stderr)); from rig.cli import main; "
@@ -58,3 +59,28 @@ def test_the_tab_key_offers_options_and_their_values() -> None:
 
 def test_the_tab_key_after_what_is_no_command_is_silent() -> None:
     assert completed("rig chekc --", 2)[0] in ([], ["--version", "--help"])
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_command_and_option_says_what_it_does_in_sentences(name: str) -> None:
+    command = rig.get_command(click.Context(rig), name)
+    assert command is not None
+    assert command.help
+    assert COMMANDS[name].help.endswith((".", "?"))
+    for option in command.params:
+        if isinstance(option, click.Option) and not option.hidden:
+            said = option.help or ""
+            assert said[:1].isupper() or said[:1].isdigit(), f"{name} {option.opts[0]}: {said!r}"
+            assert said.endswith((".", ")", "]", "?")), f"{name} {option.opts[0]}: {said!r}"
+
+
+def test_help_says_where_to_begin() -> None:
+    assert "A first campaign: rig init." in called("main(['--help'])")[0]
+    assert "THE PROPELLER TURNS" in called("main(['run', '-h'])")[0]
+
+
+def test_help_of_the_simulated_bench_says_that_a_world_is_enough() -> None:
+    words = [sys.executable, "-m", "sim_devices", "-h"]
+    said = subprocess.run(words, capture_output=True, text=True, check=True).stdout
+    assert "python -m sim_devices WORLD.toml" in said
+    assert "..." not in said.partition("Commands:")[2]
