@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from identification.physics.digits import beside
 from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
@@ -42,7 +43,7 @@ class Asymmetry:
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
-            f"Asymmetry: in reverse the thruster gives {theta[0]:.3g} "
+            f"Asymmetry: in reverse the thruster gives {beside(theta[0], 1.0, 2)} "
             "of its forward thrust at the same voltage; use C+ and C-."
         )
 

@@ -7,6 +7,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from identification.physics.digits import beside
 from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
@@ -55,7 +56,7 @@ class Exponent:
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         hint = f"; {REGULATED}" if theta[0] < BY_WATER and scale.driver_unit == "V" else ""
-        return f"Exponent: thrust grows as |V|^{theta[0]:.2f}, not as V^2{hint}."
+        return f"Exponent: thrust grows as |V|^{beside(theta[0], 2.0, 2)}, not as V^2{hint}."
 
 
 FORMS = (Exponent(),)

@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from identification.physics.digits import percent
 from identification.physics.equation import follows
 from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
@@ -74,7 +75,7 @@ class InflowDynamics:
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         slower = "" if not self.form else f" at {scale.driver:.3g} {scale.driver_unit}, slower at less"
         return (
-            f"Inflow dynamics: after a step thrust overshoots by {100 * theta[0]:.0f} "
+            f"Inflow dynamics: after a step thrust overshoots by {percent(theta[0])} "
             f"%, until the water has followed (time constant {theta[1]:.2g} s{slower})."
         )
 

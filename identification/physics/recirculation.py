@@ -10,6 +10,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from identification.physics.digits import percent
 from identification.physics.equation import follows
 from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
@@ -81,8 +82,9 @@ class Recirculation:
         return *water, f"F = F - {coefficient:.6g} * abs(x) * jet"
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        most = percent(theta[0] * scale.driver**2 / scale.thrust)
         return (
-            f"Recirculation: the jet comes round and takes up to {100 * theta[0] * scale.driver**2 / scale.thrust:.0f} "
+            f"Recirculation: the jet comes round and takes up to {most} "
             f"% of the thrust within {theta[1] * (2 if self.form == 'circuit' else 1):.3g} s of one direction."
         )
 

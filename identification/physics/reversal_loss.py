@@ -7,6 +7,7 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from identification.physics.digits import percent
 from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
@@ -58,7 +59,7 @@ class ReversalLoss:
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         return (
-            f"Reversal loss: after a change of direction {100 * theta[0]:.0f} "
+            f"Reversal loss: after a change of direction {percent(theta[0])} "
             f"% of the thrust is missing, for some {theta[1]:.2g} s."
         )
 

@@ -11,6 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from identification.physics.digits import beside
 from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
@@ -59,7 +60,7 @@ class WindingResistance:
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         e = 2 / (1 + (1 + 4 * theta[0] * scale.driver) ** 0.5)
         return (
-            f"Winding resistance: of {scale.driver:.3g} {scale.driver_unit} only {100 * e:.0f} "
+            f"Winding resistance: of {scale.driver:.3g} {scale.driver_unit} only {beside(100 * e, 100.0)} "
             "% turns the motor; the rest is lost in the winding, as the current grows."
         )
 
