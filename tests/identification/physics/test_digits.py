@@ -32,6 +32,6 @@ def test_per_cent(share, told):
 
 
 def test_a_small_effect_is_told_with_its_size():
-    assert "gives 0.99891 of its forward thrust" in Asymmetry().statement((0.99891,), SCALE)
+    assert "gives 0.9989 of its forward thrust" in Asymmetry().statement((0.99891,), SCALE)
     assert "|V|^1.9962, not as V^2" in Exponent().statement((1.9962,), SCALE)
     assert "overshoots by 0.31 %" in INFLOW[0].statement((0.0031, 0.4), SCALE)
