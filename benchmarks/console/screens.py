@@ -9,9 +9,9 @@ from textual.binding import Binding
 from rig.console.app import ConsoleApp
 
 ESCAPE = b"\x1b"
-TYPED = {"note": b"weed on the duct, cleared by hand", "palette": b"no", "command_palette": b"no", "channels": b"thr"}
+TYPED = {"note": b"weed on the duct, cleared by hand", "palette": b"no", "command_palette": b"no", "channel": b"thr"}
 """What is typed into the text field of a dialog, by the action that opens it."""
-DIALOGS = ("note", "leave", "help", "palette", "command_palette", "channels", "choose", "chooser")
+DIALOGS = ("note", "leave", "help", "palette", "command_palette", "channel", "choose", "chooser")
 """Actions that open something over the page; those that the console has are used."""
 TERMINAL = {"?": b"?", "question_mark": b"?", "ctrl+p": b"\x10", "ctrl+k": b"\x0b", "colon": b":", "slash": b"/"}
 
