@@ -10,6 +10,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from rig.errors import DeviceError
+from rig.link.front_end_messages import Watching
 from rig.stages.session import Session
 
 LOG_NAME = "mount.log"
@@ -23,6 +24,7 @@ def mount(session: Session) -> None:
     status, command = session.status, session.campaign.bench.mount
     status.state, status.output = "mount", None
     status.points.clear()
+    status.watch = Watching()
     if not command.command:
         session.say("info", f"put {status.thruster} on the bench")
         while not any(request.kind == "mounted" for request in session.turn()):

@@ -32,7 +32,7 @@ def standing(view: View, width: int) -> Standing | None:
     if fit is not None and fit.misfit is not None:
         said = _beside(in_words(fit), "rig diagnose", "rig diagnose, by g once the campaign has ended", width, "next: ")
         return Standing((misfit_line(fit, snapshot.points), said), fits=False)
-    return Standing((f"{in_words(fit)}: {_so_far(watch)}",), fits=True)
+    return Standing((f"{in_words(fit)}{':' if fit is not None else ';'} {_so_far(watch)}",), fits=True)
 
 
 def _so_far(watch: Watching) -> str:

@@ -51,7 +51,7 @@ def test_nothing_is_said_before_there_is_anything():
     assert said(snapshot("preflight")) == ()
     assert said(running("tare", points=(), watch=Watching("learning"))) == ()
     assert said(running("tare", points=(), watch=Watching("fits"))) == (
-        "no fit yet: two levels are needed: fits so far",
+        "no fit yet: two levels are needed; fits so far",
     )
 
 
