@@ -87,8 +87,10 @@ class TimePlot(Curve):
     greatest in each column."""
 
     def show(self, view: View) -> None:
-        entitle(self, traces.title(view, wide=self.size.width >= 64), "c: another channel")
-        made_of = (view.trace[-1:], len(view.trace), traces.plotted(view), self.size)
+        since = traces.misfit_since(view)
+        mark = "│ from here on it does not fit   " if since is not None else ""
+        entitle(self, traces.title(view, wide=self.size.width >= 64), f"{mark}c: another channel")
+        made_of = (view.trace[-1:], len(view.trace), traces.plotted(view), since, self.size)
         self.redraw(made_of, lambda plot: self._draw(plot, view))
 
     def _draw(self, plot: Plot, view: View) -> None:
@@ -109,6 +111,9 @@ class TimePlot(Curve):
         begin, end = view.trace[0][0], max(view.trace[-1][0], view.trace[0][0] + 10.0)
         plot.xlim(begin, end)
         plot.xticks(*ticks(begin, end, 6))
+        since = traces.misfit_since(view)
+        if since is not None:
+            plot.vline(since, color=AMBER)
 
     def _strip(
         self, plot: Plot, found: Sequence[traces.Band], band: Span, axis: Span, of_unit: str, side: int = LEFT

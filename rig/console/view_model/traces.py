@@ -69,6 +69,14 @@ def title(view: View, *, wide: bool) -> str:
     return f"{names(view.snapshot.channels)[one.channel]} ({unit(one.unit)}), command (V, right) over time (s){window}"
 
 
+def misfit_since(view: View) -> float | None:
+    """From which s of the recording on the watch says that the run does not fit; None where that is not on the plot."""
+    watch = view.snapshot.watch if view.snapshot is not None else None
+    if watch is None or watch.state != "mismatch" or not view.trace:
+        return None
+    return watch.began if view.trace[0][0] < watch.began < view.trace[-1][0] else None
+
+
 def bands(view: View, channel: str, most: int) -> list[Band]:
     """The envelope of one channel in at most `most` equal spans of time: no peak is lost. Rows without a sample go."""
     channels = [one.channel for one in view.snapshot.channels] if view.snapshot is not None else []

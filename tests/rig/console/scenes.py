@@ -86,6 +86,8 @@ SCENES = {
                            "temperature 61.2 °C, goes on below 50 °C, at most 9 min more"),)),
     "paused": Scene((running("paused", command=0.0, state_elapsed=83.0, reason="by the operator"),)),
     "keys": Scene((running(),), keys=("question_mark",)),
+    "channels": Scene((running(),), keys=("c", *"mot")),
+    "current": Scene((running(),), keys=("3", "c", *"current", "enter")),
     "palette": Scene((running(),), keys=("colon",)),
     "palette_not_now": Scene((snapshot("preflight", checks=FAILED),), keys=("colon", *"st")),
     "looks_on": Scene((running(attended=True, clients=2),)),

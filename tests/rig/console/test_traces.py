@@ -12,10 +12,21 @@ from hypothesis import strategies as st
 from rig.console.chooser import Chooser
 from rig.console.plots import TimePlot
 from rig.console.view_model import traces
-from rig.console.view_model.traces import MOST_DOTS, Band, bands, channels_to_choose, dots, merged, plotted, title
+from rig.console.view_model.traces import (
+    MOST_DOTS,
+    Band,
+    bands,
+    channels_to_choose,
+    dots,
+    merged,
+    misfit_since,
+    plotted,
+    title,
+)
 from rig.console.view_model.view import View, absorb
 from rig.link.front_end_messages import TracedChannel
 from tests.rig.console.feeds import CHANNELS, running, snapshot
+from tests.rig.console.scenes import DEVIATES
 from tests.rig.console.sitting import sitting
 
 VIEW = absorb(View(), running(), 0.0)
@@ -69,6 +80,13 @@ def test_every_recorded_channel_can_be_chosen_by_its_name_and_unit():
     names = [entry.name for entry in channels_to_choose(absorb(View(), running(channels=twice), 0.0))]
     assert "load_cell.thrust" in names
     assert "second_cell.thrust" in names
+
+
+def test_where_a_run_begins_not_to_fit_is_marked_while_it_is_on_the_plot():
+    assert misfit_since(VIEW) is None
+    assert misfit_since(absorb(View(), running(watch=DEVIATES), 0.0)) == DEVIATES.began
+    for began in (-1.0, 47.5):
+        assert misfit_since(absorb(View(), running(watch=replace(DEVIATES, began=began)), 0.0)) is None
 
 
 def test_titles_have_the_units():
