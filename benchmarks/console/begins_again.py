@@ -4,7 +4,8 @@
 
 All in it is the rig's: session, preflight, loop, guard, sequencer, recorder. Only what follows a stop differs: where
 `rig.stages.controller` says goodbye, the next run of the same thruster begins, into a file of its own. Each run shows
-what a console shows late on a day: two minutes of trace and forty points. SIGTERM ends it.
+what a console shows late on a day: two minutes of trace and forty points. When the motor's driver has taken 0, the
+time goes into FOLDER/zeros, ns of the monotonic clock. SIGTERM ends it.
 """
 
 from __future__ import annotations
@@ -48,10 +49,15 @@ def earlier_points(thruster: str) -> list[Point]:
 
 
 def with_a_past(session: Session) -> Callable[[float], None]:
-    """`publish` of the loop, which puts `TRACE` before the rows of each new recording."""
-    publish, loop, given = session.loop.publish, session.loop, list[int]()
+    """`publish` of the loop, which puts `TRACE` before the rows of each new recording, and notes zeros: in the tick of
+    a stop it is called right after the command."""
+    publish, loop, given, driven = session.loop.publish, session.loop, list[int](), [False]
+    zeros = (session.folder / "zeros").open("w", buffering=1)
 
     def published(now: float) -> None:
+        if driven[0] and loop.command == 0.0:
+            zeros.write(f"{loop.clock.now_ns()}\n")
+        driven[0] = loop.command != 0.0
         begun = loop.recording_since_ns
         if begun is not None and begun not in given[-1:]:
             given.append(begun)

@@ -96,6 +96,11 @@ class Truth:
         found = first()
         return found * 1e-9 if found is not None and self._driven(t_ns) else None
 
+    def sent_after(self, t_ns: int) -> float:
+        """s from `t_ns` to the first 0 that the controller handed to the motor's driver."""
+        lines = (self.path.parents[1] / "out" / "zeros").read_text().split("\n")[:-1]
+        return next(sent - t_ns for sent in map(int, lines) if sent >= t_ns) * 1e-9
+
     def _driven(self, t_ns: int) -> bool:
         return [value for t, value in self.changes if t < t_ns][-1] != 0.0
 
@@ -104,7 +109,8 @@ class Truth:
         self.read()
         while not reached():
             if time.monotonic() > deadline:
-                raise TimeoutError(f"{what} was waited for {timeout:g} s; the newest commands: {self.changes[-4:]}")
+                said = (self.path.parents[1] / "out" / "controller.out").read_text(errors="replace")[-1000:]
+                raise TimeoutError(f"{what} was waited for {timeout:g} s; {self.changes[-4:]}; the controller: {said}")
             select.select([], [], [], 0.02)
             self.read()
 

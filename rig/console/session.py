@@ -15,6 +15,7 @@ from types import FrameType
 
 from rig.console.app import ConsoleApp
 from rig.console.feed import Feed
+from rig.console.interpreter import SETTLED, settle
 from rig.console.next_run import NextRun
 from rig.console.stop_at_once import OperatorDriver
 from rig.console.view_model.view import View
@@ -72,6 +73,7 @@ async def _sit(app: ConsoleApp, browser: bool) -> Sitting:
     if not browser:
         app.driver_class = OperatorDriver
     loop = asyncio.get_running_loop()
+    loop.call_later(SETTLED, settle)
     caught: list[int] = []
 
     def leave() -> None:
