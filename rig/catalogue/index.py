@@ -43,7 +43,7 @@ SCHEMA: Final = (
     "CREATE INDEX links_of_entry ON links (entry)",
     "CREATE INDEX links_by_id ON links (id)",
 )
-READING: Final = 1
+READING: Final = 2
 """Raised when other things are read of a file, so that what was read before is read again."""
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sqlite3
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
@@ -44,17 +44,25 @@ class Refreshed(NamedTuple):
     forgotten: int
 
 
-def refresh(connection: sqlite3.Connection, folder: Path) -> Refreshed:
-    """Until index and files agree, as the files were when they were looked at."""
+def _nobody(done: int, of: int) -> None:
+    """Is not told how far it is."""
+    del done, of
+
+
+def refresh(connection: sqlite3.Connection, folder: Path, tell: Callable[[int, int], None] = _nobody) -> Refreshed:
+    """Until index and files agree, as the files were when they were looked at. `tell`: files read, of how many."""
     known, there = index.stamps(connection), files.found(folder)
     gone = known.keys() - there.keys()
     new = sorted(path for path, stamp in there.items() if known.get(path) != stamp)
     with index.transaction(connection):
         index.forget(connection, gone)
+    done = 0
     for said in _read(folder, new):
         with index.transaction(connection):
             for path, entries in said:
                 index.keep(connection, path, there[path], entries)
+        done += len(said)
+        tell(done, len(new))
     if gone or new:
         with index.transaction(connection):
             for statement in RELATE:

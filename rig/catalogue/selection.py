@@ -140,6 +140,16 @@ def _unknown(connection: sqlite3.Connection, asked: str) -> str:
     return f"{asked!r} is neither a file nor the beginning of an id here; {told}"
 
 
+def recordings_of(connection: sqlite3.Connection, what: str) -> dict[tuple[str, str], tuple[str, ...]]:
+    """(path, thruster) of each fit, twin or diagnosis to the ids of the recordings that it is of."""
+    asked = "SELECT e.path, e.thruster, links.id FROM links JOIN entries AS e ON e.key = links.entry WHERE e.what = ?"
+    found: dict[tuple[str, str], tuple[str, ...]] = {}
+    for path, thruster, identity in connection.execute(asked, (what,)):
+        key = (os.fsdecode(path), thruster)
+        found[key] = (*found.get(key, ()), identity)
+    return found
+
+
 def related(connection: sqlite3.Connection, of: Entry) -> list[Entry]:
     """Of a recording: what is of it; of everything else: the recordings that it is of."""
     if of.what == "recordings":

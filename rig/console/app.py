@@ -21,6 +21,7 @@ from rig.console.diagnosing import DIAGNOSE, DiagnosingApp, DiagnosisPanel
 from rig.console.dialogs import LeaveDialog, NoteDialog
 from rig.console.feed import Feed
 from rig.console.few_colors import filters_for
+from rig.console.history import CompareDialog, HistoryApp, HistoryPanel
 from rig.console.key_help import KeyHelp
 from rig.console.keys_in_order import KeysInOrder
 from rig.console.panels import (
@@ -53,7 +54,7 @@ STOP_KEYS: Final = ("ctrl+c", "super+c", "f9")
 """super+c is Cmd+C where a terminal passes it on."""
 
 
-class ConsoleApp(ChoosingApp, DiagnosingApp, inherit_bindings=False):
+class ConsoleApp(ChoosingApp, DiagnosingApp, HistoryApp, inherit_bindings=False):
     """One operator's window on one controller."""
 
     CSS_PATH = "console.tcss"
@@ -76,16 +77,19 @@ class ConsoleApp(ChoosingApp, DiagnosingApp, inherit_bindings=False):
         looks_on: bool = False,
         begins: bool = False,
         earlier: Sequence[str] = (),
+        folder: str = "",
     ) -> None:
         """`clock` gives s and never goes back; `again` is the command line that attaches once more, `diagnose` one to
         which a recording is added. `silent`: it never rings; `colors`: `full`, `16` or `none`.
         `looks_on`: whoever else attends, it does so from `l` on only. `begins`: what it leaves in `next_run` is run;
-        `earlier`: recordings that each of this campaign is diagnosed with."""
+        `earlier`: recordings that each of this campaign is diagnosed with;
+        `folder`: where it records."""
         super().__init__(feed, clock, View(now=clock(), looks_on=looks_on))
         self.HORIZONTAL_BREAKPOINTS = [(0, "-narrow"), (110, "-wide")]  # columns from which all panels fit at once
         self.VERTICAL_BREAKPOINTS = [(0, "-low"), (32, "-tall")]  # rows
         self.again = again
         self.diagnose, self.begins, self.earlier = diagnose, begins, earlier
+        self.run_folder = folder
         self.set_class(colors != "full", "-few-colors")
         self.chosen = "main"
         self.log_filter: LogFilter = "run"
@@ -115,6 +119,8 @@ class ConsoleApp(ChoosingApp, DiagnosingApp, inherit_bindings=False):
                 yield DiagnosisPanel()
             with VerticalScroll(id="bench"):
                 yield BenchPanel()
+            with Container(id="history"):
+                yield HistoryPanel(markup=False)
         yield Panel(id="keys", markup=False)
 
     def on_mount(self) -> None:
@@ -123,11 +129,17 @@ class ConsoleApp(ChoosingApp, DiagnosingApp, inherit_bindings=False):
         self.query_one("#results").border_title = "result per thruster: C V|V| fitted to the holds"
         self.query_one("#diagnosis").border_title = "diagnosis: what C V|V| leaves out"
         self.query_one("#bench").border_title = "bench: who is there, and how well it is heard"
+        self.query_one("#history").border_title = "history: what was measured before, newest first"
         self.run_worker(self._follow())
         self.set_interval(REDRAW, self.show_text)
         self.set_interval(REPLOT, self.show_plots)
         self.set_interval(LEASE, self.renew_lease)
         self.renew_lease()
+
+    async def on_unmount(self) -> None:
+        """The console goes: so does what computes beside it."""
+        await self.end_diagnosis()
+        await self.end_history()
 
     async def _follow(self) -> None:
         while (snapshot := await self.feed.receive()) is not None:
@@ -166,7 +178,7 @@ class ConsoleApp(ChoosingApp, DiagnosingApp, inherit_bindings=False):
             base.query_one(BenchPanel).show(view)
         base.query_one(LogPanel).show(view, self.log_filter)
         base.query_one("#keys", Panel).put(line := key_line(view), line)
-        if isinstance(self.screen, NoteDialog | LeaveDialog | KeyHelp | Chooser | SweepDialog):
+        if isinstance(self.screen, NoteDialog | LeaveDialog | KeyHelp | Chooser | SweepDialog | CompareDialog):
             self.screen.show(view)
         base.set_class(view.condition != "live", "old")
         place(self.screen, below=base.query_one(Head).size.height)
@@ -201,6 +213,8 @@ class ConsoleApp(ChoosingApp, DiagnosingApp, inherit_bindings=False):
         self.show_text()
         if name in ("bench", "diagnosis") and len(self.screen_stack) == 1:
             self.query_one(f"#{name}").focus()  # the arrow keys scroll it
+        if name == "history" and len(self.screen_stack) == 1:
+            self.open_history()
         self.call_after_refresh(self.show_plots)
 
     def look_at_time(self) -> None:

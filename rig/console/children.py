@@ -27,10 +27,10 @@ class Child:
         self._interrupted = False
 
     async def said(self, given: str = "") -> AsyncGenerator[dict[str, Any], None]:
-        """Each object that it says; at last a `fault` when it ends as it should not. `given`: what it reads first.
+        """Each object that it says; at last a `fault` when it ends as it should not. `given`: a line for it to read.
 
-        Whoever stops listening ends it. Its standard input stays open until then, unless something is `given`: a child
-        that waits for its end has its console's as well, also one that was killed.
+        Whoever stops listening ends it. Its standard input stays open until then: a child that waits for its end has
+        its console's as well, also one that was killed.
         """
         with tempfile.TemporaryFile() as errors:
             try:
@@ -80,8 +80,7 @@ async def _messages(process: Process, given: str) -> AsyncGenerator[dict[str, An
     assert process.stdin is not None
     assert process.stdout is not None
     if given:
-        process.stdin.write(given.encode())
-        process.stdin.close()
+        process.stdin.write(given.encode() + b"\n")
     while line := await process.stdout.readline():
         with suppress(ValueError):
             message = json.loads(line)

@@ -95,8 +95,8 @@ class DiagnosingApp(LeavingApp, inherit_bindings=False):
         await self.push_screen(SweepDialog(answers, begins=self.begins), chosen)
         self.call_after_refresh(self.show_text)
 
-    async def on_unmount(self) -> None:
-        """The console goes: so does what computes beside it."""
+    async def end_diagnosis(self) -> None:
+        """Whatever goes on for this page ends."""
         if self._child is not None:
             await self._child.end()
 

@@ -57,13 +57,23 @@ def attend(
     browser: bool = False,
     begins: bool = False,
     earlier: Sequence[str] = (),
+    folder: str = "",
 ) -> Sitting:
     """Run the console until the operator leaves. `clock` gives s and never goes back; `again` is the command line that
     attaches once more, shown before detaching; `silent`: no bell; `colors`: `full`, `16` or
     `none`. `browser`: keys come over a pipe from one, and it looks on until `l`. `begins`: the caller runs what
-    `next_run` names; `earlier`: recordings that each of this campaign is diagnosed with. Closes `feed`."""
+    `next_run` names; `earlier`: recordings that each of this campaign is diagnosed with; `folder`: where it records.
+    Closes `feed`."""
     app = ConsoleApp(
-        feed, clock, again, silent=silent, colors=colors, looks_on=browser, begins=begins, earlier=tuple(earlier)
+        feed,
+        clock,
+        again,
+        silent=silent,
+        colors=colors,
+        looks_on=browser,
+        begins=begins,
+        earlier=tuple(earlier),
+        folder=folder,
     )
     return asyncio.run(_sit(app, browser))
 

@@ -1,7 +1,7 @@
 """`python -m rig.diagnose.next_from_answer CAMPAIGN FOLDER`: the next experiment of an answer, as a campaign file.
 
-The answer (`thruster-rig-diagnosis`) comes on standard input. Standard output has one line of JSON: `{"files":
-[PATH]}`, one for each flow speed, or `{"fault": TEXT}`. Nothing is overwritten.
+The answer (`thruster-rig-diagnosis`) comes on standard input, in one line. Standard output has one line of JSON:
+`{"files": [PATH]}`, one for each flow speed, or `{"fault": TEXT}`. Nothing is overwritten.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ def main(campaign: str, folder: str) -> None:
     """Of the answer on standard input."""
     try:
         told: dict[str, Any] = {
-            "files": [str(file) for file in write(json.load(sys.stdin), Path(campaign), Path(folder))]
+            "files": [str(file) for file in write(json.loads(sys.stdin.readline()), Path(campaign), Path(folder))]
         }
     except (RigError, OSError) as error:
         told = {"fault": str(error)}

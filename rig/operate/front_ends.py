@@ -32,6 +32,8 @@ class Left:
     """The campaign that the operator asked for at its end."""
 
 
+AGAIN = "rig console "
+"""What stands before the run's folder in the command line that attaches once more."""
 FrontEnd = Callable[[Peer, str], Left]
 """Takes the link and the command line that attaches once more."""
 
@@ -55,7 +57,7 @@ def console_screen(
             peer.send(Request("watch"))  # before the screen comes up: until then it would count as attending
         sitting = attend(
             SocketFeed(peer), again=again, silent=not look.bell, colors=look.colors, browser=browser, begins=begins,
-            earlier=earlier,
+            earlier=earlier, folder=again.removeprefix(AGAIN),
         )  # fmt: skip
         return Left(sitting.last, sitting.detached, max(sitting.status - 128, 0), sitting.next_run)
 

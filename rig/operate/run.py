@@ -18,7 +18,7 @@ from rig.errors import LinkError, RigError
 from rig.link.front_end_messages import Request, Snapshot
 from rig.link.live_runs import Run, find_run, live_runs
 from rig.link.sockets import connect
-from rig.operate.front_ends import Console, FrontEnd, forget_keys, progress_bar
+from rig.operate.front_ends import AGAIN, Console, FrontEnd, forget_keys, progress_bar
 from rig.operate.headless import Headless, check_alive
 from rig.operate.last_page import no_report_option, write_page
 from rig.operate.screen_options import look_of, screen_options
@@ -192,7 +192,7 @@ def follow(run: Run, front: FrontEnd, *, report: bool = False) -> int:
     `report`: then also the campaign's page, which changes nothing of that status.
     """
     peer = connect(Path(run.socket), "the controller")
-    again = f"rig console {run.folder}"
+    again = f"{AGAIN}{run.folder}"
     try:
         left = front(peer, again)
     finally:

@@ -58,6 +58,8 @@ def _fits(path: str, identity: str, found: Mapping[str, Any]) -> Iterator[Entry]
                 "against": str(fit.get("voltage", "")),
                 "parameters": parameters,
                 "rmse": finite(fit.get("rmse")),
+                "chi2_per_dof": finite(fit.get("chi2_per_dof")),
+                "chi2_p": finite(fit.get("chi2_p")),
                 "calibration": str(fit.get("calibration", "")),
             },
             recordings=_texts(fit["recordings"]),

@@ -11,7 +11,7 @@ from rig.console.view_model.view import View
 from rig.link.front_end_messages import RequestKind, Snapshot
 from rig.sequence.requests import ASKED
 
-PageName = Literal["main", "fit", "time", "log", "results", "diagnosis", "bench"]
+PageName = Literal["main", "fit", "time", "log", "results", "diagnosis", "bench", "history"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +35,7 @@ PAGES: Final = (
     Page("results", "table", "results", "the table of results"),
     Page("diagnosis", "physics", "diagnosis", "the diagnosis"),
     Page("bench", "bench", "bench", "devices, and how well each is heard"),
+    Page("history", "history", "history", "what was measured before; compare two"),
 )
 """In the order of their digits, from 1."""
 

@@ -20,7 +20,7 @@ EVERY_KEY: Final = (
 
 def page_of(view: View, chosen: str) -> str:
     """`preflight`, `live` or a page of its own: the operator's choice; `main` is the preflight list at first."""
-    if chosen in ("results", "diagnosis", "bench"):
+    if chosen in ("results", "diagnosis", "bench", "history"):
         return chosen
     before = view.snapshot is None or view.snapshot.state in ("connecting", "preflight")
     return "preflight" if before and chosen == "main" else "live"

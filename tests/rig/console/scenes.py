@@ -11,6 +11,7 @@ from rig.console.app import ConsoleApp
 from rig.console.view_model.answers import Answer, answer_of, fault_of
 from rig.link.front_end_messages import LogLine, Progress, Snapshot, Watching
 from tests.rig.console.feeds import CHECKS, DEVICES, LOG, ManualClock, PlayedFeed, campaign, running, snapshot
+from tests.rig.console.past import TELLS_PAST
 from tests.rig.console.told import EXPLAINED, ambiguous, message, unexplained
 
 
@@ -100,6 +101,8 @@ SCENES = {
                        doing="diagnosing T2.h5: 12 s, looking for effects: dead band   (Escape ends it)"),
     "diagnoses": Scene(campaign(), keys=("6",), answers=(fault_of(("T9.h5",), "T9.h5: no such file"), *ANSWERS)),
     "next_sweep": Scene(campaign(), keys=("6", "s"), answers=ANSWERS),
+    "history": Scene((campaign()[-1],), keys=("8", "down", "down", "space", "down", "down")),
+    "compare": Scene((campaign()[-1],), keys=("8", "down", "down", "space", "end", "enter")),
     "end": Scene(campaign()),
     "tripped": Scene((running("done", outcome="tripped", stop_confirmed=True, command=0.0,
                               cause="motor.current 41.2 A is above its limit of 40 A."),)),
@@ -115,7 +118,10 @@ def prepare(scene: Scene, colors: str = "full") -> tuple[ConsoleApp, Callable[[P
         await settle(pilot, lambda: app.state.snapshot is scene.snapshots[-1])
         app.answers, app.begins = scene.answers, True
         app.tell_of(scene.doing)
-        await pilot.press(*scene.keys)
+        app.catalogue = TELLS_PAST
+        for key in scene.keys:
+            await pilot.press(key)
+            await settle(pilot, lambda: not app.looks_back)
         if scene.gone:
             feed.end()
             await settle(pilot, lambda: not app.state.connected)

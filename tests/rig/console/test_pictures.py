@@ -8,7 +8,7 @@ from tests.rig.console.scenes import SCENES, prepare
 
 FEW_COLORS = ("preflight_failed", "mismatch", "limit", "paused", "wait", "stop_not_confirmed", "disconnected", "note",
               "leave_attended", "end", "bench_trouble", "palette_not_now", "channels", "misfit",
-              "mismatch_time", "diagnoses", "next_sweep")  # fmt: skip
+              "mismatch_time", "diagnoses", "next_sweep", "history", "compare")  # fmt: skip
 """Scenes that are told by colour where there is one: each has a word or a sign too."""
 
 

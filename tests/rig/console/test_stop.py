@@ -29,7 +29,7 @@ STATES = {
 @pytest.mark.parametrize("state", STATES)
 async def test_on_every_page_in_every_state(state):
     async with sitting(STATES[state]) as desk:
-        for page in "1234567":
+        for page in "12345678":
             for key in ("ctrl+c", "f9"):
                 before = len(desk.kinds())
                 await desk.press(page, key)
