@@ -39,7 +39,7 @@ from rig.console.view_model.view import View
 from rig.visible_text import visible
 
 CATALOGUE: Final = (sys.executable, "-m", "rig.catalogue.beside_console")
-HINT: Final = "Space marks, Enter or c compares the marked one with this one, u reads again"
+HINT: Final = "Space marks, Enter compares, u reads again"
 LINES: Final = 2
 """Of the panel that are no rows: heading and hint."""
 

@@ -29,9 +29,10 @@ def commands(bench: LiveBench) -> list[float]:
     return [line["value"] for line in bench.truth() if line["event"] == "command" and line["value"]]
 
 
-def until_count(screen: Terminal, text: str, count: int) -> None:
+def until_after(screen: Terminal, mark: str, text: str) -> None:
+    """Wait until `text` has been drawn after `mark`."""
     deadline = time.monotonic() + 60.0
-    while screen.lines.count(text) < count:
+    while text not in screen.lines.partition(mark)[2]:
         assert time.monotonic() < deadline, screen.lines[-3000:]
         time.sleep(0.1)
 
@@ -52,9 +53,9 @@ def test_s_leads_to_the_preflight_of_the_sweep_and_only_f5_turns_the_motor(tmp_p
         before = commands(bench)
         assert before
         screen.press(DOWN + ENTER)
-        screen.until(b"next: ")
+        screen.until(b"next: /")
         screen.press(F5 * 3)  # while no console is there
-        until_count(screen, READY, 2)
+        until_after(screen, "next: /", READY)
         (sweep,) = (tmp_path / "out").glob("*/next-T1.toml")
         assert load_campaign(sweep).thrusters == ("T1",)
         time.sleep(3.0)
@@ -62,7 +63,7 @@ def test_s_leads_to_the_preflight_of_the_sweep_and_only_f5_turns_the_motor(tmp_p
         screen.press(F5)
         bench.until_held(5.4, 0.5)
         screen.press(b"\x03")
-        until_count(screen, "ABORTED", 1)
+        until_after(screen, "next: /", "ABORTED")
         screen.press(b"d")
         process.wait(60)
     assert len(list((tmp_path / "out").iterdir())) == 2

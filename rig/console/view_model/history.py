@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from math import floor, log10
 from typing import Any, Final, Literal
 
 from rich.cells import cell_len, set_cell_size
@@ -152,7 +153,9 @@ def compared_text(told: Mapping[str, Any]) -> Text:
     for number, fit in enumerate(told["fits"], 1):
         text.append(f"\n{number}  {fit['began'] or 'no date'}  {visible(str(fit['source']))}\n")
         for name, p in fit["parameters"].items():
-            text.append(f"   {name} = {p['value']:.6g} ± {p['expanded_k2']:.2g} {visible(str(p['unit']))} (k = 2)\n")
+            digits = min(max(1 - floor(log10(p["expanded_k2"])), 0), 9) if p["expanded_k2"] > 0 else 6
+            value, uncertainty = f"{p['value']:.{digits}f}", f"{p['expanded_k2']:.{digits}f}"
+            text.append(f"   {name} = {value} ± {uncertainty} {visible(str(p['unit']))} (k = 2)\n")
     for pair in told["pairs"]:
         low, high = pair["relative_interval_95"]
         text.append(f"\n{pair['coefficient']}: {100 * pair['relative']:+.3f} % (95 %: {100 * low:+.3f} to ")

@@ -51,6 +51,7 @@ MISMATCH = LogLine(
     "it; the zero at rest has not moved with it",
 )
 
+PAST_END = replace(campaign()[-1], files=("recordings/autumn-2/T1.h5", "recordings/autumn-2/T2.h5"))
 ANSWERS = (
     answer_of(("recordings/2026-11-21_1502_T1.h5",), message(EXPLAINED)),
     answer_of(("recordings/2026-11-21_1506_T3.h5",), message(ambiguous("T3"))),
@@ -101,8 +102,8 @@ SCENES = {
                        doing="diagnosing T2.h5: 12 s, looking for effects: dead band   (Escape ends it)"),
     "diagnoses": Scene(campaign(), keys=("6",), answers=(fault_of(("T9.h5",), "T9.h5: no such file"), *ANSWERS)),
     "next_sweep": Scene(campaign(), keys=("6", "s"), answers=ANSWERS),
-    "history": Scene((campaign()[-1],), keys=("8", "down", "down", "space", "down", "down")),
-    "compare": Scene((campaign()[-1],), keys=("8", "down", "down", "space", "end", "enter")),
+    "history": Scene((PAST_END,), keys=("8", "down", "down", "space", "down", "down")),
+    "compare": Scene((PAST_END,), keys=("8", "down", "down", "space", "end", "enter")),
     "end": Scene(campaign()),
     "tripped": Scene((running("done", outcome="tripped", stop_confirmed=True, command=0.0,
                               cause="motor.current 41.2 A is above its limit of 40 A."),)),
