@@ -1,7 +1,7 @@
 """Lines of a model as a person types them in: pieces that several terms write.
 
 Python with numpy's names; `d(a)/dt = ..., a(0) = ...` is a differential equation with its value where the run begins,
-and `delayed`, `play`, `since_opposite`, `since_turned` and `curve` say beside them what they are.
+and `delayed`, `play`, `since_opposite`, `since_turned`, `clipped_mean` and `curve` say beside them what they are.
 """
 
 from __future__ import annotations

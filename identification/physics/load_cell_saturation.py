@@ -1,7 +1,8 @@
 """Cell or amplifier clips: clip(F, -limit, limit); or shows less and less from an onset on, until a knee is passed.
 
 An amplifier or a converter that clips takes the noise with it. A cell on its stop does not: what the amplifier behind
-it adds goes on, so that silence speaks for a clip but noise does not speak against it.
+it adds goes on, so that silence speaks for a clip but noise does not speak against it. Where a sample is the mean of
+many conversions, each clips with a noise of its own, which the samples do not show.
 """
 
 from __future__ import annotations
@@ -24,6 +25,9 @@ LEAST_MOVE = 1e-6
 """Of the limit: what moves less within an interval stands still."""
 LEAST_BLUR = 0.01
 """The same, of the noise."""
+MOST_NOISE, LEAST_NOISE = 0.3, 1e-3
+"""Of the largest reading: of a conversion. More makes a limit another curve, less is a limit met at once."""
+NOISE_TOLD = "the noise of a conversion"
 LOWEST_KNEE = 0.25
 """Of the largest reading: what bends from less on is no limit, but another curve."""
 
@@ -61,12 +65,12 @@ class LoadCellSaturation:
         told_by=(("rotation_rate", "the measured rotation rate"), ("current", "the measured current")),
         revealed_by="current or rotation rate at the highest levels: they go on rising",
     )
-    form: Literal["hard", "before_noise", "knee"] = "hard"
+    form: Literal["hard", "before_noise", "averaged", "knee"] = "hard"
 
     @property
     def sharp(self) -> bool:
-        """Whether readings end at one value, and not over a knee."""
-        return self.form != "knee"
+        """Whether readings end at one value, and not over a knee, or the more the noise of a conversion."""
+        return self.form in ("hard", "before_noise")
 
     @property
     def silent(self) -> bool:
@@ -77,6 +81,9 @@ class LoadCellSaturation:
         most = 1.3 * scale.reading
         if self.sharp:
             return (Parameter("limit", "N", 0.1 * scale.reading, most, most),)
+        if self.form == "averaged":
+            noise = Parameter("noise", "N", LEAST_NOISE * scale.reading, MOST_NOISE * scale.reading, told=NOISE_TOLD)
+            return Parameter("limit", "N", 0.1 * scale.reading, most, most), noise
         bend = Parameter("bend", "1/N", 0.0, 50.0 / scale.reading, 0.0)
         return bend, Parameter("onset", "N", LOWEST_KNEE * scale.reading, 0.98 * scale.reading)
 
@@ -84,6 +91,8 @@ class LoadCellSaturation:
         if self.sharp:
             shares = (0.99, 0.95, 0.88, 0.75, 0.6) if self.silent else (0.95, 0.88, 0.75, 0.6)
             return tuple((share * scale.reading,) for share in shares)
+        if self.form == "averaged":
+            return tuple((share * scale.reading, 0.02 * scale.reading) for share in (0.99, 0.95, 0.88, 0.75))
         return tuple((0.5 / scale.reading, share * scale.reading) for share in (0.3, 0.5, 0.7, 0.88))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
@@ -101,7 +110,8 @@ class LoadCellSaturation:
             bent: Floats = np.copysign(limited(np.abs(reading), spread, *theta), reading) - now.tare
             return bent
         out = value.copy()
-        for share, std in ((1 - tails, noise), (tails, TAIL * noise)):
+        each = ((1.0, theta[1]),) if self.form == "averaged" else ((1 - tails, noise), (tails, TAIL * noise))
+        for share, std in each:
             if share > 0:
                 over = value + now.tare - theta[0]
                 under = -theta[0] - value - now.tare
@@ -113,6 +123,8 @@ class LoadCellSaturation:
         if self.form == "knee":
             return slope_at(np.abs(reading), *theta)
         half = _half_moved(history, C, x)
+        if self.form == "averaged":
+            half = np.hypot(half, np.sqrt(3) * theta[1])
         # limit - half share^2 is the clipped mean of an even motion
         short = np.maximum(theta[0] - np.abs(reading), 0.0)
         out: Floats = np.sqrt(np.minimum(short / np.maximum(half, LEAST_MOVE * theta[0]), 1.0))
@@ -123,16 +135,23 @@ class LoadCellSaturation:
         beyond = np.abs(reading) - self.start(theta)
         if self.sharp:
             return np.where(beyond > 0, 0.0, 1.0)
+        if self.form == "averaged":
+            return np.asarray(ndtr((theta[0] - np.abs(reading)) / theta[1]), dtype=np.float64)
         out: Floats = np.clip(1 - theta[0] * np.maximum(beyond, 0.0), 0.0, 1.0)
         return out
 
     def start(self, theta: tuple[float, ...]) -> float:
         """N: where the cell begins to show less."""
+        if self.form == "averaged":
+            return theta[0] - 2 * theta[1]
         return theta[0] if self.sharp else theta[1]
 
     def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
-        if not self.sharp:
+        if self.form == "knee":
             return "F = F + tare", *knee("F", *theta), "F = F - tare"
+        if self.form == "averaged":
+            what = "the mean of clip(F + e, -limit, limit), e normal of standard deviation noise"
+            return (f"F = clipped_mean(F + tare, {theta[0]:.6g}, {theta[1]:.6g}) - tare  # (F, limit, noise): {what}",)
         noise = "each sample with its noise" if self.silent else "before the noise of the amplifier"
         return (f"F = clip(F + tare, -{theta[0]:.6g}, {theta[0]:.6g}) - tare  # {noise}",)
 
@@ -140,6 +159,11 @@ class LoadCellSaturation:
         advice = "change the range of the amplifier or the cell"
         if self.sharp:
             return f"Load-cell saturation: readings end at +-{theta[0]:.4g} N; {advice}."
+        if self.form == "averaged":
+            return (
+                f"Load-cell saturation: each conversion that a sample is the mean of ends at +-{theta[0]:.4g} N, with "
+                f"{theta[1]:.2g} N of noise of its own; {advice}."
+            )
         return f"Load-cell saturation: from {theta[1]:.4g} N on readings show less and less of the force; {advice}."
 
 
@@ -149,4 +173,9 @@ def _half_moved(history: History, C: float, x: Floats) -> Floats:
     return out
 
 
-FORMS = (LoadCellSaturation("hard"), LoadCellSaturation("before_noise"), LoadCellSaturation("knee"))
+FORMS = (
+    LoadCellSaturation("hard"),
+    LoadCellSaturation("before_noise"),
+    LoadCellSaturation("averaged"),
+    LoadCellSaturation("knee"),
+)

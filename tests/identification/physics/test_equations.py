@@ -69,6 +69,7 @@ PLAIN = {
     ("zero_offset", ""): (-2.3, 7.77),
     ("load_cell_saturation", "hard"): (51.3,),
     ("load_cell_saturation", "before_noise"): (51.3,),
+    ("load_cell_saturation", "averaged"): (51.3, 2.3),
     ("load_cell_saturation", "knee"): (0.031, 33.1),
 }
 """Values that are plain to see."""

@@ -33,6 +33,18 @@ def test_a_clipping_cell_shows_the_mean_of_samples_that_clip_one_by_one():
     assert hard == pytest.approx(np.clip(value + 7.0, -90.0, 90.0) - 7.0)
 
 
+def test_conversions_that_clip_one_by_one_before_their_mean_is_taken():
+    """Monte Carlo: the samples' own noise is small, that of the conversions is not."""
+    value = np.linspace(-110.0, 110.0, 41)
+    form, still = term("load_cell_saturation", "averaged"), np.zeros(41)
+    got = form.apply(value, moment(H, replace(S, noise=0.5), tare=7.0, x=still), (90.0, 5.0))
+    noise = 5.0 * np.random.default_rng(3).standard_normal((41, 40_000))
+    expected = np.clip(value[:, None] + 7.0 + noise, -90.0, 90.0).mean(axis=1) - 7.0
+    assert got == pytest.approx(expected, abs=5 * 5.0 / 200)
+    passed = (np.abs(value[:, None] + 7.0 + noise) < 90.0).mean(axis=1)
+    assert form.slope(value + 7.0, (90.0, 5.0)) == pytest.approx(passed, abs=0.02)
+
+
 def of_levels(level, thrust):
     """A run of levels of one second each with their samples (n, 100)."""
     n = level.size

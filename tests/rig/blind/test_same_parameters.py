@@ -126,7 +126,7 @@ def test_an_order_of_the_rotor_has_its_size_at_the_speed_that_the_finding_says()
     assert true_values("periodic_disturbance", "rotation", mains) == {}
 
 
-@pytest.mark.parametrize("form", ["hard", "before_noise"])
+@pytest.mark.parametrize("form", ["hard", "before_noise", "averaged"])
 def test_a_limit_is_the_same_wherever_the_noise_comes_in_and_a_soft_one_is_none(form):
     for where in ({}, {"place": "cell"}):
         assert true_values("load_cell_saturation", form, sealed(load_cell_saturation={"limit": 40.0} | where)) == {

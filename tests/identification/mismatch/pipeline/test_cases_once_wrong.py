@@ -6,9 +6,19 @@ import numpy as np
 
 from identification.mismatch.diagnosis import Diagnosis, Finding
 from identification.mismatch.pipeline import diagnose
+from identification.recording import Channel, Floats
 from sim_devices import concealed
 from sim_devices.concealed import Case
 from tests.concealed.recordings import recording
+from tests.identification.diagnosed_runs import levels, run
+
+
+def turned(seed: int, seconds: float) -> tuple[Floats, Floats]:
+    """s and rev/s: two turns for each volt, read ten times a second."""
+    start, level = levels(seed, seconds)
+    t = np.arange(0.05, seconds, 0.1)
+    at = np.maximum(np.searchsorted(start, t, side="right") - 1, 0)
+    return t, 2.0 * level[at] + 0.01 * np.random.default_rng(seed).standard_normal(t.size)
 
 
 def only_finding(case: Case) -> Finding:
@@ -112,3 +122,21 @@ def test_a_cell_on_its_stop_is_named_whose_noise_comes_after() -> None:
     assert (finding.effect, finding.form) == ("load_cell_saturation", "before_noise")
     low, high = finding.parameters["limit"].interval
     assert low < case.effects[0].parameters["limit"] < high
+
+
+def test_conversions_that_clip_before_they_are_averaged_are_one_limit() -> None:
+    """A limit met at once and a bent cell stood for it, the limit and C seven and four standard errors off."""
+    limit, each, conversions = 70.0, 1.6, 16
+
+    def averaged(_t: Floats, _V: Floats, F: Floats) -> Floats:
+        noise = each * np.random.default_rng(5).standard_normal((F.size, conversions))
+        return np.clip(F[:, None] + 1.5 + noise, -limit, limit).mean(axis=1) - 1.5
+
+    rate = Channel("rotation_rate", "motor", "rotation_rate", "rev/s", *turned(seed=0, seconds=300.0))
+    found = diagnose([run(change=averaged, seconds=300.0, noise=0.01, extra=(rate,))])
+    assert isinstance(found, Diagnosis)
+    (finding,) = found.findings
+    assert (finding.effect, finding.form, found.verdict) == ("load_cell_saturation", "averaged", "explained")
+    for name, truth in (("limit", limit), ("noise", each)):
+        low, high = finding.parameters[name].interval
+        assert low < truth < high
