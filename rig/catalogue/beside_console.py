@@ -30,7 +30,7 @@ from rig.catalogue.refresh import refresh
 from rig.catalogue.selection import Filter, recordings_of, selected
 from rig.errors import ConfigError, RigError
 
-CHUNK: Final = 250
+CHUNK: Final = 100
 """Rows in one line: what the console reads between two turns of its screen."""
 MISFIT_P: Final = 1e-3
 """As in the table at the end of a campaign."""

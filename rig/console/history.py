@@ -207,9 +207,11 @@ class HistoryApp(LeavingApp, inherit_bindings=False):
                 new += found
                 wide = widths(found, wide)
                 panel.says = _says(message, len(new), Path(self.output).name)
+                in_sight = not found or len(panel.rows.all) < panel.rows.top + panel.room
                 if found and len(new) > len(panel.rows.all):
                     panel.rows, panel.wide = replace(panel.rows, all=tuple(new)), wide
-                panel.show()
+                if in_sight:  # a drawing costs more than reading a hundred rows
+                    panel.show()
             if "end" in message:
                 panel.rows, panel.wide = moved(Rows(tuple(new)), 0, panel.room), wide
 
