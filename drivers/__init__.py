@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from drivers import keller, line_stream, mt_sics, nortek_nmea, vesc_can
+from drivers import keller, line_stream, modbus_cell, modbus_cell_options, mt_sics, nortek_nmea, vesc_can
 from drivers.protocols import Instrument
 
 
@@ -30,6 +30,7 @@ class Kind:
 KINDS: dict[str, Kind] = {
     "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial"),
     "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial"),
+    "modbus_cell": Kind(modbus_cell_options.Options, modbus_cell.ModbusCell, "serial"),
     "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial"),
     "keller": Kind(keller.Options, keller.Keller, "serial", over_wire=False),
     "vesc_can": Kind(vesc_can.Options, vesc_can.VescCan, "can"),

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from typing import Literal
 
 from drivers.errors import DeviceError, LinkError
+from drivers.force_units import NEWTONS_PER_UNIT
 from drivers.mt_sics_lines import (
     INTERNAL_FAULTS,
     LINE_CHARACTERS,
-    NEWTONS_PER_UNIT,
     Decoder,
     Fault,
     Record,

@@ -11,21 +11,9 @@ import math
 import re
 from typing import NamedTuple
 
+from drivers.force_units import NEWTONS_PER_UNIT
 from drivers.ports.lines import LineCutter, printable
 
-STANDARD_GRAVITY = 9.80665
-"""m/s^2, exact by definition (BIPM SI brochure, 9th ed., CGPM 1901): what balances are adjusted with."""
-POUND = 0.453_592_37
-"""kg, exact (international avoirdupois pound)."""
-NEWTONS_PER_UNIT = {
-    "N": 1.0,
-    "mg": 1e-6 * STANDARD_GRAVITY,
-    "g": 1e-3 * STANDARD_GRAVITY,
-    "kg": STANDARD_GRAVITY,
-    "t": 1e3 * STANDARD_GRAVITY,
-    "lb": POUND * STANDARD_GRAVITY,
-    "oz": POUND / 16.0 * STANDARD_GRAVITY,
-}
 LINE_CHARACTERS = 18
 """`S D   1234.567 N` CR LF (2.1.2.1)."""
 INTERNAL_FAULTS = {

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers import keller, line_stream, mt_sics_lines, nortek_nmea, vesc_frames
+from drivers import keller, line_stream, modbus_rtu, mt_sics_lines, nortek_nmea, vesc_frames
 from drivers.ports.can_frame import Frame
 from rig.errors import LinkError
 from rig.link.framing import HEADER, decode, encode
@@ -39,6 +39,14 @@ CAN = tuple(
         (27, bytes(8)),
         (18, b"\x07"),
         (8, bytes([7, 0, 51, 0, 0, 4, 0, 1])),
+    )
+)
+MODBUS = tuple(
+    bytes.fromhex(frame)
+    for frame in (
+        "01 03 10 08 80 00 00 30 39 00 00 2e e0 00 00 00 00 00 03 d0 78",
+        "01 83 02 c0 f1",
+        "01 03 00 06 00 08 a4 0d",
     )
 )
 REGISTERS = (b"\x3f\x80\x00\x00", b"\x7f\x80\x00\x00")
@@ -70,6 +78,14 @@ def _registers(data: bytes) -> Any:
     return keller.decode_float(words[:2]) if len(words) >= 2 else None
 
 
+def _modbus(data: bytes) -> Any:
+    """A new reply to the same request each time, with a checksum that is right in every other one."""
+    decoder = modbus_rtu.Decoder()
+    decoder.expect(modbus_rtu.Read(1, 3, 6, 8))
+    records = decoder.feed(modbus_rtu.framed(data[:-2]) if len(data) % 2 else data)
+    return [records, decoder.unanswered()]
+
+
 def decoders() -> dict[str, tuple[tuple[bytes, ...], Decode, bool]]:
     """Name -> seeds, the decoder, and whether its numbers must be finite."""
     cell, flow = mt_sics_lines.Decoder(), nortek_nmea.Decoder()
@@ -80,6 +96,7 @@ def decoders() -> dict[str, tuple[tuple[bytes, ...], Decode, bool]]:
         "Nortek NMEA": (NMEA, flow.feed, True),
         "line stream": (STREAM, lines.feed, True),
         "line stream, counts": (STREAM, counts.feed, True),
+        "Modbus RTU": (MODBUS, _modbus, True),
         "VESC on CAN": (CAN, _frame, True),
         "Keller registers": (REGISTERS, _registers, False),
         "frames of the sockets": (MESSAGES, _link, False),

@@ -190,6 +190,8 @@ def _device(path: Path, name: str, table: Table) -> DeviceConfig:
     kind, found, rest = _choice(KINDS, table, path, prefix)
     if isinstance(rest.get("port"), str):
         rest["port"] = _resolved(rest["port"], path)
+    if isinstance(rest.get("map"), str) and rest["map"].endswith(".toml"):
+        rest["map"] = str((path.parent / rest["map"]).resolve())
     return DeviceConfig(name, kind, decode(found.options, rest, path, prefix))
 
 

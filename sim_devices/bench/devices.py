@@ -11,6 +11,8 @@ from sim_devices.bench.settings import DeviceOptions
 from sim_devices.instruments.button import Button, ButtonOptions
 from sim_devices.instruments.keller import Keller, KellerOptions
 from sim_devices.instruments.line_sender import LineOptions, LineSender
+from sim_devices.instruments.modbus_cell import ModbusCell
+from sim_devices.instruments.modbus_registers import ModbusCellOptions
 from sim_devices.instruments.mt_sics import MtSics
 from sim_devices.instruments.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.nortek import Nortek, NortekOptions
@@ -46,6 +48,8 @@ def serial_device(
             return Nortek(options, lambda: world.sample("flow_speed"), lambda: std * cross.draw(), epoch)
         case KellerOptions():
             return Keller(options, lambda: world.sample("pressure"), lambda: world.sample("water_temperature"))
+        case ModbusCellOptions():
+            return ModbusCell(options, read)
         case VescOptions():
             raise ValueError("a motor controller is no serial device: it is on a bus")
 
@@ -57,7 +61,7 @@ def turnaround(options: DeviceOptions) -> float:
     so that the last piece ends half of it later.
     """
     match options:
-        case KellerOptions():
+        case KellerOptions() | ModbusCellOptions():
             return options.turnaround
         case MtSicsOptions() | LineOptions() if options.average > 1:
             return 0.5 / (options.rate * options.average)

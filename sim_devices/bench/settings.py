@@ -11,6 +11,7 @@ from typing import Any
 from sim_devices.instruments.button import ButtonOptions
 from sim_devices.instruments.keller import KellerOptions
 from sim_devices.instruments.line_sender import LineOptions
+from sim_devices.instruments.modbus_registers import ModbusCellOptions
 from sim_devices.instruments.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.nortek import NortekOptions
 from sim_devices.instruments.vesc import VescOptions
@@ -18,13 +19,16 @@ from sim_devices.tables import WorldError, build, check_known
 from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin
 
-DeviceOptions = MtSicsOptions | LineOptions | ButtonOptions | NortekOptions | KellerOptions | VescOptions
+DeviceOptions = (
+    MtSicsOptions | LineOptions | ButtonOptions | NortekOptions | KellerOptions | ModbusCellOptions | VescOptions
+)
 KINDS: dict[str, type[DeviceOptions]] = {
     "mt_sics": MtSicsOptions,
     "line": LineOptions,
     "button": ButtonOptions,
     "nortek": NortekOptions,
     "keller": KellerOptions,
+    "modbus_cell": ModbusCellOptions,
     "vesc": VescOptions,
 }
 MAX_STEP = 0.005

@@ -3,9 +3,7 @@
 Source: Keller, Communication Protocol for series 30 X, X-line, version 3.7: holding registers by function 3, one
 float32 in two registers, high word first: 0x0000 CH0, 0x0002 P1 (bar), 0x0004 P2 (bar), 0x0006 T (degC),
 0x0008 TOB1 (degC), 0x000A TOB2 (degC), and the same block again from 0x0100. Function 8 sub-function 0 echoes.
-Modbus over serial line V1.02: CRC-16, polynomial 0xA001 reflected, start 0xFFFF, low byte first; a frame ends with
-3.5 characters of silence; a frame with a wrong CRC or another address is not answered. Exceptions: 1 function,
-2 address, 3 value.
+Frames: modbus_frames.py. Exceptions: 1 function, 2 address, 3 value.
 """
 
 from __future__ import annotations
@@ -15,17 +13,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from math import inf
 
+from sim_devices.wires.modbus_frames import Requests, framed
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT
 
 BLOCK = 12
 """registers in the block of measured values."""
 MIRROR = 0x0100
 READ, DIAGNOSTICS = 3, 8
-FRAME = 8
-"""bytes of every request this slave understands."""
-GAP = 0.05
-"""s of silence after which half a frame is forgotten. 3.5 characters at 9600 baud are 4 ms; a pty has no line to keep
-bytes together, so the gap allows for the host's scheduling."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,21 +38,6 @@ class KellerOptions:
             raise ValueError(f"address must be 1..247 (Modbus), got {self.address}")
 
 
-def crc16(data: bytes) -> int:
-    """Modbus CRC; sent low byte first."""
-    crc = 0xFFFF
-    for byte in data:
-        crc ^= byte
-        for _ in range(8):
-            crc = (crc >> 1) ^ 0xA001 if crc & 1 else crc >> 1
-    return crc
-
-
-def framed(body: bytes) -> bytes:
-    """An answer with its CRC, low byte first."""
-    return body + struct.pack("<H", crc16(body))
-
-
 class Keller:
     """One transmitter. `pressure` gives Pa, `temperature` degC; NaN is sent as the NaN of float32."""
 
@@ -66,27 +45,14 @@ class Keller:
 
     def __init__(self, options: KellerOptions, pressure: Callable[[], float], temperature: Callable[[], float]) -> None:
         self._options, self._pressure, self._temperature = options, pressure, temperature
-        self._buffer = b""
-        self._heard = -inf
+        self._requests = Requests()
         self._fault = ""
         self._values = self._measure()
 
     due = inf
 
     def feed(self, data: bytes, t: float) -> bytes:
-        if t - self._heard > GAP:
-            self._buffer = b""
-        self._heard = t
-        self._buffer += data
-        out = b""
-        while len(self._buffer) >= FRAME:
-            frame, rest = self._buffer[:FRAME], self._buffer[FRAME:]
-            if crc16(frame) != 0:  # a frame with its own CRC appended leaves 0
-                self._buffer = self._buffer[1:]
-                continue
-            self._buffer = rest
-            out += self._reply(frame)
-        return out
+        return b"".join(self._reply(frame) for frame in self._requests.feed(data, t))
 
     def tick(self, _t: float) -> bytes:
         """A slave speaks when it is spoken to."""

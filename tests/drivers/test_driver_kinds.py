@@ -11,6 +11,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands():
     options = {
         "mt_sics": {"port": "p", "rate": 10.0},
         "line_stream": {"port": "p", "pattern": r"(?P<value>\d+)", "rate": 10.0, "line_characters": 10},
+        "modbus_cell": {"port": "p", "map": "laumas", "rate": 10.0, "unit": "kg", "decimals": 3},
         "nortek_nmea": {"port": "p", "rate": 4.0},
         "keller": {"port": "p"},
         "vesc_can": {"bus": "b", "vesc_id": 1, "pole_pairs": 7, "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5},
