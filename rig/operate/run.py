@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 import time
@@ -238,6 +239,8 @@ def _conclude(last: Snapshot, folder: Path) -> int:
     click.echo(f"rig: the campaign ended {outcome}: {cause}", err=True)
     if last.stop_confirmed is False:
         click.echo("rig: STOP NOT CONFIRMED by a measurement: look at the propeller, cut the supply", err=True)
+    if last.files:
+        click.echo(f"to go on at the first step that is not measured: rig resume {shlex.quote(str(folder))}", err=True)
     return 1
 
 

@@ -29,8 +29,8 @@ FLAGS = (
 )
 PATIENCE = 60.0
 """s for anything to come about."""
-KEYS = {"F5": 116, "F9": 120, "l": 76, "d": 68, "n": 78, "Enter": 13, "c": 67}
-"""Virtual key codes, which xterm.js reads."""
+KEYS = {"F5": 116, "F9": 120, "Enter": 13}
+"""Virtual key codes, which xterm.js reads; that of a letter or digit is its capital's."""
 CTRL = 2
 
 
@@ -94,8 +94,8 @@ class Page:
 
     async def press(self, key: str, modifiers: int = 0) -> None:
         """As from a keyboard."""
-        word = {"key": key, "code": key if len(key) > 1 else f"Key{key.upper()}", "modifiers": modifiers}
-        word |= {"windowsVirtualKeyCode": KEYS[key]}
+        word = {"key": key, "code": key if len(key) > 1 else _code(key), "modifiers": modifiers}
+        word |= {"windowsVirtualKeyCode": KEYS.get(key) or ord(key.upper())}
         letter = {"text": key} if len(key) == 1 and not modifiers else {}
         await self.call("Input.dispatchKeyEvent", type="keyDown", **word, **letter)
         await self.call("Input.dispatchKeyEvent", type="keyUp", **word)
@@ -103,6 +103,10 @@ class Page:
     async def picture(self, path: Path) -> None:
         data = await self.call("Page.captureScreenshot", format="png")
         path.write_bytes(base64.b64decode(data["data"]))
+
+
+def _code(key: str) -> str:
+    return f"Digit{key}" if key.isdigit() else f"Key{key.upper()}"
 
 
 class Browser:

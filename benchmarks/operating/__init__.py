@@ -1,0 +1,1 @@
+"""In: keys. Out: what stood on the screen, and what the motor did."""

@@ -1,0 +1,197 @@
+"""The day of one operator at one terminal: from `rig init` to the comparison of fits."""
+
+from __future__ import annotations
+
+import re
+import time
+import tomllib
+from dataclasses import dataclass
+
+from benchmarks.operating.at_keys import DayError, Operator
+from benchmarks.operating.place import Place
+from benchmarks.operating.preparing import STOP_WITHIN
+
+READY = r"All \d+ checks done.*Press F5 to start"
+HOLDS = r"hold [+-][\d.]+"
+DIAGNOSED = 420.0
+"""s that a diagnosis may take on a busy machine."""
+
+
+@dataclass
+class Day:
+    """One operator, his bench, and the campaign's folder once there is one."""
+
+    operator: Operator
+    place: Place
+    thrusters: tuple[str, ...]
+
+    def chapter(self, title: str) -> None:
+        self.operator.transcript.chapter(title)
+
+    def check_a_port_that_is_gone(self) -> None:
+        self.chapter("A device is unplugged: rig check says so, then it is plugged in")
+        self.place.tell("fault", "thermometer", "pulled")
+        self.operator.runs("rig check campaign.toml", "one sentence", "thermometer.*there is no such port", status=2)
+        self.place.tell("clear", "thermometer")
+
+    def edit(self) -> None:
+        """Thrusters and levels; a value beyond the bench's limit on the way."""
+        self.chapter("rig edit: the thrusters, and a level that the bench does not allow")
+        here = self.operator
+        here.types("rig edit campaign.toml", "the form, and its dry run", "rig edit", "holds")
+        here.goes_to("thrusters ", "Up")
+        here.presses("C-u", "the field is empty")
+        here.window.type(", ".join(self.thrusters))
+        here.goes_to("max ", "Down")
+        here.presses("C-u", "the field is empty")
+        here.window.type("30")
+        here.sees("30 V is more than the bench has", "PROBLEM", "30", keys="30")
+        here.presses("C-u", "emptied again")
+        here.window.type("16")
+        here.goes_to("levels ", "Down")
+        here.presses("C-u", "the field is empty")
+        here.window.type("2")
+        here.sees(
+            "the dry run is as wanted",
+            r"2 at 8 V.*; 1 at 16 V",
+            r"peak voltage\D+16",
+            "not saved",
+            keys="16, Down, C-u, 2",
+        )
+        here.presses("C-s", "saved", r"\[saved\]")
+        here.presses("C-q", "back at the shell", r"\$\s*\Z")
+        text = (self.place.folder / "campaign.toml").read_text(encoding="utf-8")
+        read = tomllib.loads(text)
+        if (read["campaign"]["thrusters"], read["plan"]["levels"]) != (list(self.thrusters), 2):
+            raise DayError(f"the campaign file is not as it was typed:\n{text}")
+        here.runs("rig check campaign.toml", "it may run", r"peak voltage\D+16", "holds")
+
+    def preflight(self) -> None:
+        """With a cable that comes out while one looks on."""
+        self.chapter("Preflight; the load cell's cable comes out, and is put back")
+        here, begun = self.operator, time.monotonic_ns()
+        here.types(
+            "clear; rig run campaign.toml; echo status=$?", "the preflight passes", READY, "load_cell calibration"
+        )
+        self.place.tell("fault", "load_cell", "pulled")
+        here.sees(
+            "it is said, and the key that helps",
+            "FAILED.*load_cell",
+            r"checks FAILED",
+            "r retry load_cell|retry load_cell",
+        )
+        here.presses("F5", "refused")
+        here.presses("4", "an event says why", "not started.*load_cell")
+        here.presses("1", "the preflight again", "FAILED")
+        self.place.tell("clear", "load_cell")
+        here.presses("r", "it is there again", READY)
+        if self.place.driven(begun):
+            raise DayError("the motor was driven before F5")
+        here.transcript.fact("by the truth log: nothing was driven before F5")
+
+    def first_thruster(self) -> None:
+        """Note, pause, a step taken again, a bad point."""
+        self.chapter(f"{self.thrusters[0]}: a note, a pause, a step taken again, a bad point")
+        here, name = self.operator, self.thrusters[0]
+        here.presses("F5", "the motor's own watchdog is proved first", "proving watchdog")
+        here.sees("a hold", f"{name} {HOLDS}")
+        self.place.until_driven()
+        here.presses("4", "all events", "events of this run")
+        here.presses("n", "a dialog for the note, the stop key on it", "Note for the recording", "STOP")
+        here.types("weed on the guard", "it is among the events", "note.*weed on the guard")
+        self._pause(name)
+        here.presses("t", "the step begins anew", "is taken again from its beginning")
+        held = re.search(HOLDS, here.window.screen())
+        here.sees("it has been measured, the next level", rf"{name} hold (?!{re.escape(held[0][5:] if held else '?')})")
+        here.presses("m", "its samples stay, no fit takes them", "marked bad by the operator: step")
+        here.presses("1", "readings, events and plots", "live readings", "campaign +T")
+
+    def _pause(self, name: str) -> None:
+        here, pressed = self.operator, time.monotonic_ns()
+        here.presses("p", "paused at once", "PAUSED at 0 V")
+        self.place.zero_after(pressed, STOP_WITHIN)
+        here.presses("r", "the step is taken again", "resumed: .*retaken", f"{name} {HOLDS}")
+        self.place.until_driven()
+
+    def trip(self) -> None:
+        """The load cell is lost while the second thruster turns."""
+        name = self.thrusters[min(1, len(self.thrusters) - 1)]
+        self.chapter(f"{name}: the load cell is lost while the propeller turns")
+        here = self.operator
+        here.sees("the next thruster", f"{name} {HOLDS}", within=120.0)
+        self.place.until_driven()
+        pulled = time.monotonic_ns()
+        self.place.tell("fault", "load_cell", "pulled")
+        here.sees("tripped, and why", "TRIPPED.*load_cell", "at rest", "Press d to leave", within=30.0)
+        self.place.zero_after(pulled, 1.0)
+        here.presses("d", "the table, the page, and how to go on", "to go on .*rig resume", "status=1", within=240.0)
+
+    def resume(self) -> None:
+        """First with the cable still out."""
+        self.chapter("rig resume: the cable is still out, then it is in")
+        here, folder = self.operator, self.place.campaign
+        here.runs(f"rig resume {folder}", "refused", "load_cell.*there is no such port", status=2)
+        self.place.tell("clear", "load_cell")
+        here.types(f"clear; rig resume {folder}; echo status=$?", "the preflight, of what is left", READY)
+        here.presses("F5", "on with it", "proving watchdog|tare")
+        here.sees("completed", "COMPLETED", "at rest", within=240.0)
+        self.place.until_still()
+
+    def diagnose(self) -> None:
+        self.chapter("g: what physics C V|V| leaves out")
+        here = self.operator
+        here.presses("g", "page 6, one recording after the other", "rig diagnose")
+        here.sees("an answer", r"(adequate|explained|ambiguous|unexplained)\.", within=DIAGNOSED)
+        here.sees("all answers", rf"{self.thrusters[-1]}\.h5", within=DIAGNOSED)
+        here.presses("d", "table, page, status 0", "status=0", "report: ", within=240.0)
+
+    def report(self) -> None:
+        """What the page at the end of the campaign says."""
+        self.chapter("The report")
+        text = (self.place.folder / self.place.campaign / "report.html").read_text(encoding="utf-8")
+        wanted = (
+            *self.thrusters,
+            "weed on the guard",
+            "marked bad by the operator",
+            "load_cell",
+            "tripped",
+            "A-2026-117",
+        )
+        missing = [word for word in wanted if word not in text]
+        if missing:
+            raise DayError(f"report.html does not have {missing}")
+        self.operator.transcript.fact(f"report.html, {len(text)} characters, has {', '.join(wanted)}")
+
+    def next_sweep(self) -> None:
+        """Of the first thruster: proposed, checked, run, diagnosed together."""
+        self.chapter("The next sweep: proposed, checked, run, diagnosed with the first")
+        here, name = self.operator, self.thrusters[0]
+        first = self.place.campaign / f"{name}.h5"
+        propose = f"rig diagnose {first} --plan next.toml --campaign campaign.toml"
+        here.runs(
+            f"{propose} | tail -25",
+            "what it separates, and its power",
+            "next experiment written to next.toml",
+            within=DIAGNOSED,
+        )
+        here.runs("rig check next.toml", "it may run", "holds")
+        here.types("clear; rig run next.toml; echo status=$?", "the preflight", READY)
+        here.presses("F5", "it goes", f"{name} {HOLDS}")
+        here.sees("completed", "COMPLETED", within=400.0)
+        here.presses("d", "table and page", "status=0", within=240.0)
+        second = self.place.campaign / f"{name}.h5"
+        here.runs(
+            f"rig diagnose {first} {second} | head -25", "one answer", r"(explained|adequate)\.", within=DIAGNOSED
+        )
+
+    def catalogue(self) -> None:
+        """What was measured, and has it changed?"""
+        self.chapter("The catalogue: rig list, rig show, rig compare-fits")
+        here, name = self.operator, self.thrusters[0]
+        screen = here.runs("rig list recordings", "all recordings", *self.thrusters, "tripped", "completed")
+        ids = re.findall(rf"(?m)^\S+ \S+ +([0-9a-f]{{8}}) +{name} ", screen)
+        here.runs(f"rig show {ids[0]} recordings | head -34", "all that is known of one", name, "thrust", "N")
+        here.runs("rig list recordings --what campaigns", "the campaigns", "first")
+        here.runs("rig list recordings --what calibrations", "the calibration it was made under", "gain_std|0.0005")
+        if len(ids) > 1:
+            here.runs(f"rig compare-fits --thruster {name} recordings", "has it changed?", f"{name} has|nothing|not")
