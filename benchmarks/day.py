@@ -17,36 +17,19 @@ import os
 import sys
 import tempfile
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 from benchmarks.operating.at_keys import DayError, Operator, Transcript
 from benchmarks.operating.browser import in_browser
 from benchmarks.operating.one_day import Day
-from benchmarks.operating.place import Place
-from benchmarks.operating.preparing import begin, bench_of
+from benchmarks.operating.preparing import at_work
 from benchmarks.operating.second_terminal import second_terminal
-from benchmarks.operating.tmux import Tmux, there_is_tmux
+from benchmarks.operating.tmux import there_is_tmux
 from tests.rig.serve.chromium import CHROMIUM
 
-EFFECT = """
-[effects.winding_resistance]
-resistance = 0.012             # ohm
-"""
-"""So faint that one short sweep does not tell it from others."""
 THRUSTERS = ("T1", "T2", "T3")
-
-
-@contextmanager
-def at_work(folder: Path, transcript: Transcript, dwell: float) -> Iterator[tuple[Tmux, Operator, Place]]:
-    """A tmux of its own, an operator in the folder of a new bench, and that bench."""
-    with Tmux() as tmux:
-        operator = Operator(tmux.window("desk", folder), transcript)
-        begin(operator, folder / "bench", EFFECT, dwell)
-        with bench_of(folder / "bench", transcript) as place:
-            yield tmux, operator, place
 
 
 def one_terminal(folder: Path, transcript: Transcript) -> None:
@@ -62,7 +45,6 @@ def one_terminal(folder: Path, transcript: Transcript) -> None:
             day.resume,
             day.diagnose,
             day.report,
-            day.next_sweep,
             day.catalogue,
         ):
             chapter()

@@ -13,6 +13,8 @@ from benchmarks.operating.preparing import STOP_WITHIN
 
 READY = r"All \d+ checks done.*Press F5 to start"
 HOLDS = r"hold [+-][\d.]+"
+ENDED = r"COMPLETED|TRIPPED|ABORTED"
+VERDICT = r"[✓?✗] (ADEQUATE|EXPLAINED|AMBIGUOUS|UNEXPLAINED) +T\d"
 DIAGNOSED = 420.0
 """s that a diagnosis may take on a busy machine."""
 
@@ -24,6 +26,8 @@ class Day:
     operator: Operator
     place: Place
     thrusters: tuple[str, ...]
+    options: str = ""
+    """Of `rig run`."""
 
     def chapter(self, title: str) -> None:
         self.operator.transcript.chapter(title)
@@ -39,25 +43,10 @@ class Day:
         self.chapter("rig edit: the thrusters, and a level that the bench does not allow")
         here = self.operator
         here.types("rig edit campaign.toml", "the form, and its dry run", "rig edit", "holds")
-        here.goes_to("thrusters ", "Up")
-        here.presses("C-u", "the field is empty")
-        here.window.type(", ".join(self.thrusters))
-        here.goes_to("max ", "Down")
-        here.presses("C-u", "the field is empty")
-        here.window.type("30")
-        here.sees("30 V is more than the bench has", "PROBLEM", "30", keys="30")
-        here.presses("C-u", "emptied again")
-        here.window.type("16")
-        here.goes_to("levels ", "Down")
-        here.presses("C-u", "the field is empty")
-        here.window.type("2")
-        here.sees(
-            "the dry run is as wanted",
-            r"2 at 8 V.*; 1 at 16 V",
-            r"peak voltage\D+16",
-            "not saved",
-            keys="16, Down, C-u, 2",
-        )
+        self._enters("thrusters ", "Up", ", ".join(self.thrusters), r"campaign +\d+:\d\d expected")
+        self._enters("max ", "Down", "30", "PROBLEM.*30")
+        self._enters("max ", "Down", "16", r"peak voltage\D+16")
+        self._enters("levels ", "Down", "2", r"2 at 8 V.*; 1 at 16 V", "not saved")
         here.presses("C-s", "saved", r"\[saved\]")
         here.presses("C-q", "back at the shell", r"\$\s*\Z")
         text = (self.place.folder / "campaign.toml").read_text(encoding="utf-8")
@@ -66,13 +55,21 @@ class Day:
             raise DayError(f"the campaign file is not as it was typed:\n{text}")
         here.runs("rig check campaign.toml", "it may run", r"peak voltage\D+16", "holds")
 
+    def _enters(self, field_name: str, way: str, value: str, *wanted: str) -> None:
+        """A value in the place of what a field of the form holds, and what the dry run says of it."""
+        here = self.operator
+        here.goes_to(field_name, way)
+        here.window.press("C-u")
+        here.window.type(value)
+        keys = f"{way} ... C-u {value}"
+        here.sees(f"{field_name.strip()} = {value}", rf"{field_name} +{re.escape(value)}", *wanted, keys=keys)
+
     def preflight(self) -> None:
         """With a cable that comes out while one looks on."""
         self.chapter("Preflight; the load cell's cable comes out, and is put back")
         here, begun = self.operator, time.monotonic_ns()
-        here.types(
-            "clear; rig run campaign.toml; echo status=$?", "the preflight passes", READY, "load_cell calibration"
-        )
+        command = f"rig run campaign.toml {self.options}".strip()
+        here.types(f"clear; {command}; echo status=$?", "the preflight passes", READY, "load_cell calibration")
         self.place.tell("fault", "load_cell", "pulled")
         here.sees(
             "it is said, and the key that helps",
@@ -90,7 +87,7 @@ class Day:
         here.transcript.fact("by the truth log: nothing was driven before F5")
 
     def first_thruster(self) -> None:
-        """Note, pause, a step taken again, a bad point."""
+        """Note, pause, a step taken again, a bad point that is measured once more."""
         self.chapter(f"{self.thrusters[0]}: a note, a pause, a step taken again, a bad point")
         here, name = self.operator, self.thrusters[0]
         here.presses("F5", "the motor's own watchdog is proved first", "proving watchdog")
@@ -104,6 +101,7 @@ class Day:
         held = re.search(HOLDS, here.window.screen())
         here.sees("it has been measured, the next level", rf"{name} hold (?!{re.escape(held[0][5:] if held else '?')})")
         here.presses("m", "its samples stay, no fit takes them", "marked bad by the operator: step")
+        here.presses("b", "and is measured once more", "back to step .* on request")
         here.presses("1", "readings, events and plots", "live readings", "campaign +T")
 
     def _pause(self, name: str) -> None:
@@ -112,6 +110,16 @@ class Day:
         self.place.zero_after(pressed, STOP_WITHIN)
         here.presses("r", "the step is taken again", "resumed: .*retaken", f"{name} {HOLDS}")
         self.place.until_driven()
+
+    def stop(self) -> None:
+        """F9 in a hold."""
+        self.chapter("F9")
+        here = self.operator
+        self.place.until_driven()
+        pressed = time.monotonic_ns()
+        here.presses("F9", "stopped", "ABORTED.*stopped by console", "at rest")
+        self.place.zero_after(pressed, STOP_WITHIN)
+        here.presses("d", "the table, and how to go on", "to go on .*rig resume", "(?m)^status=1", within=120.0)
 
     def trip(self) -> None:
         """The load cell is lost while the second thruster turns."""
@@ -134,21 +142,52 @@ class Day:
         self.place.tell("clear", "load_cell")
         here.types(f"clear; rig resume {folder}; echo status=$?", "the preflight, of what is left", READY)
         here.presses("F5", "on with it", "proving watchdog|tare")
-        here.sees("completed", "COMPLETED", "at rest", within=240.0)
+        for _ in range(3):
+            screen = here.sees("the end", ENDED, "at rest", within=240.0)
+            if "this machine is busy" not in screen:
+                break
+            here.presses("d", "a machine that is busy has cut it", "to go on .*rig resume", within=240.0)
+            here.types(f"clear; rig resume {folder}; echo status=$?", "on once more", READY)
+            here.presses("F5", "on with it", "proving watchdog|tare")
+        here.sees("completed", "COMPLETED", "at rest")
         self.place.until_still()
 
     def diagnose(self) -> None:
-        self.chapter("g: what physics C V|V| leaves out")
+        """G, and from there S: the console closes, the next sweep's campaign opens."""
+        self.chapter("g: what physics C V|V| leaves out; s: the next sweep")
         here = self.operator
-        here.presses("g", "page 6, one recording after the other", "rig diagnose")
-        here.sees("an answer", r"(adequate|explained|ambiguous|unexplained)\.", within=DIAGNOSED)
-        here.sees("all answers", rf"{self.thrusters[-1]}\.h5", within=DIAGNOSED)
-        here.presses("d", "table, page, status 0", "status=0", "report: ", within=240.0)
+        here.presses("g", "page 6, one recording after the other", "diagnosing T1")
+        here.sees("all answers", "next +", gone="diagnosing", within=DIAGNOSED)
+        here.presses("End", "the last one", VERDICT)
+        screen = here.presses(
+            "s", "whose sweep, and what comes then", "Run the next sweep", "press F5 there, not before"
+        )
+        offered = re.search(r"Run the sweep of (\w+)", screen)
+        if offered is None:
+            raise DayError(f"no sweep is offered:\n{screen}")
+        here.presses("Down", "its button", "Run the sweep of")
+        begun = time.monotonic_ns()
+        here.presses("Enter", "table and page, then the next campaign's preflight", READY, within=300.0)
+        self._next_sweep(offered[1], begun)
+
+    def _next_sweep(self, name: str, begun: int) -> None:
+        """F5 in its preflight, to its end; diagnosed with the recording that proposed it."""
+        self.chapter(f"The next sweep, of {name}: F5 in its preflight, to its end, diagnosed with the first")
+        here = self.operator
+        if self.place.driven(begun):
+            raise DayError("the motor was driven before F5")
+        here.transcript.fact("by the truth log: nothing was driven before F5")
+        here.presses("F5", "it goes", f"{name} {HOLDS}")
+        here.sees("completed", "COMPLETED", "at rest", within=400.0)
+        here.presses("g", "both recordings together", rf"diagnosing {name}\S*\.h5 \+ {name}")
+        here.sees("one answer", VERDICT, gone="diagnosing", within=DIAGNOSED)
+        here.presses("d", "table, page, status 0", "report: ", r"(?m)^status=0", within=240.0)
 
     def report(self) -> None:
         """What the page at the end of the campaign says."""
         self.chapter("The report")
-        text = (self.place.folder / self.place.campaign / "report.html").read_text(encoding="utf-8")
+        first = min((self.place.folder / "recordings").glob("first-2*"))
+        text = (first / "report.html").read_text(encoding="utf-8")
         wanted = (
             *self.thrusters,
             "weed on the guard",
@@ -161,28 +200,6 @@ class Day:
         if missing:
             raise DayError(f"report.html does not have {missing}")
         self.operator.transcript.fact(f"report.html, {len(text)} characters, has {', '.join(wanted)}")
-
-    def next_sweep(self) -> None:
-        """Of the first thruster: proposed, checked, run, diagnosed together."""
-        self.chapter("The next sweep: proposed, checked, run, diagnosed with the first")
-        here, name = self.operator, self.thrusters[0]
-        first = self.place.campaign / f"{name}.h5"
-        propose = f"rig diagnose {first} --plan next.toml --campaign campaign.toml"
-        here.runs(
-            f"{propose} | tail -25",
-            "what it separates, and its power",
-            "next experiment written to next.toml",
-            within=DIAGNOSED,
-        )
-        here.runs("rig check next.toml", "it may run", "holds")
-        here.types("clear; rig run next.toml; echo status=$?", "the preflight", READY)
-        here.presses("F5", "it goes", f"{name} {HOLDS}")
-        here.sees("completed", "COMPLETED", within=400.0)
-        here.presses("d", "table and page", "status=0", within=240.0)
-        second = self.place.campaign / f"{name}.h5"
-        here.runs(
-            f"rig diagnose {first} {second} | head -25", "one answer", r"(explained|adequate)\.", within=DIAGNOSED
-        )
 
     def catalogue(self) -> None:
         """What was measured, and has it changed?"""

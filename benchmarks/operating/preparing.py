@@ -12,12 +12,17 @@ from pathlib import Path
 
 from benchmarks.operating.at_keys import Operator, Transcript
 from benchmarks.operating.place import Place
+from benchmarks.operating.tmux import Tmux
 from rig.link.live_runs import live_runs
 from tests.reliability.live import whole
 
 STOP_WITHIN = 0.25
 """s from a key that tmux is told to press to command 0: the 0.1 s of the promise, and the start of tmux's process."""
-CALIBRATION = """
+MORE = """
+[limits."motor.rotation_rate"]
+max_age = 0.6              # s
+max = 100.0                # rev/s
+
 [calibration.load_cell]
 date = 2026-03-01
 valid_until = 2099-12-31
@@ -28,6 +33,11 @@ CAMPAIGN = {
     "levels = 4 ": 'sides = "forward"\nlevels = 4 ',
     "slew = 12.0 ": "slew = 24.0 ",
 }
+EFFECT = """
+[effects.winding_resistance]
+resistance = 0.012             # ohm
+"""
+"""So faint that one short sweep does not tell it from others."""
 PLAN = """
 [tare]
 duration = 1.0             # s
@@ -50,7 +60,7 @@ def prepare(folder: Path, effect: str, dwell: float) -> None:
     busy machine."""
     bench = folder / "bench.toml"
     bench.write_text(whole(bench.read_text(encoding="utf-8")), encoding="utf-8")
-    replaced(bench, {}, CALIBRATION)
+    replaced(bench, {}, MORE)
     replaced(folder / "campaign.toml", CAMPAIGN | {"duration = 2.0 ": f"duration = {dwell} "}, PLAN)
     replaced(folder / "world.toml", {}, effect)
 
@@ -83,3 +93,13 @@ def begin(operator: Operator, folder: Path, effect: str, dwell: float) -> None:
     )
     prepare(folder, effect, dwell)
     operator.types(f"clear; cd {folder}", "in the folder", r"\$\s*\Z")
+
+
+@contextmanager
+def at_work(folder: Path, transcript: Transcript, dwell: float) -> Iterator[tuple[Tmux, Operator, Place]]:
+    """A tmux of its own, an operator in the folder of a new bench, and that bench."""
+    with Tmux() as tmux:
+        operator = Operator(tmux.window("desk", folder), transcript)
+        begin(operator, folder / "bench", EFFECT, dwell)
+        with bench_of(folder / "bench", transcript) as place:
+            yield tmux, operator, place

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping
 from typing import Final
@@ -107,9 +108,9 @@ def _result(held: tuple[Point, ...]) -> tuple[str, ...]:
     fit = running_fit(held)
     if fit is None:
         return ("—", "—", "—", "—", str(len(held)), unsteady, "—")
-    digits = decimals(fit.C_std)
-    percent = f"{100.0 * fit.C_std / abs(fit.C):.2f}" if fit.C else "—"
-    C, std = f"{fit.C:.{digits}f}", f"{fit.C_std:.{digits}f}"
+    digits, known = decimals(fit.C_std), math.isfinite(fit.C_std)  # two points leave nothing to scatter
+    percent = f"{100.0 * fit.C_std / abs(fit.C):.2f}" if fit.C and known else "—"
+    C, std = f"{fit.C:.{digits}f}", f"{fit.C_std:.{digits}f}" if known else "—"
     return (C, std, percent, f"{fit.tare:+.2f}", str(len(held)), unsteady, str(fit.left_out))
 
 

@@ -17,6 +17,7 @@ from rig.console.view_model.alarms import alarm
 from rig.console.view_model.axes import reach, thin, ticks
 from rig.console.view_model.keys import key_line
 from rig.console.view_model.running_fit import in_words, running_fit, v_abs_v
+from rig.console.view_model.tables import results_table
 from rig.console.view_model.view import TRACE_KEPT, View, absorb
 from rig.link.front_end_messages import Check, Reading
 from tests.rig.console.feeds import C, campaign, points, running, snapshot
@@ -196,3 +197,11 @@ def test_a_device_that_is_gone_is_offered_to_be_tried_again():
     assert device_gone(red) == device
     assert f" r retry {device}" in key_line(absorb(View(), red, 0.0)).plain
     assert " retry" not in key_line(absorb(View(), here, 0.0)).plain
+
+
+def test_two_holds_have_a_constant_and_no_scatter():
+    row = results_table({"T1": points("T1", 2)}).columns
+    cells = [next(iter(column.cells)) for column in row]
+    assert float(cells[1]) == pytest.approx(C["T1"], rel=0.1)
+    assert cells[2:4] == ["—", "—"]
+    assert cells[5] == "2"
