@@ -24,6 +24,8 @@ from tests.rig.console.feeds import snapshot
 
 PATIENCE = 40.0
 """s until something must have come about, on a busy machine."""
+STOP_PRESS = ["stop", "stop"]
+"""What one press of a stop key asks: in the thread that reads the keys, and again in the screen's own loop."""
 F5, F9, CTRL_C = "\x1b[15~", "\x1b[20~", "\x03"
 
 

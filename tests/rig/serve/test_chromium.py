@@ -13,7 +13,7 @@ from aiohttp import web
 
 from tests.rig.console.feeds import running
 from tests.rig.serve.chromium import CHROMIUM, CTRL, chromium
-from tests.rig.serve.played import desk, until
+from tests.rig.serve.played import STOP_PRESS, desk, until
 
 pytestmark = [
     pytest.mark.timeout(240),
@@ -72,7 +72,7 @@ async def test_keys_of_a_browser_reach_the_controller_and_nothing_is_fetched_els
         await until(lambda: here.controller.kinds == ["start"])
         await page.press("F9")
         await page.press("c", CTRL)
-        await until(lambda: here.controller.kinds == ["start", "stop", "stop"])
+        await until(lambda: here.controller.kinds == ["start", *STOP_PRESS, *STOP_PRESS])
         assert {urlsplit(url).netloc for url in page.fetched if not url.startswith("data:")} == {here.host}
         assert await page.run("document.fonts.check('16px \"Roboto Mono\"')")
         await page.open("about:blank")
@@ -119,7 +119,7 @@ async def test_a_page_of_another_origin_in_the_same_browser_gets_nowhere(tmp_pat
         assert (len(here.consoles()), here.controller.came) == (1, 1)
         assert here.controller.kinds == []
         await page.press("F9")  # the operator's own page is as it was
-        await until(lambda: here.controller.kinds == ["stop"])
+        await until(lambda: here.controller.kinds == STOP_PRESS)
 
 
 async def test_a_second_browser_with_the_same_link_is_refused(tmp_path):

@@ -12,7 +12,7 @@ import pytest
 
 from rig.serve.server import MOST_SESSIONS, NOTHING
 from tests.rig.console.feeds import running
-from tests.rig.serve.played import CTRL_C, F5, F9, desk, nobody, stranger, until
+from tests.rig.serve.played import CTRL_C, F5, F9, STOP_PRESS, desk, nobody, stranger, until
 
 pytestmark = pytest.mark.timeout(120)
 
@@ -132,12 +132,12 @@ async def test_the_stop_key_works_while_it_looks_on_and_in_a_text_field(tmp_path
         await here.let_in()
         screen = await here.screen()
         await screen.press(key)
-        await until(lambda: here.controller.kinds == ["stop"])
+        await until(lambda: here.controller.kinds == STOP_PRESS)
         await screen.press("l")
         await screen.press("n")
         await screen.until_drawn("Note")
         await screen.press(key)
-        await until(lambda: here.controller.kinds == ["stop", "stop"])
+        await until(lambda: here.controller.kinds == [*STOP_PRESS, *STOP_PRESS])
         await screen.close()
 
 
@@ -150,7 +150,7 @@ async def test_what_a_browser_should_not_say_does_nothing(tmp_path):
         await screen.socket.send_bytes(b"\x03")
         await screen.socket.send_json(["resize", {"width": 60, "height": 20}])
         await screen.press(F9)
-        await until(lambda: here.controller.kinds == ["stop"])
+        await until(lambda: here.controller.kinds == STOP_PRESS)
         await screen.close()
 
 
