@@ -89,6 +89,18 @@ class Operator:
         self.window.press("Enter")
         return self.sees(says, *wanted, rf"(?m)^status={status}\b", within=within, keys=f"{command} Enter")
 
+    def pages_to(self, says: str, wanted: str, most: int = 10) -> str:
+        """With the page key until it stands on the screen."""
+        for _ in range(most):
+            before = self.window.screen()
+            if re.search(wanted, before):
+                break
+            self.window.press("PageDown")
+            deadline = time.monotonic() + SLOW
+            while self.window.screen() == before and time.monotonic() < deadline:
+                time.sleep(LOOK)
+        return self.sees(says, wanted, keys="PageDown", within=SLOW)
+
     def goes_to(self, field_name: str, key: str, most: int = 40) -> None:
         """With an arrow key until the cursor stands in that field of a form. Where it does not move within SLOW, the
         field is one without a cursor."""

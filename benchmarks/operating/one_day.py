@@ -14,7 +14,7 @@ from benchmarks.operating.preparing import STOP_WITHIN
 READY = r"All \d+ checks done.*Press F5 to start"
 HOLDS = r"hold [+-][\d.]+"
 ENDED = r"COMPLETED|TRIPPED|ABORTED"
-VERDICT = r"[✓?✗] (ADEQUATE|EXPLAINED|AMBIGUOUS|UNEXPLAINED) +T\d"
+VERDICT = r"[✓?✗] (ADEQUATE|EXPLAINED|AMBIGUOUS|UNEXPLAINED) +"
 DIAGNOSED = 420.0
 """s that a diagnosis may take on a busy machine."""
 
@@ -28,6 +28,8 @@ class Day:
     thrusters: tuple[str, ...]
     options: str = ""
     """Of `rig run`."""
+    measured_twice: str = ""
+    """The thruster of the next sweep."""
 
     def chapter(self, title: str) -> None:
         self.operator.transcript.chapter(title)
@@ -158,7 +160,7 @@ class Day:
         here = self.operator
         here.presses("g", "page 6, one recording after the other", "diagnosing T1")
         here.sees("all answers", "next +", gone="diagnosing", within=DIAGNOSED)
-        here.presses("End", "the last one", VERDICT)
+        here.pages_to("the last one", rf"{VERDICT}{self.thrusters[-1]}")
         screen = here.presses(
             "s", "whose sweep, and what comes then", "Run the next sweep", "press F5 there, not before"
         )
@@ -168,6 +170,7 @@ class Day:
         here.presses("Down", "its button", "Run the sweep of")
         begun = time.monotonic_ns()
         here.presses("Enter", "table and page, then the next campaign's preflight", READY, within=300.0)
+        self.measured_twice = offered[1]
         self._next_sweep(offered[1], begun)
 
     def _next_sweep(self, name: str, begun: int) -> None:
@@ -180,7 +183,7 @@ class Day:
         here.presses("F5", "it goes", f"{name} {HOLDS}")
         here.sees("completed", "COMPLETED", "at rest", within=400.0)
         here.presses("g", "both recordings together", rf"diagnosing {name}\S*\.h5 \+ {name}")
-        here.sees("one answer", VERDICT, gone="diagnosing", within=DIAGNOSED)
+        here.sees("one answer", rf"{VERDICT}{name}", gone="diagnosing", within=DIAGNOSED)
         here.presses("d", "table, page, status 0", "report: ", r"(?m)^status=0", within=240.0)
 
     def report(self) -> None:
@@ -202,13 +205,13 @@ class Day:
         self.operator.transcript.fact(f"report.html, {len(text)} characters, has {', '.join(wanted)}")
 
     def catalogue(self) -> None:
-        """What was measured, and has it changed?"""
+        """What was measured, and has the thruster with two campaigns changed?"""
         self.chapter("The catalogue: rig list, rig show, rig compare-fits")
-        here, name = self.operator, self.thrusters[0]
+        here, name = self.operator, self.measured_twice
         screen = here.runs("rig list recordings", "all recordings", *self.thrusters, "tripped", "completed")
         ids = re.findall(rf"(?m)^\S+ \S+ +([0-9a-f]{{8}}) +{name} ", screen)
-        here.runs(f"rig show {ids[0]} recordings | head -34", "all that is known of one", name, "thrust", "N")
-        here.runs("rig list recordings --what campaigns", "the campaigns", "first")
-        here.runs("rig list recordings --what calibrations", "the calibration it was made under", "gain_std|0.0005")
-        if len(ids) > 1:
-            here.runs(f"rig compare-fits --thruster {name} recordings", "has it changed?", f"{name} has|nothing|not")
+        here.runs(f"rig show {ids[-1]} recordings | head -34", "all that is known of one", name, "thrust", "N")
+        here.runs("rig list recordings --what campaigns", "the campaigns", "first", "next experiment")
+        here.runs("rig list recordings --what calibrations", "the calibration it was made under", "0.0005")
+        compare = f"rig compare-fits --thruster {name} recordings"
+        here.runs(compare, "has it changed?", "2 fits in order of time", rf"{name} has (not )?changed")
