@@ -131,6 +131,7 @@ class DiagnosingApp(LeavingApp, inherit_bindings=False):
         """The sweep becomes a campaign; then this console ends for it, or says what to type."""
         answer = self.answers[place]
         folder = Path(answer.files[-1]).parent
+        self.notify("writing the campaign ...", timeout=2.0)
         child = Child([*WRITE_NEXT, answer.campaign, str(folder)])
         async with aclosing(child.said(json.dumps(self._bodies[place]))) as said:
             message = await anext(said, {"fault": "nothing was written"})

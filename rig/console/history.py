@@ -30,6 +30,7 @@ from rig.console.view_model.history import (
     compared_text,
     history_text,
     moved,
+    of_run,
     row_of,
     to_compare,
     toggled,
@@ -40,6 +41,7 @@ from rig.visible_text import visible
 
 CATALOGUE: Final = (sys.executable, "-m", "rig.catalogue.beside_console")
 HINT: Final = "Space marks, Enter compares, u reads again"
+STILL_WRITTEN: Final = "A recording of this campaign is compared once the campaign has ended."
 LINES: Final = 2
 """Of the panel that are no rows: heading and hint."""
 
@@ -163,7 +165,10 @@ class HistoryApp(LeavingApp, inherit_bindings=False):
 
     async def action_compare_rows(self) -> None:
         """The two chosen rows, in a dialog."""
-        chosen = to_compare(self.query_one(HistoryPanel).rows)
+        panel = self.query_one(HistoryPanel)
+        chosen = to_compare(panel.rows)
+        if not isinstance(chosen, str) and not self.ended and any(of_run(row, panel.running) for row in chosen):
+            chosen = STILL_WRITTEN
         if isinstance(chosen, str):
             self.notify(chosen, severity="warning", markup=False)
             return

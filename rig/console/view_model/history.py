@@ -97,6 +97,11 @@ def to_compare(rows: Rows) -> tuple[Row, Row] | str:
     return older, newer
 
 
+def of_run(row: Row, running: Sequence[str]) -> bool:
+    """Whether it is a recording of the present run, by the ends of its paths."""
+    return any(row.path.endswith(name) for name in running)
+
+
 def widths(rows: Sequence[Row], known: Sequence[int] = ()) -> tuple[int, ...]:
     """Of each column's widest text, in cells; `known`: of rows before these."""
     before = known or [cell_len(heading) for heading, _ in COLUMNS]
@@ -126,7 +131,7 @@ def history_text(rows: Rows, wide: Sequence[int], width: int, height: int, runni
     text.append(f"{' ' * MARKS}{heading}".rstrip(), "bold")
     for place in range(rows.top, min(rows.top + height, len(rows.all))):
         row = rows.all[place]
-        now = any(row.path.endswith(name) for name in running)
+        now = of_run(row, running)
         at = "reverse" if place == rows.cursor else ""
         marks = f"{'>' if place == rows.cursor else ' '}{'x' if place in rows.chosen else ' '}{'●' if now else ' '} "
         line = f"{marks}{_campaign(row) if row.what == 'campaign' else _line(row, wide[:count])}"

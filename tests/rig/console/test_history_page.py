@@ -173,6 +173,18 @@ async def test_enter_compares_and_escape_ends_what_takes_long(tmp_path):
         assert desk.kinds() == []
 
 
+async def test_during_a_run_none_of_its_own_recordings_is_opened(tmp_path):
+    files = ("out/autumn-2/T1.h5",)
+    async with sitting(replace(running(), files=files)) as desk:
+        await opened(desk, speaker(tmp_path, {"rows": past_rows()}, {"end": "7 recordings"}))
+        await desk.press("down", "down", "space", "end", "enter")
+        assert any("once the campaign has ended" in toast for toast in desk.toasts())
+        assert not desk.app.looks_back
+        desk.app.catalogue = speaker(tmp_path, {"compared": COMPARED})
+        await desk.press("home", "down", "down", "space", "end", "space", "up", "up", "enter")  # spring and March
+        await settle(desk.pilot, lambda: isinstance(desk.app.screen, CompareDialog))
+
+
 async def test_what_fails_is_one_sentence(tmp_path):
     async with sitting(END) as desk:
         assert "not read: no folder" in await opened(desk, speaker(tmp_path, {"fault": "no folder"}))
