@@ -77,7 +77,7 @@ class Truth:
                     self.changes.append((line["t_ns"], value))
         return found
 
-    def until_driven(self, seconds: float = 0.15, timeout: float = 60.0) -> None:
+    def until_driven(self, seconds: float = 0.15, timeout: float = 20.0) -> None:
         """Wait until the drive has had the same command, which is not 0, for so long: a hold, and no ramp."""
         self._until(
             lambda: self.command != 0.0 and time.monotonic_ns() - self.since_ns > seconds * 1e9,

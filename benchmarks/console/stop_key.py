@@ -33,6 +33,7 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from benchmarks.console.bench import Truth, running
 from benchmarks.console.screens import Screen, screens
+from rig.errors import LinkError
 from rig.link.live_runs import Run
 from tests.reliability.machine.metronome import metronome, stalled
 from tests.reliability.test_console_stop import CTRL_C, F9, RIG
@@ -41,6 +42,7 @@ from tests.rig.console.terminal import Terminal, on_terminal
 
 PROMISE = 0.1
 """s, p99 of 100 presses (docs/reliability.md, promise 4)."""
+MOST_BENCHES = 8
 FLUSH = 2.0
 """s for which the recorder stands still around a press at most; it goes on as soon as command 0 has come."""
 
@@ -97,8 +99,19 @@ def press(terminal: Terminal, truth: Truth, recorder: int, screen: Screen, key: 
 
 
 def on_screen(screen: Screen, presses: int, size: tuple[int, int]) -> list[Latency]:
-    """s of each press."""
+    """s of each press. Where the guard has ended a run, for this machine is busy, the bench is started once more."""
     found: list[Latency] = []
+    for _ in range(MOST_BENCHES):
+        try:
+            _on_one_bench(screen, presses, size, found)
+        except (TimeoutError, AssertionError, LinkError) as error:
+            print(f"{screen.name}: begun again after {len(found)} presses: {str(error)[:100]}", file=sys.stderr)
+        if len(found) >= presses:
+            return found
+    raise TimeoutError(f"{screen.name}: {len(found)} of {presses} presses on {MOST_BENCHES} benches: a busy machine")
+
+
+def _on_one_bench(screen: Screen, presses: int, size: tuple[int, int], found: list[Latency]) -> None:
     with (
         TemporaryDirectory() as folder,
         metronome(idle := Path(folder) / "idle"),
@@ -112,7 +125,6 @@ def on_screen(screen: Screen, presses: int, size: tuple[int, int]) -> list[Laten
         while len(found) < presses:
             latency = press(terminal, truth, recorder, screen, F9 if len(found) % 2 else CTRL_C, idle)
             found += [] if latency is None else [latency]
-    return found
 
 
 @contextmanager
