@@ -10,7 +10,17 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from drivers import keller, line_stream, modbus_cell, modbus_cell_options, mt_sics, nortek_nmea, vesc_can
+from drivers import (
+    keller,
+    line_stream,
+    modbus_cell,
+    modbus_cell_options,
+    mt_sics,
+    nortek_nmea,
+    roboteq,
+    roboteq_options,
+    vesc_can,
+)
 from drivers.protocols import Instrument
 
 
@@ -33,5 +43,6 @@ KINDS: dict[str, Kind] = {
     "modbus_cell": Kind(modbus_cell_options.Options, modbus_cell.ModbusCell, "serial"),
     "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial"),
     "keller": Kind(keller.Options, keller.Keller, "serial", over_wire=False),
+    "roboteq": Kind(roboteq_options.Options, roboteq.Roboteq, "serial"),
     "vesc_can": Kind(vesc_can.Options, vesc_can.VescCan, "can"),
 }

@@ -38,7 +38,7 @@ from sim_devices import __main__ as simulator
 from sim_devices.bench import control
 from sim_devices.bench.settings import KEYS, CanBus, ScriptedFault, load
 from sim_devices.bench.settings import KINDS as SIMULATED
-from sim_devices.instruments import button, keller, line_sender, modbus_cell, mt_sics, nortek, vesc
+from sim_devices.instruments import button, keller, line_sender, modbus_cell, mt_sics, nortek, roboteq, vesc
 from sim_devices.vehicle.body import AXES, Body
 from sim_devices.vehicle.settings import Noise as VehicleNoise
 from sim_devices.vehicle.settings import Scalars
@@ -200,6 +200,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("button", button.Button),
         ("nortek", nortek.Nortek),
         ("keller", keller.Keller),
+        ("roboteq", roboteq.Roboteq),
         ("vesc", vesc.Vesc),
     ):
         (table,) = [part for part in page.split("\n\n") if part.startswith("| fault of") and f"(`{kind}`)" in part]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers import keller, line_stream, modbus_rtu, mt_sics_lines, nortek_nmea, vesc_frames
+from drivers import keller, line_stream, modbus_rtu, mt_sics_lines, nortek_nmea, roboteq_lines, vesc_frames
 from drivers.ports.can_frame import Frame
 from rig.errors import LinkError
 from rig.link.framing import HEADER, decode, encode
@@ -49,6 +49,7 @@ MODBUS = tuple(
         "01 03 00 06 00 08 a4 0d",
     )
 )
+ROBOTEQ = (b"A=100:200\r", b"V=135:246:4730\r", b"BS=-3100\r", b"+\r-\r", b"FID=Roboteq v2.1\r", b"!G 1 250\r")
 REGISTERS = (b"\x3f\x80\x00\x00", b"\x7f\x80\x00\x00")
 MESSAGES = tuple(
     encode(message)
@@ -88,7 +89,7 @@ def _modbus(data: bytes) -> Any:
 
 def decoders() -> dict[str, tuple[tuple[bytes, ...], Decode, bool]]:
     """Name -> seeds, the decoder, and whether its numbers must be finite."""
-    cell, flow = mt_sics_lines.Decoder(), nortek_nmea.Decoder()
+    cell, flow, motor = mt_sics_lines.Decoder(), nortek_nmea.Decoder(), roboteq_lines.Decoder()
     pattern = r"(?:(?P<t>[^;]+);)?(?P<value>[-+.\deEnainf]+)(?: (?P<unit>\w+))?(?: raw=(?P<raw>\S+))?"
     lines, counts = line_stream.Decoder(pattern), line_stream.Decoder(r"(?P<raw>\S+)")
     return {
@@ -98,6 +99,7 @@ def decoders() -> dict[str, tuple[tuple[bytes, ...], Decode, bool]]:
         "line stream, counts": (STREAM, counts.feed, True),
         "Modbus RTU": (MODBUS, _modbus, True),
         "VESC on CAN": (CAN, _frame, True),
+        "Roboteq": (ROBOTEQ, motor.feed, True),
         "Keller registers": (REGISTERS, _registers, False),
         "frames of the sockets": (MESSAGES, _link, False),
     }

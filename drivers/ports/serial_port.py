@@ -121,9 +121,10 @@ class SerialPort(Generic[Record]):
             self.error = f"{self.settings.port} refused {len(data)} bytes ({error}): check cable and power"
             raise LinkError(f"{self._name}: {self.error}") from error
         if self._transcript is not None:
-            self._transcript.write(self._now_ns(), ">", data)
+            self._transcript.write(self.now_ns(), ">", data)
 
-    def _now_ns(self) -> int:
+    def now_ns(self) -> int:
+        """Time of the stamps, ns: the machine's monotonic clock, or the wire's."""
         return time.monotonic_ns() if self._wire is None else round(self._wire.now() * 1e9)
 
     def ask(self, request: bytes, match: Callable[[Record], bool], timeout: float) -> Record | None:

@@ -17,6 +17,8 @@ from sim_devices.bench.punctual import give_way, on_time
 from sim_devices.bench.settings import BenchSettings, DeviceOptions, load, script
 from sim_devices.bench.truth_log import TruthLog, header_fields, state_fields
 from sim_devices.instruments.motor_tap import MotorTap
+from sim_devices.instruments.roboteq import Roboteq
+from sim_devices.instruments.roboteq_options import RoboteqOptions, measured
 from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.vesc import Vesc, VescOptions
 from sim_devices.wires.can_frame import CanFrame
@@ -64,6 +66,8 @@ class Bench:
         self.truth = TruthLog(settings.truth)
         self.vesc: Vesc | None = None
         self.tap: MotorTap | None = None
+        self.drive: Vesc | Roboteq | None = None
+        """What turns the thruster."""
         self.serial: dict[str, tuple[SerialDevice, PtyPort, float]] = {}
         """device name -> device, its port, its turnaround (s)."""
         self.adapters = {name: (Adapter(), self._port(name, None)) for name in settings.can.adapters}
@@ -79,7 +83,12 @@ class Bench:
         if isinstance(options, VescOptions):
             self.tap = MotorTap(self.world, options.pole_pairs, options.vesc_id)
             self.vesc = Vesc(options, self.settings.world.supply.voltage, self.tap.telemetry, self.log)
-            self.tap.vesc = self.vesc
+            self.tap.vesc = self.drive = self.vesc
+            return
+        if isinstance(options, RoboteqOptions):
+            supply = self.settings.world.supply.voltage
+            self.drive = motor = Roboteq(options, supply, lambda: measured(self.world), self.log)
+            self.serial[name] = (motor, self._port(options.port, options.baud), 0.0)
             return
         device = serial_device(options, self.world, self._cross_rng, self._epoch)
         self.serial[name] = (device, self._port(options.port, options.baud), turnaround(options))
@@ -138,11 +147,11 @@ class Bench:
                 say(port.wire, device.tick(t), t, late)
 
     def _step_world(self, t: float) -> None:
-        dt, world, vesc, tap = self.settings.step, self.world, self.vesc, self.tap
+        dt, world, drive, tap = self.settings.step, self.world, self.drive, self.tap
         s = world.state
         while (self._steps + 1) * dt <= t:
             self._steps += 1
-            volts, amps = vesc.drive(s.n, dt) if vesc else (None, 0.0)
+            volts, amps = drive.drive(s.n, dt) if drive else (None, 0.0)
             world.step(dt, volts, amps)
             if tap:
                 tap.after_step(dt)

@@ -16,6 +16,7 @@ from sim_devices.instruments.modbus_registers import ModbusCellOptions
 from sim_devices.instruments.mt_sics import MtSics
 from sim_devices.instruments.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.nortek import Nortek, NortekOptions
+from sim_devices.instruments.roboteq_options import RoboteqOptions
 from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.vesc import VescOptions
 from sim_devices.wires.serial_line import Wire
@@ -32,7 +33,7 @@ def serial_device(
 ) -> SerialDevice:
     """The device of these options. `force`: what a load cell reads, N; None: the world's, as it is.
 
-    Raises ValueError for a motor controller, which is on a bus.
+    Raises ValueError for a motor controller, which drives the world as well.
     """
     read = force or (lambda: world.sample("thrust"))
     match options:
@@ -50,8 +51,8 @@ def serial_device(
             return Keller(options, lambda: world.sample("pressure"), lambda: world.sample("water_temperature"))
         case ModbusCellOptions():
             return ModbusCell(options, read)
-        case VescOptions():
-            raise ValueError("a motor controller is no serial device: it is on a bus")
+        case VescOptions() | RoboteqOptions():
+            raise ValueError("a motor controller does more than measure: the bench makes it")
 
 
 def turnaround(options: DeviceOptions) -> float:

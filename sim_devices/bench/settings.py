@@ -14,14 +14,24 @@ from sim_devices.instruments.line_sender import LineOptions
 from sim_devices.instruments.modbus_registers import ModbusCellOptions
 from sim_devices.instruments.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.nortek import NortekOptions
+from sim_devices.instruments.roboteq_options import RoboteqOptions
 from sim_devices.instruments.vesc import VescOptions
 from sim_devices.tables import WorldError, build, check_known
 from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin
 
 DeviceOptions = (
-    MtSicsOptions | LineOptions | ButtonOptions | NortekOptions | KellerOptions | ModbusCellOptions | VescOptions
+    MtSicsOptions
+    | LineOptions
+    | ButtonOptions
+    | NortekOptions
+    | KellerOptions
+    | ModbusCellOptions
+    | RoboteqOptions
+    | VescOptions
 )
+MOTORS = (RoboteqOptions, VescOptions)
+"""Those that turn the thruster."""
 KINDS: dict[str, type[DeviceOptions]] = {
     "mt_sics": MtSicsOptions,
     "line": LineOptions,
@@ -29,6 +39,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "nortek": NortekOptions,
     "keller": KellerOptions,
     "modbus_cell": ModbusCellOptions,
+    "roboteq": RoboteqOptions,
     "vesc": VescOptions,
 }
 MAX_STEP = 0.005
@@ -109,7 +120,7 @@ def _from_tables(tables: Mapping[str, Any], folder: Path) -> BenchSettings:
         step=step,
         faults=tuple(build(ScriptedFault, t, f"faults[{i}]") for i, t in enumerate(tables.get("faults", []))),
     )
-    motors = [name for name, options in devices.items() if isinstance(options, VescOptions)]
+    motors = [name for name, options in devices.items() if isinstance(options, MOTORS)]
     if len(motors) > 1:
         raise WorldError(f"devices: one motor controller turns the one thruster, got {', '.join(motors)}")
     return settings

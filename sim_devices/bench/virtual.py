@@ -12,10 +12,12 @@ from math import inf
 import numpy as np
 
 from sim_devices.bench.devices import say, serial_device, turnaround
-from sim_devices.bench.settings import BenchSettings, script
+from sim_devices.bench.settings import MOTORS, BenchSettings, script
 from sim_devices.bench.virtual_wire import Host, VirtualWire
 from sim_devices.instruments.low_pass import LowPass
 from sim_devices.instruments.motor_tap import MotorTap
+from sim_devices.instruments.roboteq import Roboteq
+from sim_devices.instruments.roboteq_options import RoboteqOptions, measured
 from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.vesc import Vesc, VescOptions
 from sim_devices.tables import WorldError
@@ -51,14 +53,15 @@ class VirtualBench:
         self._low_passes: list[LowPass] = []
         self._adapter, self._bus = Adapter(), self._wired(bus, None)
         self.serial: dict[str, tuple[SerialDevice, VirtualWire, float]] = {}
-        motors = [options for options in settings.devices.values() if isinstance(options, VescOptions)]
-        if len(motors) != 1:
-            raise WorldError(f"devices: a bench in virtual time has one motor controller, this one {len(motors)}")
-        self._tap = MotorTap(self.world, motors[0].pole_pairs, motors[0].vesc_id)
-        self.vesc = Vesc(motors[0], settings.world.supply.voltage, self._tap.telemetry, self._log)
-        self._tap.vesc = self.vesc
+        self.vesc: Vesc | None = None
+        self._tap: MotorTap | None = None
+        self.drive = self._motor()
+        """What turns the thruster."""
         for name, options in settings.devices.items():
             if isinstance(options, VescOptions):
+                continue
+            if isinstance(self.drive, Roboteq) and isinstance(options, RoboteqOptions):
+                self.serial[name] = (self.drive, self._wired(name, options.baud), 0.0)
                 continue
             device = serial_device(options, self.world, cross_rng, EPOCH, self._cell((filters or {}).get(name, 0.0)))
             self.serial[name] = (device, self._wired(name, options.baud), turnaround(options))
@@ -67,9 +70,20 @@ class VirtualBench:
         self._next_stall = self._until_stall()
         self._script = script(settings.faults)
 
+    def _motor(self) -> Vesc | Roboteq:
+        motors = [options for options in self.settings.devices.values() if isinstance(options, MOTORS)]
+        if len(motors) != 1:
+            raise WorldError(f"devices: a bench in virtual time has one motor controller, this one {len(motors)}")
+        options, supply = motors[0], self.settings.world.supply.voltage
+        if isinstance(options, RoboteqOptions):
+            return Roboteq(options, supply, lambda: measured(self.world), self._log)
+        self._tap = MotorTap(self.world, options.pole_pairs, options.vesc_id)
+        self.vesc = self._tap.vesc = Vesc(options, supply, self._tap.telemetry, self._log)
+        return self.vesc
+
     def fault(self, device: str, name: str, amount: float = DEFAULT_AMOUNT) -> None:
         """A device or its wire goes wrong from now on. Raises ValueError for a fault that neither has."""
-        found, wire = self.serial[device][:2] if device in self.serial else (self.vesc, None)
+        found, wire = self.serial[device][:2] if device in self.serial else (self.drive, None)
         if wire is not None and name in WIRE_FAULTS:
             wire.wire.fault(name, amount)
         else:
@@ -77,7 +91,7 @@ class VirtualBench:
 
     def clear(self, device: str) -> None:
         """Device and wire are in order again."""
-        found, wire = self.serial[device][:2] if device in self.serial else (self.vesc, None)
+        found, wire = self.serial[device][:2] if device in self.serial else (self.drive, None)
         found.clear(self._t)
         if wire is not None:
             wire.wire.clear()
@@ -136,7 +150,7 @@ class VirtualBench:
 
     def _next_event(self) -> float:
         devices = [device.due for device, _, _ in self.serial.values()]
-        return min([*devices, self.vesc.due, *(wire.due for wire in self._ends)])
+        return min([*devices, self.vesc.due if self.vesc else inf, *(wire.due for wire in self._ends)])
 
     def _run_to(self, t: float) -> None:
         """Event by event, each in the world of its own instant."""
@@ -153,21 +167,23 @@ class VirtualBench:
         self._move_world(t)
 
     def _move_world(self, t: float) -> None:
-        world, vesc, tap = self.world, self.vesc, self._tap
+        world, drive, tap = self.world, self.drive, self._tap
         step = min(self.settings.step, FILTERED) if self._low_passes else self.settings.step
         state = world.state
         while (left := t - state.t) > SAME:
             dt = min(step, left)
-            volts, amps = vesc.drive(state.n, dt)
+            volts, amps = drive.drive(state.n, dt)
             world.step(dt, volts, amps)
-            tap.after_step(dt)
+            if tap:
+                tap.after_step(dt)
             for low_pass in self._low_passes:
                 low_pass.follow(world.exact("thrust"), dt)
         self._t = max(t, self._t)
 
     def _happen(self, t: float) -> None:
-        if self.vesc.due <= t:
-            for frame in self.vesc.tick(t):
+        vesc = self.vesc
+        if vesc and vesc.due <= t:
+            for frame in vesc.tick(t):
                 self._deliver(frame, t)
         for device, wire, late in self.serial.values():
             if device.due <= t:
@@ -178,7 +194,7 @@ class VirtualBench:
             answer, frames = self._adapter.feed(data)
             if answer:
                 self._bus.wire.put(answer, t)
-            for answered in (reply for frame in frames for reply in self.vesc.receive(frame, t)):
+            for answered in (reply for frame in frames for reply in (vesc.receive(frame, t) if vesc else ())):
                 self._deliver(answered, t)
         for wire in self._ends:
             if wire.due <= t:

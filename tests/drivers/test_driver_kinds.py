@@ -14,6 +14,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands():
         "modbus_cell": {"port": "p", "map": "laumas", "rate": 10.0, "unit": "kg", "decimals": 3},
         "nortek_nmea": {"port": "p", "rate": 4.0},
         "keller": {"port": "p"},
+        "roboteq": {"port": "p", "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5, "rotation": "none"},
         "vesc_can": {"bus": "b", "vesc_id": 1, "pole_pairs": 7, "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5},
     }
     assert set(options) == set(KINDS)
@@ -21,7 +22,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands():
         bus = (CanBus("virtual", "x", 1),) if kind.link == "can" else ()
         device = kind.build(name, kind.options(**options[name]), *bus)
         assert isinstance(device, Instrument)
-        assert isinstance(device, MotorController) == (name == "vesc_can")
+        assert isinstance(device, MotorController) == (name in ("roboteq", "vesc_can"))
         assert device.drain() == []
         assert not device.health().alive
         device.close()

@@ -1,0 +1,236 @@
+"""The bench of benches/roboteq over real bytes in virtual time: a campaign finds the truth, its faults end a run, and
+after the controller's watchdog the motor stays where it is."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from drivers.errors import DeviceError, LinkError
+from drivers.roboteq import Roboteq
+from rig.campaign.loading import load_bench
+from rig.cli import record_in_virtual_time
+from rig.fit.answer import fit_recordings
+from rig.hdf5.load import load
+from rig.operate.check import check_campaign
+from rig.recording.ledger import read
+from sim_devices.bench.settings import load as load_world
+from sim_devices.bench.virtual import VirtualBench
+from sim_devices.bench.virtual_wire import Host
+
+BENCH = Path(__file__).parents[3] / "benches" / "roboteq"
+CAMPAIGN = """
+[campaign]
+name = "short"
+bench = "bench.toml"
+output = "out"
+thrusters = ["T2"]
+expected_C = 0.4
+[watch]
+off = true
+[tare]
+duration = 1.0
+max_drift = 1.0
+[plan]
+kind = "levels"
+voltages = [7.2, -7.2, 12.0, -12.0, 16.8, -16.8, 19.2, -19.2]
+zero_every = 4
+slew = 24.0
+[plan.dwell]
+kind = "fixed"
+duration = 2.5
+"""
+TRUTH = 0.3985 * 1.0002
+"""N/V^2: of T2, times the cell's gain."""
+
+
+def bench(seed: int = 1, **motor) -> VirtualBench:
+    settings = load_world(BENCH / "world.toml")
+    devices = {**settings.devices, "motor": replace(settings.devices["motor"], **motor)}
+    made = replace(settings, world=replace(settings.world, mounted="T2"), devices=devices, seed=seed, step=0.005)
+    return VirtualBench(made, Host(adapter=3e-4, work=5e-4, reader_late=2e-4, loop_late=3e-4), "none")
+
+
+def files(folder: Path) -> Path:
+    text = (BENCH / "bench.toml").read_text(encoding="utf-8")
+    text = text[: text.index("[mount]")].replace("min = -300.0 ", "max_age = 1.0\nmin = -300.0 ")
+    (folder / "bench.toml").write_text(text, encoding="utf-8")
+    (folder / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
+    return folder / "campaign.toml"
+
+
+class Faulty:
+    """The bench, whose motor gets a fault once it was driven with `volts` for two seconds."""
+
+    def __init__(self, world: VirtualBench, volts: float, fault: str, amount: float) -> None:
+        self.bench, self.wires, self._volts, self._fault = world, world.wires, volts, (fault, amount)
+        self.begun: float | None = None
+
+    def now_ns(self) -> int:
+        return self.bench.now_ns()
+
+    def sleep_until_ns(self, t_ns: int) -> None:
+        self.bench.sleep_until_ns(t_ns)
+        if self.begun is None and self.bench.commands:
+            since, volts = self.bench.commands[-1]
+            if abs(volts - self._volts) < 0.01 and self.bench.now() - since > 2.0:
+                self.begun = self.bench.now()
+                self.bench.fault("motor", *self._fault)
+
+
+@pytest.mark.parametrize("motor", [{}, {"echo": False, "at_zero": "coast"}], ids=["as delivered", "quiet, coasting"])
+def test_a_campaign_finds_the_truth_and_proves_the_watchdog(tmp_path, motor):
+    world = bench(**motor)
+    path, _ = record_in_virtual_time(files(tmp_path), tmp_path / "run", world, ("some-id", "2026-01-01"))
+    recording = load(path)
+    assert (recording.outcome, recording.cause) == ("completed", "")
+    (fitted,) = fit_recordings([recording])
+    constant = fitted.fit.parameters["C"]
+    assert abs(constant.value - TRUTH) < 3.0 * constant.std
+    assert constant.std < 0.002 * TRUTH
+    end = next(fact for fact in read(tmp_path / "run") if fact["fact"] == "run_end")
+    assert 0.5 <= end["time_to_zero_s"] < 3.0
+    names = {(channel.stream, channel.name) for channel in recording.channels}
+    assert {("motor", "rotation_rate"), ("motor", "motor_voltage"), ("motor_state", "fault_flags")} <= names
+    rotation = recording.first_of("rotation_rate")
+    assert len(rotation.time) / rotation.time[-1] == pytest.approx(50.0, rel=0.05)
+    assert not [event.text for event in recording.events if "could not be understood" in event.text]
+
+
+@pytest.mark.parametrize(
+    ("fault", "amount", "within", "cause"),
+    [
+        ("over_temperature", 0.1, 0.3, "motor reports overheat"),
+        ("over_current", 0.1, 0.3, "motor reports short circuit"),
+        ("stall", 0.1, 0.3, "motor reports stall detected"),
+        ("pulse_mode", 0.1, 0.3, "motor reports commanded by a pulse input"),
+        ("silent", 0.1, 0.5, "is stale"),
+        ("frozen", 0.1, 3.0, "frozen"),
+        ("ignores_commands", 0.1, 3.0, "the motor does not follow|contradict"),
+        ("redrives", 0.5, 3.0, "contradict|does not|by itself"),
+        ("rate_factor", 1.3, 3.0, "contradict"),
+    ],
+)
+def test_a_fault_ends_the_run(tmp_path, fault, amount, within, cause):
+    world = Faulty(bench(), 12.0, fault, amount)
+    with pytest.raises(RuntimeError, match=cause):
+        record_in_virtual_time(files(tmp_path), tmp_path / "run", world, ("some-id", "2026-01-01"))
+    assert world.begun is not None
+    zeros = [t for t, volts in world.bench.commands if volts == 0.0 and t >= world.begun]
+    if fault != "silent":  # hears nothing any more: its own watchdog stops it
+        assert zeros[0] - world.begun < within
+    assert world.bench.commands[-1][1] == 0.0
+    assert world.bench.drive.power == 0.0 or fault == "redrives"
+
+
+def test_a_watchdog_that_never_fires_is_refused_by_the_proof(tmp_path):
+    with pytest.raises(RuntimeError, match="the motor's own watchdog is refused"):
+        record_in_virtual_time(
+            files(tmp_path), tmp_path / "run", bench(broken_watchdog=True), ("some-id", "2026-01-01")
+        )
+
+
+def driver(world: VirtualBench) -> Roboteq:
+    return Roboteq("motor", load_bench(BENCH / "bench.toml").devices["motor"].options, world.wires["motor"])
+
+
+def pass_time(world: VirtualBench, seconds: float) -> None:
+    world.sleep_until_ns(world.now_ns() + round(seconds * 1e9))
+
+
+def left_running(**motor) -> VirtualBench:
+    """A controller whose host is gone in the middle of a hold at 12 V; its watchdog has stopped the motor."""
+    world = bench(channels=2, **motor)
+    world.wires["motor"].write(b"!G 1 250\r")
+    pass_time(world, 0.4)
+    assert world.drive.power == 250.0
+    pass_time(world, 5.0)
+    assert world.drive.power == 0.0
+    return world
+
+
+def test_a_naive_host_makes_the_motor_run():
+    world = left_running()
+    world.wires["motor"].write(b"!AC 1 5000\r")  # an acceleration, no set-point
+    pass_time(world, 0.1)
+    assert world.drive.power == 250.0
+    assert world.world.state.n > 1.0
+
+
+def test_the_driver_does_not():
+    world = left_running()
+    device = driver(world)
+    device.open()
+    world.commands.clear()
+    for _ in range(100):
+        device.drain()
+        pass_time(world, 0.02)
+        assert world.drive.power == 0.0
+    world.wires["motor"].write(b"!AC 1 5000\r")
+    pass_time(world, 0.1)
+    assert world.drive.power == 0.0, "what could have been resumed is gone"
+    assert all(volts == 0.0 for _, volts in world.commands)
+    device.close()
+
+
+def test_half_a_command_of_a_killed_host_does_no_more_than_a_tick():
+    world = left_running()
+    world.wires["motor"].write(b"!G 1 5")
+    device = driver(world)
+    device.open()
+    assert world.drive.power == 0.0
+    device.close()
+
+
+def test_a_silence_of_the_loop_ends_in_zero():
+    world = bench()
+    device = driver(world)
+    device.open()
+    device.command(0.0)
+    device.command(12.0)
+    pass_time(world, 0.3)
+    device.command(12.0)
+    pass_time(world, 0.6)
+    assert world.drive.power == 0.0, "its own watchdog"
+    with pytest.raises(LinkError, match="command 0 V first"):
+        device.command(12.0)
+    pass_time(world, 0.1)
+    assert world.drive.power == 0.0
+    device.command(0.0)
+    device.command(12.0)
+    pass_time(world, 0.1)
+    assert world.drive.power == 250.0
+    device.close()
+    pass_time(world, 0.1)
+    assert world.drive.power == 0.0
+    world.wires["motor"].write(b"!AC 1 5000\r")
+    pass_time(world, 0.1)
+    assert world.drive.power == 0.0, "what is closed left nothing to resume"
+
+
+@pytest.mark.parametrize(
+    ("motor", "sentence"),
+    [
+        ({"watchdog": 0}, "watchdog is switched off"),
+        ({"watchdog": 1000}, "1000 ms"),
+        ({"mode": 1}, "closes a loop"),
+        ({"pole_pairs": 4}, "BPOL = 4"),
+    ],
+)
+def test_settings_that_are_refused(motor, sentence):
+    world = left_running(**motor) if motor.get("watchdog") != 0 and motor.get("watchdog") != 1000 else bench(**motor)
+    device = driver(world)
+    with pytest.raises(DeviceError, match=sentence):
+        device.open()
+    pass_time(world, 0.1)
+    assert world.drive.power == 0.0
+
+
+def test_the_bench_as_it_is_shipped_passes_the_check(tmp_path):
+    text = (BENCH / "bench.toml").read_text(encoding="utf-8")
+    for port in ("load_cell", "motor"):
+        (tmp_path / port).touch()
+        text = text.replace(f"ports/{port}", str(tmp_path / port))
+    (tmp_path / "bench.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
+    assert check_campaign(tmp_path / "campaign.toml").peak_thrust == pytest.approx(0.4 * 19.2**2)
