@@ -69,6 +69,10 @@ class Chooser(ModalScreen[str]):
     def on_input_changed(self, _: Input.Changed) -> None:
         self._list()
 
+    def on_option_list_option_selected(self, _: OptionList.OptionSelected) -> None:
+        """A click."""
+        self.action_choose()
+
     def _list(self) -> None:
         """What fits what is typed; the mark goes to the first where the list has become another one."""
         options = self.query_one(OptionList)

@@ -12,8 +12,8 @@ from rig.watch.watch_link import run_of
 def begin_watch(session: Session, thruster: str, t0_ns: int) -> None:
     """A run begins; what was learnt of another mounting is forgotten."""
     status = session.status
-    status.watch, status.held = Watching(), []
     session.watched = session.loop.watcher is not None
+    status.watch, status.held = Watching("learning" if session.watched else "off"), []
     if session.loop.watcher is not None:
         loop = session.loop
         session.loop.watcher.begin(

@@ -58,7 +58,7 @@ def main(folder: str) -> None:
     with TemporaryDirectory(prefix="tunnel-") as bench, live_bench(Path(bench)):
         campaign = Path(bench) / "campaign.toml"
         text = (PROJECT / "campaigns/demo.toml").read_text().replace("../benches/simulated/", "")
-        campaign.write_text(text.replace("levels = 5", "levels = 12").replace('name = "demo"', 'name = "tunnel demo"'))
+        campaign.write_text(text.replace("levels = 4", "levels = 12").replace('name = "demo"', 'name = "tunnel demo"'))
         out = Path(bench) / "recordings"
         out.mkdir()
         run, process = start_controller(campaign, out, ())

@@ -109,6 +109,16 @@ async def test_arrows_choose_and_escape_closes():
         assert desk.kinds() == ["accept", "pause"]
 
 
+async def test_a_click_chooses():
+    async with sitting(running()) as desk:
+        await desk.press("colon")
+        await desk.draw()
+        await desk.pilot.click(OptionList, offset=(5, 1))
+        await desk.pilot.pause()
+        assert desk.kinds() == ["accept"]
+        assert len(desk.app.screen_stack) == 1
+
+
 async def test_what_is_not_possible_is_refused_with_its_reason_and_the_palette_stays():
     async with sitting(running()) as desk:
         await desk.press("colon", *"start", "enter")
