@@ -112,7 +112,7 @@ def test_clean_campaign_of_two_thrusters_says_nothing_and_begins_anew_with_each(
 
         seen = play(world, watch)
         assert world.session.status.outcome == "completed"
-        assert {snapshot.watch.state for snapshot in seen if snapshot.state == "mount"} == {"off"}
+        assert {snapshot.watch.state for snapshot in seen if snapshot.state == "mount"} <= {"off", "learning"}
         assert len(world.recorder.of(Close)) == 2
         assert not [fact for fact in read(tmp_path) if fact["fact"] == "mismatch"]
         assert "not watched" not in world.texts
