@@ -17,7 +17,7 @@ from rig.console.view_model import wording
 from rig.console.view_model.alarms import alarm
 from rig.console.view_model.log_filter import BEFORE, TITLES, LogFilter, run_of, wanted
 from rig.console.view_model.running_diagnosis import standing
-from rig.console.view_model.tables import checks_table, readings_text, results_table, verdict_summary
+from rig.console.view_model.tables import checks_table, readings_text, refusal, results_table, verdict_summary
 from rig.console.view_model.view import View
 from rig.link.front_end_messages import LogLine, Snapshot
 
@@ -145,7 +145,9 @@ class ChecksPanel(Panel):
     def show(self, view: View) -> None:
         checks = view.snapshot.checks if view.snapshot is not None else ()
         state = view.snapshot.state if view.snapshot is not None else "connecting"
-        self.put((checks, state), Group(verdict_summary(checks, state), Text(), checks_table(checks)))
+        refused = refusal(view.snapshot)
+        said = [Text(refused, LOG_STYLES["warning"])] if refused else []
+        self.put((checks, state, refused), Group(verdict_summary(checks, state), *said, Text(), checks_table(checks)))
 
 
 class ResultsPanel(Panel):

@@ -51,7 +51,8 @@ def preflight(session: Session) -> None:
             against = [check for check in session.status.checks if check.verdict in ("failed", "waiting")]
             if not against:
                 break
-            session.say("warning", f"not started: {against[0].name}: {against[0].text}")
+            name = against[0].name
+            session.say("warning", f"not started: {name}: {against[0].text.removeprefix(f'{name}: ')}")
     for check in checks:
         level: Level = "warning" if check.verdict == "warning" else "info"
         session.say(level, f"preflight: {check.name}: {check.text}", of_bench=True)

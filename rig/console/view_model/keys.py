@@ -54,7 +54,8 @@ def _doing(view: View) -> tuple[tuple[str, str], ...]:
         return leave
     if snapshot.state == "preflight":
         gone = device_gone(snapshot)
-        return (*((("resume", f"retry {gone}"),) if gone else ()), ("start", "start"), *leave)
+        start = () if NAMED["start"].not_now(view) else (("start", "start"),)
+        return (*((("resume", f"retry {gone}"),) if gone else ()), *start, *leave)
     if snapshot.state == "mount":
         return (("start", "mounted"), *leave) if snapshot.mounted_by_hand else leave
     if snapshot.state == "paused":

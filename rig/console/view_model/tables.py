@@ -29,6 +29,8 @@ CHECK_WORDS: Final = {
     "failed": ("✗ FAILED", "bold #ff6070"),
     "waiting": ("… waiting", "#9a9a9a"),
 }
+REFUSED: Final = "not started: "
+"""Begins the event of a start that the controller has refused."""
 TROUBLE_FIRST: Final = ("failed", "waiting", "warning", "passed")
 NAME, VALUE, UNIT, LIMIT, AGE, STATE = 17, 9, 5, 11, 7, 7
 """Cells per column of the readings."""
@@ -112,6 +114,16 @@ def _result(held: tuple[Point, ...]) -> tuple[str, ...]:
     percent = f"{100.0 * fit.C_std / abs(fit.C):.2f}" if fit.C and known else "—"
     C, std = f"{fit.C:.{digits}f}", f"{fit.C_std:.{digits}f}" if known else "—"
     return (C, std, percent, f"{fit.tare:+.2f}", str(len(held)), unsteady, str(fit.left_out))
+
+
+def refusal(snapshot: Snapshot | None) -> str:
+    """The event with which the newest start was refused, while it still would be; empty: none was."""
+    if snapshot is None or snapshot.state != "preflight":
+        return ""
+    if not any(check.verdict in ("failed", "waiting") for check in snapshot.checks):
+        return ""
+    refused = [line for line in snapshot.log if line.text.startswith(REFUSED)]
+    return f"{refused[-1].time:.1f} s: {refused[-1].text}" if refused else ""
 
 
 def verdict_summary(checks: tuple[Check, ...], state: State) -> Text:

@@ -30,6 +30,7 @@ class Scene:
 
 NO_ANSWER = "no answer on ports/flow within 2.0 s; is it powered?"
 FAILED = tuple(replace(c, verdict="failed", text=NO_ANSWER) if c.name == "flow" else c for c in CHECKS)
+REFUSAL = LogLine(9.4, "warning", f"not started: flow: {NO_ANSWER}", -1)
 STALE = tuple(
     replace(r, state="stale", age=1.9) if r.channel == "flow.flow_speed"
     else replace(r, state="limit", value=41.2) if r.channel == "motor.current" else r
@@ -67,7 +68,7 @@ BENT = tuple(replace(p, thrust=0.92 * p.thrust if p.voltage < 0 else p.thrust) f
 
 SCENES = {
     "preflight": Scene((snapshot("preflight"),)),
-    "preflight_failed": Scene((snapshot("preflight", checks=FAILED),)),
+    "preflight_failed": Scene((snapshot("preflight", checks=FAILED, log=(REFUSAL,), log_count=1),)),
     "sweep": Scene((running(),)),
     "fit": Scene((running(),), keys=("2",)),
     "time": Scene((running(),), keys=("3",)),

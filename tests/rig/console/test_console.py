@@ -29,6 +29,22 @@ async def test_a_failed_check_is_said_in_words():
         assert "1 of 7 checks FAILED" in desk.text(ChecksPanel)
 
 
+async def test_a_start_that_was_refused_is_said_where_it_was_asked_for():
+    failed = (*CHECKS[:-1], replace(CHECKS[-1], verdict="failed", text="off"))
+    log = (
+        LogLine(3.0, "warning", "not started: flow: no rows", -1),
+        LogLine(9.4, "warning", "not started: watchdog: off", -1),
+    )
+    async with sitting(snapshot("preflight", checks=failed)) as desk:
+        assert "F5" not in desk.text("#keys")
+        await desk.play(snapshot("preflight", checks=failed, log=log, log_count=2))
+        assert "9.4 s: not started: watchdog: off" in desk.text(ChecksPanel)
+        assert "no rows" not in desk.text(ChecksPanel)
+        await desk.play(snapshot("preflight", log=log, log_count=2))
+        assert "not started" not in desk.text(ChecksPanel)
+        assert "F5" in desk.text("#keys")
+
+
 async def test_f5_says_that_the_thruster_is_mounted():
     async with sitting(running("mount", thruster="T3", mounted_by_hand=True)) as desk:
         assert "Put T3 on the bench" in desk.alarm()

@@ -46,9 +46,7 @@ def test_device_that_does_not_open_is_tried_again_until_it_does(tmp_path):
         watched(world, [(2.0, look), (5.0, lambda: setattr(world.cell, "refuses", "")), (9.0, look)])
         assert seen[0] == ("failed", "passed")
         assert outcome(world) == ("completed", "")
-        assert world.texts.count("load_cell: no cable") == 1 + world.texts.count(
-            "not started: load_cell: load_cell: no"
-        )
+        assert world.texts.count("load_cell: no cable") == 1 + world.texts.count("not started: load_cell: no")
         assert "load_cell is back: virtual cell 2" in world.texts
         assert len(list(tmp_path.glob("controller.log"))) == 1, "in the same folder"
 
