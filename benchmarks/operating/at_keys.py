@@ -52,9 +52,7 @@ class Transcript:
     def fact(self, text: str) -> None:
         """Something that was looked for elsewhere than on the screen, and found."""
         self.found += 1
-        self.write(
-            f"{self.clock()} by the truth log: {text}" if not text.startswith("file") else f"{self.clock()} {text}"
-        )
+        self.write(f"{self.clock()} {text}")
 
 
 @dataclass

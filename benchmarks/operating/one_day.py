@@ -77,11 +77,9 @@ class Day:
             "it is said, and the key that helps",
             "FAILED.*load_cell",
             r"checks FAILED",
-            "r retry load_cell|retry load_cell",
+            "r retry load_cell",
         )
-        here.presses("F5", "refused")
-        here.presses("4", "an event says why", "not started.*load_cell")
-        here.presses("1", "the preflight again", "FAILED")
+        here.presses("F5", "refused, and why", "not started: load_cell", "FAILED")
         self.place.tell("clear", "load_cell")
         here.presses("r", "it is there again", READY)
         if self.place.driven(begun):

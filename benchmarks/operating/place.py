@@ -86,12 +86,8 @@ class Place:
             raise DayError("no command 0 in the truth log")
         took = (found[0]["t_ns"] - since_ns) * 1e-9
         if took > within or self.driven(found[0]["t_ns"]):
-            raise DayError(
-                f"command 0 came {took:.3f} s after the key, {within:g} s are allowed, or it was driven again"
-            )
-        self.transcript.fact(
-            f"by the truth log: command 0 V {1000 * took:.0f} ms after the key, and never driven again"
-        )
+            raise DayError(f"command 0 came {took:.3f} s later, {within:g} s are allowed, or it was driven again")
+        self.transcript.fact(f"by the truth log: command 0 V {1000 * took:.0f} ms after that, and not driven again")
 
     def _until(self, what: str, true: Callable[[list[dict[str, Any]]], bool], seconds: float, within: float) -> None:
         deadline = time.monotonic() + within
