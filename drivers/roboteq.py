@@ -58,8 +58,8 @@ class Roboteq:
         self._fault: str | None = None
         self._refused = 0
         self._fed_ns = 0
-        self._motor = Round(motor_queries(o.channel, o.rotation), o.rate)
-        self._state = Round(state_queries(o.channel), o.state_rate)
+        self._motor = Round(motor_queries(o.channel, o.rotation), o.rate, o.baud)
+        self._state = Round(state_queries(o.channel), o.state_rate, o.baud)
 
     @property
     def streams(self) -> tuple[Stream, ...]:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
-ANSWER_TIME_NS = 100_000_000
-"""ns after which answers that did not come are given up; those of one round take a few ms."""
+PATIENCE = 0.015
+"""s, beside twice its time on the line, after which the answers of a round are given up."""
+BITS = 10
+"""Of a character on the line: 8N1."""
 EARLY = 0.25
 """Of a period: a turn that comes by so much too early is one in time."""
 COMMANDS = 50.0
@@ -57,10 +59,12 @@ class Round:
     """Queries that are asked together, and the row that their answers make. Answers come in the order of the queries;
     a row that lacks one is none."""
 
-    def __init__(self, queries: tuple[Query, ...], rate: float) -> None:
+    def __init__(self, queries: tuple[Query, ...], rate: float, baud: int) -> None:
         self._names = tuple(query.name for query in queries)
         self.request = b"".join(query.text.encode("ascii") + b"\r" for query in queries)
         self._period_ns = round(1e9 / rate)
+        on_the_line = sum(query.characters for query in queries) * BITS / baud
+        self._given_up_ns = round(1e9 * (PATIENCE + 2.0 * on_the_line))
         self._next_ns = self._asked_ns = 0
         self._waiting = False
         self._row: list[tuple[int, ...]] = []
@@ -69,7 +73,7 @@ class Round:
         """Whether it is time to send `request`; then it counts as sent."""
         if now_ns < self._next_ns - EARLY * self._period_ns:
             return False
-        if self._waiting and now_ns - self._asked_ns < ANSWER_TIME_NS:
+        if self._waiting and now_ns - self._asked_ns < self._given_up_ns:
             return False
         behind = now_ns - self._next_ns >= self._period_ns
         self._next_ns = (now_ns if behind else self._next_ns) + self._period_ns

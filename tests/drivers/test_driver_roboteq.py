@@ -118,7 +118,7 @@ def test_a_channel_alone_or_among_all():
 
 
 def test_a_round_is_asked_at_its_rate_and_not_twice_at_once():
-    asked = Round(motor_queries(1, "brushless"), 50.0)
+    asked = Round(motor_queries(1, "brushless"), 50.0, 115200)
     assert asked.request == b"?BS 1\r?A 1\r?P 1\r?V 2\r"
     ms = 1_000_000
     assert asked.begin(1000 * ms)
@@ -128,13 +128,13 @@ def test_a_round_is_asked_at_its_rate_and_not_twice_at_once():
     assert asked.take("V", (2,)) == ((1,), (1,), (1,), (2,))
     assert not asked.begin(1010 * ms)
     assert asked.begin(1019 * ms), "a turn that is a little early is in time"
-    assert not asked.begin(1118 * ms)
-    assert asked.begin(1119 * ms), "answers that never came are given up"
+    assert not asked.begin(1042 * ms), "24 ms: 15, and twice 54 characters"
+    assert asked.begin(1044 * ms), "answers that never came are given up"
 
 
 @pytest.mark.parametrize("lost", [0, 1, 2, 3])
 def test_a_row_that_lacks_an_answer_is_none(lost):
-    asked, names = Round(motor_queries(1, "brushless"), 50.0), ["BS", "A", "P", "V"]
+    asked, names = Round(motor_queries(1, "brushless"), 50.0, 115200), ["BS", "A", "P", "V"]
     asked.begin(0)
     for name in names[:lost] + names[lost + 1 :]:
         assert asked.take(name, (1,)) is None

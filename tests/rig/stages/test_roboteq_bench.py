@@ -130,6 +130,50 @@ def test_a_watchdog_that_never_fires_is_refused_by_the_proof(tmp_path):
         )
 
 
+def without_a_rate(folder: Path) -> Path:
+    """The same bench, its controller without a sensor on the motor."""
+    campaign = files(folder)
+    text = (folder / "bench.toml").read_text(encoding="utf-8")
+    text = text.replace('rotation = "brushless"', 'rotation = "none"').replace("pole_pairs = 7 ", "# pole_pairs ")
+    (folder / "bench.toml").write_text(text, encoding="utf-8")
+    return campaign
+
+
+def test_without_a_rate_the_watchdog_cannot_be_proved(tmp_path):
+    campaign = without_a_rate(tmp_path)
+    with pytest.raises(RuntimeError, match="the watchdog can't be proved: no rotation rate is measured"):
+        record_in_virtual_time(campaign, tmp_path / "run", bench(), ("some-id", "2026-01-01"))
+
+
+def test_without_a_rate_a_run_is_measured_and_its_rest_is_never_confirmed(tmp_path):
+    campaign = without_a_rate(tmp_path)
+    text = campaign.read_text(encoding="utf-8").replace("[watch]", "prove_watchdog = false\n[watch]")
+    text += '[overrides]\n"campaign.prove_watchdog" = "this controller measures no rotation rate"\n'
+    campaign.write_text(text, encoding="utf-8")
+    world = bench()
+    with pytest.raises(RuntimeError, match="STOP NOT CONFIRMED at the end of the run"):
+        record_in_virtual_time(campaign, tmp_path / "run", world, ("some-id", "2026-01-01"))
+    recording = load(tmp_path / "run" / "T2.h5")
+    (fitted,) = fit_recordings([recording])
+    constant = fitted.fit.parameters["C"]
+    assert abs(constant.value - TRUTH) < 3.0 * constant.std
+    assert any("no rotation rate is measured on this bench" in event.text for event in recording.events)
+    assert recording.first_of("rotation_rate") is None
+    assert world.drive.power == 0.0
+
+
+def test_a_line_that_loses_bytes_costs_rows_and_is_told(tmp_path):
+    world = bench()
+    path, _ = record_in_virtual_time(
+        files(tmp_path), tmp_path / "run", Faulty(world, 12.0, "shifted", 0.01), ("some-id", "2026-01-01")
+    )
+    recording = load(path)
+    assert recording.outcome == "completed"
+    rotation = recording.first_of("rotation_rate")
+    assert 0.9 < len(rotation.time) / rotation.time[-1] / 50.0 < 1.0
+    assert any("motor: " in event.text and "could not be understood" in event.text for event in recording.events)
+
+
 def driver(world: VirtualBench) -> Roboteq:
     return Roboteq("motor", load_bench(BENCH / "bench.toml").devices["motor"].options, world.wires["motor"])
 
