@@ -31,10 +31,9 @@ class Kind:
     options: type[Any]
     """Frozen dataclass; its `__post_init__` raises ValueError for impossible values."""
     build: Callable[..., Instrument]
-    """`build(name, options)` for a serial device, `build(name, options, bus)` for one on CAN."""
+    """`build(name, options)` or, over a wire that is given, `build(name, options, wire)` for a serial device;
+    `build(name, options, bus)` for one on CAN."""
     link: Literal["serial", "can"]
-    over_wire: bool = True
-    """Of a serial device: `build(name, options, wire)` as well. False: its protocol library opens the port itself."""
 
 
 KINDS: dict[str, Kind] = {
@@ -42,7 +41,7 @@ KINDS: dict[str, Kind] = {
     "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial"),
     "modbus_cell": Kind(modbus_cell_options.Options, modbus_cell.ModbusCell, "serial"),
     "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial"),
-    "keller": Kind(keller.Options, keller.Keller, "serial", over_wire=False),
+    "keller": Kind(keller.Options, keller.Keller, "serial"),
     "roboteq": Kind(roboteq_options.Options, roboteq.Roboteq, "serial"),
     "vesc_can": Kind(vesc_can.Options, vesc_can.VescCan, "can"),
 }

@@ -78,7 +78,7 @@ class ModbusCell:
             self._read_unit()
             self._read_division()
             self._look()
-            self._poll.start(self._request, self._options.rate)
+            self._poll.start([self._request], self._options.rate)
             undo.pop_all()
         return f"{self._map.title}, Modbus address {self._options.address}, in {self._unit} (serial number not read)"
 

@@ -1,4 +1,4 @@
-"""One request to a Modbus device, again and again: sent on time, one at a time, with silence between two frames.
+"""The same requests to a Modbus device, again and again: on time, one at a time, with silence between two frames.
 
 On a port of its own a thread does that; over a wire whose time belongs to somebody else, whoever takes the replies.
 """
@@ -34,9 +34,10 @@ class ModbusPoll:
         self._turn = threading.Lock()
         self._port: SerialPort[Record] = SerialPort(name, settings, self._feed, wire)
         self._unanswered: deque[tuple[int, Record]] = deque(maxlen=1000)
-        self._request: Read | None = None
+        self._requests: tuple[Read, ...] = ()
+        self._at = 0
         self._period = self._due = self._sent = self._heard = self._quiet = 0.0
-        self._waiting = False
+        self._waiting = self._refused = False
         self._wake, self._closing = threading.Event(), threading.Event()
         self._poller: threading.Thread | None = None
 
@@ -61,7 +62,7 @@ class ModbusPoll:
         self.close()
         self._closing.clear()
         self._unanswered.clear()
-        self._request, self._waiting = None, False
+        self._requests, self._at, self._waiting = (), 0, False
         self._port.open()
 
     def ask(self, request: Read) -> Registers:
@@ -85,10 +86,10 @@ class ModbusPoll:
             f" {self._settings.framing}, asked by function {request.function} for {registers}: {why}"
         )
 
-    def start(self, request: Read, rate: float) -> None:
-        """Ask `request` `rate` times a second from now on."""
+    def start(self, requests: Sequence[Read], rate: float) -> None:
+        """Ask all `requests`, one after the other, `rate` times a second; after a failure from the first again."""
         self._port.inbox.take_all()
-        self._request, self._period = request, 1.0 / rate
+        self._requests, self._period = tuple(requests), 1.0 / rate
         self._due = self._now()
         self._quiet = self._due + self._gap
         if self._wire is None:
@@ -98,7 +99,7 @@ class ModbusPoll:
     def take(self) -> Sequence[tuple[int, Record]]:
         """(ns of arrival, record) of all that came, an Unreadable for each request without a reply. Never blocks."""
         rows = self._port.inbox.take_all()
-        if self._wire is not None and self._request is not None and self._port.alive:
+        if self._wire is not None and self._requests and self._port.alive:
             with contextlib.suppress(LinkError):  # told by `error`
                 self._step(self._now())
         while self._unanswered:
@@ -110,7 +111,7 @@ class ModbusPoll:
         self._wake.set()
         if self._poller is not None:
             self._poller.join(JOIN_MARGIN)
-        self._poller, self._request = None, None
+        self._poller, self._requests = None, ()
         self._port.close()
 
     def _now(self) -> float:
@@ -127,7 +128,7 @@ class ModbusPoll:
         with self._turn:
             records = self._decoder.feed(data)
         if records:
-            self._heard = self._now()
+            self._heard, self._refused = self._now(), not isinstance(records[-1], Registers)
             self._wake.set()
         return records
 
@@ -151,11 +152,12 @@ class ModbusPoll:
                 answered = not self._decoder.waiting
             if answered:
                 self._waiting, self._quiet = False, self._heard + self._gap
+                self._at = 0 if self._refused else (self._at + 1) % len(self._requests)
             elif now - self._sent < self._timeout:
                 return self._sent + self._timeout
             else:
                 self._give_up(now)
-        due = max(self._due, self._quiet)
+        due = self._quiet if self._at else max(self._due, self._quiet)
         if now < due:
             return due
         self._send(now)
@@ -167,15 +169,16 @@ class ModbusPoll:
             why = self._decoder.unanswered()
             self._decoder.expect(None)
         self._unanswered.append((round(now * 1e9), Unreadable(f"{why} within {self._timeout:g} s")))
-        self._waiting, self._quiet = False, now + self._timeout
+        self._waiting, self._quiet, self._at = False, now + self._timeout, 0
 
     def _send(self, now: float) -> None:
-        assert self._request is not None
-        self._due = max(self._due + self._period, now)
+        request = self._requests[self._at]
+        if self._at == 0:
+            self._due = max(self._due + self._period, now)
         with self._turn:
-            self._decoder.expect(self._request)
+            self._decoder.expect(request)
         self._sent, self._waiting = now, True
-        self._port.write(self._request.encode())
+        self._port.write(request.encode())
 
 
 def _is_answer(record: Record) -> bool:

@@ -32,9 +32,10 @@ EXCEPTIONS = {
 
 
 class Registers(NamedTuple):
-    """What was asked for: one 16-bit word a register."""
+    """What was asked for: one 16-bit word a register, from `register` on."""
 
     words: tuple[int, ...]
+    register: int
 
 
 class Refusal(NamedTuple):
@@ -156,7 +157,7 @@ def _reply(data: bytes, at: int, asked: Read) -> tuple[Registers | Refusal | Non
     if data[at + 1] == asked.function and data[at + 2] == 2 * asked.count and len(data) >= at + length:
         frame = data[at : at + length]
         if crc16(frame) == 0:
-            return Registers(struct.unpack(f">{asked.count}H", frame[3:-2])), length
+            return Registers(struct.unpack(f">{asked.count}H", frame[3:-2]), asked.register), length
     if data[at + 1] == asked.function | 0x80 and crc16(data[at : at + REPLY_OVERHEAD]) == 0:
         return Refusal(data[at + 2]), REPLY_OVERHEAD
     return None, 0

@@ -8,7 +8,7 @@ import tomllib
 from collections.abc import Iterable, Mapping
 from dataclasses import MISSING, fields, is_dataclass
 from pathlib import Path
-from typing import Any, Final, TypeVar, get_type_hints
+from typing import Any, Final, TypeVar, get_args, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -154,6 +154,8 @@ WORDS = {
 
 def _type_said(hint: Any) -> str:
     """The type in an operator's words."""
+    if type(None) in get_args(hint) and len(get_args(hint)) == 2:
+        return _type_said(next(each for each in get_args(hint) if each is not type(None)))
     name = hint.__name__ if isinstance(hint, type) else str(hint)
     if hint is Path:
         return "a path"

@@ -81,10 +81,8 @@ def build(config: BenchConfig, wires: Mapping[str, Wire] | None = None) -> Bench
             instruments[name] = kind.build(name, device.options, buses[device.options.bus])
         elif wires is None:
             instruments[name] = kind.build(name, device.options)
-        elif kind.over_wire:
-            instruments[name] = kind.build(name, device.options, _wire(name, config, wires))
         else:
-            raise ConfigError(f"{config.path}: devices.{name}: a {device.kind} opens its port itself: leave it out")
+            instruments[name] = kind.build(name, device.options, _wire(name, config, wires))
     return Bench(config, buses, instruments)
 
 

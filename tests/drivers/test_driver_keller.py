@@ -86,9 +86,10 @@ def test_timeouts_and_refusals_are_counted_and_polling_goes_on():
     with Peer(script, terminator=None) as peer:
         device = keller.Keller("thermometer", keller.Options(peer.port, rate=20.0, baud=115_200, timeout=0.1))
         device.open()
-        wait_until(lambda: device.health().bad >= 2)
-        seen = device.health().received
-        wait_until(lambda: device.health().received > seen)
+        wait_until(lambda: device.drain() is not None and device.health().bad >= 2)
+        first, second = device.health().first_bad[:2]
+        assert (first, second) == ("no reply within 0.1 s", "exception 2 (no such register)")
+        assert collect(device, 2)[-1].values == (18.25, 1e5), "temperature and pressure are paired as they were asked"
         assert device.health().alive
         device.close()
 
@@ -108,8 +109,20 @@ def test_a_pulled_thermometer():
         device.open()
         peer.unplug()
         wait_until(lambda: not device.health().alive)
-        assert "was lost" in device.health().error
+        assert any(word in device.health().error for word in ("was lost", "refused"))
         device.close()
+
+
+def test_every_byte_is_kept(tmp_path):
+    capture = tmp_path / "bytes.txt"
+    with Peer(transmitter, terminator=None) as peer:
+        options = keller.Options(peer.port, rate=20.0, baud=115_200, timeout=0.5, capture=str(capture))
+        device = keller.Keller("thermometer", options)
+        device.open()
+        collect(device, 1)
+        device.close()
+    (case,) = KELLER["request"]
+    assert f"> {case['frame']}" in capture.read_text()
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,7 @@ def test_requests(case):
 def test_the_golden_reply_and_exception():
     (reply,), (exception,) = GOLDEN["reply"], GOLDEN["exception"]
     assert bytes.fromhex(reply["request"]) == ASKED.encode()
-    assert answered(REPLY) == [Registers(tuple(reply["words"]))]
+    assert answered(REPLY) == [Registers(tuple(reply["words"]), 6)]
     assert answered(bytes.fromhex(exception["frame"])) == [Refusal(exception["code"])]
     assert str(Refusal(2)) == "exception 2 (no such register)"
     assert ASKED.reply_characters == len(REPLY)
@@ -60,7 +60,7 @@ def test_a_reply_in_any_pieces(words, function, address, draw):
     frame = crc(body)
     assert decoder.feed(frame[:cut]) == []
     assert decoder.waiting
-    assert decoder.feed(frame[cut:]) == [Registers(tuple(words))]
+    assert decoder.feed(frame[cut:]) == [Registers(tuple(words), 0)]
     assert not decoder.waiting
 
 
@@ -104,7 +104,7 @@ def test_garbage_and_then_a_reply(noise):
     decoder.expect(ASKED)
     decoder.feed(noise)
     decoder.expect(ASKED)
-    assert decoder.feed(REPLY)[-1] == Registers(tuple(GOLDEN["reply"][0]["words"]))
+    assert decoder.feed(REPLY)[-1] == Registers(tuple(GOLDEN["reply"][0]["words"]), 6)
 
 
 def test_silence_between_frames():

@@ -74,14 +74,15 @@ def test_reader_of_a_can_bus(report, prompt):
     prompt(seen, max(3 * PERIOD, 2 * READ_TIMEOUT), died)
 
 
-def test_poller_of_a_transmitter(report, prompt):
+@pytest.mark.parametrize("which", ["poll", "read"])
+def test_poller_of_a_transmitter(which, report, prompt):
     with Peer(transmitter, terminator=None) as peer:
         before = set(threading.enumerate())
         device = keller.Keller("cell", keller.Options(peer.port, rate=1 / PERIOD, baud=115_200, timeout=0.5))
         device.open()
-        (reader,) = readers(before)
-        died = kill(reader)
+        (thread,) = [each for each in readers(before) if each.name == f"{which} cell"]
+        died = kill(thread)
         seen = seen_after(device, died)
-        report("poller of a transmitter dies, to the trip", seen, "s")
+        report(f"{'poller' if which == 'poll' else 'reader'} of a transmitter dies, to the trip", seen, "s")
         device.close()
     prompt(seen, 3 * PERIOD, died)

@@ -1,5 +1,6 @@
 """Bench and campaign files, right and wrong."""
 
+import re
 from datetime import date
 from pathlib import Path
 
@@ -181,3 +182,26 @@ def test_file_that_is_no_text(tmp_path):
     path.write_bytes(b"\xff\xfe\x00")
     with pytest.raises(ConfigError, match="can't be read"):
         load_bench(path)
+
+
+def test_a_modbus_cell_with_a_map_beside_the_bench_file(tmp_path, monkeypatch):
+    """A relative map is relative to the bench file, as a port is; what is wrong with it is said with its name."""
+    bench = (ROOT / "benches/simulated/bench.toml").read_text(encoding="utf-8")
+    cell = 'kind = "modbus_cell"\nport = "ports/load_cell"\nmap = "own.toml"\nrate = 10.0\nunit = "kg"\n'
+    cell += 'word_order = "low_first"\ndecimals = 2\nrange_max = 500.0\n'
+    text = re.sub(r"(?<=\[devices\.load_cell\]\n)(?:.+\n)+", cell, bench)
+    (tmp_path / "bench.toml").write_text(text, encoding="utf-8")
+    (tmp_path / "own.toml").write_text(
+        (ROOT / "drivers/modbus_maps/laumas.toml").read_text(encoding="utf-8"), encoding="utf-8"
+    )
+    monkeypatch.chdir("/")
+    options = load_bench(tmp_path / "bench.toml").devices["load_cell"].options
+    assert (options.map, options.word_order) == (str(tmp_path / "own.toml"), "low_first")
+    (tmp_path / "bench.toml").write_text(text.replace("low_first", "upside_down"), encoding="utf-8")
+    with pytest.raises(
+        ConfigError, match=r"devices\.load_cell\.word_order must be one of \['high_first', 'low_first'\]"
+    ):
+        load_bench(tmp_path / "bench.toml")
+    (tmp_path / "bench.toml").write_text(text.replace("own.toml", "other.toml"), encoding="utf-8")
+    with pytest.raises(ConfigError, match=r"bench\.toml: \[devices\.load_cell\]: .*other\.toml cannot be read"):
+        load_bench(tmp_path / "bench.toml")

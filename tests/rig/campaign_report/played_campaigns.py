@@ -78,7 +78,7 @@ class World:
 
 
 def files(folder: Path, limit: float = 300.0) -> Path:
-    """The demo's bench without its thermometer, which opens its port itself, and a campaign of two thrusters."""
+    """The demo's bench without its thermometer, and a campaign of two thrusters."""
     text = (ROOT / "benches" / "simulated" / "bench.toml").read_text(encoding="utf-8")
     text = text[: text.index("[devices.thermometer]")] + text[text.index('[limits."load_cell') : text.index("[mount]")]
     folder.mkdir(parents=True, exist_ok=True)

@@ -36,7 +36,7 @@ duration = 1.5
 
 
 def files(folder: Path, proved: str = "true", limit: float = 300.0) -> Path:
-    """The demo's bench without its thermometer, which opens its port itself."""
+    """The demo's bench without its thermometer."""
     text = (ROOT / "benches" / "simulated" / "bench.toml").read_text(encoding="utf-8")
     text = text[: text.index("[devices.thermometer]")] + text[text.index('[limits."load_cell') : text.index("[mount]")]
     folder.mkdir(exist_ok=True)
@@ -102,9 +102,12 @@ def test_a_device_without_a_wire_is_refused(tmp_path):
         record_in_virtual_time(campaign, tmp_path / "run", world(), ("", ""))
 
 
-def test_a_device_that_opens_its_port_itself_is_refused(tmp_path):
-    campaign = files(tmp_path)
+def test_the_thermometer_is_asked_in_virtual_time(tmp_path):
+    """Two requests a row, each sent by the loop that takes the rows."""
+    campaign = files(tmp_path, proved="false")
     with (tmp_path / "bench.toml").open("a", encoding="utf-8") as bench:
         bench.write('\n[devices.thermometer]\nkind = "keller"\nport = "here"\nbaud = 9600\nrate = 2.0\n')
-    with pytest.raises(RuntimeError, match="a keller opens its port itself"):
-        record_in_virtual_time(campaign, tmp_path / "run", world(), ("", ""))
+    path, _ = record_in_virtual_time(campaign, tmp_path / "run", world(), ("some-id", "2026-01-01"))
+    found = load(path).first_of("water_temperature")
+    assert np.diff(found.time) == pytest.approx(0.5, abs=0.06)
+    assert found.value == pytest.approx(18.2, abs=0.1)

@@ -88,7 +88,7 @@ class LyingWorld:
 
 
 def files(folder: Path, dwell: float) -> Path:
-    """The demo's bench, its samples allowed to be old, without the thermometer, which opens its port itself."""
+    """The demo's bench, its samples allowed to be old, without the thermometer."""
     text = (ROOT / "benches" / "simulated" / "bench.toml").read_text(encoding="utf-8")
     text = text[: text.index("[devices.thermometer]")] + text[text.index('[limits."load_cell') : text.index("[mount]")]
     text = text.replace("min = -300.0 ", "max_age = 1.0\nmin = -300.0 ")
