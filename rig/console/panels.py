@@ -17,7 +17,14 @@ from rig.console.view_model import wording
 from rig.console.view_model.alarms import alarm
 from rig.console.view_model.log_filter import BEFORE, TITLES, LogFilter, run_of, wanted
 from rig.console.view_model.running_diagnosis import standing
-from rig.console.view_model.tables import checks_table, readings_text, refusal, results_table, verdict_summary
+from rig.console.view_model.tables import (
+    checks_table,
+    misfits,
+    readings_text,
+    refusal,
+    results_table,
+    verdict_summary,
+)
 from rig.console.view_model.view import View
 from rig.link.front_end_messages import LogLine, Snapshot
 
@@ -162,7 +169,9 @@ class ResultsPanel(Panel):
 
 
 def _ending(view: View, snapshot: Snapshot) -> list[Text]:
-    lines = [Text(f"outcome: {snapshot.outcome or 'not started'}. {snapshot.cause}", "bold"), Text()]
+    wrong = misfits(view.points)
+    lines = [*wrong, *([Text()] if wrong else [])]
+    lines += [Text(f"outcome: {snapshot.outcome or 'not started'}. {snapshot.cause}", "bold"), Text()]
     missing = len(snapshot.files) - len(view.points)
     if missing > 0 and snapshot.state == "done":
         lines += [

@@ -95,25 +95,36 @@ def checks_table(checks: tuple[Check, ...]) -> Table:
 
 def results_table(points: Mapping[str, tuple[Point, ...]]) -> Table:
     """One row per thruster seen by this console: the fit over its holds. `scatter` is the standard deviation of C that
-    follows from the points alone; `rig fit` adds the calibration's."""
+    follows from the points alone; `rig fit` adds the calibration's. `out`: holds that the fit leaves out."""
     table = Table(box=None, padding=(0, 1), header_style="bold")
     table.add_column("thruster", no_wrap=True)
-    for heading in ("C [N/V²]", "scatter", "[%]", "rest [N]", "holds", "not steady", "left out"):
+    for heading in ("C [N/V²]", "scatter", "[%]", "rest [N]", "chi²/dof", "holds", "unsteady", "out"):
         table.add_column(heading, justify="right", no_wrap=True)
     for thruster, held in points.items():
         table.add_row(Text(thruster or "?"), *_result(held))
     return table
 
 
+def misfits(points: Mapping[str, tuple[Point, ...]]) -> list[Text]:
+    """A line for each thruster whose constant says too little, with what to do next."""
+    found = [(thruster, fit) for thruster, held in points.items() if (fit := running_fit(held)) is not None]
+    return [
+        Text(f"{thruster}: C V|V| does NOT fit (chi²/dof {fit.misfit:.3g}). Next: g, or rig diagnose.", "bold #f0c040")
+        for thruster, fit in found
+        if fit.misfit is not None
+    ]
+
+
 def _result(held: tuple[Point, ...]) -> tuple[str, ...]:
     unsteady = str(sum(not point.steady for point in held))
     fit = running_fit(held)
     if fit is None:
-        return ("—", "—", "—", "—", str(len(held)), unsteady, "—")
+        return ("—", "—", "—", "—", "—", str(len(held)), unsteady, "—")
     digits, known = decimals(fit.C_std), math.isfinite(fit.C_std)  # two points leave nothing to scatter
     percent = f"{100.0 * fit.C_std / abs(fit.C):.2f}" if fit.C and known else "—"
     C, std = f"{fit.C:.{digits}f}", f"{fit.C_std:.{digits}f}" if known else "—"
-    return (C, std, percent, f"{fit.tare:+.2f}", str(len(held)), unsteady, str(fit.left_out))
+    judged = "—" if fit.per_dof is None else f"{fit.per_dof:.2g}" if fit.per_dof < 100 else f"{fit.per_dof:.0f}"
+    return (C, std, percent, f"{fit.tare:+.2f}", judged, str(len(held)), unsteady, str(fit.left_out))
 
 
 def refusal(snapshot: Snapshot | None) -> str:

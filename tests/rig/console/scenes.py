@@ -106,6 +106,7 @@ SCENES = {
     "history": Scene((PAST_END,), keys=("8", "down", "down", "space", "down", "down")),
     "compare": Scene((PAST_END,), keys=("8", "down", "down", "space", "end", "enter")),
     "end": Scene(campaign()),
+    "end_misfit": Scene((*campaign()[:2], *(replace(s, points=BENT) for s in campaign()[3:]))),
     "tripped": Scene((running("done", outcome="tripped", stop_confirmed=True, command=0.0,
                               cause="motor.current 41.2 A is above its limit of 40 A."),)),
 }  # fmt: skip

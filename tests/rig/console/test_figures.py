@@ -17,7 +17,7 @@ from rig.console.view_model.alarms import alarm
 from rig.console.view_model.axes import reach, thin, ticks
 from rig.console.view_model.keys import key_line
 from rig.console.view_model.running_fit import in_words, running_fit, v_abs_v
-from rig.console.view_model.tables import results_table
+from rig.console.view_model.tables import misfits, results_table
 from rig.console.view_model.view import TRACE_KEPT, View, absorb
 from rig.link.front_end_messages import Check, Reading
 from tests.rig.console.feeds import C, campaign, points, running, snapshot
@@ -185,6 +185,9 @@ def test_points_that_a_square_law_does_not_fit_are_flagged_when_the_sweep_is_ove
     assert "COMPLETED." in told.text
     assert "T1: C V|V| does NOT fit" in told.text
     assert "next: rig diagnose" in told.text
+    assert [line.plain for line in misfits({"T1": weak, "T2": held})] == [
+        f"T1: C V|V| does NOT fit (chi²/dof {bad.misfit:.3g}). Next: g, or rig diagnose."
+    ]
     fine = absorb(View(), running("done", outcome="completed", stop_confirmed=True, points=held), 10.0)
     assert alarm(replace(fine, connected=True, now=10.0)).severity == "info"
 
@@ -204,4 +207,4 @@ def test_two_holds_have_a_constant_and_no_scatter():
     cells = [next(iter(column.cells)) for column in row]
     assert float(cells[1]) == pytest.approx(C["T1"], rel=0.1)
     assert cells[2:4] == ["—", "—"]
-    assert cells[5] == "2"
+    assert cells[6] == "2"
