@@ -135,6 +135,10 @@ def _limit(values: Values, form: str, _k: float, _driver: float) -> Table:
 
 
 def _cell_limit(values: Values, form: str, _k: float, _driver: float) -> Table:
+    if form == "averaged":
+        raise WorldError(
+            "load_cell_saturation of the form 'averaged' is a device's: give it `average`, and its limit here"
+        )
     return {**values, "place": "cell"} if form == "before_noise" else {**values, "form": form or "hard"}
 
 
