@@ -98,8 +98,16 @@ class Truth:
 
     def sent_after(self, t_ns: int) -> float:
         """s from `t_ns` to the first 0 that the controller handed to the motor's driver."""
-        lines = (self.path.parents[1] / "out" / "zeros").read_text().split("\n")[:-1]
-        return next(sent - t_ns for sent in map(int, lines) if sent >= t_ns) * 1e-9
+        zeros = self.path.parents[1] / "out" / "zeros"
+
+        def first() -> int | None:  # the log may be ahead of who writes this line
+            lines = zeros.read_text().split("\n")[:-1] if zeros.exists() else []
+            return next((sent - t_ns for sent in map(int, lines) if sent >= t_ns), None)
+
+        self._until(lambda: first() is not None, "the line of the 0 that was sent", 2.0)
+        found = first()
+        assert found is not None
+        return found * 1e-9
 
     def _driven(self, t_ns: int) -> bool:
         return [value for t, value in self.changes if t < t_ns][-1] != 0.0

@@ -224,6 +224,10 @@ class SteadyMonitor:
         return self.estimate().std_error
 
     @property
+    def dof(self) -> float:
+        return self.estimate().dof
+
+    @property
     def drift(self) -> float:
         return self.estimate().drift
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
@@ -125,6 +126,8 @@ class Point:
     steady: bool
     """Verdict of the dwell: False = drift or standard error still above the threshold at the maximum dwell."""
     thruster: str = ""
+    dof: float = math.inf
+    """Degrees of freedom behind `std_error`."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -54,6 +54,7 @@ class Holding:
             voltage=self._step.voltage,
             thrust=estimate.mean - tare,
             std_error=estimate.std_error,
+            dof=estimate.dof,
             duration=time - self._start,
             steady=self._steady(),
             thruster=self._settings.thruster,

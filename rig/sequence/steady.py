@@ -29,6 +29,10 @@ class SteadyEstimator(Protocol):
     def std_error(self) -> float: ...
 
     @property
+    def dof(self) -> float:
+        """Degrees of freedom behind `std_error`."""
+
+    @property
     def drift(self) -> float:
         """N/s."""
 

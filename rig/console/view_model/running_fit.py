@@ -10,6 +10,7 @@ from typing import Final
 import numpy as np
 
 from identification.estimation.least_squares import Rows, estimate
+from identification.steady_state.pooling import moderate
 from identification.thruster.thrust_report import MISFIT_P
 from rig.link.front_end_messages import Point
 
@@ -57,14 +58,11 @@ def running_fit(points: tuple[Point, ...]) -> RunningFit | None:
     x = np.array([v_abs_v(point) for point in chosen])
     if len(np.unique(x)) < 2:
         return None
-    rows = Rows(
-        np.column_stack([x, np.ones_like(x)]),
-        np.array([point.thrust for point in chosen]),
-        ("C", "tare"),
-        (slice(0, len(chosen)),),
-        np.array([point.std_error for point in chosen]),
-        np.full(len(chosen), np.inf),  # a snapshot does not carry the degrees of freedom behind a standard error
-    )
+    thrust = np.array([point.thrust for point in chosen])
+    errors = np.array([point.std_error for point in chosen])
+    shared = moderate(errors, np.array([point.dof for point in chosen]), np.abs(thrust))
+    columns = np.column_stack([x, np.ones_like(x)])
+    rows = Rows(columns, thrust, ("C", "tare"), (slice(0, len(chosen)),), shared.std_error, shared.dof)
     found = estimate(rows)
     fit, judged = found.fit, found.underfit
     std = float(fit.std[0]) if fit.dof > 0 else math.inf
