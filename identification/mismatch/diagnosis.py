@@ -133,7 +133,8 @@ class PlanStep:
 
 @dataclass(frozen=True, slots=True)
 class NextExperiment:
-    """Steps that would settle which of several models is right, and the probability that they do."""
+    """Steps that would settle which of several models is right, and the probability that they do; without any where no
+    sweep does, and `why` says what else would."""
 
     why: str
     steps: tuple[PlanStep, ...]

@@ -209,6 +209,8 @@ def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) 
     """The next experiment as a campaign, or why there is none."""
     if found.next_experiment is None:
         click.echo(f"no next experiment is needed, for no finding has a rival; {plan} was not written", err=True)
+    elif not found.next_experiment.steps:
+        click.echo(f"no sweep settles it: {found.next_experiment.why}; {plan} was not written", err=True)
     for file in write_next(found, campaign, plan):
         click.echo(f"next experiment written to {file}; next: rig check {file}", err=err)
 

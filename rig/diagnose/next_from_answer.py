@@ -31,6 +31,8 @@ def proposed_in(answer: Mapping[str, Any]) -> NextExperiment:
     told = answer["next_experiment"]
     if told is None:
         raise ConfigError("the diagnosis proposes no next experiment")
+    if not told["steps"]:
+        raise ConfigError(f"no sweep settles it: {told['why']}")
     quantity = "command_voltage" if "command_voltage" in told["steps"][0] else "rotation_rate"
     steps = tuple(PlanStep(step[quantity], step["duration"], step["flow_speed"]) for step in told["steps"])
     return NextExperiment(told["why"], steps, told["expected_power"], quantity)

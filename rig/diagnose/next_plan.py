@@ -93,9 +93,9 @@ def next_template(
 
 
 def write_next(found: Diagnosis, campaign: CampaignConfig, path: Path, *, attended: bool = False) -> tuple[Path, ...]:
-    """Write the sweep, one file for each flow speed; none when nothing is to be told apart. Raises ConfigError, also
-    when the levels are no voltages."""
-    if found.next_experiment is None:
+    """Write the sweep, one file for each flow speed; none when nothing is to be told apart, or no sweep does. Raises
+    ConfigError, also when the levels are no voltages."""
+    if found.next_experiment is None or not found.next_experiment.steps:
         return ()
     return write_proposed(found.next_experiment, found.thruster, campaign, path, attended=attended)
 

@@ -207,8 +207,11 @@ def _next(d: Diagnosis) -> Iterator[str]:
     if d.next_experiment is None:
         return
     n = d.next_experiment
-    total = sum(step.duration for step in n.steps)
     yield ""
+    if not n.steps:
+        yield from _para(f"Next experiment: no sweep settles it. {n.why}")
+        return
+    total = sum(step.duration for step in n.steps)
     yield from _para(f"Next experiment ({total:.0f} s, expected power {n.expected_power:.2f}): {n.why}")
     flow = any(step.flow_speed for step in n.steps)
     for step in n.steps[:MOST_STEPS]:

@@ -146,6 +146,9 @@ class _Tried:
             chosen = self._shortened(chosen)
             worst, at = self._judged(chosen)
         held = "command_voltage" if self.driver_unit == "V" else "rotation_rate"
+        hopeless = max(at[pair] for pair, counts in zip(self.pairs, self.decisive, strict=True) if counts)
+        if hopeless < policy.next_experiment.HOPELESS_POWER:
+            return NextExperiment(self._alike(), (), self._expected(at), held)
         return NextExperiment(self._why(chosen, at), self._steps(chosen), self._expected(at), held)
 
     def _steps(self, chosen: Sequence[int]) -> tuple[PlanStep, ...]:
@@ -225,6 +228,12 @@ class _Tried:
         if self.driver_unit != "V":
             says += f"; the levels are in {self.driver_unit}, the recordings have no command in V"
         return "; ".join([says, *self._beyond(chosen, at)])
+
+    def _alike(self) -> str:
+        """The same where nothing that may be driven tells any pair apart."""
+        one, *others = dict.fromkeys(self.contest.names)
+        told = [f"{other} ({_other_means(one, other, self.recorded)} would tell)" for other in others]
+        return f"within these limits {one} is like {' and '.join(told)}"
 
     def _beyond(self, chosen: Sequence[int], at: dict[tuple[int, int], float]) -> list[str]:
         """What else it takes for the pairs that this sweep hardly tells apart."""

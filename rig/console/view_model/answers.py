@@ -68,6 +68,8 @@ class Answer:
     left: str = ""
     notes: tuple[str, ...] = ()
     sweep: Sweep | None = None
+    hopeless: str = ""
+    """Why no sweep settles it; empty: there is one, or nothing to settle."""
     no_sweep: str = ""
     """Why the sweep can't be made a campaign; empty: it can."""
     campaign: str = ""
@@ -100,7 +102,8 @@ def answer_of(files: tuple[str, ...], message: Mapping[str, Any]) -> Answer:
 
 def _answer(files: tuple[str, ...], message: Mapping[str, Any]) -> Answer:
     d = message["answer"]
-    sweep = None if d["next_experiment"] is None else _sweep(d["next_experiment"], d["model"]["parameters"])
+    proposed = d["next_experiment"]
+    sweep = _sweep(proposed, d["model"]["parameters"]) if proposed is not None and proposed["steps"] else None
     unit = str(d["response"]["unit"])
     return Answer(
         files,
@@ -114,6 +117,7 @@ def _answer(files: tuple[str, ...], message: Mapping[str, Any]) -> Answer:
         left=_left(d["unexplained"]),
         notes=tuple(visible(str(note)) for note in d["notes"]),
         sweep=sweep,
+        hopeless="" if proposed is None or proposed["steps"] else visible(str(proposed["why"])),
         no_sweep=visible(str(message["no_sweep"])),
         campaign=str(message["campaign"]),
     )

@@ -84,7 +84,8 @@ def _rows(answer: Answer, keys: str) -> Iterator[tuple[str, Text]]:
 
 def _next(answer: Answer, keys: str) -> Iterator[tuple[str, Text]]:
     if answer.sweep is None:
-        yield "next", Text("none is proposed: nothing that was named has a rival")
+        none = "none is proposed: nothing that was named has a rival"
+        yield "next", Text(f"no sweep settles it: {answer.hopeless}" if answer.hopeless else none)
         return
     yield "next", Text("").append(sweep_text(answer.sweep), "bold")
     yield "", Text(answer.sweep.why)

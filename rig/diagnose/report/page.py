@@ -86,8 +86,9 @@ def short(d: Diagnosis) -> Iterator[Remark]:
         yield Remark(text) if not d.model_terms else Remark(text, "good" if tone == "good" else "bad")
     if d.next_experiment is not None:
         total = sum(step.duration for step in d.next_experiment.steps)
+        sweep = f"a sweep of {total:.0f} s, expected power {d.next_experiment.expected_power:.2f}"
         first = _clauses(d.next_experiment.why)[0]
-        yield Remark(f"Next: a sweep of {total:.0f} s, expected power {d.next_experiment.expected_power:.2f}. {first}")
+        yield Remark(f"Next: {sweep if d.next_experiment.steps else 'no sweep settles it'}. {first}")
 
 
 def _verdict(d: Diagnosis) -> Remark:

@@ -278,6 +278,10 @@ def _next(d: Diagnosis) -> Iterator[str]:
     if n is None:
         yield "none is needed"
         return
+    if not n.steps:
+        yield "no sweep settles it"
+        yield n.why
+        return
     seconds = float(np.sum([step.duration for step in n.steps]))
     yield f"{len(n.steps)} steps, {seconds:.4g} s, probability of a right decision {n.expected_power:.3g}"
     yield n.why

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.diagnosis import PlanStep
+from identification.mismatch.diagnosis import Diagnosis, PlanStep
 from identification.mismatch.model.parameters import Layout
 from identification.mismatch.next_experiment.discrimination import distances, pieces, power
 from identification.mismatch.next_experiment.predicted_response import (
@@ -22,6 +22,7 @@ from identification.mismatch.pipeline import diagnose
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.select.forward_selection import search
 from identification.recording import Channel, Recording
+from tests.identification.diagnosed_runs import run
 
 RATE, HOLD, TOP, C, NOISE = 40.0, 3.0, 20.0, 0.4, 1.2
 LEVELS = (0.0, 10.0, -10.0, 15.0, -15.0, 20.0, -20.0, 0.0)
@@ -206,3 +207,15 @@ def test_one_zero_for_all_runs():
     assert view.slopes.shape == (4, 5)
     assert view.slopes[:, 1].tolist() == (slopes[:, 1] + slopes[:, 2]).tolist()
     assert view.cov.shape == (5, 5)
+
+
+def test_where_nothing_that_may_be_driven_tells_them_apart_there_is_no_sweep():
+    """Asymmetry and cross-talk are one curve: a sweep of four steps was said to separate them."""
+    found = diagnose([run(change=lambda _t, V, F: np.where(V < 0, 0.9 * F, F), noise=0.1)])
+    assert isinstance(found, Diagnosis)
+    assert found.verdict == "ambiguous"
+    assert found.next_experiment is not None
+    assert found.next_experiment.steps == ()
+    told = "within these limits asymmetry is like torque_crosstalk (the torque channel, or dead weights on the cell"
+    assert told in found.next_experiment.why
+    assert "No sweep settles it: within these limits asymmetry is like torque_crosstalk" in found.statement
