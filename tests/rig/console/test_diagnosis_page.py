@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
 from rig.campaign.loading import load_campaign
 from rig.console.app import ConsoleApp
@@ -17,6 +18,9 @@ from rig.console.diagnosing import DiagnosisPanel
 from rig.console.next_run import NextRun
 from rig.console.sweep_dialog import SweepDialog
 from rig.console.view_model.answers import answer_of, levels_text, sweep_text
+from rig.console.view_model.answers_text import answers_text
+from rig.diagnose.next_from_answer import proposed_in
+from rig.errors import ConfigError
 from rig.link.front_end_messages import Request
 from rig.link.processes import alive
 from rig.operate.check import check_campaign
@@ -275,3 +279,18 @@ def test_the_real_process_ends_with_the_input_of_a_console_that_was_killed(tmp_p
 
 def test_a_console_of_its_own_begins_nothing_unless_told():
     assert not ConsoleApp(None, time.monotonic).begins
+
+
+def test_a_doubt_that_no_sweep_settles_says_what_else_would():
+    why = "within these limits asymmetry is like torque_crosstalk (dead weights on the cell would tell)"
+    told = {**ambiguous("T3"), "next_experiment": {"why": why, "steps": [], "expected_power": 0.0}}
+    answer = answer_of(("T3.h5",), message(told))
+    assert not answer.fault
+    assert answer.sweep is None
+    assert not answer.runs
+    console = Console(width=200)
+    with console.capture() as shown:
+        console.print(answers_text([answer], ""))
+    assert f"no sweep settles it: {why}" in shown.get()
+    with pytest.raises(ConfigError, match="no sweep settles it"):
+        proposed_in(told)

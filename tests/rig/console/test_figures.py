@@ -57,9 +57,9 @@ def test_running_fit_against_polyfit():
     assert fit is not None
     x, y = [v_abs_v(p) for p in held], [p.thrust for p in held]
     (slope, rest), cov = np.polyfit(x, y, 1, w=[1 / p.std_error for p in held], cov="unscaled")
-    assert pytest.approx(slope, rel=1e-9) == fit.C
-    assert fit.tare == pytest.approx(rest, abs=1e-9)
-    assert fit.C_std >= math.sqrt(cov[0, 0]) * (1 - 1e-9)
+    assert pytest.approx(slope, rel=1e-7) == fit.C  # errors that are known are taken as of a million degrees of freedom
+    assert fit.tare == pytest.approx(rest, abs=1e-6)
+    assert fit.C_std >= math.sqrt(cov[0, 0]) * (1 - 1e-6)
     assert abs(fit.C - C["T1"]) < 4 * fit.C_std
 
 
