@@ -6,7 +6,7 @@ A child of full_buses.py. The host opens LINK, a pty. RATE frames a second come 
 millisecond, as an adapter on USB hands them over. `--behind PORT`: what comes from that adapter (a simulated bench's)
 goes in between, and what the host writes goes to it. `--counting ID`: a VESC of that id at rest, that sends STATUS_5 a
 thousand times a second, whose tachometer counts the messages. On SIGTERM it says in a line of JSON what it sent, and
-what the host's buffer did not take.
+what the host's buffer did not take, between SIGUSR1 and SIGUSR2: before and after nobody may read.
 """
 
 from __future__ import annotations
@@ -100,6 +100,9 @@ def main() -> None:
     bus, ended = Bus(asked.link), list[int]()
     behind = os.open(asked.behind, os.O_RDWR | os.O_NOCTTY | os.O_NONBLOCK) if asked.behind else None
     signal.signal(signal.SIGTERM, lambda number, _: ended.append(number))
+    counts = list[tuple[int, int]]()
+    for number in (signal.SIGUSR1, signal.SIGUSR2):
+        signal.signal(number, lambda *_: counts.append((bus.frames + bus.counted, bus.lost)))
     print("ready", flush=True)
     each, owed, due = asked.rate * PERIOD, 0.0, time.monotonic()
     half = b""
@@ -125,7 +128,8 @@ def main() -> None:
             bus.say(burst(bus, int(owed), asked.counting))
             owed -= int(owed)
             due += PERIOD
-    print(json.dumps({"frames": bus.frames + bus.counted, "lost": bus.lost}), flush=True)
+    (begun, lost_before), (sent, lost) = counts
+    print(json.dumps({"frames": sent - begun, "lost": lost - lost_before}), flush=True)
     sys.exit(0)
 
 

@@ -15,11 +15,12 @@ import argparse
 import json
 import multiprocessing
 import os
+import signal
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import Any
@@ -29,7 +30,8 @@ import numpy as np
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 from loop_lateness import FIGURES, processor_time
 
-from rig.hdf5 import RecordingFile, load
+from identification.recording import Recording
+from rig.hdf5 import load
 from rig.link.front_end_messages import Snapshot
 from tests.reliability.live import LiveBench, attach, live_bench
 
@@ -78,8 +80,8 @@ def world_file(text: str) -> str:
 
 
 @contextmanager
-def traffic(folder: Path, rate: float, bus: int) -> Iterator[dict[str, int]]:
-    """Fills when it ends: frames sent, and lost by the host's buffer."""
+def traffic(folder: Path, rate: float, bus: int) -> Iterator[tuple[dict[str, int], Callable[[int], None]]]:
+    """What fills when it ends: frames sent, and lost by the host's buffer, between two signals; and what sends them."""
     more = ["--behind", str(folder / "ports" / "can0")] if bus == 0 else ["--counting", str(COUNTING)]
     words = [sys.executable, str(HERE / "can_traffic.py"), str(folder / "ports" / f"full{bus}"), str(rate), *more]
     told: dict[str, int] = {}
@@ -87,7 +89,7 @@ def traffic(folder: Path, rate: float, bus: int) -> Iterator[dict[str, int]]:
         assert process.stdout is not None
         process.stdout.readline()
         try:
-            yield told
+            yield told, process.send_signal
         finally:
             process.terminate()
             told.update(json.loads(process.stdout.readline() or '{"frames": 0, "lost": -1}'))
@@ -117,29 +119,32 @@ def children(pid: int) -> list[int]:
     return [int(word) for word in Path(f"/proc/{pid}/task/{pid}/children").read_text().split()]
 
 
-def missing(recording: RecordingFile) -> int:
+def missing(recording: Recording) -> int:
     """STATUS_5 messages between the first and the last that are not in the recording, or twice."""
     (count,) = [c for c in recording.channels if c.stream == "counting_supply" and c.name == "tachometer"]
     return int(np.sum(np.abs(np.diff(count.value) - 1)))
 
 
-def measured(bench: LiveBench, seconds: float) -> dict[str, Any]:
-    """One campaign of four levels on that bench."""
+def measured(bench: LiveBench, seconds: float, tell: Callable[[int], None]) -> dict[str, Any]:
+    """One campaign of four levels on that bench; `tell`: what to signal when its holds begin and end."""
     run = bench.start(dwell=seconds / 4, **{"max_drift = 1.0": "max_drift = 5.0"})
     front = attach(run)
     front.begin(lambda s: s.state == "hold", timeout=120.0)
-    recorders, began = children(run.pid), time.monotonic()
+    recorders, began, took, told = children(run.pid), time.monotonic(), 1.0, False
+    tell(signal.SIGUSR1)
     before = [processor_time(pid) for pid in (run.pid, *recorders)]
     spent, last = before, front.last
 
     def over(snapshot: Snapshot) -> bool:
-        nonlocal spent, last, took
+        nonlocal spent, last, took, told
+        if snapshot.state in ("stopping", "done") and not told:
+            tell(signal.SIGUSR2)
+            told = True
         if snapshot.state not in ("stopping", "done"):
             spent, last = [processor_time(pid) for pid in (run.pid, *recorders)], snapshot
             took = time.monotonic() - began
         return snapshot.state == "done"
 
-    took = 1.0
     end = front.until(over, timeout=2 * seconds + 120.0)
     front.peer.close()
     bench.controllers[-1].wait(60)
@@ -166,9 +171,15 @@ def trial(seconds: float, rate: float, many: int) -> dict[str, Any]:
         bench = stack.enter_context(live_bench(folder, world_file, bench_file))
         buses = [stack.enter_context(traffic(folder, rate, bus)) for bus in (0, 1)]
         stack.enter_context(busy(many))
-        found = measured(bench, seconds)
+
+        def tell(number: int) -> None:
+            for _, send in buses:
+                send(number)
+
+        found = measured(bench, seconds, tell)
         stack.close()
-    return {"busy": many, **found, "frames": sum(b["frames"] for b in buses), "lost": sum(b["lost"] for b in buses)}
+    every = [told for told, _ in buses]
+    return {"busy": many, **found, "frames": sum(b["frames"] for b in every), "lost": sum(b["lost"] for b in every)}
 
 
 def main() -> None:
