@@ -24,7 +24,7 @@ from can.interfaces.slcan import slcanBus
 from drivers.errors import LinkError
 from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
-from drivers.ports.serial_port import chunk_reader, hurry
+from drivers.ports.serial_port import chunk_reader, set_low_latency
 from drivers.ports.slcan_lines import SlcanLines
 from drivers.ports.transcript import Transcript
 from drivers.ports.wire import SerialOverWire, Wire
@@ -174,7 +174,7 @@ class CanBus:
     def _read(self, bus: can.BusABC) -> None:
         end: str | None = f"the reader of {self._channel} stopped on an error of this program (see the log)"
         try:
-            read = self._slcan_reader(bus) if isinstance(bus, slcanBus) else lambda: _received(bus, self._bad)
+            read = self._slcan_reader(bus) if isinstance(bus, slcanBus) else lambda: _next_frame(bus, self._bad)
             while not self._closing.is_set():
                 frames = read()
                 if frames:
@@ -188,7 +188,7 @@ class CanBus:
                 inbox.end()
 
     def _slcan_reader(self, bus: slcanBus) -> Callable[[], list[Frame]]:
-        hurry(bus.serialPortOrig)
+        set_low_latency(bus.serialPortOrig)
         chunk, lines = chunk_reader(bus.serialPortOrig), SlcanLines(self._bad)
         return lambda: lines.feed(chunk())
 
@@ -203,7 +203,7 @@ class CanBus:
                 inbox.put(t_ns, accepted)
 
 
-def _received(bus: can.BusABC, bad: BadRecords) -> list[Frame]:
+def _next_frame(bus: can.BusABC, bad: BadRecords) -> list[Frame]:
     """The next frame of any other adapter; none after READ_TIMEOUT, or where it holds no data."""
     message = bus.recv(READ_TIMEOUT)
     if message is None:

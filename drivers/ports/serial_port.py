@@ -213,11 +213,11 @@ def _open_serial(settings: SerialSettings) -> serial.Serial:
         write_timeout=WRITE_TIMEOUT,
         exclusive=True,
     )
-    hurry(port)
+    set_low_latency(port)
     return port
 
 
-def hurry(port: serial.Serial) -> None:
+def set_low_latency(port: serial.Serial) -> None:
     """1 ms instead of the 16 ms of FTDI adapters; a pty and most URLs have no such mode."""
     with contextlib.suppress(OSError, ValueError, NotImplementedError, AttributeError):
         port.set_low_latency_mode(True)

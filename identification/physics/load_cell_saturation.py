@@ -27,6 +27,10 @@ LEAST_BLUR = 0.01
 """The same, of the noise."""
 MOST_NOISE, LEAST_NOISE = 0.3, 1e-3
 """Of the largest reading: of a conversion. More makes a limit another curve, less is a limit met at once."""
+TRIED_NOISE = 0.02
+"""The same, where a search begins: a fit finds any other from there."""
+CLIPS_SELDOM = 2.0
+"""Standard deviations below the limit: one conversion in forty clips there, and the mean shows less from there on."""
 NOISE_TOLD = "the noise of a conversion"
 LOWEST_KNEE = 0.25
 """Of the largest reading: what bends from less on is no limit, but another curve."""
@@ -92,7 +96,7 @@ class LoadCellSaturation:
             shares = (0.99, 0.95, 0.88, 0.75, 0.6) if self.silent else (0.95, 0.88, 0.75, 0.6)
             return tuple((share * scale.reading,) for share in shares)
         if self.form == "averaged":
-            return tuple((share * scale.reading, 0.02 * scale.reading) for share in (0.99, 0.95, 0.88, 0.75))
+            return tuple((share * scale.reading, TRIED_NOISE * scale.reading) for share in (0.99, 0.95, 0.88, 0.75))
         return tuple((0.5 / scale.reading, share * scale.reading) for share in (0.3, 0.5, 0.7, 0.88))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
@@ -124,7 +128,7 @@ class LoadCellSaturation:
             return slope_at(np.abs(reading), *theta)
         half = _half_moved(history, C, x)
         if self.form == "averaged":
-            half = np.hypot(half, np.sqrt(3) * theta[1])
+            half = np.hypot(half, np.sqrt(3) * theta[1])  # an even motion of that variance
         # limit - half share^2 is the clipped mean of an even motion
         short = np.maximum(theta[0] - np.abs(reading), 0.0)
         out: Floats = np.sqrt(np.minimum(short / np.maximum(half, LEAST_MOVE * theta[0]), 1.0))
@@ -143,7 +147,7 @@ class LoadCellSaturation:
     def start(self, theta: tuple[float, ...]) -> float:
         """N: where the cell begins to show less."""
         if self.form == "averaged":
-            return theta[0] - 2 * theta[1]
+            return theta[0] - CLIPS_SELDOM * theta[1]
         return theta[0] if self.sharp else theta[1]
 
     def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:

@@ -146,8 +146,8 @@ class _Tried:
             chosen = self._shortened(chosen)
             worst, at = self._judged(chosen)
         held = "command_voltage" if self.driver_unit == "V" else "rotation_rate"
-        hopeless = max(at[pair] for pair, counts in zip(self.pairs, self.decisive, strict=True) if counts)
-        if hopeless < policy.next_experiment.HOPELESS_POWER:
+        best = max(at[pair] for pair, counts in zip(self.pairs, self.decisive, strict=True) if counts)
+        if best < policy.next_experiment.HOPELESS_POWER:
             return NextExperiment(self._alike(), (), self._expected(at), held)
         return NextExperiment(self._why(chosen, at), self._steps(chosen), self._expected(at), held)
 
