@@ -56,10 +56,18 @@ def test_the_json_holds_what_the_contract_promises(which, request):
     assert told["fit"]["train"].keys() >= {"rmse_before", "rmse_after"}
     assert told["fit"]["heldout"].keys() >= {"rmse_before", "rmse_after", "noise", "what"}
     if told["verdict"] == "ambiguous":
+        assert told["next_experiment"]["why"]
         steps = told["next_experiment"]["steps"]
-        assert steps
         assert all(abs(s["command_voltage"]) <= TOP and s["duration"] > 0 for s in steps)
         assert 0 <= told["next_experiment"]["expected_power"] <= 1
+
+
+def test_a_doubt_that_no_sweep_settles_has_no_steps_and_says_what_would(uneven):
+    """Without a torque channel asymmetry and torque cross-talk are one curve at any command."""
+    told = diagnosis_json(uneven)
+    assert told["verdict"] == "ambiguous"
+    assert told["next_experiment"]["steps"] == []
+    assert "torque" in told["next_experiment"]["why"]
 
 
 def test_numbers_that_are_not_finite_become_null(dead):
