@@ -1,6 +1,7 @@
 """Wires: bytes to SI numbers and back. Knows no campaign, file or screen.
 
-`KINDS` is the list of devices that a bench file can name. A new device is one file and one line here
+`KINDS` is the list of devices that a bench file can name. A new device is one file in the folder of its family and
+one line here
 (docs/howto/add-a-device.md).
 """
 
@@ -10,18 +11,14 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from drivers import (
-    keller,
-    line_stream,
-    modbus_cell,
-    modbus_cell_options,
-    mt_sics,
-    nortek_nmea,
-    roboteq,
-    roboteq_options,
-    vesc_can,
-)
+from drivers.modbus import keller
+from drivers.modbus.cell import ModbusCell
+from drivers.modbus.cell_options import Options as ModbusCellOptions
 from drivers.protocols import Instrument
+from drivers.roboteq.controller import Roboteq
+from drivers.roboteq.options import Options as RoboteqOptions
+from drivers.serial_lines import line_stream, mt_sics, nortek_nmea
+from drivers.vesc import over_can
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,9 +36,9 @@ class Kind:
 KINDS: dict[str, Kind] = {
     "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial"),
     "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial"),
-    "modbus_cell": Kind(modbus_cell_options.Options, modbus_cell.ModbusCell, "serial"),
+    "modbus_cell": Kind(ModbusCellOptions, ModbusCell, "serial"),
     "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial"),
     "keller": Kind(keller.Options, keller.Keller, "serial"),
-    "roboteq": Kind(roboteq_options.Options, roboteq.Roboteq, "serial"),
-    "vesc_can": Kind(vesc_can.Options, vesc_can.VescCan, "can"),
+    "roboteq": Kind(RoboteqOptions, Roboteq, "serial"),
+    "vesc_can": Kind(over_can.Options, over_can.VescCan, "can"),
 }

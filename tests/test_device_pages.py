@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivers import KINDS
-from drivers.modbus_maps import known_maps, load_map
+from drivers.modbus.maps import known_maps, load_map
 from tests.test_pages import FENCED, anchor
 
 DEVICES = Path(__file__).parents[1] / "docs" / "devices"

@@ -38,7 +38,12 @@ from sim_devices import __main__ as simulator
 from sim_devices.bench import control
 from sim_devices.bench.settings import KEYS, CanBus, ScriptedFault, load
 from sim_devices.bench.settings import KINDS as SIMULATED
-from sim_devices.instruments import button, keller, line_sender, modbus_cell, mt_sics, nortek, roboteq, vesc
+from sim_devices.instruments import button
+from sim_devices.instruments.modbus import cell as modbus_cell
+from sim_devices.instruments.modbus import keller
+from sim_devices.instruments.roboteq import controller as roboteq
+from sim_devices.instruments.serial_lines import line_sender, mt_sics, nortek
+from sim_devices.instruments.vesc import controller as vesc
 from sim_devices.vehicle.body import AXES, Body
 from sim_devices.vehicle.settings import Noise as VehicleNoise
 from sim_devices.vehicle.settings import Scalars

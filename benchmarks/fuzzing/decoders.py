@@ -13,8 +13,11 @@ from typing import Any
 
 import numpy as np
 
-from drivers import keller, line_stream, modbus_rtu, mt_sics_lines, nortek_nmea, roboteq_lines, vesc_frames
+from drivers.modbus import keller, rtu
 from drivers.ports.can_frame import Frame
+from drivers.roboteq import lines as roboteq_lines
+from drivers.serial_lines import line_stream, mt_sics_lines, nortek_nmea
+from drivers.vesc import can_frames
 from rig.errors import LinkError
 from rig.link.framing import HEADER, decode, encode
 from rig.link.front_end_messages import Request
@@ -71,7 +74,7 @@ def _link(data: bytes) -> Any:
 
 def _frame(data: bytes) -> Any:
     number = int.from_bytes(data[:4], "big") & 0x1FFFFFFF
-    return vesc_frames.decode(Frame(number, True, data[4:12]))
+    return can_frames.decode(Frame(number, True, data[4:12]))
 
 
 def _registers(data: bytes) -> Any:
@@ -81,9 +84,9 @@ def _registers(data: bytes) -> Any:
 
 def _modbus(data: bytes) -> Any:
     """A new reply to the same request each time, with a checksum that is right in every other one."""
-    decoder = modbus_rtu.Decoder()
-    decoder.expect(modbus_rtu.Read(1, 3, 6, 8))
-    records = decoder.feed(modbus_rtu.framed(data[:-2]) if len(data) % 2 else data)
+    decoder = rtu.Decoder()
+    decoder.expect(rtu.Read(1, 3, 6, 8))
+    records = decoder.feed(rtu.framed(data[:-2]) if len(data) % 2 else data)
     return [records, decoder.unanswered()]
 
 

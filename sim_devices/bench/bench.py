@@ -17,10 +17,10 @@ from sim_devices.bench.punctual import give_way, on_time
 from sim_devices.bench.settings import BenchSettings, DeviceOptions, load, script
 from sim_devices.bench.truth_log import TruthLog, header_fields, state_fields
 from sim_devices.instruments.motor_tap import MotorTap
-from sim_devices.instruments.roboteq import Roboteq
-from sim_devices.instruments.roboteq_options import RoboteqOptions, measured
+from sim_devices.instruments.roboteq.controller import Roboteq
+from sim_devices.instruments.roboteq.options import RoboteqOptions, measured
 from sim_devices.instruments.serial_device import SerialDevice
-from sim_devices.instruments.vesc import Vesc, VescOptions
+from sim_devices.instruments.vesc.controller import Vesc, VescOptions
 from sim_devices.wires.can_frame import CanFrame
 from sim_devices.wires.ports import ControlSocket, PtyPort, wait
 from sim_devices.wires.serial_line import Wire

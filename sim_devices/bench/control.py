@@ -15,7 +15,7 @@ from typing import Protocol
 
 from sim_devices.bench.settings import BenchSettings
 from sim_devices.instruments.serial_device import SerialDevice
-from sim_devices.instruments.vesc import Vesc
+from sim_devices.instruments.vesc.controller import Vesc
 from sim_devices.tables import WorldError, check_known
 from sim_devices.wires.ports import PtyPort
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT, WIRE_FAULTS

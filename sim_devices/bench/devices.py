@@ -9,16 +9,16 @@ import numpy as np
 
 from sim_devices.bench.settings import DeviceOptions
 from sim_devices.instruments.button import Button, ButtonOptions
-from sim_devices.instruments.keller import Keller, KellerOptions
-from sim_devices.instruments.line_sender import LineOptions, LineSender
-from sim_devices.instruments.modbus_cell import ModbusCell
-from sim_devices.instruments.modbus_registers import ModbusCellOptions
-from sim_devices.instruments.mt_sics import MtSics
-from sim_devices.instruments.mt_sics_options import MtSicsOptions
-from sim_devices.instruments.nortek import Nortek, NortekOptions
-from sim_devices.instruments.roboteq_options import RoboteqOptions
+from sim_devices.instruments.modbus.cell import ModbusCell
+from sim_devices.instruments.modbus.keller import Keller, KellerOptions
+from sim_devices.instruments.modbus.registers import ModbusCellOptions
+from sim_devices.instruments.roboteq.options import RoboteqOptions
 from sim_devices.instruments.serial_device import SerialDevice
-from sim_devices.instruments.vesc import VescOptions
+from sim_devices.instruments.serial_lines.line_sender import LineOptions, LineSender
+from sim_devices.instruments.serial_lines.mt_sics import MtSics
+from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
+from sim_devices.instruments.serial_lines.nortek import Nortek, NortekOptions
+from sim_devices.instruments.vesc.controller import VescOptions
 from sim_devices.wires.serial_line import Wire
 from sim_devices.world import World
 from sim_devices.world.noise import Noise, Normals

@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from sim_devices.instruments.button import ButtonOptions
-from sim_devices.instruments.keller import KellerOptions
-from sim_devices.instruments.line_sender import LineOptions
-from sim_devices.instruments.modbus_registers import ModbusCellOptions
-from sim_devices.instruments.mt_sics_options import MtSicsOptions
-from sim_devices.instruments.nortek import NortekOptions
-from sim_devices.instruments.roboteq_options import RoboteqOptions
-from sim_devices.instruments.vesc import VescOptions
+from sim_devices.instruments.modbus.keller import KellerOptions
+from sim_devices.instruments.modbus.registers import ModbusCellOptions
+from sim_devices.instruments.roboteq.options import RoboteqOptions
+from sim_devices.instruments.serial_lines.line_sender import LineOptions
+from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
+from sim_devices.instruments.serial_lines.nortek import NortekOptions
+from sim_devices.instruments.vesc.controller import VescOptions
 from sim_devices.tables import WorldError, build, check_known
 from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin

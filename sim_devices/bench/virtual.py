@@ -16,10 +16,10 @@ from sim_devices.bench.settings import MOTORS, BenchSettings, script
 from sim_devices.bench.virtual_wire import Host, VirtualWire
 from sim_devices.instruments.low_pass import LowPass
 from sim_devices.instruments.motor_tap import MotorTap
-from sim_devices.instruments.roboteq import Roboteq
-from sim_devices.instruments.roboteq_options import RoboteqOptions, measured
+from sim_devices.instruments.roboteq.controller import Roboteq
+from sim_devices.instruments.roboteq.options import RoboteqOptions, measured
 from sim_devices.instruments.serial_device import SerialDevice
-from sim_devices.instruments.vesc import Vesc, VescOptions
+from sim_devices.instruments.vesc.controller import Vesc, VescOptions
 from sim_devices.tables import WorldError
 from sim_devices.wires.can_frame import CanFrame
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT, WIRE_FAULTS, Wire

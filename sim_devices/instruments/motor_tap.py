@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from math import copysign
 
-from sim_devices.instruments.vesc import Vesc
-from sim_devices.instruments.vesc_codec import Telemetry
+from sim_devices.instruments.vesc.codec import Telemetry
+from sim_devices.instruments.vesc.controller import Vesc
 from sim_devices.world import World
 
 SECONDS_PER_HOUR = 3600.0

@@ -14,10 +14,10 @@ import numpy as np
 from sim_devices.bench.settings import DeviceOptions
 from sim_devices.bench.virtual_wire import Host
 from sim_devices.concealed.cases.definition import Amplifier
-from sim_devices.instruments.line_sender import WIDTH, LineOptions
-from sim_devices.instruments.mt_sics_options import MtSicsOptions
-from sim_devices.instruments.nortek import NortekOptions
-from sim_devices.instruments.vesc import VescOptions
+from sim_devices.instruments.serial_lines.line_sender import WIDTH, LineOptions
+from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
+from sim_devices.instruments.serial_lines.nortek import NortekOptions
+from sim_devices.instruments.vesc.controller import VescOptions
 
 Rng = np.random.Generator
 

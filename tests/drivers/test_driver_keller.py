@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers import keller
 from drivers.errors import DeviceError, LinkError
+from drivers.modbus import keller
 from tests.drivers.collecting import FOLDER, collect, quiet
 from tests.drivers.scripted_peer import Peer, wait_until
 

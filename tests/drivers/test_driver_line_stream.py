@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers import line_stream
 from drivers.errors import DeviceError
+from drivers.serial_lines import line_stream
 from tests.drivers.collecting import collect, quiet
 from tests.drivers.scripted_peer import Peer, wait_until
 

@@ -9,8 +9,8 @@ import struct
 import pytest
 
 from drivers.errors import DeviceError, LinkError
-from drivers.modbus_cell import ModbusCell
-from drivers.modbus_cell_options import Options
+from drivers.modbus.cell import ModbusCell
+from drivers.modbus.cell_options import Options
 from tests.drivers.collecting import collect, quiet
 from tests.drivers.modbus_peer import Transmitter, crc
 from tests.drivers.scripted_peer import Peer, wait_until

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 
 from drivers.errors import DeviceError, LinkError
 from drivers.force_units import NEWTONS_PER_UNIT
-from drivers.mt_sics import MtSics, Options
-from drivers.mt_sics_lines import Decoder, Fault, Reply, Unreadable, Weight, decode, encode
+from drivers.serial_lines.mt_sics import MtSics, Options
+from drivers.serial_lines.mt_sics_lines import Decoder, Fault, Reply, Unreadable, Weight, decode, encode
 from tests.drivers.scripted_peer import Peer, answering, wait_until
 
 FRAMES = tomllib.loads((Path(__file__).parents[1] / "frames" / "mt_sics.toml").read_text())

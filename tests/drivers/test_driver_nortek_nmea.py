@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers import nortek_nmea
 from drivers.errors import DeviceError
+from drivers.serial_lines import nortek_nmea
 from tests.drivers.collecting import FOLDER, collect, quiet
 from tests.drivers.scripted_peer import Peer, wait_until
 

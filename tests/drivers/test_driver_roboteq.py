@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import DeviceError, LinkError
-from drivers.roboteq import Roboteq
-from drivers.roboteq_lines import (
+from drivers.roboteq.controller import Roboteq
+from drivers.roboteq.lines import (
     FAULTS,
     Accepted,
     Answer,
@@ -27,8 +27,8 @@ from drivers.roboteq_lines import (
     go,
     of_channel,
 )
-from drivers.roboteq_options import Options
-from drivers.roboteq_polling import Round, characters_per_second, motor_queries
+from drivers.roboteq.options import Options
+from drivers.roboteq.polling import Round, characters_per_second, motor_queries
 from tests.drivers.collecting import FOLDER, collect
 from tests.drivers.scripted_peer import Peer, wait_until
 

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from drivers.errors import DeviceError, LinkError
 from drivers.ports.can_bus import CanBus
 from drivers.ports.can_frame import Frame
-from drivers.vesc_can import Options, VescCan
-from drivers.vesc_frames import (
+from drivers.vesc.can_frames import (
     FaultCode,
     NotUnderstood,
     Pong,
@@ -28,6 +27,7 @@ from drivers.vesc_frames import (
     set_current,
     set_duty,
 )
+from drivers.vesc.over_can import Options, VescCan
 from tests.drivers.scripted_peer import Peer, wait_until
 
 FRAMES = tomllib.loads((Path(__file__).parents[1] / "frames" / "vesc_can.toml").read_text())

@@ -9,8 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.modbus_maps import known_maps, load_map, span
-from drivers.modbus_maps.numbers import number, other, sane, status, weight
+from drivers.modbus.maps import known_maps, load_map, span
+from drivers.modbus.maps.numbers import number, other, sane, status, weight
 
 OWN = """
 title = "One's own"

@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.modbus_rtu import Decoder, Read, Refusal, Registers, Unreadable, crc16, framed, gap
+from drivers.modbus.rtu import Decoder, Read, Refusal, Registers, Unreadable, crc16, framed, gap
 from tests.drivers.collecting import FOLDER
 from tests.drivers.modbus_peer import crc
 

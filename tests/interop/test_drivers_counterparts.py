@@ -10,9 +10,9 @@ import warnings
 
 import pytest
 
-from drivers import keller
-from drivers.mt_sics import MtSics, Options
-from drivers.vesc_frames import set_current, set_duty
+from drivers.modbus import keller
+from drivers.serial_lines.mt_sics import MtSics, Options
+from drivers.vesc.can_frames import set_current, set_duty
 from tests.drivers.scripted_peer import Peer, wait_until
 
 pytestmark = pytest.mark.interop

@@ -15,8 +15,8 @@ import tty
 import pytest
 
 from drivers.errors import DeviceError
-from drivers.modbus_cell import ModbusCell
-from drivers.modbus_cell_options import Options
+from drivers.modbus.cell import ModbusCell
+from drivers.modbus.cell_options import Options
 from sim_devices.bench.process import running
 from tests.drivers.collecting import collect
 from tests.drivers.scripted_peer import wait_until

@@ -9,10 +9,10 @@ import time
 
 import pytest
 
-from drivers import keller
-from drivers.line_stream import LineStream, Options
+from drivers.modbus import keller
 from drivers.ports.can_bus import CanBus
 from drivers.ports.serial_port import READ_TIMEOUT
+from drivers.serial_lines.line_stream import LineStream, Options
 from rig.safety.guard import Vitals, allowances, check
 from tests.drivers.collecting import quiet
 from tests.drivers.scripted_peer import Peer, wait_until

@@ -10,8 +10,8 @@ import time
 import pytest
 import serial
 
-from drivers.roboteq import Roboteq
-from drivers.roboteq_options import Options
+from drivers.roboteq.controller import Roboteq
+from drivers.roboteq.options import Options
 from tests.reliability.live import (
     PATIENCE,
     PROJECT,

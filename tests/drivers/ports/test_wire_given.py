@@ -5,10 +5,10 @@ from collections import deque
 import pytest
 
 from drivers.errors import DeviceError, LinkError
-from drivers.line_stream import LineStream, Options
 from drivers.ports.can_bus import CanBus
 from drivers.ports.can_frame import Frame
 from drivers.ports.serial_port import SerialPort, SerialSettings
+from drivers.serial_lines.line_stream import LineStream, Options
 
 OPTIONS = Options("nowhere", r"(?P<raw>-?\d+)", rate=80.0, line_characters=11, scale=0.5)
 

@@ -192,7 +192,7 @@ def test_a_modbus_cell_with_a_map_beside_the_bench_file(tmp_path, monkeypatch):
     text = re.sub(r"(?<=\[devices\.load_cell\]\n)(?:.+\n)+", cell, bench)
     (tmp_path / "bench.toml").write_text(text, encoding="utf-8")
     (tmp_path / "own.toml").write_text(
-        (ROOT / "drivers/modbus_maps/laumas.toml").read_text(encoding="utf-8"), encoding="utf-8"
+        (ROOT / "drivers/modbus/maps/laumas.toml").read_text(encoding="utf-8"), encoding="utf-8"
     )
     monkeypatch.chdir("/")
     options = load_bench(tmp_path / "bench.toml").devices["load_cell"].options

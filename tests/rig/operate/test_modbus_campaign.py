@@ -13,7 +13,7 @@ from rig.hdf5.load import load
 from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
-from sim_devices.instruments.modbus_registers import ModbusCellOptions
+from sim_devices.instruments.modbus.registers import ModbusCellOptions
 
 BENCHES = Path(__file__).parents[3] / "benches" / "simulated"
 CAMPAIGN = """

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from drivers.errors import DeviceError, LinkError
-from drivers.roboteq import Roboteq
+from drivers.roboteq.controller import Roboteq
 from rig.campaign.loading import load_bench
 from rig.cli import record_in_virtual_time
 from rig.fit.answer import fit_recordings

@@ -4,8 +4,8 @@ from math import exp, inf, nan
 
 import pytest
 
-from sim_devices.instruments.line_sender import FULL_SCALE, LineOptions, LineSender
 from sim_devices.instruments.low_pass import LowPass
+from sim_devices.instruments.serial_lines.line_sender import FULL_SCALE, LineOptions, LineSender
 
 OPTIONS = LineOptions("line", "cell", rate=10.0, newtons_per_count=0.01)
 

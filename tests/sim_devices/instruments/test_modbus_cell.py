@@ -5,8 +5,8 @@ from struct import pack, unpack
 
 import pytest
 
-from sim_devices.instruments.modbus_cell import ModbusCell
-from sim_devices.instruments.modbus_registers import ModbusCellOptions
+from sim_devices.instruments.modbus.cell import ModbusCell
+from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.tables import WorldError, build
 from sim_devices.wires.modbus_frames import framed
 

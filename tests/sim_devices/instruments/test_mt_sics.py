@@ -4,8 +4,8 @@ from math import nan
 
 import pytest
 
-from sim_devices.instruments.mt_sics import MtSics
-from sim_devices.instruments.mt_sics_options import MtSicsOptions
+from sim_devices.instruments.serial_lines.mt_sics import MtSics
+from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
 
 
 class Cell:

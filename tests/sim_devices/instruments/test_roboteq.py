@@ -2,8 +2,8 @@
 
 import pytest
 
-from sim_devices.instruments.roboteq import Roboteq
-from sim_devices.instruments.roboteq_options import Measured, RoboteqOptions
+from sim_devices.instruments.roboteq.controller import Roboteq
+from sim_devices.instruments.roboteq.options import Measured, RoboteqOptions
 
 NOW = Measured(rotation_rate=-10.0, current=3.42, input_current=1.26, bus_voltage=48.17, temperature=31.4)
 

@@ -5,8 +5,8 @@ from math import inf, nan
 
 import pytest
 
-from sim_devices.instruments.keller import Keller, KellerOptions
-from sim_devices.instruments.nortek import Nortek, NortekOptions, pnorc1, pnorc3, sentence
+from sim_devices.instruments.modbus.keller import Keller, KellerOptions
+from sim_devices.instruments.serial_lines.nortek import Nortek, NortekOptions, pnorc1, pnorc3, sentence
 from sim_devices.tables import WorldError
 from sim_devices.wires.can_frame import CanFrame
 from sim_devices.wires.modbus_frames import crc16, framed

@@ -4,9 +4,9 @@ import struct
 
 import pytest
 
-from sim_devices.instruments import vesc_codec as codec
-from sim_devices.instruments.vesc import Vesc, VescOptions
-from sim_devices.instruments.vesc_codec import Telemetry
+from sim_devices.instruments.vesc import codec
+from sim_devices.instruments.vesc.codec import Telemetry
+from sim_devices.instruments.vesc.controller import Vesc, VescOptions
 from sim_devices.wires.can_frame import CanFrame
 
 # Vectors made by the firmware's own packet.c, crc.c and buffer.c, compiled with -fsingle-precision-constant.

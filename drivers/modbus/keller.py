@@ -12,8 +12,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from drivers.errors import DeviceError
-from drivers.modbus_poll import ModbusPoll
-from drivers.modbus_rtu import Read, Registers, Unreadable
+from drivers.modbus.poll import ModbusPoll
+from drivers.modbus.rtu import Read, Registers, Unreadable
 from drivers.ports.inbox import BadRecords
 from drivers.ports.lines import check_line_rate
 from drivers.ports.serial_port import SerialSettings

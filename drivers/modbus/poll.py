@@ -12,7 +12,7 @@ from collections import deque
 from collections.abc import Sequence
 
 from drivers.errors import DeviceError, LinkError
-from drivers.modbus_rtu import Decoder, Read, Record, Refusal, Registers, Unreadable, gap
+from drivers.modbus.rtu import Decoder, Read, Record, Refusal, Registers, Unreadable, gap
 from drivers.ports.lines import bits_per_character
 from drivers.ports.serial_port import SerialPort, SerialSettings
 from drivers.ports.wire import Wire

@@ -15,18 +15,6 @@ from typing import Literal
 
 from drivers.errors import DeviceError, LinkError
 from drivers.force_units import NEWTONS_PER_UNIT
-from drivers.mt_sics_lines import (
-    INTERNAL_FAULTS,
-    LINE_CHARACTERS,
-    Decoder,
-    Fault,
-    Record,
-    Reply,
-    Unreadable,
-    Weight,
-    encode,
-    number,
-)
 from drivers.ports.inbox import BadRecords
 from drivers.ports.lines import (
     HOST_DELAY_STD,
@@ -40,6 +28,18 @@ from drivers.ports.lines import (
 from drivers.ports.serial_port import SerialPort, SerialSettings
 from drivers.ports.wire import Wire
 from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream
+from drivers.serial_lines.mt_sics_lines import (
+    INTERNAL_FAULTS,
+    LINE_CHARACTERS,
+    Decoder,
+    Fault,
+    Record,
+    Reply,
+    Unreadable,
+    Weight,
+    encode,
+    number,
+)
 
 RATE_TOLERANCE = 0.25
 """A module rounds UPD to the nearest rate it can do; a rate read back further off than this is refused."""

@@ -9,8 +9,8 @@ from typing import Literal
 from drivers.ports.lines import line_time
 from drivers.ports.serial_port import SerialSettings
 from drivers.protocols import Channel, Stream
-from drivers.roboteq_lines import FULL
-from drivers.roboteq_polling import characters_per_second
+from drivers.roboteq.lines import FULL
+from drivers.roboteq.polling import characters_per_second
 
 LONGEST_WATCHDOG = 65.0
 """s (`^RWD`)."""

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from math import inf, isnan
 
 from sim_devices.instruments.lies import LIES, Lying
-from sim_devices.instruments.mt_sics_options import UNITS, MtSicsOptions, line, shown
+from sim_devices.instruments.serial_lines.mt_sics_options import UNITS, MtSicsOptions, line, shown
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT
 
 BALANCE_TIMEOUT = 30.0

@@ -6,7 +6,7 @@ import math
 import struct
 from collections.abc import Sequence
 
-from drivers.modbus_maps import NumberType, Reading, RegisterMap, WordOrder
+from drivers.modbus.maps import NumberType, Reading, RegisterMap, WordOrder
 
 SMALLEST = 1e-15
 """Of the largest weight: a float that is smaller and not 0 is a small integer taken for a float, or words exchanged."""

@@ -1,7 +1,7 @@
 """Force from a load-cell transmitter on Modbus RTU, whatever the model: a map file says which register holds what.
 
 The device is polled: one request a sample, with weight and status in the same reply, so that they belong together.
-The maps that come with the rig are in `drivers/modbus_maps`, each with its manual and page.
+The maps that come with the rig are in `drivers/modbus/maps`, each with its manual and page.
 """
 
 from __future__ import annotations
@@ -12,11 +12,11 @@ import math
 
 from drivers.errors import DeviceError
 from drivers.force_units import NEWTONS_PER_UNIT
-from drivers.modbus_cell_options import Options, chosen
-from drivers.modbus_maps import Code, WordOrder, span
-from drivers.modbus_maps.numbers import other, sane, status, weight
-from drivers.modbus_poll import ModbusPoll
-from drivers.modbus_rtu import Read, Registers, Unreadable
+from drivers.modbus.cell_options import Options, chosen
+from drivers.modbus.maps import Code, WordOrder, span
+from drivers.modbus.maps.numbers import other, sane, status, weight
+from drivers.modbus.poll import ModbusPoll
+from drivers.modbus.rtu import Read, Registers, Unreadable
 from drivers.ports.inbox import BadRecords
 from drivers.ports.lines import line_time
 from drivers.ports.serial_port import SerialSettings

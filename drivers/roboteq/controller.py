@@ -17,7 +17,7 @@ from drivers.ports.lines import printable
 from drivers.ports.serial_port import SerialPort, SerialSettings
 from drivers.ports.wire import Wire
 from drivers.protocols import LinkHealth, Sample, Stream, Watchdog
-from drivers.roboteq_lines import (
+from drivers.roboteq.lines import (
     FAULTS,
     FULL,
     MOTOR_FLAGS,
@@ -35,8 +35,8 @@ from drivers.roboteq_lines import (
     go,
     of_channel,
 )
-from drivers.roboteq_options import Options, streams
-from drivers.roboteq_polling import Round, motor_queries, state_queries
+from drivers.roboteq.options import Options, streams
+from drivers.roboteq.polling import Round, motor_queries, state_queries
 
 REFUSALS = 3
 """Refused commands in a row, none accepted between, that are no spoilt line any more."""

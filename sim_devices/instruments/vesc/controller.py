@@ -1,7 +1,7 @@
 """Device side of a VESC on CAN: what it obeys, when it lets go, what it tells.
 
 Source: github.com/vedderb/bldc: comm/comm_can.c (decode_msg, send thread), timeout.c, appconf_default.h; bytes are in
-vesc_codec.py. The motor is released when no SET_* command came for `timeout` (firmware default 1000 ms, brake current
+codec.py. The motor is released when no SET_* command came for `timeout` (firmware default 1000 ms, brake current
 0): it coasts. The next command is obeyed as if nothing had been: a VESC resumes by itself.
 """
 
@@ -12,8 +12,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import copysign, inf
 
-from sim_devices.instruments import vesc_codec as codec
-from sim_devices.instruments.vesc_codec import Telemetry
+from sim_devices.instruments.vesc import codec
+from sim_devices.instruments.vesc.codec import Telemetry
 from sim_devices.wires.can_frame import CanFrame
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT
 

@@ -18,7 +18,7 @@ from drivers.ports.can_bus import CanBus
 from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
 from drivers.protocols import QUARTZ, Channel, LinkHealth, Sample, Stream, Watchdog
-from drivers.vesc_frames import (
+from drivers.vesc.can_frames import (
     FAULTS,
     PONG,
     PROCESS_SHORT_BUFFER,

@@ -7,8 +7,8 @@ from math import ceil
 from typing import Literal
 
 from drivers.force_units import NEWTONS_PER_UNIT
-from drivers.modbus_maps import Reading, RegisterMap, WordOrder, load_map, span
-from drivers.modbus_rtu import REQUEST_CHARACTERS, Read, gap
+from drivers.modbus.maps import Reading, RegisterMap, WordOrder, load_map, span
+from drivers.modbus.rtu import REQUEST_CHARACTERS, Read, gap
 from drivers.ports.lines import (
     HOST_DELAY_STD,
     bits_per_character,

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import inf
 
-from sim_devices.instruments.roboteq_options import Measured, RoboteqOptions
+from sim_devices.instruments.roboteq.options import Measured, RoboteqOptions
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT
 
 FULL = 1000

@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from sim_devices.instruments.mt_sics_options import UNITS
+from sim_devices.instruments.serial_lines.mt_sics_options import UNITS
 
 SENECA_UNITS = {"kg": 0, "g": 1, "N": 5}
 """high byte of 40003."""

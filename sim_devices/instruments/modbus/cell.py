@@ -1,6 +1,6 @@
 """Device side of a load-cell transmitter on Modbus RTU: converts at its own rate, answers with the last conversion.
 
-What its registers hold: modbus_registers.py. Modbus application protocol V1.1b3: exceptions 1 function, 2 address,
+What its registers hold: registers.py. Modbus application protocol V1.1b3: exceptions 1 function, 2 address,
 3 value, 4 device failure, 6 busy.
 """
 
@@ -13,8 +13,8 @@ from dataclasses import replace
 from math import isnan
 
 from sim_devices.instruments.lies import LIES, Lying
-from sim_devices.instruments.modbus_registers import MAPS, ModbusCellOptions, Shown
-from sim_devices.instruments.mt_sics_options import UNITS
+from sim_devices.instruments.modbus.registers import MAPS, ModbusCellOptions, Shown
+from sim_devices.instruments.serial_lines.mt_sics_options import UNITS
 from sim_devices.wires.modbus_frames import Requests, framed
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT
 

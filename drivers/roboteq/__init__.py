@@ -1,0 +1,1 @@
+"""Roboteq brushed and brushless controllers over serial text commands."""

@@ -1,0 +1,1 @@
+"""A Roboteq controller, as it answers lines."""

@@ -1,0 +1,1 @@
+"""A VESC, as it talks on CAN."""
