@@ -13,14 +13,13 @@ import numpy as np
 
 from sim_devices.bench.control import clear, fault, obey
 from sim_devices.bench.devices import say, serial_device, turnaround
+from sim_devices.bench.motors import motor
 from sim_devices.bench.punctual import give_way, on_time
-from sim_devices.bench.settings import BenchSettings, DeviceOptions, load, script
+from sim_devices.bench.settings import MOTORS, BenchSettings, DeviceOptions, load, script
 from sim_devices.bench.truth_log import TruthLog, header_fields, state_fields
-from sim_devices.instruments.motor_tap import MotorTap
-from sim_devices.instruments.roboteq.controller import Roboteq
-from sim_devices.instruments.roboteq.options import RoboteqOptions, measured
+from sim_devices.instruments.can_node import CanNode
+from sim_devices.instruments.drive import Drive
 from sim_devices.instruments.serial_device import SerialDevice
-from sim_devices.instruments.vesc.controller import Vesc, VescOptions
 from sim_devices.wires.can_frame import CanFrame
 from sim_devices.wires.ports import ControlSocket, PtyPort, wait
 from sim_devices.wires.serial_line import Wire
@@ -64,10 +63,11 @@ class Bench:
         self._heard_at = 0.0
         self._next_state = 0.0
         self.truth = TruthLog(settings.truth)
-        self.vesc: Vesc | None = None
-        self.tap: MotorTap | None = None
-        self.drive: Vesc | Roboteq | None = None
+        self.nodes: dict[str, CanNode] = {}
+        """Devices on the CAN bus."""
+        self.drive: Drive | None = None
         """What turns the thruster."""
+        self._after_step: Callable[[float], None] | None = None
         self.serial: dict[str, tuple[SerialDevice, PtyPort, float]] = {}
         """device name -> device, its port, its turnaround (s)."""
         self.adapters = {name: (Adapter(), self._port(name, None)) for name in settings.can.adapters}
@@ -80,15 +80,14 @@ class Bench:
         return PtyPort(self.settings.links / name, Wire(baud, self._wire_rng))
 
     def _add(self, name: str, options: DeviceOptions) -> None:
-        if isinstance(options, VescOptions):
-            self.tap = MotorTap(self.world, options.pole_pairs, options.vesc_id)
-            self.vesc = Vesc(options, self.settings.world.supply.voltage, self.tap.telemetry, self.log)
-            self.tap.vesc = self.drive = self.vesc
-            return
-        if isinstance(options, RoboteqOptions):
-            supply = self.settings.world.supply.voltage
-            self.drive = motor = Roboteq(options, supply, lambda: measured(self.world), self.log)
-            self.serial[name] = (motor, self._port(options.port, options.baud), 0.0)
+        if isinstance(options, MOTORS):
+            made = motor(options, self.world, self.log)
+            self.drive, self._after_step = made.drive, made.after_step
+            if made.node is not None:
+                self.nodes[name] = made.node
+            if made.serial is not None:
+                device, port, baud = made.serial
+                self.serial[name] = (device, self._port(port, baud), 0.0)
             return
         device = serial_device(options, self.world, self._cross_rng, self._epoch)
         self.serial[name] = (device, self._port(options.port, options.baud), turnaround(options))
@@ -125,36 +124,39 @@ class Bench:
         return [port for _, port in self.adapters.values()] + [port for _, port, _ in self.serial.values()]
 
     def _due(self) -> float:
-        devices = [device.due for device, _, _ in self.serial.values()]
-        wires = [port.due for port in self.ports]
-        return min([*devices, *wires, self.vesc.due if self.vesc else inf])
+        return min([self._device_due(), *(port.due for port in self.ports)])
+
+    def _device_due(self) -> float:
+        serial = (device.due for device, _, _ in self.serial.values())
+        return min([*serial, *(node.due for node in self.nodes.values())], default=inf)
 
     def _advance(self, t: float) -> None:
         """World and devices to t, device by device in the order in which they are due."""
         while True:
-            due = min([device.due for device, _, _ in self.serial.values()] + [self.vesc.due if self.vesc else inf])
+            due = self._device_due()
             self._step_world(min(due, t))
             if due > t:
                 return
             self._tick(due)
 
     def _tick(self, t: float) -> None:
-        if self.vesc is not None and self.vesc.due <= t:
-            for frame in self.vesc.tick(t):
-                self._broadcast(frame, t, None)
+        for node in self.nodes.values():
+            if node.due <= t:
+                for frame in node.tick(t):
+                    self._broadcast(frame, t, node)
         for device, port, late in self.serial.values():
             if device.due <= t:
                 say(port.wire, device.tick(t), t, late)
 
     def _step_world(self, t: float) -> None:
-        dt, world, drive, tap = self.settings.step, self.world, self.drive, self.tap
+        dt, world, drive, after = self.settings.step, self.world, self.drive, self._after_step
         s = world.state
         while (self._steps + 1) * dt <= t:
             self._steps += 1
             volts, amps = drive.drive(s.n, dt) if drive else (None, 0.0)
             world.step(dt, volts, amps)
-            if tap:
-                tap.after_step(dt)
+            if after:
+                after(dt)
             if s.t >= self._next_state:
                 self._log_state()
 
@@ -176,16 +178,17 @@ class Bench:
                 say(port.wire, device.feed(data, t), t, late)
         self.control.serve(lambda line: obey(self, line))
 
-    def _broadcast(self, frame: CanFrame, t: float, sender: PtyPort | None) -> None:
-        """A frame on the bus: every other node hears it; sender None: the motor controller."""
+    def _broadcast(self, frame: CanFrame, t: float, sender: PtyPort | CanNode) -> None:
+        """A frame on the bus: every other node hears it."""
         for adapter, port in self.adapters.values():
             if port is not sender and port.plugged:
                 line = adapter.deliver(frame)
                 if line:
                     port.wire.put(line, t)
-        if sender is not None and self.vesc is not None:
-            for answer in self.vesc.receive(frame, t):
-                self._broadcast(answer, t, None)
+        for node in self.nodes.values():
+            if node is not sender:
+                for answer in node.receive(frame, t):
+                    self._broadcast(answer, t, node)
 
     def _run_script(self, t: float) -> None:
         while self._script and self._script[0][0] <= t:

@@ -14,8 +14,8 @@ from collections.abc import Mapping, Sequence
 from typing import Protocol
 
 from sim_devices.bench.settings import BenchSettings
+from sim_devices.instruments.can_node import CanNode
 from sim_devices.instruments.serial_device import SerialDevice
-from sim_devices.instruments.vesc.controller import Vesc
 from sim_devices.tables import WorldError, check_known
 from sim_devices.wires.ports import PtyPort
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT, WIRE_FAULTS
@@ -40,7 +40,8 @@ class ControlledBench(Protocol):
     def adapters(self) -> Mapping[str, tuple[Adapter, PtyPort]]: ...
 
     @property
-    def vesc(self) -> Vesc | None: ...
+    def nodes(self) -> Mapping[str, CanNode]:
+        """Devices on the CAN bus."""
 
     @property
     def ports(self) -> Sequence[PtyPort]: ...
@@ -136,11 +137,11 @@ def status(bench: ControlledBench) -> dict[str, object]:
     }
 
 
-def _target(bench: ControlledBench, name: str) -> tuple[PtyPort | None, SerialDevice | Vesc | None]:
+def _target(bench: ControlledBench, name: str) -> tuple[PtyPort | None, SerialDevice | CanNode | None]:
     check_known(name, [*bench.settings.devices, *bench.adapters], "target")
     if name in bench.adapters:
         return bench.adapters[name][1], None
     if name in bench.serial:
         device, port, _ = bench.serial[name]
         return port, device
-    return None, bench.vesc
+    return None, bench.nodes[name]

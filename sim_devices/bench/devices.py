@@ -7,34 +7,29 @@ from datetime import datetime
 
 import numpy as np
 
-from sim_devices.bench.settings import DeviceOptions
+from sim_devices.bench.settings import SerialOptions
 from sim_devices.instruments.button import Button, ButtonOptions
 from sim_devices.instruments.modbus.cell import ModbusCell
 from sim_devices.instruments.modbus.keller import Keller, KellerOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
-from sim_devices.instruments.roboteq.options import RoboteqOptions
 from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.serial_lines.line_sender import LineOptions, LineSender
 from sim_devices.instruments.serial_lines.mt_sics import MtSics
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.serial_lines.nortek import Nortek, NortekOptions
-from sim_devices.instruments.vesc.controller import VescOptions
 from sim_devices.wires.serial_line import Wire
 from sim_devices.world import World
 from sim_devices.world.noise import Noise, Normals
 
 
 def serial_device(
-    options: DeviceOptions,
+    options: SerialOptions,
     world: World,
     cross_rng: np.random.Generator,
     epoch: datetime,
     force: Callable[[], float] | None = None,
 ) -> SerialDevice:
-    """The device of these options. `force`: what a load cell reads, N; None: the world's, as it is.
-
-    Raises ValueError for a motor controller, which drives the world as well.
-    """
+    """The device of these options. `force`: what a load cell reads, N; None: the world's, as it is."""
     read = force or (lambda: world.sample("thrust"))
     match options:
         case MtSicsOptions():
@@ -51,11 +46,9 @@ def serial_device(
             return Keller(options, lambda: world.sample("pressure"), lambda: world.sample("water_temperature"))
         case ModbusCellOptions():
             return ModbusCell(options, read)
-        case VescOptions() | RoboteqOptions():
-            raise ValueError("a motor controller does more than measure: the bench makes it")
 
 
-def turnaround(options: DeviceOptions) -> float:
+def turnaround(options: SerialOptions) -> float:
     """S from the end of a request, or of the last conversion, to the first byte of what the device says.
 
     A converter that averages sees its quantity all the time; one value in the middle of each piece stands for it here,

@@ -20,16 +20,10 @@ from sim_devices.tables import WorldError, build, check_known
 from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin
 
-DeviceOptions = (
-    MtSicsOptions
-    | LineOptions
-    | ButtonOptions
-    | NortekOptions
-    | KellerOptions
-    | ModbusCellOptions
-    | RoboteqOptions
-    | VescOptions
-)
+SerialOptions = MtSicsOptions | LineOptions | ButtonOptions | NortekOptions | KellerOptions | ModbusCellOptions
+"""Of what measures, on a serial port."""
+MotorOptions = RoboteqOptions | VescOptions
+DeviceOptions = SerialOptions | MotorOptions
 MOTORS = (RoboteqOptions, VescOptions)
 """Those that turn the thruster."""
 KINDS: dict[str, type[DeviceOptions]] = {

@@ -12,14 +12,13 @@ from math import inf
 import numpy as np
 
 from sim_devices.bench.devices import say, serial_device, turnaround
-from sim_devices.bench.settings import MOTORS, BenchSettings, script
+from sim_devices.bench.motors import motor
+from sim_devices.bench.settings import MOTORS, BenchSettings, MotorOptions, script
 from sim_devices.bench.virtual_wire import Host, VirtualWire
+from sim_devices.instruments.can_node import CanNode
+from sim_devices.instruments.drive import Drive
 from sim_devices.instruments.low_pass import LowPass
-from sim_devices.instruments.motor_tap import MotorTap
-from sim_devices.instruments.roboteq.controller import Roboteq
-from sim_devices.instruments.roboteq.options import RoboteqOptions, measured
 from sim_devices.instruments.serial_device import SerialDevice
-from sim_devices.instruments.vesc.controller import Vesc, VescOptions
 from sim_devices.tables import WorldError
 from sim_devices.wires.can_frame import CanFrame
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT, WIRE_FAULTS, Wire
@@ -53,15 +52,13 @@ class VirtualBench:
         self._low_passes: list[LowPass] = []
         self._adapter, self._bus = Adapter(), self._wired(bus, None)
         self.serial: dict[str, tuple[SerialDevice, VirtualWire, float]] = {}
-        self.vesc: Vesc | None = None
-        self._tap: MotorTap | None = None
-        self.drive = self._motor()
-        """What turns the thruster."""
+        self.nodes: dict[str, CanNode] = {}
+        """Devices on the CAN bus."""
+        self._after_step: Callable[[float], None] | None = None
+        self._require_one_motor()
         for name, options in settings.devices.items():
-            if isinstance(options, VescOptions):
-                continue
-            if isinstance(self.drive, Roboteq) and isinstance(options, RoboteqOptions):
-                self.serial[name] = (self.drive, self._wired(name, options.baud), 0.0)
+            if isinstance(options, MOTORS):
+                self._add_motor(name, options)
                 continue
             device = serial_device(options, self.world, cross_rng, EPOCH, self._cell((filters or {}).get(name, 0.0)))
             self.serial[name] = (device, self._wired(name, options.baud), turnaround(options))
@@ -70,20 +67,25 @@ class VirtualBench:
         self._next_stall = self._until_stall()
         self._script = script(settings.faults)
 
-    def _motor(self) -> Vesc | Roboteq:
+    def _require_one_motor(self) -> None:
         motors = [options for options in self.settings.devices.values() if isinstance(options, MOTORS)]
         if len(motors) != 1:
             raise WorldError(f"devices: a bench in virtual time has one motor controller, this one {len(motors)}")
-        options, supply = motors[0], self.settings.world.supply.voltage
-        if isinstance(options, RoboteqOptions):
-            return Roboteq(options, supply, lambda: measured(self.world), self._log)
-        self._tap = MotorTap(self.world, options.pole_pairs, options.vesc_id)
-        self.vesc = self._tap.vesc = Vesc(options, supply, self._tap.telemetry, self._log)
-        return self.vesc
+
+    def _add_motor(self, name: str, options: MotorOptions) -> None:
+        made = motor(options, self.world, self._log)
+        self.drive: Drive = made.drive
+        """What turns the thruster."""
+        self._after_step = made.after_step
+        if made.node is not None:
+            self.nodes[name] = made.node
+        if made.serial is not None:
+            device, _, baud = made.serial
+            self.serial[name] = (device, self._wired(name, baud), 0.0)
 
     def fault(self, device: str, name: str, amount: float = DEFAULT_AMOUNT) -> None:
         """A device or its wire goes wrong from now on. Raises ValueError for a fault that neither has."""
-        found, wire = self.serial[device][:2] if device in self.serial else (self.drive, None)
+        found, wire = self._device(device)
         if wire is not None and name in WIRE_FAULTS:
             wire.wire.fault(name, amount)
         else:
@@ -91,10 +93,13 @@ class VirtualBench:
 
     def clear(self, device: str) -> None:
         """Device and wire are in order again."""
-        found, wire = self.serial[device][:2] if device in self.serial else (self.drive, None)
+        found, wire = self._device(device)
         found.clear(self._t)
         if wire is not None:
             wire.wire.clear()
+
+    def _device(self, name: str) -> tuple[SerialDevice | CanNode, VirtualWire | None]:
+        return self.serial[name][:2] if name in self.serial else (self.nodes[name], None)
 
     def _cell(self, time_constant: float) -> Callable[[], float] | None:
         """What a converter behind a low pass reads; None without one."""
@@ -150,7 +155,8 @@ class VirtualBench:
 
     def _next_event(self) -> float:
         devices = [device.due for device, _, _ in self.serial.values()]
-        return min([*devices, self.vesc.due if self.vesc else inf, *(wire.due for wire in self._ends)])
+        nodes = (node.due for node in self.nodes.values())
+        return min([*devices, *nodes, *(wire.due for wire in self._ends)])
 
     def _run_to(self, t: float) -> None:
         """Event by event, each in the world of its own instant."""
@@ -167,24 +173,24 @@ class VirtualBench:
         self._move_world(t)
 
     def _move_world(self, t: float) -> None:
-        world, drive, tap = self.world, self.drive, self._tap
+        world, drive, after = self.world, self.drive, self._after_step
         step = min(self.settings.step, FILTERED) if self._low_passes else self.settings.step
         state = world.state
         while (left := t - state.t) > SAME:
             dt = min(step, left)
             volts, amps = drive.drive(state.n, dt)
             world.step(dt, volts, amps)
-            if tap:
-                tap.after_step(dt)
+            if after:
+                after(dt)
             for low_pass in self._low_passes:
                 low_pass.follow(world.exact("thrust"), dt)
         self._t = max(t, self._t)
 
     def _happen(self, t: float) -> None:
-        vesc = self.vesc
-        if vesc and vesc.due <= t:
-            for frame in vesc.tick(t):
-                self._deliver(frame, t)
+        for node in self.nodes.values():
+            if node.due <= t:
+                for frame in node.tick(t):
+                    self._broadcast(frame, t, node)
         for device, wire, late in self.serial.values():
             if device.due <= t:
                 say(wire.wire, device.tick(t), t, late)
@@ -194,15 +200,20 @@ class VirtualBench:
             answer, frames = self._adapter.feed(data)
             if answer:
                 self._bus.wire.put(answer, t)
-            for answered in (reply for frame in frames for reply in (vesc.receive(frame, t) if vesc else ())):
-                self._deliver(answered, t)
+            for frame in frames:
+                self._broadcast(frame, t, None)
         for wire in self._ends:
             if wire.due <= t:
                 self._told = wire.carry(t) or self._told
 
-    def _deliver(self, frame: CanFrame, t: float) -> None:
-        if line := self._adapter.deliver(frame):
+    def _broadcast(self, frame: CanFrame, t: float, sender: CanNode | None) -> None:
+        """A frame on the bus: every other node hears it; sender None: the host."""
+        if sender is not None and (line := self._adapter.deliver(frame)):
             self._bus.wire.put(line, t)
+        for node in self.nodes.values():
+            if node is not sender:
+                for answer in node.receive(frame, t):
+                    self._broadcast(answer, t, node)
 
     def _log(self, event: str, **fields: object) -> None:
         """Only what the motor was really driven with is of use here."""

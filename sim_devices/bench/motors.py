@@ -1,0 +1,43 @@
+"""The motor controllers of a bench, made of their settings and the world whose thruster they turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+from sim_devices.bench.settings import MotorOptions
+from sim_devices.instruments.can_node import CanNode
+from sim_devices.instruments.drive import Drive
+from sim_devices.instruments.motor_tap import MotorTap
+from sim_devices.instruments.roboteq.controller import Roboteq
+from sim_devices.instruments.roboteq.options import RoboteqOptions, measured
+from sim_devices.instruments.serial_device import SerialDevice
+from sim_devices.instruments.vesc.controller import Vesc, VescOptions
+from sim_devices.world import World
+
+Log = Callable[..., None]
+"""log(event, **fields): the truth log."""
+
+
+class Motor(NamedTuple):
+    """A motor controller as what turns the thruster and as what is on its wire: one of `node` and `serial`."""
+
+    drive: Drive
+    node: CanNode | None = None
+    serial: tuple[SerialDevice, str, int] | None = None
+    """Device, port, baud."""
+    after_step: Callable[[float], None] | None = None
+    """Called after each world step with its length, s."""
+
+
+def motor(options: MotorOptions, world: World, log: Log) -> Motor:
+    """The motor controller of these options."""
+    supply = world.settings.supply.voltage
+    match options:
+        case RoboteqOptions():
+            device = Roboteq(options, supply, lambda: measured(world), log)
+            return Motor(device, serial=(device, options.port, options.baud))
+        case VescOptions():
+            tap = MotorTap(world, options.pole_pairs, options.vesc_id)
+            vesc = tap.vesc = Vesc(options, supply, tap.telemetry, log)
+            return Motor(vesc, node=vesc, after_step=tap.after_step)
