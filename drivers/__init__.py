@@ -11,6 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from drivers.hbm.aed import HbmAed
+from drivers.hbm.options import Options as HbmAedOptions
 from drivers.modbus import keller
 from drivers.modbus.cell import ModbusCell
 from drivers.modbus.cell_options import Options as ModbusCellOptions
@@ -35,6 +37,7 @@ class Kind:
 
 KINDS: dict[str, Kind] = {
     "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial"),
+    "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial"),
     "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial"),
     "modbus_cell": Kind(ModbusCellOptions, ModbusCell, "serial"),
     "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial"),

@@ -13,6 +13,7 @@ from sim_devices.instruments.modbus.cell import ModbusCell
 from sim_devices.instruments.modbus.keller import Keller, KellerOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.serial_device import SerialDevice
+from sim_devices.instruments.serial_lines.hbm_aed import HbmAed, HbmAedOptions
 from sim_devices.instruments.serial_lines.line_sender import LineOptions, LineSender
 from sim_devices.instruments.serial_lines.mt_sics import MtSics
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
@@ -34,6 +35,8 @@ def serial_device(
     match options:
         case MtSicsOptions():
             return MtSics(options, read)
+        case HbmAedOptions():
+            return HbmAed(options, read)
         case LineOptions():
             return LineSender(options, read)
         case ButtonOptions():
@@ -57,6 +60,8 @@ def turnaround(options: SerialOptions) -> float:
     match options:
         case KellerOptions() | ModbusCellOptions():
             return options.turnaround
+        case HbmAedOptions():
+            return 0.5 / options.top_rate
         case MtSicsOptions() | LineOptions() if options.average > 1:
             return 0.5 / (options.rate * options.average)
         case _:

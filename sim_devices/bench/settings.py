@@ -12,6 +12,7 @@ from sim_devices.instruments.button import ButtonOptions
 from sim_devices.instruments.modbus.keller import KellerOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.roboteq.options import RoboteqOptions
+from sim_devices.instruments.serial_lines.hbm_aed import HbmAedOptions
 from sim_devices.instruments.serial_lines.line_sender import LineOptions
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.serial_lines.nortek import NortekOptions
@@ -20,7 +21,15 @@ from sim_devices.tables import WorldError, build, check_known
 from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin
 
-SerialOptions = MtSicsOptions | LineOptions | ButtonOptions | NortekOptions | KellerOptions | ModbusCellOptions
+SerialOptions = (
+    MtSicsOptions
+    | HbmAedOptions
+    | LineOptions
+    | ButtonOptions
+    | NortekOptions
+    | KellerOptions
+    | ModbusCellOptions
+)
 """Of what measures, on a serial port."""
 MotorOptions = RoboteqOptions | VescOptions
 DeviceOptions = SerialOptions | MotorOptions
@@ -28,6 +37,7 @@ MOTORS = (RoboteqOptions, VescOptions)
 """Those that turn the thruster."""
 KINDS: dict[str, type[DeviceOptions]] = {
     "mt_sics": MtSicsOptions,
+    "hbm_aed": HbmAedOptions,
     "line": LineOptions,
     "button": ButtonOptions,
     "nortek": NortekOptions,
