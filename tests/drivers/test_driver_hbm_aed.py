@@ -1,4 +1,4 @@
-"""HBM AED: golden lines and frames, bytes lost in the middle of a stream, and the driver against scripted electronics."""
+"""HBM AED: golden lines and frames, bytes lost in the middle of a stream, and the driver against a scripted peer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The simulated electronics: what they say to each command, literal values, averages, and all that they can do wrong."""
+"""The simulated electronics: what they say to each command, literal values, averages, and all they can do wrong."""
 
 from math import nan
 
