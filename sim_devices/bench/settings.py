@@ -22,13 +22,7 @@ from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin
 
 SerialOptions = (
-    MtSicsOptions
-    | HbmAedOptions
-    | LineOptions
-    | ButtonOptions
-    | NortekOptions
-    | KellerOptions
-    | ModbusCellOptions
+    MtSicsOptions | HbmAedOptions | LineOptions | ButtonOptions | NortekOptions | KellerOptions | ModbusCellOptions
 )
 """Of what measures, on a serial port."""
 MotorOptions = RoboteqOptions | VescOptions
