@@ -14,13 +14,18 @@ from typing import Any, Literal
 from drivers.hbm.aed import HbmAed
 from drivers.hbm.options import Options as HbmAedOptions
 from drivers.modbus import keller
+from drivers.modbus import recognising as recognising_modbus
 from drivers.modbus.cell import ModbusCell
 from drivers.modbus.cell_options import Options as ModbusCellOptions
 from drivers.protocols import Instrument
+from drivers.recognition.can_traffic import CanProbe
+from drivers.recognition.serial_line import SerialProbe
+from drivers.roboteq import recognising as recognising_roboteq
 from drivers.roboteq.controller import Roboteq
 from drivers.roboteq.options import Options as RoboteqOptions
-from drivers.serial_lines import line_stream, mt_sics, nortek_nmea
+from drivers.serial_lines import line_stream, mt_sics, nortek_nmea, recognising_mt_sics, recognising_streams
 from drivers.vesc import over_can
+from drivers.vesc import recognising as recognising_vesc
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,15 +38,17 @@ class Kind:
     """`build(name, options)` or, over a wire that is given, `build(name, options, wire)` for a serial device;
     `build(name, options, bus)` for one on CAN."""
     link: Literal["serial", "can"]
+    probe: SerialProbe | CanProbe | None = None
+    """How `rig devices` recognises one; None: it cannot yet."""
 
 
 KINDS: dict[str, Kind] = {
-    "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial"),
+    "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial", recognising_mt_sics.PROBE),
     "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial"),
-    "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial"),
-    "modbus_cell": Kind(ModbusCellOptions, ModbusCell, "serial"),
-    "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial"),
-    "keller": Kind(keller.Options, keller.Keller, "serial"),
-    "roboteq": Kind(RoboteqOptions, Roboteq, "serial"),
-    "vesc_can": Kind(over_can.Options, over_can.VescCan, "can"),
+    "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial", recognising_streams.NUMBERS),
+    "modbus_cell": Kind(ModbusCellOptions, ModbusCell, "serial", recognising_modbus.CELL),
+    "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial", recognising_streams.NORTEK),
+    "keller": Kind(keller.Options, keller.Keller, "serial", recognising_modbus.KELLER),
+    "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE),
+    "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE),
 }

@@ -55,6 +55,9 @@ class Entry(NamedTuple):
 
 COMMANDS: Final = {
     "init": Entry("rig.first_steps.command:init_command", "Make a bench, a world and a campaign to edit.", "measure"),
+    "devices": Entry(
+        "rig.devices.command:devices_command", "Who is on a port or bus, and a bench file to start from.", "measure"
+    ),
     "check": Entry(
         "rig.operate.check:check_command", "Check a campaign and its bench without opening a port.", "measure"
     ),

@@ -24,6 +24,7 @@ from can.interfaces.slcan import slcanBus
 from drivers.errors import LinkError
 from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
+from drivers.ports.refusals import why_not_open
 from drivers.ports.serial_port import chunk_reader, set_low_latency
 from drivers.ports.slcan_lines import SlcanLines
 from drivers.ports.transcript import Transcript
@@ -90,8 +91,8 @@ class CanBus:
         except (can.CanError, OSError, ValueError) as error:
             self.close()
             raise LinkError(
-                f"CAN bus {self._interface} on {self._channel} at {self._bitrate} bit/s does not open: {error}."
-                " Check adapter, path, bit rate, and that no other program has it open"
+                f"CAN bus {self._interface} on {self._channel} at {self._bitrate} bit/s does not open:"
+                f" {why_not_open(error)}"
             ) from error
         self._reader = threading.Thread(
             target=self._read, args=(self._bus,), name=f"read {self._channel}", daemon=False

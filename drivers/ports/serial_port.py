@@ -5,10 +5,11 @@ from __future__ import annotations
 import contextlib
 import os
 import select
+import termios
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Generic, TypeVar
 
@@ -17,6 +18,7 @@ import serial
 from drivers.errors import LinkError
 from drivers.ports.inbox import Inbox
 from drivers.ports.lines import bits_per_character
+from drivers.ports.refusals import why_not_open
 from drivers.ports.transcript import Transcript
 from drivers.ports.wire import Wire
 
@@ -88,10 +90,8 @@ class SerialPort(Generic[Record]):
         try:
             port = _open_serial(self.settings)
         except (OSError, ValueError) as error:
-            raise LinkError(
-                f"{self._name}: cannot open {self.settings.port}: {error}."
-                " Check the cable, the path, and that no other program has it open"
-            ) from error
+            why = why_not_open(error)
+            raise LinkError(f"{self._name}: cannot open {self.settings.port}: {why}") from error
         try:
             self._transcript = self._new_transcript()
         except LinkError:
@@ -122,6 +122,26 @@ class SerialPort(Generic[Record]):
             raise LinkError(f"{self._name}: {self.error}") from error
         if self._transcript is not None:
             self._transcript.write(self.now_ns(), ">", data)
+
+    def retune(self, baud: int, framing: str) -> None:
+        """Another rate from now on, the port stays open. Raises LinkError where it is not, or cannot do that rate.
+
+        A wire that was given has no rate.
+        """
+        bits_per_character(framing)
+        self.settings = replace(self.settings, baud=baud, framing=framing)
+        if self._wire is not None:
+            return
+        if self._serial is None:
+            raise LinkError(f"{self._name}: {self.settings.port} is not open")
+        try:
+            self._serial.apply_settings(
+                {
+                    "baudrate": baud, "bytesize": int(framing[0]), "parity": framing[1], "stopbits": int(framing[2]),
+                }
+            )  # fmt: skip
+        except (OSError, ValueError, termios.error) as error:
+            raise LinkError(f"{self._name}: {self.settings.port} cannot do {baud} baud {framing}: {error}") from error
 
     def now_ns(self) -> int:
         """Time of the stamps, ns: the machine's monotonic clock, or the wire's."""

@@ -43,7 +43,7 @@ def test_a_misspelt_command_is_answered_with_the_nearest(capsys: pytest.CaptureF
     assert main(["chekc", "campaign.toml"]) == 2
     assert "there is no command 'chekc'; did you mean check?" in capsys.readouterr().err
     assert main(["qqq"]) == 2
-    assert "known are init, check, edit, run" in capsys.readouterr().err
+    assert "known are init, devices, check, edit, run" in capsys.readouterr().err
 
 
 def test_the_tab_key_offers_commands_without_waiting_for_them() -> None:

@@ -1,0 +1,136 @@
+"""Probes are harmless: every question of every kind, put to every simulated device, moves nothing and sets nothing."""
+
+from __future__ import annotations
+
+import pytest
+
+from drivers import KINDS
+from drivers.recognition.can_traffic import CanProbe
+from drivers.recognition.serial_line import Rate, SerialProbe
+from drivers.vesc.recognising import HOST, LAST_ID
+from sim_devices.instruments.modbus.cell import ModbusCell
+from sim_devices.instruments.modbus.keller import Keller, KellerOptions
+from sim_devices.instruments.modbus.registers import ModbusCellOptions
+from sim_devices.instruments.roboteq.controller import Roboteq
+from sim_devices.instruments.roboteq.options import Measured, RoboteqOptions
+from sim_devices.instruments.serial_lines.mt_sics import MtSics
+from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
+from sim_devices.instruments.vesc.codec import Telemetry
+from sim_devices.instruments.vesc.controller import Vesc, VescOptions
+from sim_devices.wires.can_frame import CanFrame
+
+PROBES = {name: kind.probe for name, kind in KINDS.items() if isinstance(kind.probe, SerialProbe)}
+ASKING = {name: probe for name, probe in PROBES.items() if probe.ask is not None}
+
+
+class DirectLine:
+    """A probe's line to a simulated device in this process; time passes by a tenth of a second a question."""
+
+    def __init__(self, device) -> None:
+        self.rate, self.addresses, self.mute = Rate(9600), (1,), set()
+        self.heard, self.heard_for, self.answers, self.requests = b"", 1.0, b"", []
+        self._device, self.t = device, 10.0
+
+    def ask(self, request, enough, timeout=0.3):
+        self.t += 0.1
+        self.requests.append(request)
+        said = self._device.feed(request, self.t)
+        self.answers += said
+        return said
+
+
+def roboteq(log, **options) -> Roboteq:
+    return Roboteq(RoboteqOptions("roboteq", "p", **options), 48.0, Measured, log)
+
+
+DEVICES = {
+    "mt_sics": lambda: MtSics(MtSicsOptions("mt_sics", "p"), lambda: 12.0),
+    "keller": lambda: Keller(KellerOptions("keller", "p"), lambda: 1.1e5, lambda: 18.0),
+    "modbus_cell": lambda: ModbusCell(ModbusCellOptions("modbus_cell", "p"), lambda: 12.0),
+    "roboteq": lambda: roboteq(lambda *_, **__: None),
+}
+
+
+PAIRS = [(kind, device) for kind in ASKING for device in DEVICES if (kind, device) != ("modbus_cell", "keller")]
+"""The registers of a Keller lie where those of a Laumas do: it is asked for before, which the next test sees to."""
+
+
+@pytest.mark.parametrize(("kind", "device"), PAIRS)
+def test_a_kind_is_recognised_by_its_own_probe_and_by_no_other(kind, device):
+    found = ASKING[kind].ask(DirectLine(DEVICES[device]()))
+    assert (found.kind if found else None) == (kind if kind == device else None)
+
+
+def test_keller_is_asked_for_before_the_cells_and_numbers_come_last():
+    order = sorted(PROBES, key=lambda name: PROBES[name].order)
+    assert order.index("keller") < order.index("modbus_cell") < order.index("line_stream")
+
+
+@pytest.mark.parametrize("echo", [True, False])
+def test_every_question_leaves_a_controller_as_it_was(echo):
+    """It ran at 250 and its watchdog has stopped it: a `!` of any kind would let it go on."""
+    said: list[str] = []
+    device = roboteq(lambda event, **_: said.append(event), echo=echo)
+    device.feed(b"!G 1 250\r", 0.0)
+    device.tick(5.0)
+    assert said == ["command", "timeout"]
+    for probe in ASKING.values():
+        line = DirectLine(device)
+        probe.ask(line)
+        device.drive(0.0, 0.001)
+        assert line.requests
+        assert device.power == 0.0
+    assert said == ["command", "timeout"]
+    assert device.feed(b"~ECHOF\r~RWD\r", 20.0).count(b"ECHOF=" + (b"0" if echo else b"1")) == 1
+
+
+def test_every_question_leaves_a_running_controller_running_and_feeds_no_watchdog():
+    device = roboteq(lambda *_, **__: None)
+    device.feed(b"!G 1 250\r", 9.95)
+    for probe in ASKING.values():
+        probe.ask(DirectLine(device))
+        device.drive(0.0, 0.001)
+    assert device.due == pytest.approx(10.95) or device.power == 0.0
+
+
+def test_half_a_command_of_somebody_else_is_not_carried_out():
+    """Whatever comes first must not end it."""
+    for probe in ASKING.values():
+        device = roboteq(lambda *_, **__: None)
+        device.feed(b"!G 1 5", 0.0)
+        found = probe.ask(DirectLine(device))
+        device.drive(0.0, 0.001)
+        assert device.power == 0.0
+        if probe is ASKING["roboteq"]:
+            assert found is not None
+
+
+def test_no_question_is_an_end_of_line_alone_or_a_command():
+    for probe in ASKING.values():
+        for device in DEVICES.values():
+            line = DirectLine(device())
+            probe.ask(line)
+            assert all(request.strip() for request in line.requests)
+            assert not any(request.startswith((b"!", b"^", b"@", b"%")) for request in line.requests)
+
+
+def test_a_ping_to_every_identifier_moves_no_vesc():
+    said: list[str] = []
+    vesc = Vesc(VescOptions("vesc"), 48.0, lambda: Telemetry(), lambda event, **_: said.append(event))
+    probe = KINDS["vesc_can"].probe
+    assert isinstance(probe, CanProbe)
+
+    class Silence:
+        frames, heard_for = (), 1.0
+
+        def ask(self, requests, timeout=0.3):
+            sent = [CanFrame(each.id, each.data) for each in requests]
+            assert len(sent) == LAST_ID  # all but ours
+            assert HOST not in [each.id & 0xFF for each in requests]
+            from drivers.ports.can_frame import Frame
+
+            return tuple(Frame(a.id, a.extended, a.data) for each in sent for a in vesc.receive(each, 1.0))
+
+    (found,) = probe.ask(Silence())
+    assert found.keys["vesc_id"] == 23
+    assert said == []
