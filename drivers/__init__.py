@@ -23,7 +23,14 @@ from drivers.recognition.serial_line import SerialProbe
 from drivers.roboteq import recognising as recognising_roboteq
 from drivers.roboteq.controller import Roboteq
 from drivers.roboteq.options import Options as RoboteqOptions
-from drivers.serial_lines import line_stream, mt_sics, nortek_nmea, recognising_mt_sics, recognising_streams
+from drivers.serial_lines import (
+    line_stream,
+    mantracourt_dsc,
+    mt_sics,
+    nortek_nmea,
+    recognising_mt_sics,
+    recognising_streams,
+)
 from drivers.vesc import over_can
 from drivers.vesc import recognising as recognising_vesc
 
@@ -45,6 +52,7 @@ class Kind:
 KINDS: dict[str, Kind] = {
     "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial", recognising_mt_sics.PROBE),
     "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial"),
+    "mantracourt_dsc": Kind(mantracourt_dsc.Options, mantracourt_dsc.MantracourtDsc, "serial"),
     "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial", recognising_streams.NUMBERS),
     "modbus_cell": Kind(ModbusCellOptions, ModbusCell, "serial", recognising_modbus.CELL),
     "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial", recognising_streams.NORTEK),

@@ -42,7 +42,7 @@ from sim_devices.instruments import button
 from sim_devices.instruments.modbus import cell as modbus_cell
 from sim_devices.instruments.modbus import keller
 from sim_devices.instruments.roboteq import controller as roboteq
-from sim_devices.instruments.serial_lines import hbm_aed, line_sender, mt_sics, nortek
+from sim_devices.instruments.serial_lines import hbm_aed, line_sender, mantracourt, mt_sics, nortek
 from sim_devices.instruments.vesc import controller as vesc
 from sim_devices.vehicle.body import AXES, Body
 from sim_devices.vehicle.settings import Noise as VehicleNoise
@@ -201,6 +201,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
     for kind, device in (
         ("mt_sics", mt_sics.MtSics),
         ("hbm_aed", hbm_aed.HbmAed),
+        ("mantracourt_dsc", mantracourt.Mantracourt),
         ("line", line_sender.LineSender),
         ("modbus_cell", modbus_cell.ModbusCell),
         ("button", button.Button),

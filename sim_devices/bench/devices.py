@@ -15,6 +15,7 @@ from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAed, HbmAedOptions
 from sim_devices.instruments.serial_lines.line_sender import LineOptions, LineSender
+from sim_devices.instruments.serial_lines.mantracourt import Mantracourt, MantracourtOptions
 from sim_devices.instruments.serial_lines.mt_sics import MtSics
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.serial_lines.nortek import Nortek, NortekOptions
@@ -37,6 +38,8 @@ def serial_device(
             return MtSics(options, read)
         case HbmAedOptions():
             return HbmAed(options, read)
+        case MantracourtOptions():
+            return Mantracourt(options, read)
         case LineOptions():
             return LineSender(options, read)
         case ButtonOptions():
@@ -58,7 +61,7 @@ def turnaround(options: SerialOptions) -> float:
     so that the last piece ends half of it later.
     """
     match options:
-        case KellerOptions() | ModbusCellOptions():
+        case KellerOptions() | ModbusCellOptions() | MantracourtOptions():
             return options.turnaround
         case HbmAedOptions():
             return 0.5 / options.top_rate

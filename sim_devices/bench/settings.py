@@ -14,6 +14,7 @@ from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.roboteq.options import RoboteqOptions
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAedOptions
 from sim_devices.instruments.serial_lines.line_sender import LineOptions
+from sim_devices.instruments.serial_lines.mantracourt import MantracourtOptions
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.serial_lines.nortek import NortekOptions
 from sim_devices.instruments.vesc.controller import VescOptions
@@ -22,7 +23,14 @@ from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin
 
 SerialOptions = (
-    MtSicsOptions | HbmAedOptions | LineOptions | ButtonOptions | NortekOptions | KellerOptions | ModbusCellOptions
+    MtSicsOptions
+    | HbmAedOptions
+    | MantracourtOptions
+    | LineOptions
+    | ButtonOptions
+    | NortekOptions
+    | KellerOptions
+    | ModbusCellOptions
 )
 """Of what measures, on a serial port."""
 MotorOptions = RoboteqOptions | VescOptions
@@ -32,6 +40,7 @@ MOTORS = (RoboteqOptions, VescOptions)
 KINDS: dict[str, type[DeviceOptions]] = {
     "mt_sics": MtSicsOptions,
     "hbm_aed": HbmAedOptions,
+    "mantracourt_dsc": MantracourtOptions,
     "line": LineOptions,
     "button": ButtonOptions,
     "nortek": NortekOptions,
