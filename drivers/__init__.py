@@ -17,6 +17,8 @@ from drivers.modbus import keller
 from drivers.modbus import recognising as recognising_modbus
 from drivers.modbus.cell import ModbusCell
 from drivers.modbus.cell_options import Options as ModbusCellOptions
+from drivers.modbus.registers import ModbusRegisters
+from drivers.modbus.registers import Options as ModbusRegistersOptions
 from drivers.protocols import Instrument
 from drivers.recognition.can_traffic import CanProbe
 from drivers.recognition.serial_line import SerialProbe
@@ -55,6 +57,7 @@ KINDS: dict[str, Kind] = {
     "mantracourt_dsc": Kind(mantracourt_dsc.Options, mantracourt_dsc.MantracourtDsc, "serial"),
     "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial", recognising_streams.NUMBERS),
     "modbus_cell": Kind(ModbusCellOptions, ModbusCell, "serial", recognising_modbus.CELL),
+    "modbus_registers": Kind(ModbusRegistersOptions, ModbusRegisters, "serial"),
     "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial", recognising_streams.NORTEK),
     "keller": Kind(keller.Options, keller.Keller, "serial", recognising_modbus.KELLER),
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE),

@@ -14,6 +14,7 @@ from tests.test_pages import FENCED, anchor
 
 DEVICES = Path(__file__).parents[1] / "docs" / "devices"
 PAGES = sorted(DEVICES.glob("*.md"))
+NAMED = ("toml", "text")
 TEXT = (DEVICES / "modbus-cells.md").read_text(encoding="utf-8")
 
 
@@ -28,12 +29,25 @@ def test_links_of_the_page_lead_somewhere(page: Path) -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
-def test_devices_of_the_page_are_options_of_their_kind(page: Path) -> None:
-    blocks = [body for language, body in FENCED.findall(page.read_text(encoding="utf-8")) if language == "toml"]
-    tables = [table for body in blocks for table in tomllib.loads(body).get("devices", {}).values()]
+def test_devices_of_the_page_are_options_of_their_kind(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Blocks whose first line is a comment with a file's name are that file, beside the bench file."""
+    monkeypatch.chdir(tmp_path)
+    blocks = [body for language, body in FENCED.findall(page.read_text(encoding="utf-8")) if language in NAMED]
+    for body in blocks:
+        if name := re.match(r"(?:#|//) (\w+\.(?:toml|dbc))\n", body):
+            (tmp_path / name[1]).write_text(body.partition("\n")[2], encoding="utf-8")
+    known = [body for language, body in FENCED.findall(page.read_text(encoding="utf-8")) if language == "toml"]
+    tables = [table for body in known for table in tomllib.loads(body).get("devices", {}).values()]
     assert tables
     for table in tables:
-        KINDS[table.pop("kind")].options(**table)
+        KINDS[table.pop("kind")].options(**{key: _frozen(value) for key, value in table.items()})
+
+
+def _frozen(value: object) -> object:
+    """As the loader hands it on: arrays are tuples."""
+    return tuple(_frozen(each) for each in value) if isinstance(value, list) else value
 
 
 def test_the_map_of_the_page_is_one(tmp_path: Path) -> None:

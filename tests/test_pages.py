@@ -40,7 +40,7 @@ from sim_devices.bench.settings import KEYS, CanBus, ScriptedFault, load
 from sim_devices.bench.settings import KINDS as SIMULATED
 from sim_devices.instruments import button
 from sim_devices.instruments.modbus import cell as modbus_cell
-from sim_devices.instruments.modbus import keller
+from sim_devices.instruments.modbus import keller, registers_device
 from sim_devices.instruments.roboteq import controller as roboteq
 from sim_devices.instruments.serial_lines import hbm_aed, line_sender, mantracourt, mt_sics, nortek
 from sim_devices.instruments.vesc import controller as vesc
@@ -204,6 +204,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("mantracourt_dsc", mantracourt.Mantracourt),
         ("line", line_sender.LineSender),
         ("modbus_cell", modbus_cell.ModbusCell),
+        ("modbus_registers", registers_device.RegistersDevice),
         ("button", button.Button),
         ("nortek", nortek.Nortek),
         ("keller", keller.Keller),

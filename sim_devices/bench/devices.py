@@ -12,6 +12,7 @@ from sim_devices.instruments.button import Button, ButtonOptions
 from sim_devices.instruments.modbus.cell import ModbusCell
 from sim_devices.instruments.modbus.keller import Keller, KellerOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
+from sim_devices.instruments.modbus.registers_device import RegistersDevice, RegistersOptions
 from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAed, HbmAedOptions
 from sim_devices.instruments.serial_lines.line_sender import LineOptions, LineSender
@@ -52,6 +53,8 @@ def serial_device(
             return Keller(options, lambda: world.sample("pressure"), lambda: world.sample("water_temperature"))
         case ModbusCellOptions():
             return ModbusCell(options, read)
+        case RegistersOptions():
+            return RegistersDevice(options, world.sample)
 
 
 def turnaround(options: SerialOptions) -> float:
@@ -61,7 +64,7 @@ def turnaround(options: SerialOptions) -> float:
     so that the last piece ends half of it later.
     """
     match options:
-        case KellerOptions() | ModbusCellOptions() | MantracourtOptions():
+        case KellerOptions() | ModbusCellOptions() | RegistersOptions() | MantracourtOptions():
             return options.turnaround
         case HbmAedOptions():
             return 0.5 / options.top_rate

@@ -11,6 +11,7 @@ from typing import Any
 from sim_devices.instruments.button import ButtonOptions
 from sim_devices.instruments.modbus.keller import KellerOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
+from sim_devices.instruments.modbus.registers_device import RegistersOptions
 from sim_devices.instruments.roboteq.options import RoboteqOptions
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAedOptions
 from sim_devices.instruments.serial_lines.line_sender import LineOptions
@@ -31,6 +32,7 @@ SerialOptions = (
     | NortekOptions
     | KellerOptions
     | ModbusCellOptions
+    | RegistersOptions
 )
 """Of what measures, on a serial port."""
 MotorOptions = RoboteqOptions | VescOptions
@@ -46,6 +48,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "nortek": NortekOptions,
     "keller": KellerOptions,
     "modbus_cell": ModbusCellOptions,
+    "modbus_registers": RegistersOptions,
     "roboteq": RoboteqOptions,
     "vesc": VescOptions,
 }

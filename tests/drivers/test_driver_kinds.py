@@ -6,14 +6,19 @@ from drivers import KINDS
 from drivers.ports.can_bus import CanBus
 from drivers.protocols import Instrument, MotorController
 
+MAP = 'title="T"\nsource="t"\nfunction=3\n[channels.bus_voltage]\nregister=0\ntype="u16"\nunit="V"\n'
 
-def test_every_kind_is_an_instrument_and_only_the_motor_commands():
+
+def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
+    channels = tmp_path / "map.toml"
+    channels.write_text(MAP, encoding="utf-8")
     options = {
         "mt_sics": {"port": "p", "rate": 10.0},
         "hbm_aed": {"port": "p", "rate": 25.0, "top_rate": 100.0, "nominal_force": 500.0},
         "mantracourt_dsc": {"port": "p", "rate": 50.0, "unit": "N"},
         "line_stream": {"port": "p", "pattern": r"(?P<value>\d+)", "rate": 10.0, "line_characters": 10},
         "modbus_cell": {"port": "p", "map": "laumas", "rate": 10.0, "unit": "kg", "decimals": 3},
+        "modbus_registers": {"port": "p", "map": str(channels), "rate": 1.0},
         "nortek_nmea": {"port": "p", "rate": 4.0},
         "keller": {"port": "p"},
         "roboteq": {"port": "p", "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5, "rotation": "none"},

@@ -17,6 +17,8 @@ import pytest
 from drivers.errors import DeviceError
 from drivers.modbus.cell import ModbusCell
 from drivers.modbus.cell_options import Options
+from drivers.modbus.registers import ModbusRegisters
+from drivers.modbus.registers import Options as RegistersOptions
 from sim_devices.bench.process import running
 from tests.drivers.collecting import collect
 from tests.drivers.scripted_peer import wait_until
@@ -190,3 +192,78 @@ def _shows(cell, fault, before):
     """What a driver can see of it: rows without a number, or requests without a row."""
     rows = cell.drain()
     return any(row.values[0] != row.values[0] for row in rows) if fault == "overload" else cell.health().bad > before
+
+
+METER = """
+title = "Meter"
+source = "made up for this test"
+function = {function}
+word_order = "low_first"
+[channels.bus_voltage]
+register = 0
+type = "u16"
+scale = 0.01
+unit = "V"
+quantity = "bus_voltage"
+[channels.water_temperature]
+register = 1
+type = "float32"
+unit = "degC"
+quantity = "water_temperature"
+[channels.emergency_stop]
+register = 3
+type = "u16"
+bit = 0
+invert = true
+unit = "1"
+quantity = "emergency_stop"
+"""
+
+
+def meter(tmp_path, port, function):
+    (tmp_path / "meter.toml").write_text(METER.format(function=function))
+    return RegistersOptions(port, str(tmp_path / "meter.toml"), rate=40.0, baud=115_200, timeout=1.0)
+
+
+@pytest.mark.parametrize(("block", "function"), [("hr", 3), ("ir", 4)])
+def test_our_registers_against_the_server_of_pymodbus(tmp_path, block, function, third_party):
+    third_party("pymodbus.server")
+    words = struct.unpack(">HH", struct.pack(">f", 18.25))
+    with Server([4823, *reversed(words), 1, 0, 0], block) as server:
+        device = ModbusRegisters("meter", meter(tmp_path, server.port, function))
+        device.open()
+        assert collect(device, 5)[-1].values == pytest.approx((48.23, 18.25, 0.0))
+        assert (device.health().bad, device.health().alive) == (0, True)
+        device.close()
+
+
+SLAVE = """
+kind = "modbus_registers"
+port = "cell"
+baud = 115200
+word_order = "low_first"
+values = ["0 u16 bus_voltage 0.01", "1 float32 water_temperature 1", "3 u16 contact 1"]
+"""
+
+
+def test_minimalmodbus_reads_our_registers_and_so_do_we(tmp_path, third_party):
+    minimalmodbus = third_party("minimalmodbus")
+    head, _, _ = WORLD.format(map="", force=0.0, more="").partition("[devices.cell]")
+    (tmp_path / "world.toml").write_text(f"{head}[devices.cell]{SLAVE}")
+    with running(tmp_path / "world.toml", tmp_path / "ports", seed=1) as ours:
+        client = minimalmodbus.Instrument(str(ours.links / "cell"), 1)
+        client.serial.baudrate, client.serial.timeout = 115200, 2.0
+        try:
+            assert client.read_register(0, 2) == pytest.approx(48.0, abs=0.5)
+            swapped = client.read_float(1, byteorder=minimalmodbus.BYTEORDER_LITTLE_SWAP)
+            assert swapped == pytest.approx(18.0, abs=0.5)
+            with pytest.raises(minimalmodbus.IllegalRequestError):
+                client.read_register(9)
+        finally:
+            client.serial.close()
+        device = ModbusRegisters("meter", meter(tmp_path, str(ours.links / "cell"), 3))
+        device.open()
+        assert collect(device, 2)[-1].values == pytest.approx((48.0, 18.0, 0.0), abs=0.5)
+        ours.tell("fault cell pressed")
+        wait_until(lambda: any(row.values[2] == 1.0 for row in device.drain()))
+        device.close()

@@ -1,4 +1,4 @@
-"""Promise 12 over real bytes, in virtual time: a button's contact at a digital or an analogue input of the bench."""
+"""Promise 12 over real bytes, in virtual time: a button's contact at a digital, an analogue or a Modbus input."""
 
 from dataclasses import replace
 
@@ -10,6 +10,7 @@ from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
 from sim_devices.instruments.button import ButtonOptions
+from sim_devices.instruments.modbus.registers_device import RegistersOptions
 from tests.rig.stages.lies.lying_bench import ROOT, files
 
 RATE = 50.0
@@ -32,6 +33,30 @@ DIGITAL = (ButtonOptions("button", "button", rate=RATE), BENCH.format(characters
 ANALOGUE = (
     ButtonOptions("button", "button", rate=RATE, closed=24.0, noise=0.1),
     BENCH.format(characters=8, further="threshold = -12.0"),
+)
+
+INPUTS = """
+title = "Digital inputs"
+source = "made up for this test"
+function = 3
+[channels.emergency_stop]
+register = 0
+type = "u16"
+bit = 0
+invert = true
+unit = "1"
+quantity = "emergency_stop"
+"""
+MODBUS = (
+    RegistersOptions("modbus_registers", "button", ("0 u16 contact 1",), baud=115200),
+    """
+[devices.button]
+kind = "modbus_registers"
+port = "ports/button"
+map = "inputs.toml"
+baud = 115200
+rate = 50.0
+""",
 )
 
 
@@ -68,6 +93,7 @@ def pressed(folder, wiring, fault="pressed", after=1.0):
     host = Host(adapter=3e-4, work=5e-4, reader_late=2e-4, loop_late=3e-4)
     world = Pressed(VirtualBench(made, host, "bus0"), fault, 12.0, after)
     campaign = files(folder, 3.5)
+    (folder / "inputs.toml").write_text(INPUTS, encoding="utf-8")
     with (folder / "bench.toml").open("a", encoding="utf-8") as bench:
         bench.write(table)
     with pytest.raises(RuntimeError, match="the run ended tripped"):
@@ -77,7 +103,7 @@ def pressed(folder, wiring, fault="pressed", after=1.0):
     return load(folder / "run" / "T2.h5"), later[0][0] - world.at, [volts for _, volts in later]
 
 
-@pytest.mark.parametrize("wiring", [DIGITAL, ANALOGUE], ids=["digital", "analogue"])
+@pytest.mark.parametrize("wiring", [DIGITAL, ANALOGUE, MODBUS], ids=["digital", "analogue", "modbus"])
 @pytest.mark.parametrize("after", [0.31, 1.003, 1.507, 2.211])
 def test_the_button_is_zero_volts_at_once_and_the_run_is_marked(tmp_path, report, wiring, after):
     recording, latency, later = pressed(tmp_path, wiring, after=after)
@@ -91,8 +117,9 @@ def test_the_button_is_zero_volts_at_once_and_the_run_is_marked(tmp_path, report
     assert any("EMERGENCY STOP" in event.text for event in recording.events)
 
 
-def test_a_wire_that_is_cut_is_a_pressed_button(tmp_path, report):
-    recording, latency, later = pressed(tmp_path, DIGITAL, fault="silent")
+@pytest.mark.parametrize("wiring", [DIGITAL, MODBUS], ids=["digital", "modbus"])
+def test_a_wire_that_is_cut_is_a_pressed_button(tmp_path, report, wiring):
+    recording, latency, later = pressed(tmp_path, wiring, fault="silent")
     assert "button.emergency_stop is stale" in recording.cause
     assert set(later) == {0.0}
     report("emergency stop falls silent, to 0 V", latency, "s")
