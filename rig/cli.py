@@ -65,6 +65,9 @@ COMMANDS: Final = {
     "run": Entry(
         "rig.operate.run:run_command", "Run a campaign on its bench: console, recording, table of the fits.", "measure"
     ),
+    "jog": Entry(
+        "rig.jog.command:jog_command", "Hold a small voltage by hand: which way do force and rotation go?", "measure"
+    ),
     "resume": Entry(
         "rig.operate.resume:resume_command",
         "Go on with a campaign that was cut, at its first step that is not measured.",
