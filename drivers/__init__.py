@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from drivers.can_signals import signals as can_signals
 from drivers.hbm.aed import HbmAed
 from drivers.hbm.options import Options as HbmAedOptions
 from drivers.modbus import keller
@@ -61,5 +62,6 @@ KINDS: dict[str, Kind] = {
     "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial", recognising_streams.NORTEK),
     "keller": Kind(keller.Options, keller.Keller, "serial", recognising_modbus.KELLER),
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE),
+    "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE),
 }

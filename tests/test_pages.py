@@ -38,7 +38,7 @@ from sim_devices import __main__ as simulator
 from sim_devices.bench import control
 from sim_devices.bench.settings import KEYS, CanBus, ScriptedFault, load
 from sim_devices.bench.settings import KINDS as SIMULATED
-from sim_devices.instruments import button
+from sim_devices.instruments import button, can_signals
 from sim_devices.instruments.modbus import cell as modbus_cell
 from sim_devices.instruments.modbus import keller, registers_device
 from sim_devices.instruments.roboteq import controller as roboteq
@@ -205,6 +205,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("line", line_sender.LineSender),
         ("modbus_cell", modbus_cell.ModbusCell),
         ("modbus_registers", registers_device.RegistersDevice),
+        ("can_signals", can_signals.CanSender),
         ("button", button.Button),
         ("nortek", nortek.Nortek),
         ("keller", keller.Keller),

@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from sim_devices.bench.control import clear, fault, obey
-from sim_devices.bench.devices import say, serial_device, turnaround
+from sim_devices.bench.devices import can_node, say, serial_device, turnaround
 from sim_devices.bench.motors import motor
 from sim_devices.bench.punctual import give_way, on_time
-from sim_devices.bench.settings import MOTORS, BenchSettings, DeviceOptions, load, script
+from sim_devices.bench.settings import MOTORS, NODES, BenchSettings, DeviceOptions, load, script
 from sim_devices.bench.truth_log import TruthLog, header_fields, state_fields
 from sim_devices.instruments.can_node import CanNode
 from sim_devices.instruments.drive import Drive
@@ -88,6 +88,9 @@ class Bench:
             if made.serial is not None:
                 device, port, baud = made.serial
                 self.serial[name] = (device, self._port(port, baud), 0.0)
+            return
+        if isinstance(options, NODES):
+            self.nodes[name] = can_node(options, self.world)
             return
         device = serial_device(options, self.world, self._cross_rng, self._epoch)
         self.serial[name] = (device, self._port(options.port, options.baud), turnaround(options))

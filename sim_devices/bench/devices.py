@@ -1,4 +1,4 @@
-"""The device side of each serial wire of a bench, made of its settings and the world that it measures."""
+"""The device side of each wire of a bench, made of its settings and the world that it measures."""
 
 from __future__ import annotations
 
@@ -7,8 +7,10 @@ from datetime import datetime
 
 import numpy as np
 
-from sim_devices.bench.settings import SerialOptions
+from sim_devices.bench.settings import NodeOptions, SerialOptions
 from sim_devices.instruments.button import Button, ButtonOptions
+from sim_devices.instruments.can_node import CanNode
+from sim_devices.instruments.can_signals import CanSender
 from sim_devices.instruments.modbus.cell import ModbusCell
 from sim_devices.instruments.modbus.keller import Keller, KellerOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
@@ -55,6 +57,11 @@ def serial_device(
             return ModbusCell(options, read)
         case RegistersOptions():
             return RegistersDevice(options, world.sample)
+
+
+def can_node(options: NodeOptions, world: World) -> CanNode:
+    """The device of these options on the CAN bus."""
+    return CanSender(options, world.sample)
 
 
 def turnaround(options: SerialOptions) -> float:

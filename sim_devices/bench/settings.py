@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from sim_devices.instruments.button import ButtonOptions
+from sim_devices.instruments.can_signals import CanSignalsOptions
 from sim_devices.instruments.modbus.keller import KellerOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.modbus.registers_device import RegistersOptions
@@ -35,10 +36,14 @@ SerialOptions = (
     | RegistersOptions
 )
 """Of what measures, on a serial port."""
+NodeOptions = CanSignalsOptions
+"""Of what measures, on the CAN bus."""
 MotorOptions = RoboteqOptions | VescOptions
-DeviceOptions = SerialOptions | MotorOptions
+DeviceOptions = SerialOptions | NodeOptions | MotorOptions
 MOTORS = (RoboteqOptions, VescOptions)
 """Those that turn the thruster."""
+NODES = (CanSignalsOptions,)
+"""Those that measure, on the CAN bus."""
 KINDS: dict[str, type[DeviceOptions]] = {
     "mt_sics": MtSicsOptions,
     "hbm_aed": HbmAedOptions,
@@ -49,6 +54,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "keller": KellerOptions,
     "modbus_cell": ModbusCellOptions,
     "modbus_registers": RegistersOptions,
+    "can_signals": CanSignalsOptions,
     "roboteq": RoboteqOptions,
     "vesc": VescOptions,
 }

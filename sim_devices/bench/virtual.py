@@ -11,9 +11,9 @@ from math import inf
 
 import numpy as np
 
-from sim_devices.bench.devices import say, serial_device, turnaround
+from sim_devices.bench.devices import can_node, say, serial_device, turnaround
 from sim_devices.bench.motors import motor
-from sim_devices.bench.settings import MOTORS, BenchSettings, MotorOptions, script
+from sim_devices.bench.settings import MOTORS, NODES, BenchSettings, MotorOptions, script
 from sim_devices.bench.virtual_wire import Host, VirtualWire
 from sim_devices.instruments.can_node import CanNode
 from sim_devices.instruments.drive import Drive
@@ -59,6 +59,9 @@ class VirtualBench:
         for name, options in settings.devices.items():
             if isinstance(options, MOTORS):
                 self._add_motor(name, options)
+                continue
+            if isinstance(options, NODES):
+                self.nodes[name] = can_node(options, self.world)
                 continue
             device = serial_device(options, self.world, cross_rng, EPOCH, self._cell((filters or {}).get(name, 0.0)))
             self.serial[name] = (device, self._wired(name, options.baud), turnaround(options))

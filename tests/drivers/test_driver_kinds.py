@@ -7,11 +7,16 @@ from drivers.ports.can_bus import CanBus
 from drivers.protocols import Instrument, MotorController
 
 MAP = 'title="T"\nsource="t"\nfunction=3\n[channels.bus_voltage]\nregister=0\ntype="u16"\nunit="V"\n'
+SIGNALS = 'title="T"\nsource="t"\ndbc="x.dbc"\n[rates]\nM=1.0\n[channels.torque]\nsignal="M.t"\nunit="N.m"\n'
+DBC = 'VERSION ""\n\nNS_ :\n\nBS_:\n\nBU_: A\n\nBO_ 256 M: 2 A\n SG_ t : 0|16@1- (1,0) [0|0] "" A\n'
 
 
 def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
     channels = tmp_path / "map.toml"
     channels.write_text(MAP, encoding="utf-8")
+    signals = tmp_path / "signals.toml"
+    signals.write_text(SIGNALS, encoding="utf-8")
+    (tmp_path / "x.dbc").write_text(DBC, encoding="utf-8")
     options = {
         "mt_sics": {"port": "p", "rate": 10.0},
         "hbm_aed": {"port": "p", "rate": 25.0, "top_rate": 100.0, "nominal_force": 500.0},
@@ -22,6 +27,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
         "nortek_nmea": {"port": "p", "rate": 4.0},
         "keller": {"port": "p"},
         "roboteq": {"port": "p", "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5, "rotation": "none"},
+        "can_signals": {"bus": "b", "map": str(signals)},
         "vesc_can": {"bus": "b", "vesc_id": 1, "pole_pairs": 7, "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5},
     }
     assert set(options) == set(KINDS)

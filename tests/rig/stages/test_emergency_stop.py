@@ -1,4 +1,4 @@
-"""Promise 12 over real bytes, in virtual time: a button's contact at a digital, an analogue or a Modbus input."""
+"""Promise 12 over real bytes, in virtual time: a button's contact at a digital, an analogue, a Modbus, a CAN input."""
 
 from dataclasses import replace
 
@@ -10,6 +10,7 @@ from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
 from sim_devices.instruments.button import ButtonOptions
+from sim_devices.instruments.can_signals import CanSignalsOptions
 from sim_devices.instruments.modbus.registers_device import RegistersOptions
 from tests.rig.stages.lies.lying_bench import ROOT, files
 
@@ -59,6 +60,40 @@ rate = 50.0
 """,
 )
 
+SIGNALS = """
+title = "Safety controller"
+source = "made up for this test"
+dbc = "safety.dbc"
+[rates]
+SAFETY = 50.0
+[channels.emergency_stop]
+signal = "SAFETY.contact"
+unit = "1"
+quantity = "emergency_stop"
+scale = -1.0
+offset = 1.0
+"""
+DBC = """VERSION ""
+
+NS_ :
+
+BS_:
+
+BU_: A
+
+BO_ 256 SAFETY: 8 A
+ SG_ contact : 16|8@1+ (1,0) [0|1] "" A
+"""
+CAN = (
+    CanSignalsOptions("can_signals", ("2 u8 contact 1",), rate=RATE),
+    """
+[devices.button]
+kind = "can_signals"
+bus = "bus0"
+map = "safety.toml"
+""",
+)
+
 
 class Pressed:
     """A bench whose button is pressed so many s into the first hold of `volts`, and pulled out 0.3 s later."""
@@ -93,7 +128,8 @@ def pressed(folder, wiring, fault="pressed", after=1.0):
     host = Host(adapter=3e-4, work=5e-4, reader_late=2e-4, loop_late=3e-4)
     world = Pressed(VirtualBench(made, host, "bus0"), fault, 12.0, after)
     campaign = files(folder, 3.5)
-    (folder / "inputs.toml").write_text(INPUTS, encoding="utf-8")
+    for name, text in (("inputs.toml", INPUTS), ("safety.toml", SIGNALS), ("safety.dbc", DBC)):
+        (folder / name).write_text(text, encoding="utf-8")
     with (folder / "bench.toml").open("a", encoding="utf-8") as bench:
         bench.write(table)
     with pytest.raises(RuntimeError, match="the run ended tripped"):
@@ -103,7 +139,7 @@ def pressed(folder, wiring, fault="pressed", after=1.0):
     return load(folder / "run" / "T2.h5"), later[0][0] - world.at, [volts for _, volts in later]
 
 
-@pytest.mark.parametrize("wiring", [DIGITAL, ANALOGUE, MODBUS], ids=["digital", "analogue", "modbus"])
+@pytest.mark.parametrize("wiring", [DIGITAL, ANALOGUE, MODBUS, CAN], ids=["digital", "analogue", "modbus", "can"])
 @pytest.mark.parametrize("after", [0.31, 1.003, 1.507, 2.211])
 def test_the_button_is_zero_volts_at_once_and_the_run_is_marked(tmp_path, report, wiring, after):
     recording, latency, later = pressed(tmp_path, wiring, after=after)
@@ -117,7 +153,7 @@ def test_the_button_is_zero_volts_at_once_and_the_run_is_marked(tmp_path, report
     assert any("EMERGENCY STOP" in event.text for event in recording.events)
 
 
-@pytest.mark.parametrize("wiring", [DIGITAL, MODBUS], ids=["digital", "modbus"])
+@pytest.mark.parametrize("wiring", [DIGITAL, MODBUS, CAN], ids=["digital", "modbus", "can"])
 def test_a_wire_that_is_cut_is_a_pressed_button(tmp_path, report, wiring):
     recording, latency, later = pressed(tmp_path, wiring, fault="silent")
     assert "button.emergency_stop is stale" in recording.cause
