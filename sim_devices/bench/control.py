@@ -4,6 +4,7 @@ mount THRUSTER                  put another thruster on the bench; refused while
 fault TARGET FAULT [AMOUNT]     a device or an adapter goes wrong from now on
 clear TARGET                    it is in order again; a pulled cable is back
 flow SPEED                      tunnel flow, m/s
+hang FORCE                      dead weights of so many N on the stand, positive forward; refused while the rotor turns
 status                          JSON: thruster, rotation rate, thrust, messages lost
 """
 
@@ -11,6 +12,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from math import isfinite
 from typing import Protocol
 
 from sim_devices.bench.settings import BenchSettings
@@ -21,6 +23,7 @@ from sim_devices.wires.ports import PtyPort
 from sim_devices.wires.serial_line import DEFAULT_AMOUNT, WIRE_FAULTS
 from sim_devices.wires.slcan import Adapter
 from sim_devices.world import World
+from sim_devices.world.world import REST_RATE
 
 
 class ControlledBench(Protocol):
@@ -75,12 +78,15 @@ def _done(bench: ControlledBench, words: list[str]) -> str:
         case ["flow", speed]:
             set_flow(bench, float(speed))
             return f"flow is {float(speed)} m/s"
+        case ["hang", force]:
+            hang(bench, float(force))
+            return f"{float(force)} N hang on the stand"
         case ["status"]:
             return json.dumps(status(bench))
         case _:
             raise ValueError(
-                "control: expected mount THRUSTER, fault TARGET FAULT [AMOUNT], clear TARGET, flow SPEED or status, "
-                f"got {' '.join(words)!r}"
+                "control: expected mount THRUSTER, fault TARGET FAULT [AMOUNT], clear TARGET, flow SPEED, hang FORCE "
+                f"or status, got {' '.join(words)!r}"
             )
 
 
@@ -123,6 +129,17 @@ def set_flow(bench: ControlledBench, speed: float) -> None:
     """Tunnel flow from now on, m/s."""
     bench.world.state.flow = speed
     bench.log("flow", speed=speed)
+
+
+def hang(bench: ControlledBench, force: float) -> None:
+    """Dead weights on the stand from now on, N. Raises ValueError while the rotor turns, or for no number."""
+    s = bench.world.state
+    if not isfinite(force):
+        raise ValueError(f"hang: expected a finite force in N, got {force}")
+    if abs(s.n) > REST_RATE:
+        raise ValueError(f"hang: the rotor turns at {s.n:.1f} rev/s; stop the motor before a hand comes near")
+    s.hung = force
+    bench.log("hang", force=force)
 
 
 def status(bench: ControlledBench) -> dict[str, object]:

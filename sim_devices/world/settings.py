@@ -77,6 +77,20 @@ class Cell:
     """relative: the cell reads (1 + gain_error) of the force."""
     zero_offset: float = 0.0
     """N, read with no load."""
+    hysteresis: float = 0.0
+    """N, half the width of the loop from nothing to `hysteresis_reach` and back, in its middle."""
+    hysteresis_reach: float = 300.0
+    """N."""
+    gain_temperature: float = 0.0
+    """1/K, relative: of the gain, with the water, in which the cell hangs."""
+    zero_temperature: float = 0.0
+    """N/K."""
+    reference_temperature: float = 18.0
+    """degC, at which neither is there."""
+
+    def __post_init__(self) -> None:
+        if self.hysteresis < 0 or not self.hysteresis_reach > 0:
+            raise ValueError("hysteresis must be at least 0 N and hysteresis_reach above 0 N")
 
 
 @dataclass(frozen=True, slots=True)

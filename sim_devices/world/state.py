@@ -29,6 +29,8 @@ class State:
     """N, of the propeller, positive forward."""
     force: float = 0.0
     """N, on the load cell: thrust through the stand."""
+    hung: float = 0.0
+    """N, of dead weights that hang on the stand, positive forward."""
     reading: float = 0.0
     """N, what the cell would read without noise and clipping."""
     torque: float = 0.0

@@ -10,6 +10,7 @@ from sim_devices.tables import check_known
 from sim_devices.world.effects import Effect
 from sim_devices.world.effects.channel import ChannelFault
 from sim_devices.world.effects.stand import StandResonance
+from sim_devices.world.hysteresis import Plays
 from sim_devices.world.noise import CHANNELS, Noise, NoiseSource
 from sim_devices.world.settings import WorldSettings, make_effects
 from sim_devices.world.state import State
@@ -35,6 +36,8 @@ class World:
         self._hydro = self._of_stage("hydro")
         self._stand = self._of_stage("stand")
         self._cell = self._of_stage("cell")
+        cell = settings.cell
+        self._plays = Plays(cell.hysteresis, cell.hysteresis_reach) if cell.hysteresis else None
         self._outputs = {c: tuple(e for e in self._of_stage("output") if _concerns(e, c)) for c in CHANNELS}
         self._spin = 0.0
         """rev/s of the rotor before the effects of the rotor stage."""
@@ -109,12 +112,13 @@ class World:
         for e in self._hydro:
             force = e.apply(force, s, dt)
         s.thrust = force
+        force += s.hung
         for e in self._stand:
             force = e.apply(force, s, dt)
         s.force = force
         for e in self._cell:
             force = e.apply(force, s, dt)
-        s.reading = force
+        s.reading = force + self._plays.follow(force) if self._plays else force
 
     def sample(self, channel: str) -> float:
         """What the sensor of `channel` gives now, with noise, clipping and fault. SI; NaN: no number."""
@@ -137,7 +141,9 @@ class World:
         s = self.state
         match channel:
             case "thrust":
-                return s.reading * (1.0 + self.settings.cell.gain_error) + self.settings.cell.zero_offset
+                cell, warmer = self.settings.cell, s.water_temperature - self.settings.cell.reference_temperature
+                gain = 1.0 + cell.gain_error + cell.gain_temperature * warmer
+                return s.reading * gain + cell.zero_offset + cell.zero_temperature * warmer
             case "rotation_rate":
                 return s.n
             case "current":
