@@ -13,6 +13,7 @@ from identification.estimation.least_squares import Estimate, Method, estimate
 from identification.estimation.tails import student_quantile
 from identification.estimation.verdicts import Significance, Whiteness, significance, whiteness
 from identification.recording import Floats, Recording
+from identification.thruster.cell_error import CellError, cell_error
 from identification.thruster.thrust_data import Run, Unusable, prepare
 from identification.thruster.thrust_forms import FORMS, Form, Model
 from identification.thruster.thrust_rows import rows_of
@@ -40,11 +41,16 @@ class Parameter:
     high: float
     std_uncorrected: float = float("nan")
     """What samples taken as uncorrelated would have given."""
+    dof_calibration: float = float("inf")
+    """Of `std_calibration`."""
 
     @property
     def dof_statistical(self) -> float:
         """Degrees of freedom of `std_statistical`: Welch-Satterthwaite undone."""
-        return self.dof * (self.std_statistical / self.std) ** 4 if self.std > 0 else self.dof
+        if not self.std > 0:
+            return self.dof
+        known = self.dof * (self.std_calibration / self.std) ** 4 / self.dof_calibration
+        return self.dof * (self.std_statistical / self.std) ** 4 / max(1.0 - known, 1e-12)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +80,8 @@ class ThrustFit:
     form: Form
     cov_statistical: Floats = field(repr=False)
     """(p, p) of `names`, scatter only; NaN where not determined."""
+    cov_calibration: Floats | None = field(default=None, repr=False)
+    """(p, p) of `names`, by the curve of the cell; None: its gain alone is known, and multiplies all alike."""
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -87,7 +95,9 @@ class ThrustFit:
 
     @property
     def cov(self) -> Floats:
-        """(p, p) of `names`: scatter, and the gain of the cell that multiplies all of them alike."""
+        """(p, p) of `names`: scatter, and the calibration of the cell."""
+        if self.cov_calibration is not None:
+            return np.asarray(self.cov_statistical + self.cov_calibration)
         gain = np.array([p.std_calibration for p in (*self.parameters.values(), *self.tare.values())])
         shared = gain * np.sign(self.values)
         out: Floats = self.cov_statistical + np.outer(shared, shared)
@@ -109,13 +119,17 @@ def _uncorrected(found: Estimate, runs: Sequence[Run], contrast: Floats) -> floa
     return float(np.linalg.norm((contrast @ found.fit.solver) * white))
 
 
-def _parameter(found: Estimate, runs: Sequence[Run], contrast: Floats, unit: str, gain: float) -> Parameter:
+def _parameter(
+    found: Estimate, runs: Sequence[Run], i: int, unit: str, gain: float, cell: CellError | None
+) -> Parameter:
+    contrast: Floats = np.eye(len(found.rows.names))[i]
     value, spread = float(contrast @ found.fit.theta), found.spread(contrast)
-    calibration = abs(value) * gain
+    calibration, known_dof = (abs(value) * gain, float("inf")) if cell is None else (cell.std(i), cell.dof)
     std = float(np.hypot(spread.std, calibration))
     dof = spread.dof
-    if std > 0 and spread.std > 0 and np.isfinite(dof):
-        dof = spread.dof * (std / spread.std) ** 4  # Welch-Satterthwaite: the type B part has infinite dof
+    if std > 0 and spread.std > 0 and np.isfinite(dof):  # Welch-Satterthwaite; a stated gain_std has infinite dof
+        known = (calibration / std) ** 4 / known_dof
+        dof = 1.0 / ((spread.std / std) ** 4 / spread.dof + known) if spread.dof > 0 else spread.dof
     half = float(student_quantile(0.975, dof)) * std if dof > 0 else float("nan")
     white = float("nan")
     if np.isfinite(spread.std):
@@ -123,7 +137,7 @@ def _parameter(found: Estimate, runs: Sequence[Run], contrast: Floats, unit: str
     elif spread.dof == 0 and found.fit.dof > 0:
         value = float("nan")
     low, high = value - half, value + half
-    return Parameter(value, std, unit, spread.std, calibration, spread.internal, dof, low, high, white)
+    return Parameter(value, std, unit, spread.std, calibration, spread.internal, dof, low, high, white, known_dof)
 
 
 def _covariance(found: Estimate, stds: Floats, coefficients: int) -> Floats:
@@ -209,9 +223,10 @@ def fit_runs(runs: Sequence[Run], model: Model = "C V|V|", method: Method = "wls
         return refused
     names, unit = form.coefficients, np.eye(len(rows.names))
     gain = max(run.gain_std for run in runs)
-    parameters = {name: _parameter(found, runs, unit[i], form.units[i], gain) for i, name in enumerate(names)}
+    cell = cell_error(found, runs)
+    parameters = {name: _parameter(found, runs, i, form.units[i], gain, cell) for i, name in enumerate(names)}
     tare = {
-        run.recording_id: _parameter(found, runs, unit[len(names) + k], "N", run.gain_std) for k, run in enumerate(runs)
+        run.recording_id: _parameter(found, runs, len(names) + k, "N", run.gain_std, cell) for k, run in enumerate(runs)
     }
     stds = np.array([p.std_statistical for p in (*parameters.values(), *tare.values())])
     residual = found.fit.residual
@@ -234,6 +249,7 @@ def fit_runs(runs: Sequence[Run], model: Model = "C V|V|", method: Method = "wls
         tuple(runs),
         form,
         _covariance(found, stds, len(names)),
+        None if cell is None else cell.cov,
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from identification.calibration.curve import Curve, curve_of
 from identification.estimation.even_noise import MIN_SAMPLES
 from identification.recording import Channel, Floats, Recording, calibration_text
 from identification.steady_state.points import FALLBACK, Points, find_windows, reduce_to_points, voltage_channel
@@ -62,6 +63,8 @@ class Run:
     """Standard error of each point's voltage or rate (k,) when it was measured; None for a command."""
     calibration: str = ""
     """Which cell under which calibration: recordings that agree in it share the error of its gain."""
+    curve: Curve | None = None
+    """By which the thrust was read, with its covariance; None: the calibration says `gain_std` at most."""
 
 
 def gain_std(thrust: Channel) -> float:
@@ -73,6 +76,15 @@ def gain_std(thrust: Channel) -> float:
     found = thrust.calibration.get("gain_std", 0.0)
     good = isinstance(found, int | float) and np.isfinite(found) and found >= 0
     return float(found) if good and isinstance(found, int | float) else 0.0
+
+
+def curve_behind(thrust: Channel) -> Curve | None:
+    """The curve of `rig calibrate` that the values went through; None where there is none, or none that is whole."""
+    facts = thrust.calibration.get("curve")
+    try:
+        return None if facts is None else curve_of(facts)
+    except ValueError:
+        return None  # written by who knows whom: its `gain_std` still counts
 
 
 def voltage_at(channel: Channel, times: Floats) -> Floats:
@@ -169,6 +181,8 @@ def measured_levels(recording: Recording, source: Channel, points: Points) -> tu
 
 def _refusal(recording: Recording, who: str) -> Unusable | None:
     """What no fit can be made of, before any number is looked at."""
+    if recording.kind == "calibration":
+        return Unusable(f"{who} is a calibration of a load cell with dead weights; `rig fit` takes runs of a thruster")
     if recording.kind == "vehicle":
         return Unusable(f"{who} is a vehicle trial; `rig fit` takes tunnel or bollard runs of one thruster")
     of = sorted({channel.thruster for channel in recording.all_of("thrust") if channel.thruster})
@@ -224,4 +238,5 @@ def prepare(recording: Recording, voltage: str = "command_voltage") -> Run | Unu
         flow_of(recording, thrust.time[good], points),
         level_std,
         calibration_of(thrust),
+        curve_behind(thrust),
     )
