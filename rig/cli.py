@@ -83,8 +83,8 @@ COMMANDS: Final = {
         "rig.design.command:design_command", "Best levels, order and dwells for the time in the tunnel.", "measure"
     ),
     "calibrate": Entry(
-        "rig.fit.load_cell:calibrate_command",
-        "Scale, offset and uncertainty of a load cell from known weights.",
+        "rig.calibrate.command:calibrate_command",
+        "A load cell from dead weights: curve, uncertainty, what is wrong with a step.",
         "measure",
     ),
     "fit": Entry("rig.fit.command:fit_command", "Fit tau = C V|V| to recordings.", "identify"),

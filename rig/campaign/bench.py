@@ -12,6 +12,7 @@ from drivers.errors import LinkError as DriverLinkError
 from drivers.ports.can_bus import CanBus
 from drivers.ports.wire import Wire
 from drivers.protocols import Instrument, MotorController, Sample, Stream
+from rig.campaign.calibrated import Calibrated
 from rig.campaign.config import BenchConfig, CanBusConfig
 from rig.errors import ConfigError, DeviceError, LinkError
 
@@ -83,7 +84,17 @@ def build(config: BenchConfig, wires: Mapping[str, Wire] | None = None) -> Bench
             instruments[name] = kind.build(name, device.options)
         else:
             instruments[name] = kind.build(name, device.options, _wire(name, config, wires))
+        if name in config.curves:
+            instruments[name] = _calibrated(instruments[name], config)
     return Bench(config, buses, instruments)
+
+
+def _calibrated(instrument: Instrument, config: BenchConfig) -> Instrument:
+    of = config.calibration[instrument.name]
+    try:
+        return Calibrated(instrument, config.curves[instrument.name], str(of.date), of.certificate)
+    except ValueError as error:
+        raise ConfigError(f"{config.path}: calibration.{instrument.name}.file: {error}") from None
 
 
 def thrust_bounds(config: BenchConfig) -> tuple[float, float]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from rig.campaign.calibration_file import CalibratedCell
 from rig.campaign.plan import Plan, TareConfig
 
 
@@ -48,6 +49,8 @@ class CalibrationConfig:
     """The last day."""
     certificate: str = ""
     """Number, or where it is."""
+    file: str = ""
+    """Path of what `rig calibrate` wrote, relative to the bench file: its curve corrects what the device reads."""
 
     def __post_init__(self) -> None:
         if self.valid_until is not None and self.valid_until < self.date:
@@ -126,6 +129,8 @@ class BenchConfig:
     mount: MountConfig = field(default_factory=MountConfig)
     calibration: Mapping[str, CalibrationConfig] = field(default_factory=dict)
     """By the name of the device."""
+    curves: Mapping[str, CalibratedCell] = field(default_factory=dict)
+    """By the name of the device, where its calibration names a file."""
     overrides: Mapping[str, str] = field(default_factory=dict)
     """`[overrides]`: protection that this file takes away -> why (rig.campaign.disarmed)."""
 

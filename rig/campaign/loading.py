@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 from drivers import KINDS
 from rig.campaign.bench import build
+from rig.campaign.calibration_file import read_cell
 from rig.campaign.config import (
     BenchConfig,
     CalibrationConfig,
@@ -32,7 +33,7 @@ from rig.toml_tables import Table, construct, decode, joined, parsed, read_toml,
 
 T = TypeVar("T")
 
-BENCH_ELSEWHERE = ("path", "text", "devices", "can", "limits", "mount", "calibration", "overrides")
+BENCH_ELSEWHERE = ("path", "text", "devices", "can", "limits", "mount", "calibration", "curves", "overrides")
 """Fields of BenchConfig that are no keys of `[bench]`."""
 CAMPAIGN_ELSEWHERE = ("path", "text", "bench", "plan", "tare", "watch", "overrides")
 """Fields of CampaignConfig that are no keys of `[campaign]`."""
@@ -49,6 +50,7 @@ def load_bench(path: Path) -> BenchConfig:
     buses = table_at(path, content, "can", optional=True)
     limits = table_at(path, content, "limits", optional=True)
     devices = table_at(path, content, "devices")
+    calibration = _calibrations(path, table_at(path, content, "calibration", optional=True))
     bench = BenchConfig(
         path=path,
         text=text,
@@ -56,7 +58,8 @@ def load_bench(path: Path) -> BenchConfig:
         devices={name: _device(path, name, table_at(path, devices, name, "devices")) for name in devices},
         limits=tuple(_limit(path, channel, table_at(path, limits, channel, "limits")) for channel in limits),
         mount=decode(MountConfig, table_at(path, content, "mount", optional=True), path, "mount"),
-        calibration=_calibrations(path, table_at(path, content, "calibration", optional=True)),
+        calibration=calibration,
+        curves={name: read_cell(path.parent / each.file, name) for name, each in calibration.items() if each.file},
         overrides=_overrides(path, content),
         **scalars,
     )
@@ -280,6 +283,8 @@ def _require_devices(bench: BenchConfig) -> None:
     for name in bench.calibration:
         if name not in bench.devices:
             raise ConfigError(f"{path}: [calibration.{name}] is of no device of this bench; there are {devices}")
+        if bench.calibration[name].file and name == bench.motor:
+            raise ConfigError(f"{path}: calibration.{name}.file: dead weights calibrate a load cell, not the motor")
     built = build(bench)
     assert built.motor  # raises ConfigError when it can't turn a propeller
     streams = [stream for _, stream in built.streams()]

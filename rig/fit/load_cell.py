@@ -19,25 +19,8 @@ GRAVITY: Final = 9.80665
 """m/s^2, standard; it differs by up to 0.3 % between places."""
 
 
-@click.command("calibrate")
-@click.argument("table", type=click.Path(path_type=Path))
-@click.option("--gravity", type=float, default=GRAVITY, show_default=True, metavar="M/S^2", help="Of the place.")
-@click.option(
-    "--weights-std",
-    type=float,
-    default=0.0,
-    show_default=True,
-    metavar="SHARE",
-    help="Relative standard uncertainty that all weights share.",
-)
-def calibrate_command(table: Path, gravity: float, weights_std: float) -> int:
-    """Calibrate a load cell with known weights.
-
-    TABLE is a CSV file of the columns mass_kg or force_N, and reading, in the order in which they were put on and taken
-    off.
-
-    Exit status 1 when one step does not go with the others.
-    """
+def calibrate_table(table: Path, gravity: float, weights_std: float) -> int:
+    """Print what a table of steps tells; the exit status. Raises ConfigError."""
     force, reading = read_steps(table, gravity)
     try:
         found = calibrate(force, reading, weights_std)
