@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from drivers.can_signals import signals as can_signals
+from drivers.canopen.cia402_options import Options as Cia402Options
+from drivers.extras import of_extra
 from drivers.hbm.aed import HbmAed
 from drivers.hbm.options import Options as HbmAedOptions
 from drivers.modbus import keller
@@ -52,6 +54,12 @@ class Kind:
     """How `rig devices` recognises one; None: it cannot yet."""
 
 
+def _cia402() -> Callable[..., Instrument]:
+    from drivers.canopen.cia402 import Cia402
+
+    return Cia402
+
+
 KINDS: dict[str, Kind] = {
     "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial", recognising_mt_sics.PROBE),
     "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial"),
@@ -64,4 +72,5 @@ KINDS: dict[str, Kind] = {
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE),
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE),
+    "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can"),
 }

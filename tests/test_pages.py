@@ -39,6 +39,7 @@ from sim_devices.bench import control
 from sim_devices.bench.settings import KEYS, CanBus, ScriptedFault, load
 from sim_devices.bench.settings import KINDS as SIMULATED
 from sim_devices.instruments import button, can_signals
+from sim_devices.instruments.canopen import drive as canopen_drive
 from sim_devices.instruments.modbus import cell as modbus_cell
 from sim_devices.instruments.modbus import keller, registers_device
 from sim_devices.instruments.roboteq import controller as roboteq
@@ -210,6 +211,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("nortek", nortek.Nortek),
         ("keller", keller.Keller),
         ("roboteq", roboteq.Roboteq),
+        ("cia402", canopen_drive.Drive402),
         ("vesc", vesc.Vesc),
     ):
         (table,) = [part for part in page.split("\n\n") if part.startswith("| fault of") and f"(`{kind}`)" in part]

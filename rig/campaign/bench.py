@@ -9,6 +9,7 @@ from math import inf
 from drivers import KINDS
 from drivers.errors import DeviceError as DriverDeviceError
 from drivers.errors import LinkError as DriverLinkError
+from drivers.extras import MissingExtra
 from drivers.ports.can_bus import CanBus
 from drivers.ports.wire import Wire
 from drivers.protocols import Instrument, MotorController, Sample, Stream
@@ -78,12 +79,15 @@ def build(config: BenchConfig, wires: Mapping[str, Wire] | None = None) -> Bench
     instruments: dict[str, Instrument] = {}
     for name, device in config.devices.items():
         kind = KINDS[device.kind]
+        over: tuple[object, ...] = ()
         if kind.link == "can":
-            instruments[name] = kind.build(name, device.options, buses[device.options.bus])
-        elif wires is None:
-            instruments[name] = kind.build(name, device.options)
-        else:
-            instruments[name] = kind.build(name, device.options, _wire(name, config, wires))
+            over = (buses[device.options.bus],)
+        elif wires is not None:
+            over = (_wire(name, config, wires),)
+        try:
+            instruments[name] = kind.build(name, device.options, *over)
+        except MissingExtra as error:
+            raise ConfigError(f"{config.path}: devices.{name}: {error}") from error
         if name in config.curves:
             instruments[name] = _calibrated(instruments[name], config)
     return Bench(config, buses, instruments)

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 from sim_devices.bench.settings import MotorOptions
 from sim_devices.instruments.can_node import CanNode
+from sim_devices.instruments.canopen import drive_options
+from sim_devices.instruments.canopen.drive import Drive402
 from sim_devices.instruments.drive import Drive
 from sim_devices.instruments.motor_tap import MotorTap
 from sim_devices.instruments.roboteq.controller import Roboteq
@@ -37,6 +39,10 @@ def motor(options: MotorOptions, world: World, log: Log) -> Motor:
         case RoboteqOptions():
             device = Roboteq(options, supply, lambda: measured(world), log)
             return Motor(device, serial=(device, options.port, options.baud))
+        case drive_options.Cia402Options():
+            measure, gain = lambda: drive_options.measured(world), lambda: world.state.rate_per_volt
+            drive = Drive402(options, supply, gain, measure, log)
+            return Motor(drive, node=drive)
         case VescOptions():
             tap = MotorTap(world, options.pole_pairs, options.vesc_id)
             vesc = tap.vesc = Vesc(options, supply, tap.telemetry, log)

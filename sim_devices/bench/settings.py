@@ -10,6 +10,7 @@ from typing import Any
 
 from sim_devices.instruments.button import ButtonOptions
 from sim_devices.instruments.can_signals import CanSignalsOptions
+from sim_devices.instruments.canopen.drive_options import Cia402Options
 from sim_devices.instruments.modbus.keller import KellerOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.modbus.registers_device import RegistersOptions
@@ -38,9 +39,9 @@ SerialOptions = (
 """Of what measures, on a serial port."""
 NodeOptions = CanSignalsOptions
 """Of what measures, on the CAN bus."""
-MotorOptions = RoboteqOptions | VescOptions
+MotorOptions = RoboteqOptions | VescOptions | Cia402Options
 DeviceOptions = SerialOptions | NodeOptions | MotorOptions
-MOTORS = (RoboteqOptions, VescOptions)
+MOTORS = (RoboteqOptions, VescOptions, Cia402Options)
 """Those that turn the thruster."""
 NODES = (CanSignalsOptions,)
 """Those that measure, on the CAN bus."""
@@ -57,6 +58,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "can_signals": CanSignalsOptions,
     "roboteq": RoboteqOptions,
     "vesc": VescOptions,
+    "cia402": Cia402Options,
 }
 MAX_STEP = 0.005
 """s: the rotor's fastest time constant is 0.07 s."""

@@ -58,7 +58,8 @@ class VirtualWire:
     # -- the near end ------------------------------------------------------------------------------------------------
 
     def now(self) -> float:
-        return self._time.now()
+        """S of the clock that stamps what arrives."""
+        return self._time.stamp(self._time.now()) * 1e-9
 
     def wait(self, seconds: float) -> object:
         return self._time.wait(seconds)
