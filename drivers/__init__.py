@@ -16,12 +16,14 @@ from drivers.canopen.cia402_options import Options as Cia402Options
 from drivers.extras import of_extra
 from drivers.hbm.aed import HbmAed
 from drivers.hbm.options import Options as HbmAedOptions
-from drivers.modbus import keller
+from drivers.modbus import keller, pzem
 from drivers.modbus import recognising as recognising_modbus
 from drivers.modbus.cell import ModbusCell
 from drivers.modbus.cell_options import Options as ModbusCellOptions
 from drivers.modbus.registers import ModbusRegisters
 from drivers.modbus.registers import Options as ModbusRegistersOptions
+from drivers.pololu.maestro import Maestro
+from drivers.pololu.maestro_options import Options as MaestroOptions
 from drivers.protocols import Instrument
 from drivers.recognition.can_traffic import CanProbe
 from drivers.recognition.serial_line import SerialProbe
@@ -30,6 +32,7 @@ from drivers.roboteq.controller import Roboteq
 from drivers.roboteq.options import Options as RoboteqOptions
 from drivers.serial_lines import (
     line_stream,
+    loadstar,
     mantracourt_dsc,
     mt_sics,
     nortek_nmea,
@@ -65,10 +68,13 @@ KINDS: dict[str, Kind] = {
     "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial"),
     "mantracourt_dsc": Kind(mantracourt_dsc.Options, mantracourt_dsc.MantracourtDsc, "serial"),
     "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial", recognising_streams.NUMBERS),
+    "loadstar": Kind(loadstar.Options, loadstar.Loadstar, "serial"),
     "modbus_cell": Kind(ModbusCellOptions, ModbusCell, "serial", recognising_modbus.CELL),
     "modbus_registers": Kind(ModbusRegistersOptions, ModbusRegisters, "serial"),
     "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial", recognising_streams.NORTEK),
     "keller": Kind(keller.Options, keller.Keller, "serial", recognising_modbus.KELLER),
+    "pzem": Kind(pzem.Options, pzem.Pzem, "serial"),
+    "maestro": Kind(MaestroOptions, Maestro, "serial"),
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE),
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE),

@@ -41,9 +41,10 @@ from sim_devices.bench.settings import KINDS as SIMULATED
 from sim_devices.instruments import button, can_signals
 from sim_devices.instruments.canopen import drive as canopen_drive
 from sim_devices.instruments.modbus import cell as modbus_cell
-from sim_devices.instruments.modbus import keller, registers_device
+from sim_devices.instruments.modbus import keller, pzem, registers_device
+from sim_devices.instruments.pololu import maestro
 from sim_devices.instruments.roboteq import controller as roboteq
-from sim_devices.instruments.serial_lines import hbm_aed, line_sender, mantracourt, mt_sics, nortek
+from sim_devices.instruments.serial_lines import hbm_aed, line_sender, loadstar, mantracourt, mt_sics, nortek
 from sim_devices.instruments.vesc import controller as vesc
 from sim_devices.vehicle.body import AXES, Body
 from sim_devices.vehicle.settings import Noise as VehicleNoise
@@ -202,6 +203,9 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
     for kind, device in (
         ("mt_sics", mt_sics.MtSics),
         ("hbm_aed", hbm_aed.HbmAed),
+        ("loadstar", loadstar.Loadstar),
+        ("pzem", pzem.Pzem),
+        ("maestro", maestro.Maestro),
         ("mantracourt_dsc", mantracourt.Mantracourt),
         ("line", line_sender.LineSender),
         ("modbus_cell", modbus_cell.ModbusCell),

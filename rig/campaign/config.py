@@ -120,6 +120,11 @@ class BenchConfig:
     """s; a motor controller whose own timeout is longer, unknown or not effective is refused."""
     rest_rate: float = 0.5
     """rev/s; |rotation_rate| below this is at rest."""
+    rest_thrust: float | None = None
+    """N; where no rotation rate is measured, thrust that is no farther from its tare is no push. None: rest is never
+    confirmed there (decision 22)."""
+    rest_current: float | None = None
+    """A; there too, a current of no more drives nothing."""
     coast_time: float = 3.0
     """s a propeller may take from command 0 to rest before `STOP NOT CONFIRMED`."""
     proof_voltage: float = 4.0

@@ -23,6 +23,9 @@ MOST_REST_RATE = 3.0
 MOST_MAX_AGE = 2.0
 """s, or 10 of the stream's own periods where that is longer."""
 MOST_PERIODS = 10.0
+MOST_OF_LIMIT = 0.05
+"""Of the channel's own limit: thrust and current that may be left at rest where no rotation rate is measured. A
+propeller that pushes more turns at more than a fifth of its fastest."""
 NEEDED: Mapping[str, tuple[str, ...]] = {"thrust": ("min", "max"), "current": ("max",)}
 """Quantities whose limits stop the propeller before the bench breaks, and which ends are needed."""
 
@@ -91,10 +94,29 @@ def _bench(bench: BenchConfig, streams: tuple[Stream, ...]) -> Iterator[tuple[st
         yield "bench.consistency", "a thrust, rotation or current that contradicts the command passes; true is expected"
     channels = {f"{s.name}.{c.name}": (c.quantity, s.period_s) for s in streams for c in s.channels}
     limits = {limit.channel: limit for limit in bench.limits}
+    yield from _rest(bench, limits, {name: quantity for name, (quantity, _) in channels.items()})
     for quantity, ends in NEEDED.items():
         yield from _unlimited([name for name, (q, _) in channels.items() if q == quantity], limits, ends)
     for name, limit in limits.items():
         yield from _widened(limit, *channels[name])
+
+
+def _rest(
+    bench: BenchConfig, limits: Mapping[str, LimitConfig], quantities: Mapping[str, str | None]
+) -> Iterator[tuple[str, str]]:
+    for key, quantity, unit in (("rest_thrust", "thrust", "N"), ("rest_current", "current", "A")):
+        highest = [
+            limit.max
+            for name, limit in limits.items()
+            if quantities.get(name) == quantity and limit.max is not None and isfinite(limit.max)
+        ]
+        value, most = getattr(bench, key), MOST_OF_LIMIT * min(highest, default=inf)
+        if value is not None and value > most:
+            yield (
+                f"bench.{key}",
+                f"{value:g} {unit} protects nobody; at most {most:g} {unit}, {MOST_OF_LIMIT:.0%} of the limit of the "
+                f"{quantity}, is expected",
+            )
 
 
 def _unlimited(names: list[str], limits: Mapping[str, LimitConfig], ends: tuple[str, ...]) -> Iterator[tuple[str, str]]:

@@ -257,8 +257,9 @@ def _require_numbers(bench: BenchConfig) -> None:
         ("proof_voltage", "V"),
     ):
         _require_above_zero(bench.path, f"bench.{key}", getattr(bench, key), unit)
-    if bench.water_density is not None:
-        _require_above_zero(bench.path, "bench.water_density", bench.water_density, "kg/m^3")
+    for key, unit in (("water_density", "kg/m^3"), ("rest_thrust", "N"), ("rest_current", "A")):
+        if (value := getattr(bench, key)) is not None:
+            _require_above_zero(bench.path, f"bench.{key}", value, unit)
     if bench.proof_voltage > bench.max_voltage:
         raise ConfigError(
             f"{bench.path}: bench.proof_voltage ({bench.proof_voltage:g} V) must not exceed "

@@ -18,7 +18,7 @@ from rig.campaign.bench import COMMAND_STREAM, Bench
 from rig.campaign.limits import guarded_channels
 from rig.control.clocks import Clock
 from rig.control.envelopes import Envelopes
-from rig.control.motor_watch import MotorWatch
+from rig.control.motor_watch import MotorWatch, rest_by_thrust
 from rig.control.paces import Paces
 from rig.control.readings import Readings
 from rig.link.clients import Clients
@@ -48,6 +48,10 @@ class Inputs:
     """rev/s, newest and fresh; None otherwise."""
     thrust_rest: bool | None = None
     """Whether the force sensor says that nothing pushes; None: it is no witness."""
+    push: float | None = None
+    """N from the tare; None: not known."""
+    current_rest: bool | None = None
+    """Whether the current drives nothing; None: not known, or not asked for."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +122,8 @@ class Loop:
         self.thrust_channel = f"{force}.thrust"
         self.motor_watch = MotorWatch(self.bench, self.thrust_channel)
         self.rotation_channel = self.motor_watch.channel
+        self.rest_by_thrust = rest_by_thrust(self.bench, self.rotation_channel)
+        self.forget_tare()
         essential = [self.thrust_channel] + ([self.rotation_channel] if self.rotation_channel else [])
         streams = self.readings.streams.values()
         self.guarded_channels = guarded_channels(config.limits, streams, essential, self.thrust_channel)
@@ -149,7 +155,8 @@ class Loop:
         trip = self._judge(now, samples) if self.guarded else None
         self.thrust_rest.add(self.thrust_rows(tuple(samples), 0))
         rotation, thrust_rest = self.rotation(now), self.thrust_rest.judge(now)
-        decision = decide(Inputs(now, tuple(samples), requests, trip, rotation, thrust_rest))
+        push, current_rest = self.thrust_rest.push(now), self._current_rest(now)
+        decision = decide(Inputs(now, tuple(samples), requests, trip, rotation, thrust_rest, push, current_rest))
         sent = self._send(motor, decision, now) if motor is not None else decision.volts
         self._sent = sent
         self._record(samples, sent, self._sent_ns if motor is not None and sent is not None else now_ns)
@@ -165,6 +172,17 @@ class Loop:
         if self.rotation_channel is None or not self.motor_watch.believed:
             return None
         return self.readings.fresh(self.rotation_channel, now)
+
+    def forget_tare(self) -> None:
+        """Another thruster is on the bench, or none was yet."""
+        self.thrust_rest = ThrustRest(self.rest_by_thrust.thrust if self.rest_by_thrust is not None else None)
+
+    def _current_rest(self, now: float) -> bool | None:
+        """Whether the current drives nothing; None where it is old, NaN, or the rotation rate is measured."""
+        if self.rest_by_thrust is None:
+            return None
+        amps = self.readings.fresh(self.rest_by_thrust.channel, now)
+        return None if amps is None else abs(amps) <= self.rest_by_thrust.current
 
     def thrust_rows(self, samples: tuple[Sample, ...], since_ns: int) -> tuple[tuple[float, float], ...]:
         """(s since `since_ns`, N) of the force device's rows, oldest first."""

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from drivers.protocols import Sample
 from rig.campaign.bench import Bench
 from rig.control.consistency_watch import ConsistencyWatch
@@ -19,6 +21,31 @@ def rotation_channel(bench: Bench) -> str | None:
         if channel.quantity == "rotation_rate"
     ]
     return min(names)[1] if names else None
+
+
+class RestByThrust(NamedTuple):
+    """How rest is told on a bench that measures no rotation rate (decision 22)."""
+
+    thrust: float
+    """N from the tare that are no push."""
+    channel: str
+    """Of the current."""
+    current: float
+    """A that drive nothing."""
+
+
+def rest_by_thrust(bench: Bench, rotation: str | None) -> RestByThrust | None:
+    """None where the rotation rate is measured, the bench file does not give both limits, or there is no current."""
+    config = bench.config
+    if rotation is not None or config.rest_thrust is None or config.rest_current is None:
+        return None
+    names = [
+        (device != config.motor, f"{stream.name}.{channel.name}")
+        for device, stream in bench.streams()
+        for channel in stream.channels
+        if channel.quantity == "current"
+    ]
+    return RestByThrust(config.rest_thrust, min(names)[1], config.rest_current) if names else None
 
 
 class MotorWatch:

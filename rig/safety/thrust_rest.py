@@ -21,7 +21,9 @@ SIGMAS = 6.0
 class ThrustRest:
     """Of one thruster on the bench. Without a tare it knows nothing."""
 
-    def __init__(self) -> None:
+    def __init__(self, limit: float | None = None) -> None:
+        """`limit`: N from the tare that count as none; None: what the noise and the largest thrust allow."""
+        self._limit = limit
         self._rows: deque[tuple[float, float]] = deque()
         self._tare: float | None = None
         self._told: float | None = None
@@ -53,7 +55,14 @@ class ThrustRest:
     @property
     def within(self) -> float:
         """N from the tare that count as none."""
+        if self._limit is not None:
+            return self._limit
         return SHARE * self._largest + SIGMAS * self._noise
+
+    def push(self, now: float) -> float | None:
+        """N from the tare, mean of the newest rows; None without a tare or fresh rows."""
+        fresh = [row for row in self._rows if row[0] >= now - OLDEST]
+        return None if self._tare is None or len(fresh) < LEAST_ROWS else self._mean - self._tare
 
     def judge(self, now: float) -> bool | None:
         """True: back at its tare; False: something pushes; None: no witness (no tare, no fresh rows, or a value that

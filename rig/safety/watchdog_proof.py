@@ -31,8 +31,16 @@ class ProofSettings:
     voltage: float
     slew: float
     rest_rate: float
+    """Or N, where the thrust stands for the rotation rate."""
     watchdog_limit: float
     coast_time: float
+    unit: str = "rev/s"
+    """Of what `advance` is told: N where no rotation rate is measured."""
+
+    @property
+    def slowed(self) -> float:
+        """Share below which the motor has been let go; thrust goes with the square of the rate."""
+        return SLOWED if self.unit == "rev/s" else SLOWED**2
 
     @property
     def expected(self) -> float:
@@ -84,7 +92,7 @@ class Proof:
         self._time_to_zero = 0.0
 
     def advance(self, time: float, rotation: float | None) -> ProofStep:
-        """What to send at `time` s, given the newest rotation rate in rev/s (None: unknown)."""
+        """What to send at `time` s, given the newest rotation rate in rev/s, or thrust in N (None: unknown)."""
         if self._since is None:
             self._since = self._last = time
         dt, self._last = time - self._last, time
@@ -99,6 +107,10 @@ class Proof:
             case "quiet":
                 return self._quiet(elapsed, rotation)
 
+    def _does(self, motion: float) -> str:
+        verb = "turns" if self._settings.unit == "rev/s" else "pushes"
+        return f"{verb} {motion:.2f} {self._settings.unit}"
+
     def _go(self, phase: ProofPhase, time: float) -> None:
         self._phase, self._since = phase, time
 
@@ -107,7 +119,8 @@ class Proof:
         at_rest = rotation is not None and abs(rotation) <= self._settings.rest_rate
         if at_rest or elapsed >= self._settings.coast_time:
             if rotation is None:
-                return ProofStep(0.0, Refused("the watchdog can't be proved: no rotation rate is measured"))
+                what = "no rotation rate is measured" if self._settings.unit == "rev/s" else "no thrust is measured"
+                return ProofStep(0.0, Refused(f"the watchdog can't be proved: {what}"))
             self._idle = 0.0 if at_rest else rotation
             self._go("spin", time)
         return ProofStep(0.0)
@@ -124,8 +137,8 @@ class Proof:
             self._go("silence", time)
         elif held >= SPIN_TIME[1]:
             cause = (
-                f"the watchdog can't be proved: the propeller turns {speed:.2f} rev/s at {self._volts:g} V, at least "
-                f"{TURNING * self._settings.rest_rate:g} rev/s are needed; raise bench.proof_voltage"
+                f"the watchdog can't be proved: the propeller {self._does(speed)} at {self._volts:g} V, at least "
+                f"{TURNING * self._settings.rest_rate:g} {self._settings.unit} are needed; raise bench.proof_voltage"
             )
             return ProofStep(0.0, Refused(cause))
         return ProofStep(self._volts)
@@ -135,7 +148,7 @@ class Proof:
         limits = self._settings
         if rotation is not None:
             speed = abs(rotation - self._idle)
-            self._slowed = self._slowed or speed < SLOWED * self._spin
+            self._slowed = self._slowed or speed < limits.slowed * self._spin
             if speed <= limits.rest_rate:
                 self._time_to_zero = elapsed
                 self._go("quiet", time)
@@ -157,7 +170,8 @@ class Proof:
     def _quiet(self, elapsed: float, rotation: float | None) -> ProofStep:
         if rotation is not None and abs(rotation - self._idle) >= TURNING * self._settings.rest_rate:
             cause = (
-                f"the motor moves again at command 0 after its watchdog: {rotation:.2f} rev/s; look at the controller"
+                "the motor moves again at command 0 after its watchdog: the propeller "
+                f"{self._does(rotation)}; look at the controller"
             )
             return ProofStep(0.0, Refused(cause))
         return ProofStep(0.0, Proved(self._time_to_zero) if elapsed >= QUIET_TIME else None)

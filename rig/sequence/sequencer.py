@@ -14,7 +14,7 @@ from rig.campaign.plan import Step
 from rig.campaign.step_order import places, require_steps
 from rig.campaign.waits import Wait
 from rig.link.front_end_messages import State
-from rig.safety.stopping import Stop, turning
+from rig.safety.stopping import Stop
 from rig.safety.watchdog_proof import Proof, Refused
 from rig.sequence import standing
 from rig.sequence.holding import Holding
@@ -55,7 +55,7 @@ class Sequencer:
         self._proof: Proof | None = None
         self._prove_before = settings.proofs_before(step.phase for step in self.steps)
         self._time_to_zero: float | None = None
-        self._stop = Stop(0.0, settings.rest_rate, settings.coast_time)
+        self._stop = self._new_stop(0.0)
         self._outcome: Outcome = "running"
         self._cause = ""
         self._trip_told = self._release = False
@@ -126,7 +126,11 @@ class Sequencer:
 
     def zero(self, time: float, state: State) -> None:
         self.state, self.since, self._command, self._silent = state, time, 0.0, False
-        self._stop = Stop(time, self.settings.rest_rate, self.settings.coast_time)
+        self._stop = self._new_stop(time)
+
+    def _new_stop(self, time: float) -> Stop:
+        settings = self.settings
+        return Stop(time, settings.rest_rate, settings.coast_time, without_rate=settings.without_rate)
 
     def begin(self, time: float) -> None:
         """Begin the step at the present position, by an approach ramp where the command is elsewhere."""
@@ -187,7 +191,7 @@ class Sequencer:
 
     def _proving(self, tick: Tick) -> bool:
         assert self._proof is not None
-        volts, verdict = self._proof.advance(tick.time, tick.rotation)
+        volts, verdict = self._proof.advance(tick.time, tick.push if self.settings.without_rate else tick.rotation)
         self._silent, self._command = volts is None, volts or 0.0
         if verdict is None:
             return False
@@ -232,11 +236,11 @@ class Sequencer:
 
     def _stopping(self, tick: Tick) -> bool:
         """0 V until measured rest."""
-        confirmed, self._release = self._stop.advance(tick.time, tick.rotation, tick.thrust_rest)
+        confirmed, self._release = self._stop.advance(tick.time, tick.rotation, tick.thrust_rest, tick.current_rest)
         if confirmed is not None:
             self.end_row(tick.time)
             self._stop_confirmed, self.state = confirmed, "run_done"
-            after = f"{tick.time - self.since:.2f} s after command 0 V: {turning(tick.rotation, tick.thrust_rest)}"
+            after = f"{tick.time - self.since:.2f} s after command 0 V: {standing.motion(self, tick)}"
             text = f"at rest {after}" if confirmed else f"STOP NOT CONFIRMED {after}; cut the power"
             self.journal.say(tick.time, "info" if confirmed else "error", text)
         return False

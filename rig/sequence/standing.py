@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rig.safety.stopping import is_rest, turning
+from rig.safety.stopping import is_rest, pushes_nothing, turning, without_a_rate
 from rig.sequence.ticks import EPSILON, Tick
 
 if TYPE_CHECKING:
@@ -38,14 +38,25 @@ def take_tare(run: Sequencer, tick: Tick) -> bool:
 
 def rest(run: Sequencer, tick: Tick) -> bool:
     step = run.step
-    elapsed, at_rest = tick.time - run.since + EPSILON, is_rest(tick.rotation, run.settings.rest_rate)
-    if elapsed >= step.max_duration or (elapsed >= step.min_duration and at_rest):
+    elapsed, blind = tick.time - run.since + EPSILON, run.settings.without_rate
+    if blind:
+        at_rest = pushes_nothing(tick.thrust_rest, tick.current_rest)
+    else:
+        at_rest = is_rest(tick.rotation, run.settings.rest_rate)
+    if elapsed >= step.max_duration or (elapsed >= step.min_duration and at_rest and not blind):
         if not at_rest:
-            text = f"not at rest after {elapsed:.1f} s at 0 V: {turning(tick.rotation)}"
-            run.journal.say(tick.time, "warning", text)
+            what = motion(run, tick) if blind else turning(tick.rotation)
+            run.journal.say(tick.time, "warning", f"not at rest after {elapsed:.1f} s at 0 V: {what}")
         run.next_step(tick.time)
         return True
     return False
+
+
+def motion(run: Sequencer, tick: Tick) -> str:
+    """What is known of the rotation, in words."""
+    if run.settings.without_rate:
+        return without_a_rate(tick.thrust_rest, tick.current_rest)
+    return turning(tick.rotation, tick.thrust_rest)
 
 
 def wait(run: Sequencer, tick: Tick) -> bool:

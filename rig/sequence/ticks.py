@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, NamedTuple
 
 from identification.recording import Step as StepRow
@@ -45,6 +45,8 @@ class Settings:
     """None: the watchdog is not proved in this run."""
     proved: bool = False
     """It was in an earlier run of this motor: it is proved again at the first rest alone."""
+    without_rate: bool = False
+    """No rotation rate is measured: thrust and current stand for it."""
     attended: bool = True
     """Somebody can be asked."""
     estimator: Callable[[], SteadyEstimator] = SteadyMonitor
@@ -52,8 +54,12 @@ class Settings:
 
     def proofs_before(self, phases: Iterable[Phase]) -> tuple[str, ...]:
         """Before what the watchdog is proved in a run of steps of these `phases`: its start, then its first rest, if it
-        has one: it may break meanwhile."""
-        return () if self.proof is None else ("start",) * (not self.proved) + ("rest",) * ("rest" in phases)
+        has one: it may break meanwhile. A proof by the thrust comes after the first tare."""
+        if self.proof is None:
+            return ()
+        steps = tuple(phases)
+        start = next((phase for phase in steps if phase != "tare"), "start") if self.without_rate else "start"
+        return (start,) * (not self.proved) + ("rest",) * ("rest" in steps and (self.proved or start != "rest"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +73,10 @@ class Tick:
     """rev/s, newest; None: none, or none that is fresh."""
     thrust_rest: bool | None = None
     """Whether the force sensor says that nothing pushes; None: it is no witness."""
+    push: float | None = None
+    """N from the tare; None: not known."""
+    current_rest: bool | None = None
+    """Whether the current drives nothing; None: it is not known, or the rotation rate is measured."""
     temperature: float | None = None
     """degC of the channel that a cool-down waits for; None: none, or none that is fresh."""
     trip: Trip | None = None
@@ -131,6 +141,14 @@ def settings_for(campaign: CampaignConfig, thruster: str) -> Settings:
         max_drift=steady.max_drift if steady else None,
         proof=proof_settings(bench, slew) if campaign.prove_watchdog else None,
         attended=not campaign.unattended,
+    )
+
+
+def by_thrust(settings: Settings, rest_thrust: float) -> Settings:
+    """The same for a bench without a rotation rate: the watchdog is proved by the thrust, `rest_thrust` N at rest."""
+    proof = settings.proof
+    return replace(
+        settings, without_rate=True, proof=None if proof is None else replace(proof, rest_rate=rest_thrust, unit="N")
     )
 
 

@@ -14,7 +14,7 @@ from rig.recording.ledger import Fact, attempts, kept_steps
 from rig.recording.recorder_link import recording_path
 from rig.safety.thrust_rest import ThrustRest
 from rig.sequence.sequencer import Sequencer
-from rig.sequence.ticks import Output, Tick, settings_for
+from rig.sequence.ticks import Output, Tick, by_thrust, settings_for
 from rig.stages.recording_header import opening
 from rig.stages.session import Session, Stopped
 from rig.stages.watching import begin_watch, end_watch, hear_watch
@@ -36,7 +36,7 @@ def measure(session: Session) -> None:
     request = opening(session.campaign, session.bench, thruster, path, t0_ns, stamp, attempt, continues)
     session.recorder.open(request, loop.now)
     loop.clients.clear_trace()
-    loop.thrust_rest = ThrustRest()
+    loop.forget_tare()
     loop.begin_recording(t0_ns)
     begin_watch(session, thruster, t0_ns)  # before the first row is recorded
     status.files.append(str(path))
@@ -52,6 +52,8 @@ def measure(session: Session) -> None:
     # nothing is measured into a file that the ledger may never name
     session.wait_holding(lambda: session.ledger.settled, f"{session.ledger.path} to take that the run begins")
     settings = replace(settings_for(session.campaign, thruster), proved=session.proved)
+    if loop.rest_by_thrust is not None:
+        settings = by_thrust(settings, loop.rest_by_thrust.thrust)
     _close(session, sequence(session, Sequencer(steps, settings), t0_ns))
 
 
@@ -79,7 +81,10 @@ def sequence(session: Session, sequencer: Sequencer, t0_ns: int) -> Output:
         thrust = loop.thrust_rows(inputs.samples, begun_ns)
         trip = replace(inputs.trip, time=since_begun) if inputs.trip else None
         degrees = None if cool is None else loop.readings.fresh(cool.channel, inputs.now)
-        tick = Tick(since_begun, thrust, inputs.rotation, inputs.thrust_rest, degrees, trip, inputs.requests)
+        tick = Tick(
+            since_begun, thrust, inputs.rotation, inputs.thrust_rest, inputs.push, inputs.current_rest, degrees, trip,
+            inputs.requests,
+        )  # fmt: skip
         output = sequencer.advance(tick)
         _tell_tare(loop.thrust_rest, output, tares)
         _take(session, output, t0_ns, begun)

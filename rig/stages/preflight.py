@@ -72,16 +72,41 @@ def watchdog_check(watchdog: Watchdog, limit: float, *, proving: bool) -> Check:
     return Check("watchdog", "passed", text)
 
 
-def rest_check(readings: Iterable[Reading], rest_rate: float) -> Check:
+def rest_check(readings: Collection[Reading], config: BenchConfig) -> Check:
     """The propeller must be at rest, measured, before it is armed."""
+    rest_rate = config.rest_rate
     rates = [r for r in readings if r.quantity == "rotation_rate"]
     if not rates:
-        return Check("at rest", "warning", "no rotation rate is measured on this bench: rest can't be confirmed")
+        return _rest_without_a_rate([r for r in readings if r.quantity == "current"], config)
     moving = [r for r in rates if r.value is None or abs(r.value) > rest_rate]
     if moving:
         value = "unknown" if moving[0].value is None else f"{moving[0].value:.1f} rev/s"
         return Check("at rest", "failed", f"{moving[0].channel} is {value}; wait until |rate| < {rest_rate:g} rev/s")
     return Check("at rest", "passed", f"|rotation rate| < {rest_rate:g} rev/s")
+
+
+def _rest_without_a_rate(currents: Collection[Reading], config: BenchConfig) -> Check:
+    """The thrust has no tare yet: what the current says now, and on what rest will be told in the run."""
+    without = "no rotation rate is measured on this bench"
+    if config.rest_thrust is None or config.rest_current is None or not currents:
+        lacking = "" if currents else "no current is measured either; "
+        return Check(
+            "at rest",
+            "warning",
+            f"{without}: {lacking}rest can't be confirmed, unless bench.rest_thrust and bench.rest_current say when "
+            "thrust and current stand for it",
+        )
+    driving = [r for r in currents if r.value is None or abs(r.value) > config.rest_current]
+    if driving:
+        value = "unknown" if driving[0].value is None else f"{driving[0].value:.2f} A"
+        text = f"{driving[0].channel} is {value}; wait until it is at most {config.rest_current:g} A"
+        return Check("at rest", "failed", text)
+    return Check(
+        "at rest",
+        "warning",
+        f"{without}: at rest means {config.coast_time:g} s at 0 V, then thrust within {config.rest_thrust:g} N of its "
+        f"tare and current at most {config.rest_current:g} A; a propeller that turns too slowly to push is not seen",
+    )
 
 
 def stop_input_check(readings: Iterable[Reading]) -> Check | None:
@@ -176,7 +201,7 @@ def all_checks(
     there = [stream for name, stream in readings.streams.items() if name not in without]
     checks = [rate_check(stream, readings.rate(stream.name), readings.age(stream.name, now)) for stream in there]
     checks.append(watchdog_check(watchdog, config.watchdog_limit, proving=proving))
-    checks.append(rest_check(view, config.rest_rate))
+    checks.append(rest_check(view, config))
     stop_input = stop_input_check(view)
     if stop_input is not None:
         checks.append(stop_input)

@@ -26,7 +26,7 @@ from rig.link.watch_messages import Judged
 from rig.recording.ledger import Fact, Ledger
 from rig.recording.line_writer import LineWriter
 from rig.recording.recorder_link import RecorderLink
-from rig.safety.stopping import Stop, turning
+from rig.safety.stopping import Stop, turning, without_a_rate
 from rig.sequence.requests import ASKED
 from rig.stages.recording_header import Stamp, fresh_stamp
 from rig.watch.watch_link import WatchLink
@@ -143,12 +143,15 @@ class Session:
         loop.zero(self.motor)
         if known or not loop.has_driven:
             return
-        stop, confirmed, release = Stop(loop.now, config.rest_rate, config.coast_time), None, True
+        blind = loop.rest_by_thrust is not None
+        stop = Stop(loop.now, config.rest_rate, config.coast_time, without_rate=blind)
+        confirmed, release = None, True
         while confirmed is None:
             inputs = self._idle_tick(release=release)
-            confirmed, release = stop.advance(inputs.now, inputs.rotation, inputs.thrust_rest)
+            confirmed, release = stop.advance(inputs.now, inputs.rotation, inputs.thrust_rest, inputs.current_rest)
         self.status.stop_confirmed = confirmed
-        what = turning(inputs.rotation, inputs.thrust_rest)
+        seen = inputs.thrust_rest, inputs.current_rest
+        what = without_a_rate(*seen) if blind else turning(inputs.rotation, inputs.thrust_rest)
         if confirmed:
             self.say("info", f"at rest: {what}")
         else:

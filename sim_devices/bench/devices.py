@@ -13,11 +13,13 @@ from sim_devices.instruments.can_node import CanNode
 from sim_devices.instruments.can_signals import CanSender
 from sim_devices.instruments.modbus.cell import ModbusCell
 from sim_devices.instruments.modbus.keller import Keller, KellerOptions
+from sim_devices.instruments.modbus.pzem import Pzem, PzemOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.modbus.registers_device import RegistersDevice, RegistersOptions
 from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAed, HbmAedOptions
 from sim_devices.instruments.serial_lines.line_sender import LineOptions, LineSender
+from sim_devices.instruments.serial_lines.loadstar import Loadstar, LoadstarOptions
 from sim_devices.instruments.serial_lines.mantracourt import Mantracourt, MantracourtOptions
 from sim_devices.instruments.serial_lines.mt_sics import MtSics
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
@@ -45,6 +47,8 @@ def serial_device(
             return Mantracourt(options, read)
         case LineOptions():
             return LineSender(options, read)
+        case LoadstarOptions():
+            return Loadstar(options, read)
         case ButtonOptions():
             return Button(options)
         case NortekOptions():
@@ -53,6 +57,8 @@ def serial_device(
             return Nortek(options, lambda: world.sample("flow_speed"), lambda: std * cross.draw(), epoch)
         case KellerOptions():
             return Keller(options, lambda: world.sample("pressure"), lambda: world.sample("water_temperature"))
+        case PzemOptions():
+            return Pzem(options, lambda: world.sample("bus_voltage"), lambda: world.sample("input_current"))
         case ModbusCellOptions():
             return ModbusCell(options, read)
         case RegistersOptions():
@@ -71,7 +77,7 @@ def turnaround(options: SerialOptions) -> float:
     so that the last piece ends half of it later.
     """
     match options:
-        case KellerOptions() | ModbusCellOptions() | RegistersOptions() | MantracourtOptions():
+        case KellerOptions() | PzemOptions() | ModbusCellOptions() | RegistersOptions() | MantracourtOptions():
             return options.turnaround
         case HbmAedOptions():
             return 0.5 / options.top_rate

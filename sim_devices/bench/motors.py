@@ -11,6 +11,7 @@ from sim_devices.instruments.canopen import drive_options
 from sim_devices.instruments.canopen.drive import Drive402
 from sim_devices.instruments.drive import Drive
 from sim_devices.instruments.motor_tap import MotorTap
+from sim_devices.instruments.pololu.maestro import Maestro, MaestroOptions
 from sim_devices.instruments.roboteq.controller import Roboteq
 from sim_devices.instruments.roboteq.options import RoboteqOptions, measured
 from sim_devices.instruments.serial_device import SerialDevice
@@ -36,6 +37,9 @@ def motor(options: MotorOptions, world: World, log: Log) -> Motor:
     """The motor controller of these options."""
     supply = world.settings.supply.voltage
     match options:
+        case MaestroOptions():
+            pulses = Maestro(options, supply, log)
+            return Motor(pulses, serial=(pulses, options.port, options.baud))
         case RoboteqOptions():
             device = Roboteq(options, supply, lambda: measured(world), log)
             return Motor(device, serial=(device, options.port, options.baud))

@@ -12,11 +12,14 @@ from sim_devices.instruments.button import ButtonOptions
 from sim_devices.instruments.can_signals import CanSignalsOptions
 from sim_devices.instruments.canopen.drive_options import Cia402Options
 from sim_devices.instruments.modbus.keller import KellerOptions
+from sim_devices.instruments.modbus.pzem import PzemOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.modbus.registers_device import RegistersOptions
+from sim_devices.instruments.pololu.maestro import MaestroOptions
 from sim_devices.instruments.roboteq.options import RoboteqOptions
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAedOptions
 from sim_devices.instruments.serial_lines.line_sender import LineOptions
+from sim_devices.instruments.serial_lines.loadstar import LoadstarOptions
 from sim_devices.instruments.serial_lines.mantracourt import MantracourtOptions
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.serial_lines.nortek import NortekOptions
@@ -30,6 +33,8 @@ SerialOptions = (
     | HbmAedOptions
     | MantracourtOptions
     | LineOptions
+    | LoadstarOptions
+    | PzemOptions
     | ButtonOptions
     | NortekOptions
     | KellerOptions
@@ -39,9 +44,9 @@ SerialOptions = (
 """Of what measures, on a serial port."""
 NodeOptions = CanSignalsOptions
 """Of what measures, on the CAN bus."""
-MotorOptions = RoboteqOptions | VescOptions | Cia402Options
+MotorOptions = MaestroOptions | RoboteqOptions | VescOptions | Cia402Options
 DeviceOptions = SerialOptions | NodeOptions | MotorOptions
-MOTORS = (RoboteqOptions, VescOptions, Cia402Options)
+MOTORS = (MaestroOptions, RoboteqOptions, VescOptions, Cia402Options)
 """Those that turn the thruster."""
 NODES = (CanSignalsOptions,)
 """Those that measure, on the CAN bus."""
@@ -50,12 +55,15 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "hbm_aed": HbmAedOptions,
     "mantracourt_dsc": MantracourtOptions,
     "line": LineOptions,
+    "loadstar": LoadstarOptions,
     "button": ButtonOptions,
     "nortek": NortekOptions,
     "keller": KellerOptions,
+    "pzem": PzemOptions,
     "modbus_cell": ModbusCellOptions,
     "modbus_registers": RegistersOptions,
     "can_signals": CanSignalsOptions,
+    "maestro": MaestroOptions,
     "roboteq": RoboteqOptions,
     "vesc": VescOptions,
     "cia402": Cia402Options,

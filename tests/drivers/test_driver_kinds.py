@@ -19,6 +19,9 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
     (tmp_path / "x.dbc").write_text(DBC, encoding="utf-8")
     options = {
         "mt_sics": {"port": "p", "rate": 10.0},
+        "loadstar": {"port": "p", "rate": 50.0},
+        "pzem": {"port": "p"},
+        "maestro": {"port": "p", "channel": 0, "full_voltage": 48.0, "dead_zone": 25.0, "watchdog_timeout": 0.5},
         "hbm_aed": {"port": "p", "rate": 25.0, "top_rate": 100.0, "nominal_force": 500.0},
         "mantracourt_dsc": {"port": "p", "rate": 50.0, "unit": "N"},
         "line_stream": {"port": "p", "pattern": r"(?P<value>\d+)", "rate": 10.0, "line_characters": 10},
@@ -36,7 +39,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
         bus = (CanBus("virtual", "x", 1),) if kind.link == "can" else ()
         device = kind.build(name, kind.options(**options[name]), *bus)
         assert isinstance(device, Instrument)
-        assert isinstance(device, MotorController) == (name in ("cia402", "roboteq", "vesc_can"))
+        assert isinstance(device, MotorController) == (name in ("cia402", "maestro", "roboteq", "vesc_can"))
         assert device.drain() == []
         assert not device.health().alive
         device.close()

@@ -33,6 +33,7 @@ class Hold:
     def __init__(self, rest_rate: float) -> None:
         self._rest_rate = rest_rate
         self.command: float | None = None
+        self._driven = False
         self.blocks: deque[Means] = deque(maxlen=KEPT)
         self.count = 0
         """Blocks of this hold."""
@@ -88,8 +89,10 @@ class Hold:
         self.command, self._begun = look.command, look.time
         self.blocks.clear()
         self.count = 0
+        self._driven = self._driven or bool(look.command)
         unknown = look.command == 0.0 and look.rate is None
-        self._settle_from(look.time + (REST_SETTLE if unknown else SETTLE))
+        coasts = REST_SETTLE if self._driven else 0.0  # what nothing has driven yet is at rest
+        self._settle_from(look.time + (coasts if unknown else SETTLE))
 
     def _settle_from(self, time: float) -> None:
         self._settled_from, self._block_end = time, time + BLOCK

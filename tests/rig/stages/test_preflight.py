@@ -1,6 +1,7 @@
 """What must be green before a propeller may turn."""
 
 from datetime import date
+from pathlib import Path
 
 import pytest
 
@@ -18,6 +19,7 @@ from rig.stages.preflight import (
     stop_input_check,
     watchdog_check,
 )
+from tests.rig.virtual_bench import bench_config
 
 CELL = Stream("cell", "virtual", (Channel("thrust", "thrust", "N"), Channel("stable", None, "1")), 0.01)
 
@@ -59,11 +61,11 @@ def test_a_watchdog_that_is_not_proved_is_said_so(timeout, verdict):
 
 @pytest.mark.parametrize(("rate", "verdict"), [(0.0, "passed"), (-0.5, "passed"), (0.6, "failed"), (None, "failed")])
 def test_rest(rate, verdict):
-    assert rest_check([reading("rotation_rate", rate)], 0.5).verdict == verdict
+    assert rest_check([reading("rotation_rate", rate)], bench_config(Path())).verdict == verdict
 
 
 def test_rest_that_is_not_measured_is_said():
-    assert rest_check([reading("thrust", 0.0)], 0.5).verdict == "warning"
+    assert rest_check([reading("thrust", 0.0)], bench_config(Path())).verdict == "warning"
 
 
 @pytest.mark.parametrize(("value", "verdict"), [(0.0, "passed"), (1.0, "failed"), (None, "failed")])

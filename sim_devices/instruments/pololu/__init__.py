@@ -1,0 +1,1 @@
+"""Pololu controllers, as they take packets."""
