@@ -7,7 +7,7 @@ one line here
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -16,6 +16,7 @@ from drivers.canopen.cia402_options import Options as Cia402Options
 from drivers.extras import of_extra
 from drivers.hbm.aed import HbmAed
 from drivers.hbm.options import Options as HbmAedOptions
+from drivers.modbus import anonymising as anonymising_modbus
 from drivers.modbus import keller, pzem
 from drivers.modbus import recognising as recognising_modbus
 from drivers.modbus.cell import ModbusCell
@@ -24,12 +25,15 @@ from drivers.modbus.registers import ModbusRegisters
 from drivers.modbus.registers import Options as ModbusRegistersOptions
 from drivers.pololu.maestro import Maestro
 from drivers.pololu.maestro_options import Options as MaestroOptions
+from drivers.ports.transcript import Chunk
 from drivers.protocols import Instrument
 from drivers.recognition.can_traffic import CanProbe
 from drivers.recognition.serial_line import SerialProbe
+from drivers.roboteq import anonymising as anonymising_roboteq
 from drivers.roboteq import recognising as recognising_roboteq
 from drivers.roboteq.controller import Roboteq
 from drivers.roboteq.options import Options as RoboteqOptions
+from drivers.serial_lines import anonymising as anonymising_lines
 from drivers.serial_lines import (
     line_stream,
     loadstar,
@@ -39,6 +43,7 @@ from drivers.serial_lines import (
     recognising_mt_sics,
     recognising_streams,
 )
+from drivers.vesc import anonymising as anonymising_vesc
 from drivers.vesc import over_can
 from drivers.vesc import recognising as recognising_vesc
 
@@ -55,6 +60,8 @@ class Kind:
     link: Literal["serial", "can"]
     probe: SerialProbe | CanProbe | None = None
     """How `rig devices` recognises one; None: it cannot yet."""
+    anonymise: Callable[[Sequence[Chunk]], list[Chunk]] | None = None
+    """Takes out of a transcript whose device it is; ValueError where that cannot be done; None: nobody knows how."""
 
 
 def _cia402() -> Callable[..., Instrument]:
@@ -64,19 +71,25 @@ def _cia402() -> Callable[..., Instrument]:
 
 
 KINDS: dict[str, Kind] = {
-    "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial", recognising_mt_sics.PROBE),
+    "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial", recognising_mt_sics.PROBE, anonymising_lines.mt_sics),
     "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial"),
     "mantracourt_dsc": Kind(mantracourt_dsc.Options, mantracourt_dsc.MantracourtDsc, "serial"),
-    "line_stream": Kind(line_stream.Options, line_stream.LineStream, "serial", recognising_streams.NUMBERS),
+    "line_stream": Kind(
+        line_stream.Options, line_stream.LineStream, "serial", recognising_streams.NUMBERS, anonymising_lines.numbers
+    ),
     "loadstar": Kind(loadstar.Options, loadstar.Loadstar, "serial"),
-    "modbus_cell": Kind(ModbusCellOptions, ModbusCell, "serial", recognising_modbus.CELL),
+    "modbus_cell": Kind(
+        ModbusCellOptions, ModbusCell, "serial", recognising_modbus.CELL, anonymising_modbus.asked_values
+    ),
     "modbus_registers": Kind(ModbusRegistersOptions, ModbusRegisters, "serial"),
-    "nortek_nmea": Kind(nortek_nmea.Options, nortek_nmea.NortekNmea, "serial", recognising_streams.NORTEK),
-    "keller": Kind(keller.Options, keller.Keller, "serial", recognising_modbus.KELLER),
+    "nortek_nmea": Kind(
+        nortek_nmea.Options, nortek_nmea.NortekNmea, "serial", recognising_streams.NORTEK, anonymising_lines.nortek
+    ),
+    "keller": Kind(keller.Options, keller.Keller, "serial", recognising_modbus.KELLER, anonymising_modbus.asked_values),
     "pzem": Kind(pzem.Options, pzem.Pzem, "serial"),
     "maestro": Kind(MaestroOptions, Maestro, "serial"),
-    "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE),
+    "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE, anonymising_roboteq.anonymise),
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
-    "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE),
+    "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),
     "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can"),
 }

@@ -116,6 +116,8 @@ COMMANDS: Final = {
         "Identify drag, efficiency and inertia of a vehicle from its trials.",
         "vehicles",
     ),
+    "capture": Entry("rig.captures.command:capture_command", "Write the raw bytes of a device or bus, with times."),
+    "replay": Entry("rig.replay.command:replay_command", "Play a capture through the driver of its device."),
     "import": Entry("rig.importing.command:import_command", "Make a recording of another program's table or log."),
     "export": Entry("rig.exporting.command:export_command", "Write a recording as CSV, Parquet, MATLAB or MCAP."),
     "recover": Entry(

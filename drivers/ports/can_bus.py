@@ -113,13 +113,14 @@ class CanBus:
         if self._bus is None or not self.alive:
             raise LinkError(f"CAN bus {self._channel}: {self.error or 'is not open'}")
         message = can.Message(arbitration_id=frame.id, is_extended_id=frame.extended, data=frame.data)
+        sent_ns = self.now_ns()
         try:
             self._bus.send(message, timeout=SEND_TIMEOUT)
         except (can.CanError, OSError) as error:
             self.error = self.error or f"{self._channel} refused {frame} ({error}): check adapter, cable and power"
             raise LinkError(f"CAN bus {self.error}") from error
         if self._transcript is not None:
-            self._transcript.write(self.now_ns(), ">", str(frame).encode())
+            self._transcript.write(sent_ns, ">", str(frame).encode())
 
     def now_ns(self) -> int:
         """Of the clock that stamps what arrives."""

@@ -14,3 +14,11 @@ class Frame(NamedTuple):
 
     def __str__(self) -> str:
         return f"{self.id:08X}#{self.data.hex(' ')}" if self.extended else f"{self.id:03X}#{self.data.hex(' ')}"
+
+
+def frame_of(text: bytes) -> Frame:
+    """The frame that `str` wrote, as transcripts of a bus have it. Raises ValueError for what is none."""
+    identifier, mark, data = text.decode("ascii").partition("#")
+    if not mark or len(identifier) not in (3, 8):
+        raise ValueError(f"a frame is written as 917#01 02 or 00000917#01 02, not {text!r}")
+    return Frame(int(identifier, 16), len(identifier) == 8, bytes.fromhex(data))

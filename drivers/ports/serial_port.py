@@ -115,13 +115,14 @@ class SerialPort(Generic[Record]):
         port = self._wire or self._serial
         if port is None or not self.alive:
             raise LinkError(f"{self._name}: {self.error or f'{self.settings.port} is not open'}")
+        sent_ns = self.now_ns()  # before: the answer may be in the transcript first, and must not have the older stamp
         try:
             port.write(data)
         except OSError as error:
             self.error = f"{self.settings.port} refused {len(data)} bytes ({error}): check cable and power"
             raise LinkError(f"{self._name}: {self.error}") from error
         if self._transcript is not None:
-            self._transcript.write(self.now_ns(), ">", data)
+            self._transcript.write(sent_ns, ">", data)
 
     def retune(self, baud: int, framing: str) -> None:
         """Another rate from now on, the port stays open. Raises LinkError where it is not, or cannot do that rate.

@@ -48,7 +48,7 @@ def test_a_misspelt_command_is_answered_with_the_nearest(capsys: pytest.CaptureF
 
 def test_the_tab_key_offers_commands_without_waiting_for_them() -> None:
     offered, modules = completed("rig re", 1)
-    assert offered == ["resume", "report", "recover"]
+    assert offered == ["resume", "report", "replay", "recover"]
     assert not modules & set(HEAVY)
 
 

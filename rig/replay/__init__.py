@@ -1,0 +1,1 @@
+"""`rig replay`: what was captured plays again, at any speed."""
