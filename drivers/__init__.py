@@ -13,6 +13,7 @@ from typing import Any, Literal
 
 from drivers.can_signals import signals as can_signals
 from drivers.canopen.cia402_options import Options as Cia402Options
+from drivers.canopen.cia404_options import Options as Cia404Options
 from drivers.extras import of_extra
 from drivers.hbm.aed import HbmAed
 from drivers.hbm.options import Options as HbmAedOptions
@@ -70,6 +71,12 @@ def _cia402() -> Callable[..., Instrument]:
     return Cia402
 
 
+def _cia404() -> Callable[..., Instrument]:
+    from drivers.canopen.cia404 import Cia404
+
+    return Cia404
+
+
 KINDS: dict[str, Kind] = {
     "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial", recognising_mt_sics.PROBE, anonymising_lines.mt_sics),
     "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial"),
@@ -92,4 +99,5 @@ KINDS: dict[str, Kind] = {
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),
     "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can"),
+    "cia404": Kind(Cia404Options, of_extra("canopen", "canopen", _cia404), "can"),
 }

@@ -39,6 +39,7 @@ from sim_devices.bench import control
 from sim_devices.bench.settings import KEYS, CanBus, ScriptedFault, load
 from sim_devices.bench.settings import KINDS as SIMULATED
 from sim_devices.instruments import button, can_signals
+from sim_devices.instruments.canopen import cell as canopen_cell
 from sim_devices.instruments.canopen import drive as canopen_drive
 from sim_devices.instruments.modbus import cell as modbus_cell
 from sim_devices.instruments.modbus import keller, pzem, registers_device
@@ -216,6 +217,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("keller", keller.Keller),
         ("roboteq", roboteq.Roboteq),
         ("cia402", canopen_drive.Drive402),
+        ("cia404", canopen_cell.Cell404),
         ("vesc", vesc.Vesc),
     ):
         (table,) = [part for part in page.split("\n\n") if part.startswith("| fault of") and f"(`{kind}`)" in part]

@@ -112,29 +112,31 @@ class CanopenNode:
 
     # -- PDOs --------------------------------------------------------------------------------------------------------
 
-    def lay_out_sent(self, number: int, fields: tuple[Field, ...], period_ms: int) -> None:
-        """TPDO `number` (1 to 4): these fields every `period_ms`, no more often. No fields: it is switched off."""
-        self._lay_out(0x1800 + number - 1, SEND_PDO[number - 1], fields, period_ms)
+    def lay_out_sent(
+        self, number: int, fields: tuple[Field, ...], period_ms: int | None, transmission: int = BY_EVENT
+    ) -> None:
+        """TPDO `number` (1 to 4): these fields every `period_ms`, no more often; None: by `transmission` alone."""
+        self._lay_out(0x1800 + number - 1, SEND_PDO[number - 1], fields, period_ms, transmission)
 
     def lay_out_received(self, number: int, fields: tuple[Field, ...]) -> None:
         """RPDO `number` (1 to 4): these fields, obeyed as they come."""
-        self._lay_out(0x1400 + number - 1, RECEIVE_PDO[number - 1], fields, None)
+        self._lay_out(0x1400 + number - 1, RECEIVE_PDO[number - 1], fields, None, BY_EVENT)
 
-    def _lay_out(self, index: int, function: int, fields: tuple[Field, ...], period_ms: int | None) -> None:
+    def _lay_out(
+        self, index: int, function: int, fields: tuple[Field, ...], period_ms: int | None, transmission: int
+    ) -> None:
         """CiA 301: switch off, empty the mapping, write it, count it, switch on. Every value is read back."""
         what = f"{'TPDO' if index >= 0x1800 else 'RPDO'} {(index & 0x1FF) + 1}"
         cob = Field(index, 1, 32)
         other = self.number(index, 1) & ~(DISABLED | COB_ID)  # bit 30 of a TPDO: no remote frames
         wanted = other | function + self.id
         self.set(cob, wanted | DISABLED, what, DISABLED | COB_ID)
-        if not fields:
-            return
         count = Field(index + 0x200, 0, 8)
         self.set(count, 0, what)
         for sub, field in enumerate(fields, 1):
             self.set(Field(index + 0x200, sub, 32), field.mapping, f"{what}, which shall hold 0x{field.index:04X}")
         self.set(count, len(fields), what)
-        self.set(Field(index, 2, 8), BY_EVENT, f"transmission type of {what}")
+        self.set(Field(index, 2, 8), transmission, f"transmission type of {what}")
         if period_ms is not None:
             self.set(Field(index, 3, 16), 10 * period_ms, f"inhibit time of {what}, 0.1 ms")
             self.set(Field(index, 5, 16), period_ms, f"event timer of {what}, ms")

@@ -11,6 +11,7 @@ from sim_devices.bench.settings import NodeOptions, SerialOptions
 from sim_devices.instruments.button import Button, ButtonOptions
 from sim_devices.instruments.can_node import CanNode
 from sim_devices.instruments.can_signals import CanSender
+from sim_devices.instruments.canopen.cell import Cell404, Cia404Options
 from sim_devices.instruments.modbus.cell import ModbusCell
 from sim_devices.instruments.modbus.keller import Keller, KellerOptions
 from sim_devices.instruments.modbus.pzem import Pzem, PzemOptions
@@ -65,8 +66,10 @@ def serial_device(
             return RegistersDevice(options, world.sample)
 
 
-def can_node(options: NodeOptions, world: World) -> CanNode:
-    """The device of these options on the CAN bus."""
+def can_node(options: NodeOptions, world: World, force: Callable[[], float] | None = None) -> CanNode:
+    """The device of these options on the CAN bus. `force` as above."""
+    if isinstance(options, Cia404Options):
+        return Cell404(options, force or (lambda: world.sample("thrust")))
     return CanSender(options, world.sample)
 
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from sim_devices.instruments.button import ButtonOptions
 from sim_devices.instruments.can_signals import CanSignalsOptions
+from sim_devices.instruments.canopen.cell import Cia404Options
 from sim_devices.instruments.canopen.drive_options import Cia402Options
 from sim_devices.instruments.modbus.keller import KellerOptions
 from sim_devices.instruments.modbus.pzem import PzemOptions
@@ -42,13 +43,13 @@ SerialOptions = (
     | RegistersOptions
 )
 """Of what measures, on a serial port."""
-NodeOptions = CanSignalsOptions
+NodeOptions = CanSignalsOptions | Cia404Options
 """Of what measures, on the CAN bus."""
 MotorOptions = MaestroOptions | RoboteqOptions | VescOptions | Cia402Options
 DeviceOptions = SerialOptions | NodeOptions | MotorOptions
 MOTORS = (MaestroOptions, RoboteqOptions, VescOptions, Cia402Options)
 """Those that turn the thruster."""
-NODES = (CanSignalsOptions,)
+NODES = (CanSignalsOptions, Cia404Options)
 """Those that measure, on the CAN bus."""
 KINDS: dict[str, type[DeviceOptions]] = {
     "mt_sics": MtSicsOptions,
@@ -67,6 +68,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "roboteq": RoboteqOptions,
     "vesc": VescOptions,
     "cia402": Cia402Options,
+    "cia404": Cia404Options,
 }
 MAX_STEP = 0.005
 """s: the rotor's fastest time constant is 0.07 s."""

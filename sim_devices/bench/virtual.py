@@ -61,7 +61,7 @@ class VirtualBench:
                 self._add_motor(name, options)
                 continue
             if isinstance(options, NODES):
-                self.nodes[name] = can_node(options, self.world)
+                self.nodes[name] = can_node(options, self.world, self._cell((filters or {}).get(name, 0.0)))
                 continue
             device = serial_device(options, self.world, cross_rng, EPOCH, self._cell((filters or {}).get(name, 0.0)))
             self.serial[name] = (device, self._wired(name, options.baud), turnaround(options))

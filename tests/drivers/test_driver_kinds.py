@@ -33,6 +33,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
         "can_signals": {"bus": "b", "map": str(signals)},
         "vesc_can": {"bus": "b", "vesc_id": 1, "pole_pairs": 7, "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5},
         "cia402": {"bus": "b", "node_id": 5, "max_voltage": 24.0, "watchdog_timeout": 0.5, "rate_per_volt": 1.0},
+        "cia404": {"bus": "b", "node_id": 6, "rate": 100.0},
     }
     assert set(options) == set(KINDS)
     for name, kind in KINDS.items():
