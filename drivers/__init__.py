@@ -24,6 +24,8 @@ from drivers.modbus.cell import ModbusCell
 from drivers.modbus.cell_options import Options as ModbusCellOptions
 from drivers.modbus.registers import ModbusRegisters
 from drivers.modbus.registers import Options as ModbusRegistersOptions
+from drivers.odrive.options import Options as ODriveOptions
+from drivers.odrive.over_can import ODriveCan
 from drivers.pololu.maestro import Maestro
 from drivers.pololu.maestro_options import Options as MaestroOptions
 from drivers.ports.transcript import Chunk
@@ -97,6 +99,7 @@ KINDS: dict[str, Kind] = {
     "maestro": Kind(MaestroOptions, Maestro, "serial"),
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE, anonymising_roboteq.anonymise),
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
+    "odrive_can": Kind(ODriveOptions, ODriveCan, "can"),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),
     "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can"),
     "cia404": Kind(Cia404Options, of_extra("canopen", "canopen", _cia404), "can"),

@@ -43,6 +43,7 @@ from sim_devices.instruments.canopen import cell as canopen_cell
 from sim_devices.instruments.canopen import drive as canopen_drive
 from sim_devices.instruments.modbus import cell as modbus_cell
 from sim_devices.instruments.modbus import keller, pzem, registers_device
+from sim_devices.instruments.odrive import axis as odrive
 from sim_devices.instruments.pololu import maestro
 from sim_devices.instruments.roboteq import controller as roboteq
 from sim_devices.instruments.serial_lines import hbm_aed, line_sender, loadstar, mantracourt, mt_sics, nortek
@@ -215,6 +216,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("button", button.Button),
         ("nortek", nortek.Nortek),
         ("keller", keller.Keller),
+        ("odrive", odrive.ODriveAxis),
         ("roboteq", roboteq.Roboteq),
         ("cia402", canopen_drive.Drive402),
         ("cia404", canopen_cell.Cell404),

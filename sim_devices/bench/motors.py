@@ -11,6 +11,8 @@ from sim_devices.instruments.canopen import drive_options
 from sim_devices.instruments.canopen.drive import Drive402
 from sim_devices.instruments.drive import Drive
 from sim_devices.instruments.motor_tap import MotorTap
+from sim_devices.instruments.odrive import options as odrive
+from sim_devices.instruments.odrive.axis import ODriveAxis
 from sim_devices.instruments.pololu.maestro import Maestro, MaestroOptions
 from sim_devices.instruments.roboteq.controller import Roboteq
 from sim_devices.instruments.roboteq.options import RoboteqOptions, measured
@@ -47,6 +49,10 @@ def motor(options: MotorOptions, world: World, log: Log) -> Motor:
             measure, gain = lambda: drive_options.measured(world), lambda: world.state.rate_per_volt
             drive = Drive402(options, supply, gain, measure, log)
             return Motor(drive, node=drive)
+        case odrive.ODriveOptions():
+            gain, seen = lambda: world.state.rate_per_volt, lambda: odrive.measured(world)
+            axis = ODriveAxis(options, supply, gain, seen, log)
+            return Motor(axis, node=axis)
         case VescOptions():
             tap = MotorTap(world, options.pole_pairs, options.vesc_id)
             vesc = tap.vesc = Vesc(options, supply, tap.telemetry, log)

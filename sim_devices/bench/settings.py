@@ -16,6 +16,7 @@ from sim_devices.instruments.modbus.keller import KellerOptions
 from sim_devices.instruments.modbus.pzem import PzemOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.modbus.registers_device import RegistersOptions
+from sim_devices.instruments.odrive.options import ODriveOptions
 from sim_devices.instruments.pololu.maestro import MaestroOptions
 from sim_devices.instruments.roboteq.options import RoboteqOptions
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAedOptions
@@ -45,9 +46,9 @@ SerialOptions = (
 """Of what measures, on a serial port."""
 NodeOptions = CanSignalsOptions | Cia404Options
 """Of what measures, on the CAN bus."""
-MotorOptions = MaestroOptions | RoboteqOptions | VescOptions | Cia402Options
+MotorOptions = MaestroOptions | ODriveOptions | RoboteqOptions | VescOptions | Cia402Options
 DeviceOptions = SerialOptions | NodeOptions | MotorOptions
-MOTORS = (MaestroOptions, RoboteqOptions, VescOptions, Cia402Options)
+MOTORS = (MaestroOptions, ODriveOptions, RoboteqOptions, VescOptions, Cia402Options)
 """Those that turn the thruster."""
 NODES = (CanSignalsOptions, Cia404Options)
 """Those that measure, on the CAN bus."""
@@ -65,6 +66,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "modbus_registers": RegistersOptions,
     "can_signals": CanSignalsOptions,
     "maestro": MaestroOptions,
+    "odrive": ODriveOptions,
     "roboteq": RoboteqOptions,
     "vesc": VescOptions,
     "cia402": Cia402Options,

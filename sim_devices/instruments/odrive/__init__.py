@@ -1,0 +1,1 @@
+"""An ODrive axis, as it talks CANSimple."""
