@@ -47,7 +47,7 @@ from drivers.serial_lines import (
     recognising_streams,
 )
 from drivers.vesc import anonymising as anonymising_vesc
-from drivers.vesc import over_can
+from drivers.vesc import over_can, over_uart
 from drivers.vesc import recognising as recognising_vesc
 
 
@@ -100,6 +100,7 @@ KINDS: dict[str, Kind] = {
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE, anonymising_roboteq.anonymise),
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
     "odrive_can": Kind(ODriveOptions, ODriveCan, "can"),
+    "vesc_uart": Kind(over_uart.Options, over_uart.VescUart, "serial"),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),
     "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can"),
     "cia404": Kind(Cia404Options, of_extra("canopen", "canopen", _cia404), "can"),

@@ -221,6 +221,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("cia402", canopen_drive.Drive402),
         ("cia404", canopen_cell.Cell404),
         ("vesc", vesc.Vesc),
+        ("vesc_uart", vesc.Vesc),
     ):
         (table,) = [part for part in page.split("\n\n") if part.startswith("| fault of") and f"(`{kind}`)" in part]
         assert set(device.faults) <= words(table)

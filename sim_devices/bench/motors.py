@@ -18,6 +18,7 @@ from sim_devices.instruments.roboteq.controller import Roboteq
 from sim_devices.instruments.roboteq.options import RoboteqOptions, measured
 from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.vesc.controller import Vesc, VescOptions
+from sim_devices.instruments.vesc.over_uart import VescUart, VescUartOptions
 from sim_devices.world import World
 
 Log = Callable[..., None]
@@ -53,6 +54,11 @@ def motor(options: MotorOptions, world: World, log: Log) -> Motor:
             gain, seen = lambda: world.state.rate_per_volt, lambda: odrive.measured(world)
             axis = ODriveAxis(options, supply, gain, seen, log)
             return Motor(axis, node=axis)
+        case VescUartOptions():
+            tap = MotorTap(world, options.pole_pairs, options.vesc_id)
+            line = VescUart(Vesc(options.controller(), supply, tap.telemetry, log))
+            tap.vesc = line.vesc
+            return Motor(line, serial=(line, options.port, options.baud), after_step=tap.after_step)
         case VescOptions():
             tap = MotorTap(world, options.pole_pairs, options.vesc_id)
             vesc = tap.vesc = Vesc(options, supply, tap.telemetry, log)

@@ -26,6 +26,7 @@ from sim_devices.instruments.serial_lines.mantracourt import MantracourtOptions
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.serial_lines.nortek import NortekOptions
 from sim_devices.instruments.vesc.controller import VescOptions
+from sim_devices.instruments.vesc.over_uart import VescUartOptions
 from sim_devices.tables import WorldError, build, check_known
 from sim_devices.world.settings import WORLD_TABLES, WorldSettings, read_world
 from sim_devices.world.twin import with_twin
@@ -46,9 +47,9 @@ SerialOptions = (
 """Of what measures, on a serial port."""
 NodeOptions = CanSignalsOptions | Cia404Options
 """Of what measures, on the CAN bus."""
-MotorOptions = MaestroOptions | ODriveOptions | RoboteqOptions | VescOptions | Cia402Options
+MotorOptions = MaestroOptions | ODriveOptions | RoboteqOptions | VescOptions | Cia402Options | VescUartOptions
 DeviceOptions = SerialOptions | NodeOptions | MotorOptions
-MOTORS = (MaestroOptions, ODriveOptions, RoboteqOptions, VescOptions, Cia402Options)
+MOTORS = (MaestroOptions, ODriveOptions, RoboteqOptions, VescOptions, Cia402Options, VescUartOptions)
 """Those that turn the thruster."""
 NODES = (CanSignalsOptions, Cia404Options)
 """Those that measure, on the CAN bus."""
@@ -68,6 +69,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "maestro": MaestroOptions,
     "odrive": ODriveOptions,
     "roboteq": RoboteqOptions,
+    "vesc_uart": VescUartOptions,
     "vesc": VescOptions,
     "cia402": Cia402Options,
     "cia404": Cia404Options,

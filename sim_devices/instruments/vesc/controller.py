@@ -197,11 +197,15 @@ class Vesc:
             answer = bytes((self._options.vesc_id, codec.HARDWARE_TYPE_VESC))
             return [CanFrame(codec.PONG << 8 | frame.data[0], answer)]
         if command == codec.PROCESS_SHORT_BUFFER and len(frame.data) >= 3:
-            return self._process(frame.data[2:], frame.data[0], t)
+            reply = self.answer(frame.data[2:], t)
+            return codec.buffer_frames(reply, frame.data[0], self._options.vesc_id) if reply else []
         return []
 
-    def _process(self, payload: bytes, sender: int, t: float) -> list[CanFrame]:
+    def answer(self, payload: bytes, t: float) -> bytes:
+        """A payload of comm/commands.c, over whatever wire; returns the reply's, empty where it has none."""
         reply = b""
+        if self._boots_at < inf or self._fault == "silent":
+            return reply
         match payload[0]:
             case codec.COMM_FW_VERSION:
                 reply = codec.firmware_version(bytes.fromhex(self._options.uuid))
@@ -214,7 +218,7 @@ class Vesc:
                 self._feed(t)
             case comm if comm in COMM_TO_CAN and len(payload) >= 5:
                 self._set(COMM_TO_CAN[comm], payload[1:5], t)
-        return codec.buffer_frames(reply, sender, self._options.vesc_id) if reply else []
+        return reply
 
     def _feed(self, t: float) -> None:
         self._last_command = t
