@@ -117,7 +117,9 @@ COMMANDS: Final = {
         "vehicles",
     ),
     "capture": Entry("rig.captures.command:capture_command", "Write the raw bytes of a device or bus, with times."),
-    "replay": Entry("rig.replay.command:replay_command", "Play a capture through the driver of its device."),
+    "replay": Entry(
+        "rig.replay.command:replay_command", "Play a recording into the console, a capture through its driver."
+    ),
     "import": Entry("rig.importing.command:import_command", "Make a recording of another program's table or log."),
     "export": Entry("rig.exporting.command:export_command", "Write a recording as CSV, Parquet, MATLAB or MCAP."),
     "recover": Entry(

@@ -66,6 +66,9 @@ class AskingApp(App[None], inherit_bindings=False):
 
     def action_take_lease(self) -> None:
         """From now on this console attends, beside the one that does."""
+        if self.state.snapshot is not None and self.state.snapshot.replay:
+            self.notify("A recording plays: there is nothing to attend.", severity="warning")
+            return
         self.state = replace(self.state, looks_on=False)
         self.renew_lease()
         self.show_text()

@@ -100,7 +100,7 @@ class Head(Vertical):
 
 
 def _attendance(view: View) -> str:
-    if view.snapshot is None:
+    if view.snapshot is None or view.snapshot.replay:
         return ""
     if view.looks_on:
         return "   READ-ONLY: press l to attend"

@@ -55,13 +55,14 @@ def attend(
     silent: bool = False,
     colors: str = "full",
     browser: bool = False,
+    looks_on: bool = False,
     begins: bool = False,
     earlier: Sequence[str] = (),
     folder: str = "",
 ) -> Sitting:
     """Run the console until the operator leaves. `clock` gives s and never goes back; `again` is the command line that
-    attaches once more, shown before detaching; `silent`: no bell; `colors`: `full`, `16` or
-    `none`. `browser`: keys come over a pipe from one, and it looks on until `l`. `begins`: the caller runs what
+    attaches once more, shown before detaching; `silent`: no bell; `colors`: `full`, `16` or `none`. `browser`: keys
+    come over a pipe from one; then, and with `looks_on`, it looks on until `l`. `begins`: the caller runs what
     `next_run` names; `earlier`: recordings that each of this campaign is diagnosed with; `folder`: where it records.
     Closes `feed`."""
     app = ConsoleApp(
@@ -70,7 +71,7 @@ def attend(
         again,
         silent=silent,
         colors=colors,
-        looks_on=browser,
+        looks_on=browser or looks_on,
         begins=begins,
         earlier=tuple(earlier),
         folder=folder,

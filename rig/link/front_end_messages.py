@@ -234,6 +234,8 @@ class Snapshot:
     """In the order of the bench file."""
     channels: tuple[TracedChannel, ...] = ()
     """Of `trace`, in the order of its numbers."""
+    replay: bool = False
+    """A recording plays: there is no controller, and what is asked moves nothing."""
 
 
 RequestKind = Literal[

@@ -44,20 +44,26 @@ def progress_bar(*, start: bool, look: Look = USUAL) -> FrontEnd:
 
 
 def console_screen(
-    look: Look = USUAL, *, browser: bool = False, begins: bool = False, earlier: Sequence[str] = ()
+    look: Look = USUAL,
+    *,
+    browser: bool = False,
+    begins: bool = False,
+    earlier: Sequence[str] = (),
+    looks_on: bool = False,
 ) -> FrontEnd:
-    """Imported before a controller is started: Ctrl+C in that second leaves nothing behind. `browser`: it looks on.
+    """Imported before a controller is started: Ctrl+C in that second leaves nothing behind. `browser` and
+    `looks_on`: it looks on.
 
     `begins`: whoever takes its `Left` runs the `next_run`; `earlier`: recordings that are diagnosed with the new ones.
     """
     from rig.console import SocketFeed, attend
 
     def front(peer: Peer, again: str) -> Left:
-        if browser:
+        if browser or looks_on:
             peer.send(Request("watch"))  # before the screen comes up: until then it would count as attending
         sitting = attend(
-            SocketFeed(peer), again=again, silent=not look.bell, colors=look.colors, browser=browser, begins=begins,
-            earlier=earlier, folder=again.removeprefix(AGAIN),
+            SocketFeed(peer), again=again, silent=not look.bell, colors=look.colors, browser=browser,
+            looks_on=looks_on, begins=begins, earlier=earlier, folder=again.removeprefix(AGAIN),
         )  # fmt: skip
         return Left(sitting.last, sitting.detached, max(sitting.status - 128, 0), sitting.next_run)
 

@@ -109,6 +109,8 @@ def activity(snapshot: Snapshot) -> str:
 
 def link(view: View) -> str:
     """Whether the figures on the screen are the present."""
+    if view.condition == "live" and view.snapshot is not None and view.snapshot.replay:
+        return "REPLAY of a recording, nothing turns"
     if view.condition == "live":
         return f"LIVE, data {view.silence:.1f} s old"
     if view.condition == "waiting":
