@@ -8,7 +8,7 @@ freedom by Welch and Satterthwaite (the same, G.4).
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, isfinite, sqrt
 
 import numpy as np
@@ -18,7 +18,7 @@ from identification.calibration.estimate import Estimated, estimated
 from identification.calibration.loads import Forces, Load, Place, Source, Weight, forces_of
 from identification.calibration.model import POWER, straight_line
 from identification.calibration.steps import Steps
-from identification.calibration.wrong_weight import WrongStep, with_guess, wrong_steps
+from identification.calibration.wrong_weight import WrongStep, doubtful_steps
 from identification.estimation.tails import student_quantile, student_sf
 from identification.recording import Floats
 
@@ -81,9 +81,9 @@ class CellCalibration:
     """N of one step about the curve."""
     dof: int
     residual: Floats
-    """(n,) N"""
+    """(n,) N, of the steps that are believed."""
     wrong: tuple[WrongStep, ...]
-    """Steps that are not to be believed; the rest of the answer is with them in it."""
+    """Steps that are not to be believed: all else is of the others."""
 
     def term(self, name: str) -> TermFound | None:
         """None for one that was not asked for."""
@@ -112,13 +112,11 @@ def calibrated(
     `quantum`: N, step of the readings. `stability`: relative standard uncertainty of what the gain does until the next
     calibration. Raises ValueError with a sentence when the steps tell no gain.
     """
-    forces = forces_of(loads, weights, place, correlation)
-    found = answered(steps, forces, quantum, stability)
-    return _with(found, tuple(with_guess(each, loads[each.step], weights, place) for each in wrong_steps(steps)))
-
-
-def _with(found: CellCalibration, wrong: tuple[WrongStep, ...]) -> CellCalibration:
-    return CellCalibration(**{name: getattr(found, name) for name in found.__dataclass_fields__} | {"wrong": wrong})
+    wrong = doubtful_steps(steps, loads, weights, place)
+    kept = np.isin(np.arange(steps.count), [each.step for each in wrong], invert=True)
+    believed = [load for load, good in zip(loads, kept, strict=True) if good]
+    forces = forces_of(believed, weights, place, correlation)
+    return replace(answered(steps.without(kept), forces, quantum, stability), wrong=wrong)
 
 
 def answered(steps: Steps, forces: Forces, quantum: float = 0.0, stability: float = 0.0) -> CellCalibration:
@@ -214,6 +212,7 @@ def _curve(fit: Estimated, cov: Floats, ends: tuple[float, float], dof: float) -
         *ends,
         dof,
         abs(fit.value("lag")),
+        abs(fit.value("remanence")),
         creep,
     )
 

@@ -39,11 +39,13 @@ class Curve:
     """Effective degrees of freedom of the gain (Welch-Satterthwaite); infinite where the scatter is no part of it."""
     lag: float = 0.0
     """N, half the width of the hysteresis loop in its middle."""
+    remanence: float = 0.0
+    """N, half of what the zero after a load forward differs from that after one backward."""
     creep: float = 0.0
     """Relative, the most by which a long or a short hold reads otherwise than one of the calibration."""
 
     def __post_init__(self) -> None:
-        numbers = (self.zero, *self.terms, self.low, self.high, self.lag, self.creep)
+        numbers = (self.zero, *self.terms, self.low, self.high, self.lag, self.remanence, self.creep)
         cov = np.array(self.covariance, dtype=float)
         if cov.shape != (4, 4) or not (np.all(np.isfinite(cov)) and all(map(isfinite, numbers))):
             raise ValueError("a calibration's curve needs four terms, a covariance of 4 by 4, and finite numbers")
@@ -84,8 +86,9 @@ class Curve:
     def effects(self, force: Floats) -> Floats:
         """(n, q) N: columns whose outer products, summed, are the covariance of forces (n,) read with this curve.
 
-        The terms by their covariance; hysteresis and creep as what is not known of a run: each anywhere within its
-        width with the same probability, the same for all of the run.
+        The terms by their covariance; hysteresis and creep as what is not known of a run, the same for all of it: one
+        branch of the loop or the other, two values whose standard deviation is the half of what is between them, and a
+        creep anywhere within its width with the same probability.
         """
         held = np.clip(force, self.low, self.high)
         slope = np.array([self.slope(each) for each in held])
@@ -93,9 +96,10 @@ class Curve:
         values, vectors = np.linalg.eigh(np.array(self.covariance))
         root = vectors * np.sqrt(np.maximum(values, 0.0))
         share = np.abs(held) / np.where(held < 0.0, -self.low or np.inf, self.high or np.inf)
-        lag = self.lag / sqrt(3.0) * 4.0 * share * (1.0 - share) * np.sign(held)
+        lag = self.lag * 4.0 * share * (1.0 - share) * np.sign(held)
+        remanence = self.remanence * np.sign(held)
         creep = self.creep / sqrt(3.0) * force
-        out: Floats = np.column_stack([columns @ root, lag, creep])
+        out: Floats = np.column_stack([columns @ root, lag, remanence, creep])
         return out
 
     @property
@@ -114,6 +118,7 @@ class Curve:
             "range": [self.low, self.high],
             "degrees_of_freedom": self.dof if isfinite(self.dof) else None,
             "lag": self.lag,
+            "remanence": self.remanence,
             "creep": self.creep,
         }
 
@@ -134,6 +139,7 @@ def curve_of(facts: object) -> Curve:
             float(high),
             float("inf") if dof is None else float(dof),
             float(facts.get("lag", 0.0)),
+            float(facts.get("remanence", 0.0)),
             float(facts.get("creep", 0.0)),
         )
     except KeyError as error:

@@ -1,8 +1,8 @@
 """Which terms the steps of a calibration can tell, and the rows of the regression for them.
 
-reading = zero + gain F + even F^2 + odd F|F| + cubic F^3 + lag + drift t + (zero_temperature + gain_temperature F) dT
-+ creep (x - x_ref), with x the load as a slow part of the cell has followed it (`steps.crept`) and x_ref what it would
-be at the usual age of a reading under a steady load: the curve is that of readings of this age.
+reading = zero + gain F + even F^2 + odd F|F| + cubic F^3 + lag + remanence + drift t + (zero_temperature +
+gain_temperature F) dT + creep (x - x_ref), with x the load as a slow part of the cell has followed it (`steps.crept`)
+and x_ref what it would be at the usual age of a reading under a steady load: the curve is that of such readings.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.calibration.steps import Steps, crept, lag_shape, levels
+from identification.calibration.steps import Steps, crept, lag_shape, levels, side_of
 from identification.recording import Floats
 
 SPARE = 3
@@ -50,9 +50,9 @@ def terms_of(steps: Steps) -> tuple[str, ...]:
         wanted += ["even"]
     if (both or most) >= BENT:
         wanted += ["odd"] if both else ["even"]
-    lag = lag_shape(force)
+    lag = steps.of_history(lag_shape)
     if np.any(lag > 0.0) and np.any(lag < 0.0):
-        wanted += ["lag"]
+        wanted += ["lag", "remanence"] if both else ["lag"]
     known = steps.temperature[np.isfinite(steps.temperature)]
     if known.size == steps.count and float(np.ptp(known)) > WARMED:
         wanted += ["zero_temperature", "gain_temperature"]
@@ -77,14 +77,15 @@ def design_of(steps: Steps, names: tuple[str, ...], time_constant: float | None)
         "even": (share**2, 1.0 / scale**2),
         "odd": (share * np.abs(share), 1.0 / scale**2),
         "cubic": (share**3, 1.0 / scale**3),
-        "lag": (lag_shape(steps.force)[:, None] * np.ones((1, w)), 1.0),
+        "lag": (steps.of_history(lag_shape)[:, None] * np.ones((1, w)), 1.0),
+        "remanence": (steps.of_history(side_of)[:, None] * np.ones((1, w)), 1.0),
         "drift": (when, 1.0 / span),
         "zero_temperature": (warmth, 1.0),
         "gain_temperature": (warmth * share, 1.0 / scale),
     }
     columns = [shapes[name] for name in names]
     if time_constant is not None:
-        slow = crept(steps.force, steps.hung, steps.time, time_constant)
+        slow = crept(steps, time_constant)
         usual = steps.force[:, None] * -np.expm1(-steps.age / time_constant)
         columns.append(((slow - usual) / scale, 1.0 / scale))
         names = (*names, "creep")

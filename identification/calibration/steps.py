@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -29,6 +29,8 @@ class Steps:
     """(n, w) N, mean reading in it."""
     temperature: Floats
     """(n,) degC; NaN where nobody measured."""
+    unread: tuple[tuple[float, float], ...] = ()
+    """(s, N) of loads that hung and were not read: what the cell remembers of them is in the readings."""
 
     def __post_init__(self) -> None:
         n = self.force.size
@@ -66,7 +68,20 @@ class Steps:
 
     def without(self, keep: NDArray[np.bool_]) -> Steps:
         """Only the steps (n,) that are kept."""
-        return Steps(self.force[keep], self.hung[keep], self.time[keep], self.value[keep], self.temperature[keep])
+        kept = (self.force[keep], self.hung[keep], self.time[keep], self.value[keep], self.temperature[keep])
+        return Steps(*kept, self.unread)
+
+    def history(self) -> tuple[Floats, Floats, NDArray[np.int64]]:
+        """Forces (m,) and times (m,) of all loads in order, and the places (n,) of those that were read."""
+        force = np.concatenate([self.force, [load for _, load in self.unread]])
+        hung = np.concatenate([self.hung, [when for when, _ in self.unread]])
+        order = np.argsort(hung, kind="stable")
+        return force[order], hung[order], np.argsort(order, kind="stable")[: self.count]
+
+    def of_history(self, shape: Callable[[Floats], Floats]) -> Floats:
+        """(n,): a shape of the order of all loads, at those that were read."""
+        force, _, at = self.history()
+        return shape(force)[at]
 
 
 def levels(force: Floats, sign: int) -> int:
@@ -81,7 +96,8 @@ def levels(force: Floats, sign: int) -> int:
 def lag_shape(force: Floats) -> Floats:
     """(n,): +1 in the middle of a range that was reached upward, -1 downward; nothing at its ends, where loops close.
 
-    Upward is towards forward thrust; a repetition of the same load keeps the way of the one before.
+    Upward is towards forward thrust; a repetition of the same load keeps the way of the one before. The loop is that of
+    a cell that has been loaded to the end of the range before in that direction.
 
     >>> lag_shape(np.array([0.0, 5.0, 10.0, 5.0, 10.0])).tolist()
     [0.0, 1.0, 0.0, -1.0, 0.0]
@@ -97,13 +113,28 @@ def lag_shape(force: Floats) -> Floats:
     return out
 
 
-def crept(force: Floats, hung: Floats, time: Floats, time_constant: float) -> Floats:
-    """(n, w) N: what a slow part of that time constant (s) holds at `time` (n, w), of a cell that was empty before."""
+def side_of(force: Floats) -> Floats:
+    """(n,): the direction of the load, and without one that of the load before: a cell remembers what it was last.
+
+    >>> side_of(np.array([0.0, 5.0, 0.0, -5.0, 0.0])).tolist()
+    [0.0, 1.0, 1.0, -1.0, -1.0]
+    """
+    out, side = np.zeros(force.size), 0.0
+    for k, each in enumerate(force):
+        side = float(np.sign(each)) or side
+        out[k] = side
+    return out
+
+
+def crept(steps: Steps, time_constant: float) -> Floats:
+    """(n, w) N: what a slow part of that time constant (s) holds in each window, of a cell that was empty before."""
+    force, hung, at = steps.history()
     start = [0.0]
     for (load, begun), (_, next_begun) in pairwise(zip(force, hung, strict=True)):
         start.append(float(load + (start[-1] - load) * np.exp(-(next_begun - begun) / time_constant)))
-    held = force[:, None]
-    out: Floats = held + (np.array(start)[:, None] - held) * np.exp(-(time - hung[:, None]) / time_constant)
+    held = steps.force[:, None]
+    waned = np.exp(-(steps.time - steps.hung[:, None]) / time_constant)
+    out: Floats = held + (np.array(start)[at][:, None] - held) * waned
     return out
 
 
@@ -120,7 +151,9 @@ def windows_of(time: Floats, value: Floats, start: float, count: int = 2) -> tup
     return np.array([time[part].mean() for part in parts]), np.array([value[part].mean() for part in parts])
 
 
-def joined_steps(parts: Sequence[tuple[float, float, Floats, Floats, float]]) -> Steps:
+def joined_steps(
+    parts: Sequence[tuple[float, float, Floats, Floats, float]], unread: Sequence[tuple[float, float]] = ()
+) -> Steps:
     """From (force, time of loading, window times, window readings, temperature) of each step."""
     width = len(parts[0][2]) if parts else 1
     return Steps(
@@ -129,4 +162,5 @@ def joined_steps(parts: Sequence[tuple[float, float, Floats, Floats, float]]) ->
         np.array([part[2] for part in parts]).reshape(len(parts), width),
         np.array([part[3] for part in parts]).reshape(len(parts), width),
         np.array([part[4] for part in parts]),
+        tuple(unread),
     )

@@ -24,6 +24,9 @@ WRONG = 0.01
 """Probability that some step of a sound calibration is called wrong."""
 MOST_WRONG = 0.2
 """Of the steps: with more of them nobody can say which are right."""
+MATERIAL = 0.2
+"""Of the smallest weight: what is off by less was no wrong weight."""
+ROUNDS = 6
 EXHAUSTIVE = 12
 """Weights of a set up to which every combination is tried; of a larger one those with up to three pieces changed."""
 CHANGED = 3
@@ -98,9 +101,31 @@ def _seen_by(steps: Steps, kept: NDArray[np.int64], step: int, p_value: float) -
     fit = estimated(_only(steps, np.append(kept, step)))
     at = int(np.searchsorted(kept, step))
     without, spare = _without(fit)
-    gain, stated = estimated(_only(steps, kept)).value("gain"), float(steps.force[step])
-    away = float(fit.residual[at] / spare[at]) / gain
-    return WrongStep(step, stated, stated + away, float(without[at] / np.sqrt(spare[at])) / abs(gain), p_value)
+    others, stated = estimated(_only(steps, kept)), float(steps.force[step])
+    gain = others.value("gain")
+    wanted = _bent(others, stated) + float(fit.residual[at] / spare[at])
+    expected = stated
+    for _ in range(ROUNDS):  # bends are small beside the gain: each round leaves a share of them
+        expected += (wanted - _bent(others, expected)) / gain
+    return WrongStep(step, stated, expected, float(without[at] / np.sqrt(spare[at])) / abs(gain), p_value)
+
+
+def _bent(fit: Estimated, force: float) -> float:
+    """N that the curve adds to the zero."""
+    bends = fit.value("even") * force + fit.value("odd") * abs(force) + fit.value("cubic") * force**2
+    return force * (fit.value("gain") + bends)
+
+
+def doubtful_steps(
+    steps: Steps, loads: Sequence[Load], weights: Mapping[str, Weight], place: Place
+) -> tuple[WrongStep, ...]:
+    """Those that are off by so much that another weight may have hung, with the weight that it probably was.
+
+    Raises ValueError as `estimated`.
+    """
+    least = MATERIAL * min(abs(force_of(Load((name,)), weights, place)) for name in weights)
+    wrong = [each for each in wrong_steps(steps) if abs(each.expected - each.stated) > least]
+    return tuple(with_guess(each, loads[each.step], weights, place) for each in wrong)
 
 
 def with_guess(wrong: WrongStep, load: Load, weights: Mapping[str, Weight], place: Place) -> WrongStep:

@@ -20,7 +20,7 @@ from rig.calibrate.listening import listening, thrust_of
 from rig.calibrate.loads_file import LoadsPlan, load_plan
 from rig.calibrate.operator import Command, Operator, Terminal
 from rig.calibrate.result import as_json, name_in_bench, write_result
-from rig.calibrate.session import Session, Taken, doubtful, replaced, steps_of
+from rig.calibrate.session import Session, replaced, steps_of
 from rig.calibrate.text import told
 from rig.campaign.bench import Bench, build
 from rig.campaign.loading import load_bench
@@ -106,11 +106,12 @@ def calibrate_bench(asked: Asked, recorder: RecorderLink, clock: Clock) -> int:
     recording, result = stem.with_suffix(".h5"), stem.with_suffix(".json")
     stamp = fresh_stamp()
     with listening(bench, plan, recording, recorder, clock, stamp) as listener:
-        taken = Session(plan, listener, asked.operator).run()
+        session = Session(plan, listener, asked.operator)
+        taken = session.run()
     kept = {"file": recording.name, "recording_id": stamp.recording_id, "sha256": _sha256(recorder)}
-    found = answer_of(plan, taken, _quantum(bench))
+    found = answer_of(plan, session, _quantum(bench))
     asked.operator.tell("\n".join(told(found, len(taken))))
-    if wrong := doubtful(plan, taken):
+    if wrong := found.wrong:
         lines = [sentence(replaced(each, taken[each.step].index), taken[each.step].load) for each in wrong]
         asked.operator.tell("\n".join(f"WRONG          {line}" for line in lines))
         asked.operator.tell(f"no calibration was written; the readings are in {recording}")
@@ -126,16 +127,16 @@ def calibrate_bench(asked: Asked, recorder: RecorderLink, clock: Clock) -> int:
     return 0
 
 
-def answer_of(plan: LoadsPlan, taken: tuple[Taken, ...], quantum: float) -> CellCalibration:
+def answer_of(plan: LoadsPlan, session: Session, quantum: float) -> CellCalibration:
     """Raises RecordingError where the steps tell no gain."""
-    loads = [step.load for step in taken]
+    loads = [step.load for step in session.taken]
     try:
         return calibrated(
-            steps_of(taken), loads, plan.weights, plan.place,
+            steps_of(session.taken, session.unread), loads, plan.weights, plan.place,
             correlation=plan.correlation, quantum=quantum, stability=plan.about.stability,
         )  # fmt: skip
     except ValueError as error:
-        raise RecordingError(f"no calibration comes of these {len(taken)} steps: {error}") from error
+        raise RecordingError(f"no calibration comes of these {len(loads)} steps: {error}") from error
 
 
 def _stem(folder: Path, device: str, day: date) -> Path:

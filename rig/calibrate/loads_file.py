@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
@@ -121,6 +121,8 @@ class Pace:
     directions: tuple[int, ...] = (1,)
     """`[1, -1]` where the stand can be pulled both ways."""
     repetitions: int = 2
+    preloads: int = 1
+    """Times that the largest load hangs before each ladder and is not read: loops are then the same in each."""
     settle: float = 5.0
     """s at least from the loading to the reading."""
     steady: float = 0.05
@@ -133,20 +135,27 @@ class Pace:
     def __post_init__(self) -> None:
         if not self.directions or any(way not in (1, -1) for way in self.directions):
             raise ValueError(f"directions must be of 1 and -1, but are {list(self.directions)}")
-        if len(self.ladder) < 2 or self.repetitions < 1:
-            raise ValueError("a ladder needs two loads at least, and repetitions at least 1")
+        if len(self.ladder) < 2 or self.repetitions < 1 or self.preloads < 0:
+            raise ValueError("a ladder needs two loads at least, repetitions at least 1, preloads at least 0")
         if not (self.settle > 0.0 and self.hold > 0.0 and self.steady > 0.0 and self.patience >= self.settle):
             raise ValueError("settle, hold and steady must be above 0, patience not below settle")
 
-    def loads(self) -> tuple[Load, ...]:
-        """Up and down in each direction, `repetitions` times; nothing hangs twice at a turn."""
+    def loads(self) -> tuple[tuple[Load, ...], frozenset[int]]:
+        """Up and down in each direction, `repetitions` times, nothing twice at a turn; and which are not read."""
         out: list[Load] = []
+        unread: set[int] = set()
         for way in self.directions * self.repetitions:
             up = [Load(names, way) for names in self.ladder]
+            for _ in range(self.preloads):
+                unread |= {len(out), len(out) + 1}
+                out += [up[-1], up[0]]
+            if self.preloads:
+                unread.discard(len(out) - 1)  # its last load is the ladder's first
+                out.pop()
             course = [*up, *up[-2::-1]]
             same = bool(out) and out[-1].weights == course[0].weights == ()
             out += course[1:] if same else course
-        return tuple(out)
+        return tuple(out), frozenset(unread)
 
 
 @dataclass(frozen=True, slots=True)
@@ -184,7 +193,9 @@ class LoadsPlan:
     correlation: float
     pace: Pace
     hang: Hang
-    loads: tuple[Load, ...] = field(default=())
+    loads: tuple[Load, ...]
+    unread: frozenset[int]
+    """Places of the loads that hang before a ladder and are not read."""
 
     @property
     def shortest(self) -> float:
@@ -201,7 +212,7 @@ def load_plan(path: Path) -> LoadsPlan:
     weights, correlation = _weights(path, table_at(path, content, "weights"))
     pace = decode(Pace, table_at(path, content, "steps"), path, "steps")
     hang = decode(Hang, table_at(path, content, "hang", optional=True), path, "hang")
-    loads = _loads(path, pace)
+    loads, unread = _loads(path, pace)
     for name in dict.fromkeys(name for load in loads for name in load.weights):
         if name not in weights:
             raise ConfigError(f"{path}: steps.ladder hangs {name!r}, but [weights.pieces] has {', '.join(weights)}")
@@ -209,10 +220,10 @@ def load_plan(path: Path) -> LoadsPlan:
         place = where.place()
     except ValueError as error:
         raise ConfigError(f"{path}: [place]: {error}") from None
-    return LoadsPlan(path, text, about, place, weights, correlation, pace, hang, loads)
+    return LoadsPlan(path, text, about, place, weights, correlation, pace, hang, loads, unread)
 
 
-def _loads(path: Path, pace: Pace) -> tuple[Load, ...]:
+def _loads(path: Path, pace: Pace) -> tuple[tuple[Load, ...], frozenset[int]]:
     try:
         return pace.loads()
     except ValueError as error:

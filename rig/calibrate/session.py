@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.calibration.loads import Load, force_of
 from identification.calibration.steps import Steps, joined_steps, windows_of
-from identification.calibration.wrong_weight import WrongStep, sentence, with_guess, wrong_steps
+from identification.calibration.wrong_weight import WrongStep, doubtful_steps, sentence
 from identification.recording import Floats
 from rig.calibrate.listening import Listener
 from rig.calibrate.loads_file import LoadsPlan
@@ -22,8 +22,6 @@ WINDOWS = 2
 """Parts of a reading: what changes from one to the next is the creep."""
 JUDGED = 6
 """Steps from which one can be told to be wrong by the others."""
-MATERIAL = 0.2
-"""Of the smallest weight: what is off by less was no wrong weight."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +58,8 @@ class Session:
     listener: Listener
     operator: Operator
     taken: list[Taken] = field(default_factory=list)
+    unread: list[tuple[float, float]] = field(default_factory=list)
+    """s, N: when what hung that was not read."""
     kept: set[int] = field(default_factory=set)
     """Indices of steps that the operator believes though the others say otherwise."""
 
@@ -70,7 +70,7 @@ class Session:
             if self._hang(at) == "again" and at > 0:
                 self._again(at - 1)
                 continue
-            self._read(at)
+            self._take(at)
             self._judge()
             at += 1
         return tuple(self.taken)
@@ -81,18 +81,33 @@ class Session:
             prompt = "take all weights off"
         else:
             prompt = f"hang {load.said} ({force:.5g} N)" if load.weights else "take all weights off (0 N)"
+        prompt += ", only to load the cell" if at in self.plan.unread else ""
         return self.operator.hang(f"step {at + 1} of {len(self.plan.loads)}: {prompt}", load, force, self.listener.turn)
 
     def _force(self, at: int) -> float:
         return force_of(self.plan.loads[at], self.plan.weights, self.plan.place)
 
-    def _read(self, at: int) -> None:
-        pace, listener, force = self.plan.pace, self.listener, self._force(at)
-        listener.load(at, force)
+    def _take(self, at: int) -> None:
+        """Wait for what hangs, and read it unless the plan only loads the cell with it."""
+        hung, settled = self._settle(at)
+        if at in self.plan.unread:
+            self.unread.append((hung, self._force(at)))
+        else:
+            self._read(at, hung, settled=settled)
+
+    def _settle(self, at: int) -> tuple[float, bool]:
+        """S when it was hung, and whether the reading came to stand still."""
+        pace, listener = self.plan.pace, self.listener
+        listener.load(at, self._force(at))
         settling = Settling(listener.now, pace.settle, pace.steady)
         listener.heard = settling.add
         while not (settled := settling.settled(listener.now)) and listener.now - settling.hung < pace.patience:
             listener.turn()
+        listener.heard = None
+        return settling.hung, settled
+
+    def _read(self, at: int, hung: float, *, settled: bool) -> None:
+        pace, listener, force = self.plan.pace, self.listener, self._force(at)
         start = listener.now
         rows: list[tuple[float, float]] = []
         listener.heard = lambda time, value: rows.append((time, value))
@@ -105,7 +120,7 @@ class Session:
             raise DeviceError(f"{listener.device}: step {at + 1}: {error}; look at its rate") from None
         listener.step(at, start, listener.now)
         load = self.plan.loads[at]
-        found = (settling.hung, start, listener.now, times, readings, listener.temperature, settled)
+        found = (hung, start, listener.now, times, readings, listener.temperature, settled)
         self.taken.append(Taken(at, load, force, *found))
         self._tell(self.taken[-1])
 
@@ -136,11 +151,11 @@ class Session:
             self.listener.step(step.index, step.start, step.end, "void")
             self.taken.remove(step)
         self._hang(index)
-        self._read(index)
+        self._take(index)
 
     def doubtful(self) -> list[WrongStep]:
         """Of the steps so far, in order of time."""
-        return doubtful(self.plan, self.taken)
+        return doubtful(self.plan, self.taken, self.unread)
 
 
 def replaced(wrong: WrongStep, index: int) -> WrongStep:
@@ -148,25 +163,21 @@ def replaced(wrong: WrongStep, index: int) -> WrongStep:
     return WrongStep(index, wrong.stated, wrong.expected, wrong.std, wrong.p_value, wrong.probable)
 
 
-def doubtful(plan: LoadsPlan, taken: Sequence[Taken]) -> list[WrongStep]:
+def doubtful(plan: LoadsPlan, taken: Sequence[Taken], unread: Sequence[tuple[float, float]]) -> list[WrongStep]:
     """Steps, by their place in `taken`, that the others contradict by more than a share of the smallest weight."""
     if len(taken) < JUDGED or all(step.force == 0.0 for step in taken):
         return []
+    loads = [step.load for step in taken]
     try:
-        found = wrong_steps(steps_of(taken))
+        return list(doubtful_steps(steps_of(taken, unread), loads, plan.weights, plan.place))
     except ValueError:
         return []  # so far they tell no gain; the end says so if it stays
-    smallest = min(abs(force_of(Load((name,)), plan.weights, plan.place)) for name in plan.weights)
-    return [
-        with_guess(each, taken[each.step].load, plan.weights, plan.place)
-        for each in found
-        if abs(each.expected - each.stated) > MATERIAL * smallest
-    ]
 
 
-def steps_of(taken: Sequence[Taken]) -> Steps:
+def steps_of(taken: Sequence[Taken], unread: Sequence[tuple[float, float]]) -> Steps:
     """For the estimate."""
-    return joined_steps([(step.force, step.hung, step.times, step.readings, step.temperature) for step in taken])
+    parts = [(step.force, step.hung, step.times, step.readings, step.temperature) for step in taken]
+    return joined_steps(parts, unread)
 
 
 def _expected(before: Sequence[Taken], force: float) -> float:

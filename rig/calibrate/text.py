@@ -14,6 +14,7 @@ SAID = {
     "odd": "bend, mirrored",
     "cubic": "bend, cubic",
     "lag": "hysteresis, half the loop (+: up reads more)",
+    "remanence": "zero after forward less after backward, half",
     "drift": "drift of the zero",
     "zero_temperature": "zero with temperature",
     "gain_temperature": "gain with temperature",

@@ -10,7 +10,7 @@ from GTC import reporting
 from identification.calibration.answer import answered, calibrated
 from identification.calibration.loads import Forces, Load, Weight, forces_of
 from identification.calibration.model import straight_line, terms_of
-from identification.calibration.steps import Steps, lag_shape, levels, windows_of
+from identification.calibration.steps import Steps, crept, lag_shape, levels, side_of, windows_of
 from identification.calibration.wrong_weight import sentence, wrong_steps
 from tests.identification.calibration.weighed_cells import PLACE, SET, forces, loads, read
 
@@ -166,6 +166,26 @@ def test_temperature_of_gain_and_zero():
         assert abs(found.term(name).value - truth) < 4.0 * found.term(name).std < 0.8 * truth
     assert found.term("drift") is None
     assert (found.term("gain_temperature").unit, found.term("zero_temperature").unit) == ("1/K", "N/K")
+
+
+def test_a_zero_that_remembers_the_direction():
+    steps = read(np.random.default_rng(9), FORCE, lag=0.03)
+    value = steps.value + 0.05 * side_of(FORCE)[:, None]
+    found = calibrated(Steps(FORCE, steps.hung, steps.time, value, steps.temperature), COURSE, SET, PLACE)
+    assert found.term("remanence").value == pytest.approx(0.05, abs=0.004)
+    assert found.curve.remanence == pytest.approx(0.05, abs=0.004)
+    assert found.gain.low < 1.003 < found.gain.high
+
+
+def test_a_load_that_was_not_read_is_remembered():
+    """Creep of a load that hung before the first step; and the way by which the first step was reached."""
+    steps = Steps(np.array([0.0, 5.0]), np.array([20.0, 40.0]), np.array([[25.0], [50.0]]), np.zeros((2, 1)),
+                  np.full(2, np.nan), unread=((0.0, 10.0),))  # fmt: skip
+    left = 10.0 * (1.0 - np.exp(-20.0 / 8.0)) * np.exp(-5.0 / 8.0)
+    assert crept(steps, 8.0)[0, 0] == pytest.approx(left)
+    assert steps.of_history(side_of).tolist() == [1.0, 1.0]
+    assert steps.of_history(lag_shape).tolist() == [0.0, 1.0]
+    assert steps.without(np.array([False, True])).unread == ((0.0, 10.0),)
 
 
 def test_without_stated_sources_only_the_scatter_counts():

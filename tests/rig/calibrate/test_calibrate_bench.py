@@ -155,6 +155,17 @@ def test_a_step_is_read_again_when_asked(tmp_path):
     assert len(json.loads((tmp_path / RESULT).read_text())["steps"]) == 17
 
 
+def test_a_preload_is_recorded_and_not_read(tmp_path):
+    one_way = LOADS.replace("preloads = 0", "preloads = 1").replace("[1, -1]", "[1]")
+    status, hanger = weighed(tmp_path, bench_of(), loads=one_way)
+    assert status == 0
+    assert hanger.asked[0] == "step 1 of 10: hang 10kg + 5kg + 2kg (166.67 N), only to load the cell"
+    assert [step["index"] for step in json.loads((tmp_path / RESULT).read_text())["steps"]] == list(range(1, 10))
+    found = load(tmp_path / RECORDING)
+    loads = next(channel for channel in found.channels if channel.name == "force")
+    assert loads.value[0] == pytest.approx(166.67, abs=0.01)
+
+
 def test_a_cable_that_is_pulled_ends_it_with_a_sentence_and_a_whole_recording(tmp_path):
     virtual = bench_of()
     hanger = Hanger(virtual)

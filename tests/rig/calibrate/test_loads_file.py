@@ -38,7 +38,18 @@ def test_gravity_of_a_latitude(tmp_path):
 
 
 def test_the_plan_of_the_demo_can_be_used():
-    assert len(load_plan(ROOT / "benches" / "simulated" / "loads.toml").loads) == 41
+    found = load_plan(ROOT / "benches" / "simulated" / "loads.toml")
+    assert len(found.loads) == 48
+    assert found.unread == {0, 12, 24, 36}, "the largest load hangs before each ladder"
+
+
+def test_preloads_hang_before_each_ladder(tmp_path):
+    found = plan(tmp_path, LOADS.replace("preloads = 0", "preloads = 2"))
+    said = [load.said for load in found.loads]
+    most = "10kg + 5kg + 2kg"
+    assert said[:5] == [most, "no load", most, "no load", "2kg"]
+    assert said[11:16] == ["no load", f"{most} backward", "no load", f"{most} backward", "no load"]
+    assert [said[at].removesuffix(" backward") for at in sorted(found.unread)] == 2 * [most, "no load", most]
 
 
 @pytest.mark.parametrize(

@@ -35,6 +35,7 @@ lever_std = 5e-5
 ladder = [[], ["2kg"], ["5kg"], ["10kg"], ["10kg", "5kg", "2kg"]]
 directions = [1, -1]
 repetitions = 1
+preloads = 0
 settle = 1.0
 steady = 0.1
 hold = 2.0
