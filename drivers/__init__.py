@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from drivers.can_signals import signals as can_signals
+from drivers.canopen.cia401_options import Options as Cia401Options
 from drivers.canopen.cia402_options import Options as Cia402Options
 from drivers.canopen.cia404_options import Options as Cia404Options
 from drivers.extras import of_extra
@@ -67,6 +68,12 @@ class Kind:
     """Takes out of a transcript whose device it is; ValueError where that cannot be done; None: nobody knows how."""
 
 
+def _cia401() -> Callable[..., Instrument]:
+    from drivers.canopen.cia401 import Cia401
+
+    return Cia401
+
+
 def _cia402() -> Callable[..., Instrument]:
     from drivers.canopen.cia402 import Cia402
 
@@ -103,5 +110,6 @@ KINDS: dict[str, Kind] = {
     "vesc_uart": Kind(over_uart.Options, over_uart.VescUart, "serial"),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),
     "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can"),
+    "cia401": Kind(Cia401Options, of_extra("canopen", "canopen", _cia401), "can"),
     "cia404": Kind(Cia404Options, of_extra("canopen", "canopen", _cia404), "can"),
 }

@@ -41,6 +41,7 @@ from sim_devices.bench.settings import KINDS as SIMULATED
 from sim_devices.instruments import button, can_signals
 from sim_devices.instruments.canopen import cell as canopen_cell
 from sim_devices.instruments.canopen import drive as canopen_drive
+from sim_devices.instruments.canopen import output as canopen_output
 from sim_devices.instruments.modbus import cell as modbus_cell
 from sim_devices.instruments.modbus import keller, pzem, registers_device
 from sim_devices.instruments.odrive import axis as odrive
@@ -219,6 +220,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("odrive", odrive.ODriveAxis),
         ("roboteq", roboteq.Roboteq),
         ("cia402", canopen_drive.Drive402),
+        ("cia401", canopen_output.Output401),
         ("cia404", canopen_cell.Cell404),
         ("vesc", vesc.Vesc),
         ("vesc_uart", vesc.Vesc),

@@ -71,6 +71,10 @@ class CanopenNode:
         data = self._read_if_there(index, sub)
         return None if data is None else int.from_bytes(data, "little", signed=signed)
 
+    def size(self, index: int, sub: int = 0) -> int:
+        """Bytes that an object has. Raises DeviceError, LinkError."""
+        return len(self._read(index, sub))
+
     def write(self, field: Field, value: int, what: str) -> None:
         """Write an object. `what` says in the sentence what it is for. Raises DeviceError, LinkError."""
         data = value.to_bytes(field.bits // 8, "little", signed=field.signed)

@@ -9,6 +9,7 @@ from sim_devices.bench.settings import MotorOptions
 from sim_devices.instruments.can_node import CanNode
 from sim_devices.instruments.canopen import drive_options
 from sim_devices.instruments.canopen.drive import Drive402
+from sim_devices.instruments.canopen.output import Cia401Options, Output401
 from sim_devices.instruments.drive import Drive
 from sim_devices.instruments.motor_tap import MotorTap
 from sim_devices.instruments.odrive import options as odrive
@@ -59,6 +60,9 @@ def motor(options: MotorOptions, world: World, log: Log) -> Motor:
             line = VescUart(Vesc(options.controller(), supply, tap.telemetry, log))
             tap.vesc = line.vesc
             return Motor(line, serial=(line, options.port, options.baud), after_step=tap.after_step)
+        case Cia401Options():
+            output = Output401(options, supply, log)
+            return Motor(output, node=output)
         case VescOptions():
             tap = MotorTap(world, options.pole_pairs, options.vesc_id)
             vesc = tap.vesc = Vesc(options, supply, tap.telemetry, log)

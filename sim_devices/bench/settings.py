@@ -12,6 +12,7 @@ from sim_devices.instruments.button import ButtonOptions
 from sim_devices.instruments.can_signals import CanSignalsOptions
 from sim_devices.instruments.canopen.cell import Cia404Options
 from sim_devices.instruments.canopen.drive_options import Cia402Options
+from sim_devices.instruments.canopen.output import Cia401Options
 from sim_devices.instruments.modbus.keller import KellerOptions
 from sim_devices.instruments.modbus.pzem import PzemOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
@@ -47,9 +48,11 @@ SerialOptions = (
 """Of what measures, on a serial port."""
 NodeOptions = CanSignalsOptions | Cia404Options
 """Of what measures, on the CAN bus."""
-MotorOptions = MaestroOptions | ODriveOptions | RoboteqOptions | VescOptions | Cia402Options | VescUartOptions
+MotorOptions = (
+    MaestroOptions | ODriveOptions | RoboteqOptions | VescOptions | Cia402Options | Cia401Options | VescUartOptions
+)
 DeviceOptions = SerialOptions | NodeOptions | MotorOptions
-MOTORS = (MaestroOptions, ODriveOptions, RoboteqOptions, VescOptions, Cia402Options, VescUartOptions)
+MOTORS = (MaestroOptions, ODriveOptions, RoboteqOptions, VescOptions, Cia402Options, Cia401Options, VescUartOptions)
 """Those that turn the thruster."""
 NODES = (CanSignalsOptions, Cia404Options)
 """Those that measure, on the CAN bus."""
@@ -72,6 +75,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "vesc_uart": VescUartOptions,
     "vesc": VescOptions,
     "cia402": Cia402Options,
+    "cia401": Cia401Options,
     "cia404": Cia404Options,
 }
 MAX_STEP = 0.005

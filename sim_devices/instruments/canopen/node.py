@@ -41,6 +41,8 @@ class Node:
         self.state = PRE_OPERATIONAL
         self.beats, self.deaf = True, False
         """Whether it sends its heartbeat; whether it hears and says nothing."""
+        self.waits = True
+        """Whether it misses the heartbeat that it waits for."""
         self._sent: list[Pdo] = []
         self._received: list[Pdo] = []
         self._queue: list[CanFrame] = []
@@ -96,7 +98,9 @@ class Node:
         elif self._boots_at < inf:
             return []
         if t >= self._expires:
-            self._expire(t)
+            self._expires = inf
+            if self.waits:
+                self._expire(t)
         if t >= self._beat_at:
             self._beat(t)
         if self.state == OPERATIONAL:
@@ -107,7 +111,6 @@ class Node:
         return [] if self.deaf else frames
 
     def _expire(self, t: float) -> None:
-        self._expires = inf
         self.emergency(HEARTBEAT_LOST, 0x11)
         self.state = {0: PRE_OPERATIONAL, 2: STOPPED}.get(self.objects.number(0x1029, 1), self.state)
         self._lost(t)
@@ -179,7 +182,7 @@ class Node:
     def _note_heartbeat(self, node_id: int, t: float) -> None:
         """Waiting begins with the first of them (CiA 301, 7.2.8.2.2.3)."""
         awaited, time_ms = divmod(self.objects.number(0x1016, 1), 1 << 16)
-        if time_ms and node_id == awaited:
+        if self.waits and time_ms and node_id == awaited:
             self.heard, self._expires = t, t + 1e-3 * time_ms
 
     def _take_pdo(self, frame: CanFrame, t: float) -> None:
