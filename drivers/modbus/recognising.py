@@ -22,6 +22,11 @@ LEAST_TEMPERATURE = 1e-3
 """degC: a float that is smaller and not 0 is a whole number taken for a float."""
 
 
+DRIVING = frozenset((*range(0x83, 0x90), 0x9F, 0xA7, 0xA8, 0xAA, 0xFF))
+"""Bytes with which a Pololu controller takes the next ones for a set-point, a setting or a script (Maestro guide 5.c to
+5.f, Simple Motor Controller G2 guide 6.2): a frame that has one is not sent to a device that nobody knows yet."""
+
+
 def _hear(_line: Line) -> Found | None:
     """A slave says nothing by itself."""
     return None
@@ -37,7 +42,14 @@ def _read(line: Line, request: Read) -> Registers | Refusal | None:
 
     if request.address in line.mute:
         return None
-    came = line.ask(request.encode(), lambda data: reply(data) is not None)
+    frame = request.encode()
+    if DRIVING & set(frame):
+        line.withheld.append(
+            f"address {request.address} was not asked everything: {frame.hex(' ')} could drive a Pololu controller;"
+            " where you know the device, name its kind in a bench file"
+        )
+        return None
+    came = line.ask(frame, lambda data: reply(data) is not None)
     if not came:
         line.mute.add(request.address)
     return reply(came)

@@ -40,6 +40,8 @@ class Line:
         """All that came after questions at this rate."""
         self.mute: set[int] = set()
         """Addresses of a shared line that gave no byte when they were asked at this rate."""
+        self.withheld: list[str] = []
+        """What was not asked at this rate, and why."""
         settings = SerialSettings(port, rate.baud, rate.framing, capture)
         self._port: SerialPort[bytes] = SerialPort(port, settings, _as_it_is)
 
@@ -65,6 +67,7 @@ class Line:
         self._port.inbox.take_all()
         self.heard, self.heard_for, self.answers = b"", 0.0, b""
         self.mute.clear()
+        self.withheld = []
 
     def listen(self, seconds: float) -> bytes:
         """All that was heard at this rate, after another `seconds` of silence on our side."""

@@ -71,7 +71,7 @@ def look_at_port(
                 if silent and line.heard:
                     line.listen(seconds)
                 found, asked = _at_rate(line, probes if ask else [], probes, told=bool(rates))
-                tried.append(Tried(rate, line.heard, line.answers, asked))
+                tried.append(Tried(rate, line.heard, line.answers, asked, tuple(line.withheld)))
                 say(f"{port} at {rate}: {_told(tried[-1])}")
                 if found is not None:
                     return PortSeen(port, tuple(tried), found, rate)

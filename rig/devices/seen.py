@@ -18,6 +18,8 @@ class Tried(NamedTuple):
     answers: bytes
     asked: tuple[str, ...]
     """Kinds."""
+    withheld: tuple[str, ...] = ()
+    """What was not asked, and why."""
 
 
 @dataclass(frozen=True, slots=True)

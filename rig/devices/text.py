@@ -22,7 +22,7 @@ def told(seen: PortSeen | BusSeen, expected: str = "", only: bool = False) -> li
     if isinstance(seen, BusSeen):
         return _bus(seen, expected)
     if seen.found is None:
-        return [_nobody(seen, only)]
+        return [_nobody(seen, only), *dict.fromkeys(why for each in seen.tried for why in each.withheld)]
     lines = [f"{seen.port}, {seen.rate}: {seen.found.kind}", *_found(seen.found)]
     return [*lines, *_other(expected, [seen.found])]
 

@@ -31,6 +31,12 @@ from rig.operate.run import END_TIMEOUT, LOG_NAME, campaign_folder, start_contro
     help="Hold so many seconds, without a key; it starts by itself when the preflight has passed.",
 )
 @click.option("--limit", type=float, help=f"Most V commanded by hand (default: {SHARE:.0%} of bench.max_voltage).")
+@click.option(
+    "--without-proof",
+    "unproved",
+    metavar="REASON",
+    help="Leave the proof of the watchdog out, for this reason (a motor without a rotation rate).",
+)
 @click.option("--thruster", default="", help="The thruster on the bench; needed where the bench mounts by a command.")
 @click.option(
     "--output",
@@ -40,7 +46,13 @@ from rig.operate.run import END_TIMEOUT, LOG_NAME, campaign_folder, start_contro
     help="Make the run's own folder in this one.",
 )
 def jog_command(
-    bench: Path, volts: float, seconds: float | None, limit: float | None, thruster: str, output: Path
+    bench: Path,
+    volts: float,
+    seconds: float | None,
+    limit: float | None,
+    unproved: str | None,
+    thruster: str,
+    output: Path,
 ) -> int:
     """Hold VOLTS on BENCH by hand, and say which way force and rotation go.
 
@@ -55,20 +67,18 @@ def jog_command(
     if seconds is None and not sys.stdin.isatty():
         raise ConfigError("rig jog holds while a key is held, which needs a terminal; --for S holds without one")
     folder = campaign_folder(output, NAME)
-    campaign = write(folder, config, name, volts, LONGEST if seconds is None else seconds)
+    campaign = write(folder, config, name, volts, LONGEST if seconds is None else seconds, unproved)
     check_campaign(campaign)
-    click.echo(_announced(config, volts, seconds))
+    click.echo(_announced(config, volts, seconds, proved=unproved is None))
     front = _by_hand if seconds is None else progress_bar(start=True)
     last = _attend(campaign, folder, front)
     return _conclude(last, volts, config, by_hand=seconds is None)
 
 
-def _announced(bench: BenchConfig, volts: float, seconds: float | None) -> str:
+def _announced(bench: BenchConfig, volts: float, seconds: float | None, *, proved: bool) -> str:
     how = "while SPACE is held" if seconds is None else f"for {seconds:g} s"
-    return (
-        f"{volts:+g} V on {bench.name} {how}; before that the motor's own watchdog is proved at"
-        f" {bench.proof_voltage:g} V (bench.proof_voltage)"
-    )
+    proof = f"; before that the motor's own watchdog is proved at {bench.proof_voltage:g} V (bench.proof_voltage)"
+    return f"{volts:+g} V on {bench.name} {how}{proof if proved else '; its watchdog is NOT proved before'}"
 
 
 def _by_hand(peer: object, _again: str) -> Left:

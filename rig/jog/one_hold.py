@@ -25,6 +25,7 @@ bench = {bench}
 output = "."
 thrusters = [{thruster}]
 notes = "held by hand with rig jog, to see wiring and direction"
+prove_watchdog = {proved}
 
 [watch]
 off = true
@@ -69,15 +70,20 @@ def thruster_of(bench: BenchConfig, asked: str) -> str:
     return asked or NAME
 
 
-def write(folder: Path, bench: BenchConfig, thruster: str, volts: float, seconds: float) -> Path:
-    """The campaign file in `folder`."""
+def write(
+    folder: Path, bench: BenchConfig, thruster: str, volts: float, seconds: float, unproved: str | None = None
+) -> Path:
+    """The campaign file in `folder`. `unproved`: why the watchdog is not proved before."""
     text = CAMPAIGN.format(
         bench=json.dumps(str(bench.path.resolve())),
         thruster=json.dumps(thruster),
+        proved="true" if unproved is None else "false",
         volts=float(volts),
         slew=min(bench.slew, abs(volts) / RISE),
         seconds=float(seconds),
     )
+    if unproved is not None:
+        text += f'\n[overrides]\n"campaign.prove_watchdog" = {json.dumps(unproved)}\n'
     path = folder / "campaign.toml"
     path.write_text(text, encoding="utf-8")
     return path

@@ -5,12 +5,15 @@ from __future__ import annotations
 import pytest
 
 from drivers import KINDS
+from drivers.modbus.recognising import DRIVING
+from drivers.modbus.rtu import Read
 from drivers.recognition.can_traffic import CanProbe
 from drivers.recognition.serial_line import Rate, SerialProbe
 from drivers.vesc.recognising import HOST, LAST_ID
 from sim_devices.instruments.modbus.cell import ModbusCell
 from sim_devices.instruments.modbus.keller import Keller, KellerOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
+from sim_devices.instruments.pololu.maestro import Maestro, MaestroOptions
 from sim_devices.instruments.roboteq.controller import Roboteq
 from sim_devices.instruments.roboteq.options import Measured, RoboteqOptions
 from sim_devices.instruments.serial_lines.mt_sics import MtSics
@@ -27,7 +30,7 @@ class DirectLine:
     """A probe's line to a simulated device in this process; time passes by a tenth of a second a question."""
 
     def __init__(self, device) -> None:
-        self.rate, self.addresses, self.mute = Rate(9600), (1,), set()
+        self.rate, self.addresses, self.mute, self.withheld = Rate(9600), (1,), set(), []
         self.heard, self.heard_for, self.answers, self.requests = b"", 1.0, b"", []
         self._device, self.t = device, 10.0
 
@@ -112,6 +115,37 @@ def test_no_question_is_an_end_of_line_alone_or_a_command():
             probe.ask(line)
             assert all(request.strip() for request in line.requests)
             assert not any(request.startswith((b"!", b"^", b"@", b"%")) for request in line.requests)
+
+
+def maestro(said: list[str], **options) -> Maestro:
+    made = Maestro(MaestroOptions("maestro", "p", **options), 16.0, lambda event, **_: said.append(event))
+    made.feed(bytes((0x84, 0, 0x70, 0x2E)), 0.0)  # 1500 us: arms the ESC
+    return made
+
+
+@pytest.mark.parametrize("address", range(1, 248))
+def test_no_question_at_any_address_drives_a_maestro(address):
+    """Its packets begin with a byte above 7F, and what follows may be a set-point."""
+    device = maestro([], on_error="go_to", home=1500.0)
+    line = DirectLine(device)
+    line.addresses = (address,)
+    for probe in ASKING.values():
+        probe.ask(line)
+        line.t += 3.0
+        device.tick(line.t)
+        device.drive(0.0, 0.001)
+        assert not DRIVING & set(b"".join(line.requests))
+        assert device.pulse in (0.0, 1500.0)
+    if address in DRIVING:
+        assert "could drive a Pololu controller" in line.withheld[0]
+
+
+def test_a_set_point_hidden_in_an_address_would_drive_one():
+    """What the guard is there for: Modbus address 0x84 is Set Target of channel 3."""
+    device = maestro([], channel=3, min_pulse=0.0)
+    device.feed(Read(0x84, 3, 0x2E08, 2).encode()[:2] + bytes((0x2E, 0x2E)), 1.0)
+    device.tick(2.0)
+    assert device.pulse not in (0.0, 1500.0)
 
 
 def test_a_ping_to_every_identifier_moves_no_vesc():

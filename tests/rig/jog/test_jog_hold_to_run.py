@@ -8,11 +8,14 @@ from pathlib import Path
 
 import pytest
 
+from rig.campaign.loading import load_bench, load_campaign
 from rig.cli import main
 from rig.jog.held_key import FIRST, NEXT, HeldKey
 from rig.jog.hold_to_run import HoldToRun
+from rig.jog.one_hold import write
 from rig.link.front_end_messages import Check, Request, Snapshot
 from rig.link.sockets import Peer, pair
+from rig.operate.check import check_loaded
 
 READY = (Check("motor", "passed", "it is there"),)
 BENCH = Path(__file__).parents[3] / "benches" / "roboteq" / "bench.toml"
@@ -146,6 +149,17 @@ def test_the_end_of_the_terminal_ends_it(desk):
     desk.master = os.dup(desk.slave)
     desk.now += 0.03
     assert desk.tick("hold", seconds=0.03) == ["stop"]
+
+
+@pytest.mark.parametrize("unproved", [None, 'no rate, "yet"'])
+def test_the_campaign_of_a_jog_is_one_that_may_run(tmp_path, unproved):
+    bench = load_bench(BENCH)
+    report = check_loaded(load_campaign(write(tmp_path, bench, "T1", -3, 2.0, unproved)))
+    holds = [step for step in report.steps if step.phase == "hold"]
+    assert [(step.voltage, step.min_duration, step.max_duration) for step in holds] == [(-3.0, 2.0, 2.0)]
+    assert report.campaign.prove_watchdog == (unproved is None)
+    assert [each.reason for each in report.overridden] == ([] if unproved is None else [unproved])
+    assert report.campaign.plan.slew == 3.0
 
 
 @pytest.mark.parametrize(
