@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from drivers.can_signals import signals as can_signals
+from drivers.canopen import recognising as recognising_canopen
 from drivers.canopen.cia401_options import Options as Cia401Options
 from drivers.canopen.cia402_options import Options as Cia402Options
 from drivers.canopen.cia404_options import Options as Cia404Options
@@ -109,7 +110,7 @@ KINDS: dict[str, Kind] = {
     "odrive_can": Kind(ODriveOptions, ODriveCan, "can"),
     "vesc_uart": Kind(over_uart.Options, over_uart.VescUart, "serial"),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),
-    "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can"),
-    "cia401": Kind(Cia401Options, of_extra("canopen", "canopen", _cia401), "can"),
-    "cia404": Kind(Cia404Options, of_extra("canopen", "canopen", _cia404), "can"),
+    "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can", recognising_canopen.DRIVE),
+    "cia401": Kind(Cia401Options, of_extra("canopen", "canopen", _cia401), "can", recognising_canopen.OUTPUT),
+    "cia404": Kind(Cia404Options, of_extra("canopen", "canopen", _cia404), "can", recognising_canopen.CELL),
 }

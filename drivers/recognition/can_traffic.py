@@ -24,6 +24,8 @@ class Traffic:
         """(ns of arrival, frame) heard without asking."""
         self.heard_for = 0.0
         """s"""
+        self.named = False
+        """The operator has named the kind that asks now: he knows what is on the bus."""
 
     def listen(self, seconds: float) -> None:
         """Ends early when the bus is lost."""

@@ -141,6 +141,7 @@ def _on_bus(traffic: Traffic, expected: str, ask: bool) -> tuple[list[Found], tu
         alone = all(probe.owns(frame) for _, frame in traffic.frames)
         if probe.ask is not None and (alone or name == expected):
             asked.append(name)
+            traffic.named = name == expected
             found += probe.ask(traffic)
     return found, tuple(asked)
 

@@ -112,6 +112,8 @@ def _bus(seen: BusSeen, expected: str) -> list[str]:
         asked = f"nor does anybody answer ({', '.join(seen.asked)} asked)" if seen.asked else "and nothing was asked"
         lines.append(
             f"{seen.bus}: no frame is heard, {asked}. Is the bus powered and terminated at both ends (60 ohm between"
-            " CANH and CANL), and is this its bit rate? It is not searched for: a wrong one disturbs the others"
+            " CANH and CANL), and is this its bit rate? It is not searched for: a wrong one disturbs the others."
+            " A CANopen device whose heartbeat is off, as delivered, says nothing by itself: --kind cia402 (or another)"
+            " asks every node"
         )
     return [*lines, *(_other(expected, seen.found) if seen.found else [])]
