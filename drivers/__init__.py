@@ -26,6 +26,7 @@ from drivers.modbus.cell import ModbusCell
 from drivers.modbus.cell_options import Options as ModbusCellOptions
 from drivers.modbus.registers import ModbusRegisters
 from drivers.modbus.registers import Options as ModbusRegistersOptions
+from drivers.odrive import recognising as recognising_odrive
 from drivers.odrive.options import Options as ODriveOptions
 from drivers.odrive.over_can import ODriveCan
 from drivers.pololu.maestro import Maestro
@@ -49,7 +50,7 @@ from drivers.serial_lines import (
     recognising_streams,
 )
 from drivers.vesc import anonymising as anonymising_vesc
-from drivers.vesc import over_can, over_uart
+from drivers.vesc import over_can, over_uart, recognising_uart
 from drivers.vesc import recognising as recognising_vesc
 
 
@@ -103,12 +104,12 @@ KINDS: dict[str, Kind] = {
         nortek_nmea.Options, nortek_nmea.NortekNmea, "serial", recognising_streams.NORTEK, anonymising_lines.nortek
     ),
     "keller": Kind(keller.Options, keller.Keller, "serial", recognising_modbus.KELLER, anonymising_modbus.asked_values),
-    "pzem": Kind(pzem.Options, pzem.Pzem, "serial"),
+    "pzem": Kind(pzem.Options, pzem.Pzem, "serial", recognising_modbus.PZEM, anonymising_modbus.asked_values),
     "maestro": Kind(MaestroOptions, Maestro, "serial"),
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE, anonymising_roboteq.anonymise),
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
-    "odrive_can": Kind(ODriveOptions, ODriveCan, "can"),
-    "vesc_uart": Kind(over_uart.Options, over_uart.VescUart, "serial"),
+    "odrive_can": Kind(ODriveOptions, ODriveCan, "can", recognising_odrive.PROBE),
+    "vesc_uart": Kind(over_uart.Options, over_uart.VescUart, "serial", recognising_uart.PROBE),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),
     "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can", recognising_canopen.DRIVE),
     "cia401": Kind(Cia401Options, of_extra("canopen", "canopen", _cia401), "can", recognising_canopen.OUTPUT),

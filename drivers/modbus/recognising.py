@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 from drivers.force_units import NEWTONS_PER_UNIT
+from drivers.modbus import pzem
 from drivers.modbus.keller import P1, TOB1, decode_float
 from drivers.modbus.maps import RegisterMap, known_maps, load_map, span
 from drivers.modbus.maps.numbers import sane, status, weight
@@ -78,6 +79,26 @@ def _of_water(bar: float, degrees: float) -> bool:
     return inside and math.isfinite(bar) and abs(degrees) > LEAST_TEMPERATURE
 
 
+def _ask_pzem(line: Line) -> Found | None:
+    """A meter whose power is its voltage times its current."""
+    for address in line.addresses:
+        reply = _read(line, Read(address, 4, 0, pzem.REGISTERS))
+        if not isinstance(reply, Registers):
+            continue
+        volts, amps, watts, *_ = pzem.decode(reply.words)
+        alarms = set(reply.words[6:]) <= {0, 0xFFFF}
+        if volts == 0.0 or not alarms or abs(watts - volts * amps) > max(0.3, 0.02 * watts):
+            continue
+        return Found(
+            "pzem",
+            f"Peacefair PZEM DC meter, Modbus address {address}",
+            keys={"address": address},
+            settings=(f"{volts:.4g} V, {amps:.4g} A, {watts:.4g} W (its serial number is not asked for)",),
+            rate="sends nothing until it is asked; renews its values about once a second",
+        )
+    return None
+
+
 def _ask_cell(line: Line) -> Found | None:
     for address in line.addresses:
         evidence = {name: _evidence(line, address, load_map(name)) for name in known_maps()}
@@ -138,6 +159,14 @@ KELLER = SerialProbe(
     rates=RATES[:4], asks="Modbus function 3 (reads P1 and TOB1)", hear=_hear, ask=_ask_keller, order=20
 )
 """Before the cells: its floats are no weights, but its registers lie where those of a Laumas do."""
+PZEM = SerialProbe(
+    rates=(Rate(9600, "8N2"), Rate(9600)),
+    asks="Modbus function 4 (reads voltage, current, power)",
+    hear=_hear,
+    ask=_ask_pzem,
+    order=19,
+)
+"""Before the cells: its registers lie where those of a Dini Argeo do."""
 CELL = SerialProbe(
     rates=RATES, asks="Modbus functions 3 and 4 (reads the registers of each map)", hear=_hear, ask=_ask_cell, order=21
 )
