@@ -39,6 +39,8 @@ from drivers.roboteq import anonymising as anonymising_roboteq
 from drivers.roboteq import recognising as recognising_roboteq
 from drivers.roboteq.controller import Roboteq
 from drivers.roboteq.options import Options as RoboteqOptions
+from drivers.scpi.options import Options as ScpiSupplyOptions
+from drivers.scpi.supply import ScpiSupply
 from drivers.serial_lines import anonymising as anonymising_lines
 from drivers.serial_lines import (
     line_stream,
@@ -108,6 +110,7 @@ KINDS: dict[str, Kind] = {
     "maestro": Kind(MaestroOptions, Maestro, "serial"),
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE, anonymising_roboteq.anonymise),
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
+    "scpi_supply": Kind(ScpiSupplyOptions, ScpiSupply, "serial"),
     "odrive_can": Kind(ODriveOptions, ODriveCan, "can", recognising_odrive.PROBE),
     "vesc_uart": Kind(over_uart.Options, over_uart.VescUart, "serial", recognising_uart.PROBE),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),

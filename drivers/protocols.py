@@ -127,6 +127,15 @@ class MotorController(Instrument, Protocol):
         """The second way to stop, by another command than `command(0)` (current 0, disable, quick stop)."""
 
 
+@runtime_checkable
+class OneWay(Protocol):
+    """A motor controller that drives in one direction alone: its least command is not -max_voltage."""
+
+    @property
+    def min_voltage(self) -> float:
+        """V"""
+
+
 class ForceSensor(Instrument, Protocol):
     """An instrument whose first stream has a `thrust` channel."""
 

@@ -47,6 +47,7 @@ from sim_devices.instruments.modbus import keller, pzem, registers_device
 from sim_devices.instruments.odrive import axis as odrive
 from sim_devices.instruments.pololu import maestro
 from sim_devices.instruments.roboteq import controller as roboteq
+from sim_devices.instruments.scpi import supply as scpi_supply
 from sim_devices.instruments.serial_lines import hbm_aed, line_sender, loadstar, mantracourt, mt_sics, nortek
 from sim_devices.instruments.vesc import controller as vesc
 from sim_devices.vehicle.body import AXES, Body
@@ -218,6 +219,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("nortek", nortek.Nortek),
         ("keller", keller.Keller),
         ("odrive", odrive.ODriveAxis),
+        ("scpi_supply", scpi_supply.ScpiSupply),
         ("roboteq", roboteq.Roboteq),
         ("cia402", canopen_drive.Drive402),
         ("cia401", canopen_output.Output401),

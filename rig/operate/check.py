@@ -11,7 +11,7 @@ import click
 from rich.console import Console
 from rich.table import Table
 
-from drivers.protocols import Channel, Instrument, MotorController
+from drivers.protocols import Channel, Instrument, MotorController, OneWay
 from rig.campaign.bench import build
 from rig.campaign.config import BenchConfig, CampaignConfig
 from rig.campaign.disarmed import Disarmed, disarmed, require_armed
@@ -125,10 +125,22 @@ def _require_voltages(campaign: CampaignConfig, motor: MotorController) -> None:
         plan.require_within(bench.max_voltage, bench.slew, "the bench (bench.max_voltage, bench.slew)")
     except PlanError as error:
         raise PlanError(f"{campaign.path}: [plan]: {error}") from None
+    if isinstance(motor, OneWay):
+        _require_one_way(campaign, motor.min_voltage)
     if campaign.prove_watchdog and bench.proof_voltage > motor.max_voltage:
         raise ConfigError(
             f"{bench.path}: bench.proof_voltage is {bench.proof_voltage:g} V, but the motor controller {bench.motor!r} "
             f"gives at most {motor.max_voltage:g} V"
+        )
+
+
+def _require_one_way(campaign: CampaignConfig, least: float) -> None:
+    """A motor controller that gives nothing below `least` V has nothing to do in a plan that goes there."""
+    lowest = min(step.voltage - abs(step.amplitude) for step in campaign.plan)
+    if lowest < least:
+        raise PlanError(
+            f"{campaign.path}: [plan]: the plan goes down to {lowest:g} V, but the motor controller"
+            f" {campaign.bench.motor!r} gives nothing below {least:g} V: choose levels on one side"
         )
 
 

@@ -17,6 +17,7 @@ from sim_devices.instruments.odrive.axis import ODriveAxis
 from sim_devices.instruments.pololu.maestro import Maestro, MaestroOptions
 from sim_devices.instruments.roboteq.controller import Roboteq
 from sim_devices.instruments.roboteq.options import RoboteqOptions, measured
+from sim_devices.instruments.scpi import supply as scpi
 from sim_devices.instruments.serial_device import SerialDevice
 from sim_devices.instruments.vesc.controller import Vesc, VescOptions
 from sim_devices.instruments.vesc.over_uart import VescUart, VescUartOptions
@@ -63,6 +64,9 @@ def motor(options: MotorOptions, world: World, log: Log) -> Motor:
         case Cia401Options():
             output = Output401(options, supply, log)
             return Motor(output, node=output)
+        case scpi.ScpiSupplyOptions():
+            bench_supply = scpi.ScpiSupply(options, lambda: scpi.measured(world), log)
+            return Motor(bench_supply, serial=(bench_supply, options.port, options.baud))
         case VescOptions():
             tap = MotorTap(world, options.pole_pairs, options.vesc_id)
             vesc = tap.vesc = Vesc(options, supply, tap.telemetry, log)

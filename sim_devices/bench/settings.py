@@ -20,6 +20,7 @@ from sim_devices.instruments.modbus.registers_device import RegistersOptions
 from sim_devices.instruments.odrive.options import ODriveOptions
 from sim_devices.instruments.pololu.maestro import MaestroOptions
 from sim_devices.instruments.roboteq.options import RoboteqOptions
+from sim_devices.instruments.scpi.supply import ScpiSupplyOptions
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAedOptions
 from sim_devices.instruments.serial_lines.line_sender import LineOptions
 from sim_devices.instruments.serial_lines.loadstar import LoadstarOptions
@@ -49,10 +50,26 @@ SerialOptions = (
 NodeOptions = CanSignalsOptions | Cia404Options
 """Of what measures, on the CAN bus."""
 MotorOptions = (
-    MaestroOptions | ODriveOptions | RoboteqOptions | VescOptions | Cia402Options | Cia401Options | VescUartOptions
+    MaestroOptions
+    | ODriveOptions
+    | RoboteqOptions
+    | VescOptions
+    | Cia402Options
+    | Cia401Options
+    | VescUartOptions
+    | ScpiSupplyOptions
 )
 DeviceOptions = SerialOptions | NodeOptions | MotorOptions
-MOTORS = (MaestroOptions, ODriveOptions, RoboteqOptions, VescOptions, Cia402Options, Cia401Options, VescUartOptions)
+MOTORS = (
+    MaestroOptions,
+    ODriveOptions,
+    RoboteqOptions,
+    VescOptions,
+    Cia402Options,
+    Cia401Options,
+    VescUartOptions,
+    ScpiSupplyOptions,
+)
 """Those that turn the thruster."""
 NODES = (CanSignalsOptions, Cia404Options)
 """Those that measure, on the CAN bus."""
@@ -73,6 +90,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "odrive": ODriveOptions,
     "roboteq": RoboteqOptions,
     "vesc_uart": VescUartOptions,
+    "scpi_supply": ScpiSupplyOptions,
     "vesc": VescOptions,
     "cia402": Cia402Options,
     "cia401": Cia401Options,

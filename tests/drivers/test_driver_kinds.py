@@ -31,6 +31,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
         "keller": {"port": "p"},
         "roboteq": {"port": "p", "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5, "rotation": "none"},
         "can_signals": {"bus": "b", "map": str(signals)},
+        "scpi_supply": {"port": "p", "max_voltage": 24.0, "current_limit": 5.0},
         "odrive_can": {
             "bus": "b",
             "node_id": 3,
@@ -50,7 +51,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
         device = kind.build(name, kind.options(**options[name]), *bus)
         assert isinstance(device, Instrument)
         assert isinstance(device, MotorController) == (
-            name in ("cia401", "cia402", "maestro", "odrive_can", "roboteq", "vesc_can", "vesc_uart")
+            name in ("cia401", "cia402", "maestro", "odrive_can", "roboteq", "scpi_supply", "vesc_can", "vesc_uart")
         )
         assert device.drain() == []
         assert not device.health().alive

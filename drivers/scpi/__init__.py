@@ -1,0 +1,1 @@
+"""Bench supplies that speak SCPI on a serial port."""

@@ -1,0 +1,1 @@
+"""A SCPI bench supply, as it answers lines."""
