@@ -31,6 +31,8 @@ from drivers.odrive.options import Options as ODriveOptions
 from drivers.odrive.over_can import ODriveCan
 from drivers.pololu.maestro import Maestro
 from drivers.pololu.maestro_options import Options as MaestroOptions
+from drivers.pololu.smc import SmcG2
+from drivers.pololu.smc_options import Options as SmcG2Options
 from drivers.ports.transcript import Chunk
 from drivers.protocols import Instrument
 from drivers.recognition.can_traffic import CanProbe
@@ -111,6 +113,7 @@ KINDS: dict[str, Kind] = {
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE, anonymising_roboteq.anonymise),
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
     "scpi_supply": Kind(ScpiSupplyOptions, ScpiSupply, "serial"),
+    "smc_g2": Kind(SmcG2Options, SmcG2, "serial"),
     "odrive_can": Kind(ODriveOptions, ODriveCan, "can", recognising_odrive.PROBE),
     "vesc_uart": Kind(over_uart.Options, over_uart.VescUart, "serial", recognising_uart.PROBE),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),

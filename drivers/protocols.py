@@ -52,6 +52,8 @@ class Stream:
     clock_drift_std: float | None = None
     """Relative, 1 sigma: the device sends rows by a clock of its own, and its rate is known so well; None: it is asked,
     or sends when it likes."""
+    with_commands: bool = False
+    """Rows are asked with set-points alone: while nothing is commanded there are none."""
 
 
 class Sample(NamedTuple):

@@ -45,7 +45,7 @@ from sim_devices.instruments.canopen import output as canopen_output
 from sim_devices.instruments.modbus import cell as modbus_cell
 from sim_devices.instruments.modbus import keller, pzem, registers_device
 from sim_devices.instruments.odrive import axis as odrive
-from sim_devices.instruments.pololu import maestro
+from sim_devices.instruments.pololu import maestro, smc
 from sim_devices.instruments.roboteq import controller as roboteq
 from sim_devices.instruments.scpi import supply as scpi_supply
 from sim_devices.instruments.serial_lines import hbm_aed, line_sender, loadstar, mantracourt, mt_sics, nortek
@@ -210,6 +210,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("loadstar", loadstar.Loadstar),
         ("pzem", pzem.Pzem),
         ("maestro", maestro.Maestro),
+        ("smc_g2", smc.SmcG2),
         ("mantracourt_dsc", mantracourt.Mantracourt),
         ("line", line_sender.LineSender),
         ("modbus_cell", modbus_cell.ModbusCell),

@@ -10,12 +10,12 @@ turns.
 from __future__ import annotations
 
 import contextlib
-import threading
 from collections import deque
 
 from drivers.errors import DeviceError, LinkError
+from drivers.pololu.asking import Asking
 from drivers.pololu.maestro_options import MICROSECOND, QUARTERS, TIMEOUT_FLAG, Options, flags, streams
-from drivers.pololu.packets import Answer, Decoder, Record, seven_bits
+from drivers.pololu.packets import Answer, Record, seven_bits
 from drivers.ports.inbox import BadRecords
 from drivers.ports.serial_port import SerialPort, SerialSettings
 from drivers.ports.wire import Wire
@@ -26,10 +26,6 @@ GET_POSITION, GET_ERRORS, GO_HOME = 0x90, 0xA1, 0xA2
 """Compact protocol (0J40, 5.e)."""
 ANSWER_BYTES = 4
 """Position and errors."""
-PATIENCE_NS = 100_000_000
-"""After which an answer is given up."""
-UNANSWERED = 3
-"""Questions in a row without an answer: the Maestro is gone."""
 RECENT_NS = 150_000_000
 """A pulse is one that was asked for so lately: the Maestro changes it at its next period (20 ms as delivered)."""
 ASTRAY = 5
@@ -49,9 +45,9 @@ class Maestro:
         self.name = name
         self._options = options
         self._packets = options.packets
-        self._decoder, self._turn = Decoder(), threading.Lock()
+        self._asking = Asking(options.rate)
         settings = SerialSettings(options.port, options.baud, capture=options.capture)
-        self._port: SerialPort[Record] = SerialPort(name, settings, self._feed, wire)
+        self._port: SerialPort[Record] = SerialPort(name, settings, self._asking.feed, wire)
         self._reset()
 
     def _reset(self) -> None:
@@ -59,11 +55,9 @@ class Maestro:
         self._fault: str | None = None
         self._targets: deque[tuple[int, int]] = deque(maxlen=256)
         """(ns, target) of what was commanded."""
-        self._fed_ns = self._asked_ns = self._next_ns = 0
-        self._lapsed = False
-        self._astray = self._unanswered = self._disobeyed = 0
-        with self._turn:
-            self._decoder.expect(0)
+        self._fed_ns = 0
+        self._astray = self._disobeyed = 0
+        self._asking.reset()
 
     @property
     def streams(self) -> tuple[Stream, ...]:
@@ -118,7 +112,8 @@ class Maestro:
         self._require_obedience()
         now_ns = self._port.now_ns()
         silence, stated = (now_ns - self._fed_ns) * 1e-9, self._options.watchdog_timeout
-        self._lapsed = self._lapsed or silence >= EXPECTED * stated
+        if silence >= EXPECTED * stated:
+            self._asking.excuse(TIMEOUT_FLAG)
         refused = volts != 0.0 and silence >= stated
         self._send(0.0 if refused else volts, now_ns)
         if refused:
@@ -163,41 +158,22 @@ class Maestro:
 
     def _begin_question(self, now_ns: int) -> bool:
         """Whether it is time for a row, and nothing is still waited for."""
-        period = round(1e9 / self._options.rate)
-        if now_ns < self._next_ns - period // 4:
-            return False
-        with self._turn:
-            if self._decoder.waiting and now_ns - self._asked_ns < PATIENCE_NS:
-                return False
-            given_up, rest = self._decoder.waiting, self._decoder.expect(0)
-            if not given_up:
-                self._decoder.expect(ANSWER_BYTES)
-        self._next_ns = max(self._next_ns + period, now_ns)
-        if given_up:  # what comes late must not be taken for the next answer: one round is left out
-            self._bad.add(f"no answer within {PATIENCE_NS * 1e-6:.0f} ms, came {rest.hex(' ') or 'nothing'}")
-            self._unanswered += 1
-            if self._unanswered >= UNANSWERED:
-                self._fault = f"{self.name} does not answer any more: check its power and its USB cable"
-            return False
-        self._asked_ns = now_ns
-        return True
+        begun, given_up = self._asking.begin(now_ns, ANSWER_BYTES)
+        if given_up:
+            self._bad.add(given_up)
+        if self._asking.gone:
+            self._fault = f"{self.name} does not answer any more: check its power and its USB cable"
+        return begun
 
     # -- what comes --------------------------------------------------------------------------------------------------
 
-    def _feed(self, data: bytes) -> list[Record]:
-        with self._turn:
-            return self._decoder.feed(data)
-
     def _row(self, t_ns: int, position: int, errors: int) -> Sample:
-        self._unanswered = 0
-        self._judge_errors(errors)
+        self._judge_errors(errors & ~self._asking.answered())
         self._judge_position(position)
         return Sample(self.name, t_ns, (position / QUARTERS * MICROSECOND, float(errors)))
 
-    def _judge_errors(self, errors: int) -> None:
+    def _judge_errors(self, unexpected: int) -> None:
         """Any error sends the channel home, and the next set-point lets it go on: that is no run."""
-        unexpected = errors & ~TIMEOUT_FLAG if self._lapsed else errors
-        self._lapsed = False
         if unexpected:
             self._fault = (
                 f"{self.name} reports {flags(unexpected)}, and has stopped the motor for it: look at cable, CRC setting"
@@ -221,11 +197,9 @@ class Maestro:
 
     def _ask(self) -> tuple[int, int] | None:
         """Position and errors, which it forgets by that; None: no answer."""
-        with self._turn:
-            self._decoder.expect(ANSWER_BYTES)
+        self._asking.expect(ANSWER_BYTES)
         record = self._port.ask(self._question(), lambda r: isinstance(r, Answer), self._options.timeout)
-        with self._turn:
-            self._decoder.expect(0)
+        self._asking.expect(0)
         self._fed_ns = self._port.now_ns()
         if not isinstance(record, Answer):
             return None

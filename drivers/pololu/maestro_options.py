@@ -133,7 +133,7 @@ def streams(name: str, options: Options) -> tuple[Stream, ...]:
         "pulse_width", None, "s", quantum=step, description="Get Position: what the Maestro sends; 0: nothing"
     )
     flags = Channel("error_flags", None, "1", integer=True, description="Get Errors: since the row before, 0 is none")
-    return (Stream(name, "maestro", (pulse, flags), 1.0 / options.rate),)
+    return (Stream(name, "maestro", (pulse, flags), 1.0 / options.rate, with_commands=True),)
 
 
 def flags(value: int) -> str:

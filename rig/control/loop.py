@@ -241,8 +241,13 @@ class Loop:
         newest = {one.channel: self.readings.newest(one.channel) for one in self.guarded_channels}
         vitals = self._vitals(now)
         trip = guard.check(self.guarded_channels, newest, vitals, self.allowed)
-        trip = trip or self.motor_watch.trip or (self._paces.advance(vitals, samples) if self._paces else None)
+        trip = trip or self.motor_watch.trip or self._pace(vitals, samples)
         return self._told(trip)
+
+    def _pace(self, vitals: Vitals, samples: list[Sample]) -> Trip | None:
+        if self._paces is None:
+            return None
+        return self._paces.advance(vitals, samples, commanded=self._sent is not None)
 
     def _told(self, trip: Trip | None) -> Trip | None:
         """With what the machine may have done to it, which changes nothing else."""

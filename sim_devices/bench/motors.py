@@ -14,6 +14,7 @@ from sim_devices.instruments.drive import Drive
 from sim_devices.instruments.motor_tap import MotorTap
 from sim_devices.instruments.odrive import options as odrive
 from sim_devices.instruments.odrive.axis import ODriveAxis
+from sim_devices.instruments.pololu import smc
 from sim_devices.instruments.pololu.maestro import Maestro, MaestroOptions
 from sim_devices.instruments.roboteq.controller import Roboteq
 from sim_devices.instruments.roboteq.options import RoboteqOptions, measured
@@ -45,6 +46,9 @@ def motor(options: MotorOptions, world: World, log: Log) -> Motor:
         case MaestroOptions():
             pulses = Maestro(options, supply, log)
             return Motor(pulses, serial=(pulses, options.port, options.baud))
+        case smc.SmcG2Options():
+            brushed = smc.SmcG2(options, supply, lambda: smc.measured(world), log)
+            return Motor(brushed, serial=(brushed, options.port, options.baud))
         case RoboteqOptions():
             device = Roboteq(options, supply, lambda: measured(world), log)
             return Motor(device, serial=(device, options.port, options.baud))

@@ -19,6 +19,7 @@ from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.modbus.registers_device import RegistersOptions
 from sim_devices.instruments.odrive.options import ODriveOptions
 from sim_devices.instruments.pololu.maestro import MaestroOptions
+from sim_devices.instruments.pololu.smc import SmcG2Options
 from sim_devices.instruments.roboteq.options import RoboteqOptions
 from sim_devices.instruments.scpi.supply import ScpiSupplyOptions
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAedOptions
@@ -58,6 +59,7 @@ MotorOptions = (
     | Cia401Options
     | VescUartOptions
     | ScpiSupplyOptions
+    | SmcG2Options
 )
 DeviceOptions = SerialOptions | NodeOptions | MotorOptions
 MOTORS = (
@@ -69,6 +71,7 @@ MOTORS = (
     Cia401Options,
     VescUartOptions,
     ScpiSupplyOptions,
+    SmcG2Options,
 )
 """Those that turn the thruster."""
 NODES = (CanSignalsOptions, Cia404Options)
@@ -89,6 +92,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "maestro": MaestroOptions,
     "odrive": ODriveOptions,
     "roboteq": RoboteqOptions,
+    "smc_g2": SmcG2Options,
     "vesc_uart": VescUartOptions,
     "scpi_supply": ScpiSupplyOptions,
     "vesc": VescOptions,

@@ -39,6 +39,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
             "watchdog_timeout": 0.5,
             "rate_per_volt": 1.0,
         },
+        "smc_g2": {"port": "p", "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5},
         "vesc_uart": {"port": "p", "pole_pairs": 7, "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5},
         "vesc_can": {"bus": "b", "vesc_id": 1, "pole_pairs": 7, "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5},
         "cia402": {"bus": "b", "node_id": 5, "max_voltage": 24.0, "watchdog_timeout": 0.5, "rate_per_volt": 1.0},
@@ -51,7 +52,18 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
         device = kind.build(name, kind.options(**options[name]), *bus)
         assert isinstance(device, Instrument)
         assert isinstance(device, MotorController) == (
-            name in ("cia401", "cia402", "maestro", "odrive_can", "roboteq", "scpi_supply", "vesc_can", "vesc_uart")
+            name
+            in (
+                "cia401",
+                "cia402",
+                "maestro",
+                "odrive_can",
+                "roboteq",
+                "scpi_supply",
+                "smc_g2",
+                "vesc_can",
+                "vesc_uart",
+            )
         )
         assert device.drain() == []
         assert not device.health().alive
