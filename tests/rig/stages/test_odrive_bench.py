@@ -142,10 +142,21 @@ def test_an_axis_that_is_not_calibrated_ends_the_run(tmp_path):
         record_in_virtual_time(files(tmp_path), tmp_path / "run", bench(calibrated=False), ("some-id", "2026-01-01"))
 
 
+OPEN: list[CanBus] = []
+
+
+@pytest.fixture(autouse=True)
+def _buses_closed():
+    yield
+    while OPEN:
+        OPEN.pop().close()
+
+
 def driver(world: VirtualBench) -> ODriveCan:
     config = load_bench(BENCH / "bench.toml")
     bus = CanBus("slcan", "ports/can0", 250_000, wire=world.wires["bus0"])
     bus.open()
+    OPEN.append(bus)
     return ODriveCan("motor", config.devices["motor"].options, bus)
 
 
