@@ -17,6 +17,7 @@ from drivers.canopen.cia401_options import Options as Cia401Options
 from drivers.canopen.cia402_options import Options as Cia402Options
 from drivers.canopen.cia404_options import Options as Cia404Options
 from drivers.extras import of_extra
+from drivers.hbm import recognising as recognising_hbm
 from drivers.hbm.aed import HbmAed
 from drivers.hbm.options import Options as HbmAedOptions
 from drivers.modbus import anonymising as anonymising_modbus
@@ -50,6 +51,7 @@ from drivers.serial_lines import (
     mantracourt_dsc,
     mt_sics,
     nortek_nmea,
+    recognising_cells,
     recognising_mt_sics,
     recognising_streams,
 )
@@ -94,12 +96,14 @@ def _cia404() -> Callable[..., Instrument]:
 
 KINDS: dict[str, Kind] = {
     "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial", recognising_mt_sics.PROBE, anonymising_lines.mt_sics),
-    "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial"),
-    "mantracourt_dsc": Kind(mantracourt_dsc.Options, mantracourt_dsc.MantracourtDsc, "serial"),
+    "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial", recognising_hbm.PROBE),
+    "mantracourt_dsc": Kind(
+        mantracourt_dsc.Options, mantracourt_dsc.MantracourtDsc, "serial", recognising_cells.MANTRACOURT
+    ),
     "line_stream": Kind(
         line_stream.Options, line_stream.LineStream, "serial", recognising_streams.NUMBERS, anonymising_lines.numbers
     ),
-    "loadstar": Kind(loadstar.Options, loadstar.Loadstar, "serial"),
+    "loadstar": Kind(loadstar.Options, loadstar.Loadstar, "serial", recognising_cells.LOADSTAR),
     "modbus_cell": Kind(
         ModbusCellOptions, ModbusCell, "serial", recognising_modbus.CELL, anonymising_modbus.asked_values
     ),

@@ -112,3 +112,5 @@ class SerialProbe:
     """By questions that a motor controller, of this kind or another, answers without moving."""
     order: int = 0
     """Lower comes first: text before binary frames, whatever is particular before whatever takes anything."""
+    named_only: bool = False
+    """It is asked only where the operator names the kind: another kind may take its questions for commands."""

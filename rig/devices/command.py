@@ -11,7 +11,7 @@ import click
 
 from drivers import KINDS
 from drivers.ports.machine_ports import machine_ports
-from drivers.recognition.serial_line import Rate
+from drivers.recognition.serial_line import Rate, SerialProbe
 from rig.devices.bench_file import write
 from rig.devices.looking import LISTEN, can_probes, look_at_bus, look_at_port, rates_of, serial_probes, without_probe
 from rig.devices.seen import Bus, BusSeen, PortSeen
@@ -142,6 +142,9 @@ def _list_ports() -> None:
         click.echo(f"  {name:<14} {probe.asks}; {', '.join(map(str, probe.rates))}")
     for name, can in can_probes():
         click.echo(f"  {name:<14} {can.asks}")
+    for name, kind in KINDS.items():
+        if isinstance(kind.probe, SerialProbe) and kind.probe.named_only:
+            click.echo(f"  {name:<14} {kind.probe.asks}")
     click.echo(f"rates, in this order: {', '.join(map(str, rates_of(serial_probes())))}")
     if without_probe():
         click.echo(f"cannot be recognised yet: {', '.join(without_probe())}")

@@ -24,8 +24,9 @@ Say = Callable[[str], None]
 
 
 def serial_probes(first: str = "") -> list[tuple[str, SerialProbe]]:
-    """(kind, probe) in the order of asking, that of the kind `first` in front."""
-    found = [(name, kind.probe) for name, kind in KINDS.items() if isinstance(kind.probe, SerialProbe)]
+    """(kind, probe) in the order of asking, that of the kind `first` in front; some are asked only if they are that."""
+    known = ((name, kind.probe) for name, kind in KINDS.items() if isinstance(kind.probe, SerialProbe))
+    found = [(name, probe) for name, probe in known if name == first or not probe.named_only]
     return sorted(found, key=lambda pair: (pair[0] != first, pair[1].order))
 
 

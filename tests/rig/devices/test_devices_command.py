@@ -64,6 +64,18 @@ unit = "N"
 kind = "modbus_cell"
 port = "dini"
 map = "dini_argeo_dgt"
+[devices.hbm]
+kind = "hbm_aed"
+port = "hbm"
+[devices.loadstar]
+kind = "loadstar"
+port = "loadstar"
+[devices.card]
+kind = "mantracourt_dsc"
+port = "card"
+[devices.meter]
+kind = "pzem"
+port = "meter"
 """
 )
 QUICK = ("--seconds", "0.3")
@@ -94,6 +106,9 @@ def bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RunningBench]:
         ("laumas", "modbus_cell", "registers as Laumas"),
         ("seneca", "modbus_cell", "registers as Seneca"),
         ("dini", "modbus_cell", "registers as Dini Argeo"),
+        ("hbm", "hbm_aed", "HBM, AED104,1234"),
+        ("loadstar", "loadstar", "FCM DI-1000, F1234-5678"),
+        ("meter", "pzem", r"48\.?\d* V, "),
     ],
 )
 def test_each_simulated_device_is_recognised(bench, capsys, port, kind, told):
@@ -128,6 +143,14 @@ def test_a_bench_file_to_start_from(bench, tmp_path, capsys):
     capsys.readouterr()
     assert main(["devices", *QUICK, ports[0], "--write", str(file)]) == 2
     assert "exists and is not overwritten" in capsys.readouterr().err
+
+
+def test_a_kind_whose_questions_another_may_take_for_commands_is_asked_only_by_name(bench, capsys):
+    card = ["devices", *QUICK, str(bench.links / "card"), "--baud", "115200"]
+    assert main(card) == 1
+    assert "mantracourt_dsc" not in capsys.readouterr().out.replace("cannot be recognised", "")
+    assert main([*card, "--kind", "mantracourt_dsc"]) == 0
+    assert "serial number 123456" in capsys.readouterr().out
 
 
 def test_a_device_of_another_kind(bench, capsys):
