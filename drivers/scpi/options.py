@@ -91,4 +91,4 @@ def stream(name: str, options: Options) -> Stream:
         Channel("motor_voltage", "motor_voltage", "V", description="MEAS:VOLT?, at the supply's terminals"),
         Channel("current", "current", "A", description="MEAS:CURR?"),
     )
-    return Stream(name, "scpi_supply", channels, 1.0 / options.rate)
+    return Stream(name, "scpi_supply", channels, 1.0 / options.rate, with_commands=True)
