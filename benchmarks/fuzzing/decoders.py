@@ -13,11 +13,12 @@ from typing import Any
 
 import numpy as np
 
-from drivers.modbus import keller, rtu
+from drivers.modbus import keller, pzem, rtu
+from drivers.pololu import packets
 from drivers.ports.can_frame import Frame
 from drivers.roboteq import lines as roboteq_lines
-from drivers.serial_lines import line_stream, mt_sics_lines, nortek_nmea
-from drivers.vesc import can_frames
+from drivers.serial_lines import line_stream, loadstar_lines, mt_sics_lines, nortek_nmea
+from drivers.vesc import can_frames, uart_packets
 from rig.errors import LinkError
 from rig.link.framing import HEADER, decode, encode
 from rig.link.front_end_messages import Request
@@ -53,6 +54,14 @@ MODBUS = tuple(
     )
 )
 ROBOTEQ = (b"A=100:200\r", b"V=135:246:4730\r", b"BS=-3100\r", b"+\r-\r", b"FID=Roboteq v2.1\r", b"!G 1 250\r")
+LOADSTAR = (b"      2.5000\r\n", b"-0000C1\r", b" 7FFFFF\r", b"A\r\n", b"FCM DI-1000\r\n")
+VESC_UART = (
+    uart_packets.framed(bytes.fromhex("32 00 00 81 cf 013a 00fa 000004d2 00000237 00fc ffffe49c 01e1 02")),
+    uart_packets.framed(b"\0\x06\x05SIM\0" + bytes(12)),
+    uart_packets.set_duty(0.25),
+)
+POLOLU = (b"\x70\x17\x00\x00", b"\x71\x17\x20\x00\x07")
+PZEM = (struct.pack(">8H", 1254, 523, 6558, 0, 17, 0, 0, 0xFFFF),)
 REGISTERS = (b"\x3f\x80\x00\x00", b"\x7f\x80\x00\x00")
 MESSAGES = tuple(
     encode(message)
@@ -90,6 +99,18 @@ def _modbus(data: bytes) -> Any:
     return [records, decoder.unanswered()]
 
 
+def _pololu(data: bytes) -> Any:
+    """Four bytes are waited for, as behind each set-point."""
+    decoder = packets.Decoder()
+    decoder.expect(4)
+    records = decoder.feed(data)
+    return [records, [each.words for each in records if isinstance(each, packets.Answer)]]
+
+
+def _pzem(data: bytes) -> Any:
+    return pzem.decode(struct.unpack(">8H", data[:16])) if len(data) >= 16 else None
+
+
 def decoders() -> dict[str, tuple[tuple[bytes, ...], Decode, bool]]:
     """Name -> seeds, the decoder, and whether its numbers must be finite."""
     cell, flow, motor = mt_sics_lines.Decoder(), nortek_nmea.Decoder(), roboteq_lines.Decoder()
@@ -103,6 +124,10 @@ def decoders() -> dict[str, tuple[tuple[bytes, ...], Decode, bool]]:
         "Modbus RTU": (MODBUS, _modbus, True),
         "VESC on CAN": (CAN, _frame, True),
         "Roboteq": (ROBOTEQ, motor.feed, True),
+        "Loadstar": (LOADSTAR, loadstar_lines.Decoder().feed, True),
+        "VESC on UART": (VESC_UART, uart_packets.Decoder().feed, True),
+        "Pololu": (POLOLU, _pololu, True),
+        "PZEM registers": (PZEM, _pzem, True),
         "Keller registers": (REGISTERS, _registers, False),
         "frames of the sockets": (MESSAGES, _link, False),
     }
