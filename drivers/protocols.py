@@ -138,8 +138,11 @@ class OneWay(Protocol):
         """V"""
 
 
+@runtime_checkable
 class ForceSensor(Instrument, Protocol):
     """An instrument whose first stream has a `thrust` channel."""
 
     def tare(self) -> None:
-        """Zero inside the instrument. The rig prefers to tare by subtraction; this is for devices that saturate."""
+        """Zero inside the instrument. A campaign tares by subtraction; `rig calibrate` asks for this where its plan
+        says so: for a cell whose hook takes it near the end of its range. Raises LinkError, DeviceError when refused.
+        """

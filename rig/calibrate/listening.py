@@ -10,11 +10,13 @@ from math import ceil, isfinite, nan
 from pathlib import Path
 from typing import Final, NamedTuple
 
-from drivers.protocols import Sample, Stream
+from drivers.errors import DeviceError as DriverDeviceError
+from drivers.errors import LinkError as DriverLinkError
+from drivers.protocols import ForceSensor, Sample, Stream
 from rig.calibrate.loads_file import LoadsPlan
 from rig.campaign.bench import Bench
 from rig.control.clocks import Clock
-from rig.errors import ConfigError, LinkError
+from rig.errors import ConfigError, DeviceError, LinkError
 from rig.link.recorder_messages import Attribute, ChannelSpec, EventRow, Open, Outcome, StepRow, StreamSpec
 from rig.recording.recorder_link import RecorderLink
 from rig.stages.recording_header import Stamp, fresh_stamp, stream_spec
@@ -130,6 +132,8 @@ def listening(
         undo.callback(bench.close)
         for name in devices:
             bench.open_device(name)
+        if plan.about.tare:
+            _tare(bench)
         thrust = thrust_of(bench)
         listener = Listener(bench, device, thrust, thermometer, devices, recorder, clock, clock.now_ns())
         recorder.open(_opening(listener, plan, path, stamp or fresh_stamp()), clock.now_ns() * 1e-9)
@@ -141,6 +145,19 @@ def listening(
             recorder.close_file(outcome, cause)
             with contextlib.suppress(LinkError):  # what ended it is said already
                 _wait(listener, lambda: recorder.closed is not None, "the recorder to close its file")
+
+
+def _tare(bench: Bench) -> None:
+    """Raises DeviceError for a cell that can't, or does not want to, LinkError for one that is gone."""
+    cell = bench.instruments[bench.config.force]
+    if not isinstance(cell, ForceSensor):
+        raise DeviceError(f"{cell.name} can't be zeroed inside: take `tare` out of the loads file")
+    try:
+        cell.tare()
+    except DriverLinkError as error:
+        raise LinkError(str(error)) from error
+    except DriverDeviceError as error:
+        raise DeviceError(str(error)) from error
 
 
 def _wait(listener: Listener, done: Callable[[], bool], what: str) -> None:

@@ -28,6 +28,8 @@ class About:
     """From the day of the calibration on."""
     stability: float = 0.0
     """Relative standard uncertainty of what the gain does in that time, from earlier calibrations."""
+    tare: bool = False
+    """Zero inside the instrument before the first load: for a cell whose hook takes it near the end of its range."""
     thermometer: str = ""
     """`<stream>.<channel>` of the bench in degC; empty: nobody measures."""
 

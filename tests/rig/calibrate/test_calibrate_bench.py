@@ -1,16 +1,19 @@
 """`rig calibrate BENCH --loads PLAN` over real bytes: what it records, writes, says, and never sends."""
 
 import json
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from drivers.errors import DeviceError as DriverDeviceError
+from identification.thruster.thrust import fit_thrust
 from rig.campaign.bench import build
 from rig.campaign.calibrated import RAW
 from rig.campaign.loading import load_bench
-from rig.errors import ConfigError, LinkError
+from rig.cli import record_in_virtual_time
+from rig.errors import ConfigError, DeviceError, LinkError
 from rig.hdf5.load import load
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
@@ -99,6 +102,39 @@ def test_a_run_reads_through_the_curve_and_keeps_the_raw_value(done):
     assert np.mean([row.values[-1] for row in rows]) == pytest.approx(1.012 * 120.0 + 0.4, abs=0.06)
 
 
+CAMPAIGN = """
+[campaign]
+name = "after the calibration"
+bench = "bench.toml"
+thrusters = ["T2"]
+output = "out"
+[tare]
+duration = 1.0
+[plan]
+kind = "levels"
+voltages = [0.0, 10.0, -10.0, 18.0, -18.0, 0.0]
+slew = 24.0
+dwell = { kind = "fixed", duration = 3.0, settle = 1.0 }
+"""
+
+
+def test_a_campaign_on_the_calibrated_bench_is_fitted_with_its_covariance(done, tmp_path):
+    folder, *_ = done
+    for name in ("bench.toml", RESULT):
+        (tmp_path / name).write_text(re.sub(r"\[mount\]\ncommand.*\n", "", (folder / name).read_text()))
+    (tmp_path / "campaign.toml").write_text(CAMPAIGN)
+    virtual = bench_of(Cell(gain_error=0.012, zero_offset=0.4), mounted="T2")
+    path, _ = record_in_virtual_time(tmp_path / "campaign.toml", tmp_path / "run", virtual, ("id", "2026-11-27"))
+    run = load(path)
+    found = fit_thrust([run])
+    C = found.parameters["C"]
+    assert C.low < 0.3985 < C.high
+    assert 2e-5 < C.std_calibration < 2e-3 * C.value
+    assert found.cov_calibration.shape == (2, 2)
+    raw = next(channel for channel in run.channels if channel.name == f"thrust{RAW}")
+    assert np.nanmax(raw.value) == pytest.approx(1.012 * np.nanmax(run.first_of("thrust").value) + 0.4, abs=0.2)
+
+
 def test_another_cell_under_this_calibration_is_refused(done):
     folder, _, _, _, _ = done
     bench = load_bench(folder / "bench.toml")
@@ -164,6 +200,20 @@ def test_a_preload_is_recorded_and_not_read(tmp_path):
     found = load(tmp_path / RECORDING)
     loads = next(channel for channel in found.channels if channel.name == "force")
     assert loads.value[0] == pytest.approx(166.67, abs=0.01)
+
+
+def test_the_cell_is_zeroed_inside_where_the_plan_says_so(tmp_path):
+    zeroed = LOADS.replace("[place]", "tare = true\n[place]").replace("[1, -1]", "[1]")
+    status, _ = weighed(tmp_path, bench_of(Cell(zero_offset=40.0)), loads=zeroed)
+    assert status == 0
+    assert json.loads((tmp_path / RESULT).read_text())["curve"]["zero"] == pytest.approx(0.0, abs=0.3)
+
+
+def test_a_cell_that_can_not_be_zeroed_says_so(tmp_path):
+    virtual = bench_of()
+    virtual.fault("load_cell", "no_value")
+    with pytest.raises(DeviceError, match="load_cell"):
+        weighed(tmp_path, virtual, loads=LOADS.replace("[place]", "tare = true\n[place]"))
 
 
 def test_a_cable_that_is_pulled_ends_it_with_a_sentence_and_a_whole_recording(tmp_path):

@@ -83,9 +83,9 @@ class RecordingClock:
         self.bench.sleep_until_ns(t_ns)
 
 
-def bench_of(cell: Cell | None = None, effects=None, seed=1) -> VirtualBench:
+def bench_of(cell: Cell | None = None, effects=None, seed=1, mounted="T1") -> VirtualBench:
     settings = load_world(ROOT / "benches" / "simulated" / "world.toml")
-    world = replace(settings.world, cell=cell or settings.world.cell, effects=effects or {})
+    world = replace(settings.world, cell=cell or settings.world.cell, effects=effects or {}, mounted=mounted)
     made = replace(settings, world=world, seed=seed, step=0.005)
     return VirtualBench(made, Host(adapter=3e-4, work=5e-4, reader_late=2e-4, loop_late=3e-4), "bus0")
 
