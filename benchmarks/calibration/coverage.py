@@ -31,9 +31,10 @@ from benchmarks.calibration.simulated_cells import (
     read,
 )
 from identification.calibration.answer import CellCalibration, calibrated
+from identification.calibration.estimate import estimated
 from identification.calibration.loads import Load, force_of
-from identification.calibration.model import straight_line
-from identification.calibration.steps import Steps, crept, lag_shape, side_of
+from identification.calibration.model import CREEP, crept_beyond, straight_line
+from identification.calibration.steps import Steps, lag_shape, side_of
 from identification.recording import Channel, Floats, Recording, Step
 from identification.thruster.thrust import ThrustFit, fit_thrust
 from sim_devices.world import World
@@ -113,7 +114,7 @@ def _by_gtc(found: CellCalibration, steps: Steps, loads: list[Load]) -> tuple[di
             GTC.set_correlation(CORRELATION, a, b)
     per_kg = g * lever * (1 - air / rho) * (1 - 1.2 / 8000.0) / (1 - 1.2 / rho)
     force = [each.direction * per_kg * sum((masses[n] for n in each.weights), 0.0) for each in loads]
-    gain = _gain(force, steps, found)
+    gain = _gain(force, steps)
     digit = GTC.ureal(0.0, next((each.std for each in found.budget if each.name.startswith("resolution")), 0.0))
     scatter = GTC.ureal(0.0, found.budget[0].std, found.budget[0].dof)
     total = gain + digit + scatter
@@ -124,14 +125,14 @@ def _by_gtc(found: CellCalibration, steps: Steps, loads: list[Load]) -> tuple[di
     return out | {name: abs(GTC.rp.u_component(gain, each)) for name, each in single.items()}, total
 
 
-def _gain(force: list[object], steps: Steps, found: CellCalibration) -> object:
+def _gain(force: list[object], steps: Steps) -> object:
     """The straight line's slope as a sum of readings times uncertain weights: normal equations in GTC's numbers."""
     when = steps.time.mean(axis=1) / steps.time.max() - 0.5
     rows = [
         [1.0, f / 100, (f / 100) ** 2, (f / 100) * abs(f / 100), (f / 100) ** 3, w, s, d]
         for f, w, s, d in zip(force, steps.of_history(lag_shape), steps.of_history(side_of), when, strict=True)
     ]
-    y = (steps.mean - _crept(found, steps)).tolist()
+    y = (steps.mean - _crept(steps)).tolist()
     p = len(rows[0])
     square = [[sum(row[i] * row[j] for row in rows) for j in range(p)] for i in range(p)]
     right = [sum(row[i] * each for row, each in zip(rows, y, strict=True)) for i in range(p)]
@@ -147,14 +148,11 @@ def _gain(force: list[object], steps: Steps, found: CellCalibration) -> object:
     return sum(a * t / s for a, t, s in zip(line, theta[1:5], (1e2, 1e4, 1e4, 1e6), strict=True))
 
 
-def _crept(found: CellCalibration, steps: Steps) -> Floats:
+def _crept(steps: Steps) -> Floats:
     """N, (n,): what the found creep adds to the mean of each step."""
-    term = found.term("creep")
-    if term is None or found.time_constant is None:
-        return np.zeros(steps.count)
-    slow = crept(steps, found.time_constant)
-    usual = steps.force[:, None] * -np.expm1(-steps.age / found.time_constant)
-    return np.asarray(term.value * (slow - usual).mean(axis=1))
+    fit = estimated(steps)
+    both = [fit.value(name) * crept_beyond(steps, ages * steps.age).mean(axis=1) for name, ages in CREEP.items()]
+    return np.asarray(sum(both, np.zeros(steps.count)))
 
 
 def wrong_weights(runs: int) -> None:

@@ -14,15 +14,17 @@ from math import inf, isfinite, sqrt
 import numpy as np
 
 from identification.calibration.curve import TERMS, Curve
-from identification.calibration.estimate import Estimated, estimated
+from identification.calibration.estimate import Estimated, creep_time, estimated
 from identification.calibration.loads import Forces, Load, Place, Source, Weight, forces_of
-from identification.calibration.model import POWER, straight_line
+from identification.calibration.model import CREEP, POWER, straight_line
 from identification.calibration.steps import Steps
 from identification.calibration.wrong_weight import WrongStep, doubtful_steps
-from identification.estimation.tails import student_quantile, student_sf
+from identification.estimation.tails import fisher_sf, student_quantile, student_sf
 from identification.recording import Floats
 
 LEVEL = 0.95
+CREEPS = 0.01
+"""Probability that a cell without creep is said to have one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,7 +81,7 @@ class CellCalibration:
     """degC, mean; NaN where nobody measured."""
     scatter: float
     """N of one step about the curve."""
-    dof: int
+    dof: float
     residual: Floats
     """(n,) N, of the steps that are believed."""
     wrong: tuple[WrongStep, ...]
@@ -132,13 +134,14 @@ def answered(steps: Steps, forces: Forces, quantum: float = 0.0, stability: floa
     cov = fit.cov + sum((each.effect @ each.effect.T for each in sources), np.zeros_like(fit.cov))
     line = _line(fit, straight_line(low, high))
     budget = _budget(fit, line, sources)
+    creep = _creep(fit)
     gain = _gain(float(line @ fit.theta), budget)
     return CellCalibration(
-        curve=_curve(fit, cov, (low, high), gain.dof),
+        curve=_curve(fit, cov, (low, high), gain.dof, creep),
         gain=gain,
         budget=budget,
-        terms=tuple(_term(fit, cov, name) for name in fit.names),
-        time_constant=fit.time_constant,
+        terms=(*(_term(fit, cov, name) for name in fit.names if name not in CREEP), *([creep] if creep else [])),
+        time_constant=creep_time(steps) if creep and creep.p_value < CREEPS else None,
         age=steps.age,
         temperature=float(np.mean(steps.temperature)),
         scatter=fit.scatter,
@@ -196,15 +199,27 @@ def _gain(value: float, budget: Sequence[Contribution]) -> Gain:
     return Gain(value, std, value - coverage * std, value + coverage * std, coverage, dof)
 
 
-def _curve(fit: Estimated, cov: Floats, ends: tuple[float, float], dof: float) -> Curve:
+def _creep(fit: Estimated) -> TermFound | None:
+    """By how much more than at the usual age a cell reads that has been loaded for long, as a share of the load."""
+    if any(name not in fit.names for name in CREEP):
+        return None
+    at = [fit.names.index(name) for name in CREEP]
+    left = np.exp([-1.0 / ages for ages in CREEP.values()])
+    cov = fit.cov[np.ix_(at, at)]
+    ratio = float(fit.theta[at] @ np.linalg.pinv(cov) @ fit.theta[at]) / len(at)
+    p_value = float(fisher_sf(ratio, len(at), fit.dof))
+    return TermFound("creep", float(left @ fit.theta[at]), float(np.sqrt(left @ cov @ left)), "1", p_value)
+
+
+def _curve(fit: Estimated, cov: Floats, ends: tuple[float, float], dof: float, creep: TermFound | None) -> Curve:
     at = [fit.names.index(name) if name in fit.names else -1 for name in TERMS]
     full = np.array([[float(cov[i, j]) if min(i, j) >= 0 else 0.0 for j in at] for i in at])
     full = 0.5 * (full + full.T)
     gain, even, odd, cubic = (fit.value(name) for name in TERMS)
-    creep = 0.0
-    if fit.time_constant is not None:
-        left = float(np.exp(-fit.steps.age / fit.time_constant))
-        creep = abs(fit.value("creep")) * max(left, 1.0 - left)
+    width = 0.0
+    if creep is not None:
+        at_once = creep.value - sum(fit.value(name) for name in CREEP)
+        width = max(abs(creep.value), abs(at_once)) if creep.p_value < CREEPS else creep.std
     return Curve(
         fit.value("zero"),
         (gain, even, odd, cubic),
@@ -213,7 +228,7 @@ def _curve(fit: Estimated, cov: Floats, ends: tuple[float, float], dof: float) -
         dof,
         abs(fit.value("lag")),
         abs(fit.value("remanence")),
-        creep,
+        width,
     )
 
 
@@ -228,7 +243,7 @@ def _unit(name: str) -> str:
     """Of a term of a reading in N."""
     if name == "drift":
         return "N/s"
-    power = POWER.get(name, 1 if name == "creep" else 0)
+    power = POWER.get(name, 0)
     base = ("N", "1", "1/N", "1/N^2")[power]
     kelvin = {"N": "N/K", "1": "1/K"}
     return kelvin[base] if name.endswith("temperature") else base

@@ -1,9 +1,8 @@
 """Least squares of a calibration's steps: terms with the covariance of their scatter, and what a force's error does.
 
 Two kinds of rows: the mean of each step, which scatters as a load that is put on again does, and the change within a
-step, which only the noise of the readings disturbs and which alone tells the creep. The variance of each kind comes
-from its own residuals (feasible generalised least squares); the time constant of the creep is the best of a grid, and
-there is a creep only where the changes say so.
+step, which only the noise of the readings disturbs and which tells the creep. The variance of each kind comes from its
+own residuals (feasible generalised least squares).
 """
 
 from __future__ import annotations
@@ -12,13 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from identification.calibration.model import Design, design_of, terms_of
+from identification.calibration.model import CREEP, Design, crept_beyond, design_of, terms_of, with_creep
 from identification.calibration.steps import Steps
-from identification.estimation.tails import fisher_sf
 from identification.recording import Floats
 
-CREEPS = 0.01
-"""Probability that a cell without creep is said to have one."""
 TIMES = 25
 """Time constants that are tried, evenly in their logarithm, from half the time between two windows to ..."""
 LONGEST = 30.0
@@ -46,10 +42,8 @@ class Estimated:
     """(n,) of the means, 0 to 1."""
     scatter: float
     """N, standard deviation of one step's mean about the curve."""
-    dof: int
-    """Of the scatter."""
-    time_constant: float | None
-    """s of the creep; None: none is seen."""
+    dof: float
+    """Of the scatter: what the terms leave of the means."""
 
     def value(self, name: str) -> float:
         """0 for a term that is not there."""
@@ -63,31 +57,24 @@ class Estimated:
 
 def estimated(steps: Steps) -> Estimated:
     """Raises ValueError with a sentence when the steps tell no gain."""
-    names = terms_of(steps)
+    names = with_creep(steps, terms_of(steps))
     if steps.count < len(names) + 2:
         raise ValueError(f"{steps.count} steps are too few: {len(names) + 2} are needed, better twice as many")
-    creep = creep_time(steps)
-    found = _solved(steps, design_of(steps, names, creep), creep)
+    found = _solved(steps, design_of(steps, names))
     if abs(found.value("gain")) < LEAST or not np.all(np.isfinite(found.theta)):
         raise ValueError("the reading does not change with the force: is the cell connected?")
     return found
 
 
-def creep_time(steps: Steps) -> float | None:
-    """s, time constant of the creep that the changes within the steps tell; None when they tell none."""
-    if steps.time.shape[1] < 2:
-        return None
+def creep_time(steps: Steps) -> float:
+    """s, time constant that the changes within the steps tell best, of a creep that is seen."""
     change = steps.value[:, -1] - steps.value[:, 0]
     apart = float(np.median(steps.time[:, -1] - steps.time[:, 0]))
     tried = np.geomspace(0.5 * apart, LONGEST * max(steps.age, apart), TIMES)
     drift = (steps.time[:, -1] - steps.time[:, 0]) / apart  # of the zero, which is no creep
-    left = _left(drift[:, None], change)
-    sums = [_left(np.column_stack([drift, design_of(steps, (), each).changes]), change) for each in tried]
-    best, dof = int(np.argmin(sums)), steps.count - 3
-    if dof < 1 or left <= 0.0:
-        return None
-    ratio = (left - sums[best]) / 2.0 / max(sums[best] / dof, (LEAST * steps.reach) ** 2)
-    return float(tried[best]) if float(fisher_sf(ratio, 2, dof)) < CREEPS else None
+    slow = [crept_beyond(steps, each) for each in tried]
+    sums = [_left(np.column_stack([drift, each[:, -1] - each[:, 0]]), change) for each in slow]
+    return float(tried[int(np.argmin(sums))])
 
 
 def _left(columns: Floats, y: Floats) -> float:
@@ -95,17 +82,18 @@ def _left(columns: Floats, y: Floats) -> float:
     return float(np.sum((y - columns @ theta) ** 2))
 
 
-def _solved(steps: Steps, design: Design, creep: float | None) -> Estimated:
-    n, p = design.means.shape
+def _solved(steps: Steps, design: Design) -> Estimated:
+    n = steps.count
     mean, change = steps.mean, steps.value[:, -1] - steps.value[:, 0]
-    dof = n - p + (creep is not None)
-    ratio = 1.0
-    for _ in range(ROUNDS if creep is not None else 1):
-        rows = np.vstack([design.means, design.changes / ratio]) if creep is not None else design.means
-        y = np.concatenate([mean, change / ratio]) if creep is not None else mean
+    creeps, ratio = any(name in CREEP for name in design.names), 1.0
+    for _ in range(ROUNDS if creeps else 1):
+        rows = np.vstack([design.means, design.changes / ratio]) if creeps else design.means
+        y = np.concatenate([mean, change / ratio]) if creeps else mean
         inverse = np.linalg.pinv(rows)
         theta = inverse @ y
         residual = mean - design.means @ theta
+        leverage = np.clip(np.einsum("ij,ji->i", design.means, inverse[:, :n]), 0.0, 1.0)
+        dof = float(n - leverage.sum())
         scatter = max(float(np.sqrt(residual @ residual / dof)), LEAST * steps.reach)
         moved = change - design.changes @ theta
         noise = float(np.sqrt(moved @ moved / max(n - 2, 1)))
@@ -118,8 +106,7 @@ def _solved(steps: Steps, design: Design, creep: float | None) -> Estimated:
         np.asarray(scatter**2 * (inverse @ inverse.T) * np.outer(unit, unit)),
         np.asarray(inverse[:, :n] * unit[:, None]),
         residual,
-        np.clip(np.einsum("ij,ji->i", design.means, inverse[:, :n]), 0.0, 1.0),
+        leverage,
         scatter,
         dof,
-        creep,
     )

@@ -1,8 +1,10 @@
 """Which terms the steps of a calibration can tell, and the rows of the regression for them.
 
 reading = zero + gain F + even F^2 + odd F|F| + cubic F^3 + lag + remanence + drift t + (zero_temperature +
-gain_temperature F) dT + creep (x - x_ref), with x the load as a slow part of the cell has followed it (`steps.crept`)
-and x_ref what it would be at the usual age of a reading under a steady load: the curve is that of such readings.
+gain_temperature F) dT + fast (x_1 - r_1) + slow (x_2 - r_2), with x_i the load as a slow part of the cell has followed
+it (`steps.crept`) and r_i what it would be at the usual age of a reading under a steady load: the curve is that of such
+readings. Two time constants that are given, five times apart, carry a creep of any between and beyond them without a
+search, so that what is not known of it is in the covariance.
 """
 
 from __future__ import annotations
@@ -22,6 +24,8 @@ ZEROS = 3
 """Steps without a load from which a drift of the zero is asked for."""
 BENT, CUBIC = 3, 4
 """Loads of a direction from which a bend, and a second one, can be told from the scatter."""
+CREEP = {"creep_fast": 1.0, "creep_slow": 5.0}
+"""Time constants in ages of a reading."""
 POWER = {"gain": 1, "even": 2, "odd": 2, "cubic": 3, "gain_temperature": 1}
 """Of the force in each term: what its unit is made of."""
 
@@ -63,8 +67,14 @@ def terms_of(steps: Steps) -> tuple[str, ...]:
     return tuple(dict.fromkeys(wanted))[: max(steps.count - SPARE, 2)]
 
 
-def design_of(steps: Steps, names: tuple[str, ...], time_constant: float | None) -> Design:
-    """`time_constant`: s of the creep; None without one. Scaled so that every column is of the size of 1."""
+def with_creep(steps: Steps, names: tuple[str, ...]) -> tuple[str, ...]:
+    """With its terms where steps were read in two windows at least, and are enough."""
+    enough = steps.time.shape[1] > 1 and steps.count >= len(names) + len(CREEP) + SPARE
+    return (*names, *CREEP) if enough else names
+
+
+def design_of(steps: Steps, names: tuple[str, ...]) -> Design:
+    """Scaled so that every column is of the size of 1."""
     scale, w = steps.reach, steps.time.shape[1]
     share = (steps.force / scale)[:, None] * np.ones((1, w))
     span = max(float(steps.time.max() - steps.time.min()), 1.0)
@@ -83,14 +93,17 @@ def design_of(steps: Steps, names: tuple[str, ...], time_constant: float | None)
         "zero_temperature": (warmth, 1.0),
         "gain_temperature": (warmth * share, 1.0 / scale),
     }
+    for name, ages in CREEP.items():
+        shapes[name] = (crept_beyond(steps, ages * steps.age) / scale, 1.0 / scale)
     columns = [shapes[name] for name in names]
-    if time_constant is not None:
-        slow = crept(steps, time_constant)
-        usual = steps.force[:, None] * -np.expm1(-steps.age / time_constant)
-        columns.append(((slow - usual) / scale, 1.0 / scale))
-        names = (*names, "creep")
     rows = np.stack([column for column, _ in columns], axis=2)
     return Design(names, rows.mean(axis=1), rows[:, -1] - rows[:, 0], np.array([unit for _, unit in columns]))
+
+
+def crept_beyond(steps: Steps, time_constant: float) -> Floats:
+    """(n, w) N: by how much a slow part holds more than under a load that has always been there, at the usual age."""
+    usual = steps.force[:, None] * -np.expm1(-steps.age / time_constant)
+    return np.asarray(crept(steps, time_constant) - usual)
 
 
 def straight_line(low: float, high: float) -> Floats:

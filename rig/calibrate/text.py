@@ -18,7 +18,7 @@ SAID = {
     "drift": "drift of the zero",
     "zero_temperature": "zero with temperature",
     "gain_temperature": "gain with temperature",
-    "creep": "creep",
+    "creep": "creep of a long hold, beyond that of the steps",
 }
 
 
@@ -32,11 +32,10 @@ def told(found: CellCalibration, steps: int) -> Iterator[str]:
     for term in found.terms:
         if term.name in SAID:
             seen = "" if term.p_value < SEEN else "   (not seen)"
-            extra = f", time constant {found.time_constant:.3g} s" if term.name == "creep" else ""
+            seen_creep = term.name == "creep" and found.time_constant is not None
+            extra = f", time constant about {found.time_constant:.2g} s" if seen_creep else ""
             yield f"  {SAID[term.name]:<45} {term.value:+.3g} +- {term.std:.2g} {term.unit}{extra}{seen}"
-    if found.time_constant is None:
-        yield "  creep: none is seen within the steps"
-    yield f"scatter        {found.scatter:.3g} N of one load put on again ({found.dof} degrees of freedom)"
+    yield f"scatter        {found.scatter:.3g} N of one load put on again ({found.dof:.3g} degrees of freedom)"
     yield "budget of the gain"
     total = gain.std**2
     for each in sorted(found.budget, key=lambda one: -one.std):
