@@ -25,15 +25,13 @@ WRONG = 0.01
 MOST_WRONG = 0.2
 """Of the steps: with more of them nobody can say which are right."""
 MATERIAL = 0.2
-"""Of the smallest weight: what is off by less was no wrong weight."""
+"""Of the smallest weight: what is off by less was no wrong weight, and a sum of weights that is so near is meant."""
 ROUNDS = 6
 EXHAUSTIVE = 12
 """Weights of a set up to which every combination is tried; of a larger one those with up to three pieces changed."""
 CHANGED = 3
 WITHIN = 4.0
 """Standard deviations within which a combination explains the reading."""
-LEAST_WITHIN = 0.004
-"""Of the force: a sum of weights that is so near is meant, whatever the scatter."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +58,11 @@ def wrong_steps(steps: Steps) -> tuple[WrongStep, ...]:
     found: list[tuple[int, float]] = []
     while len(found) < max(int(MOST_WRONG * steps.count), 1):
         try:
-            fit = estimated(_only(steps, kept))
+            worst = _worst(estimated(_only(steps, kept)))
         except ValueError:
             if not found:
                 raise
             break
-        worst = _worst(fit)
         if worst is None:
             break
         found.append((int(kept[worst[0]]), worst[1]))
@@ -77,22 +74,20 @@ def _only(steps: Steps, kept: NDArray[np.int64]) -> Steps:
     return steps.without(np.isin(np.arange(steps.count), kept))
 
 
-def _without(fit: Estimated) -> tuple[Floats, Floats]:
-    """(n,) scatter in N by the other steps, and share of its own residual that each step leaves."""
-    spare = np.maximum(1.0 - fit.leverage, 1e-9)
-    squares = fit.scatter**2 * fit.dof - fit.residual**2 / spare
-    floor = (1e-9 * fit.steps.reach) ** 2
-    return np.sqrt(np.maximum(squares / max(fit.dof - 1, 1), floor)), spare
+def _spare(fit: Estimated) -> Floats:
+    """(n,): share of its own residual that each step leaves."""
+    return np.maximum(1.0 - fit.leverage, 1e-9)
 
 
 def _worst(fit: Estimated) -> tuple[int, float] | None:
-    """Step and p-value of the one that is wrong; None when all go together."""
-    without, spare = _without(fit)
-    studentised: Floats = np.where(spare > 1e-6, np.abs(fit.residual) / (without * np.sqrt(spare)), 0.0)
-    step = int(np.argmax(studentised))
-    if fit.dof < 2:
+    """Step and p-value of the one that is wrong; None when all go together. Raises ValueError as `estimated`."""
+    spare = _spare(fit)
+    size: Floats = np.where(spare > 1e-6, np.abs(fit.residual) / np.sqrt(spare), 0.0)
+    step = int(np.argmax(size))
+    others = estimated(fit.steps.without(np.arange(fit.steps.count) != step))
+    if others.dof < 1.0:
         return None
-    p_value = min(fit.steps.count * 2.0 * float(student_sf(float(studentised[step]), fit.dof - 1)), 1.0)
+    p_value = min(fit.steps.count * 2.0 * float(student_sf(float(size[step]) / others.scatter, others.dof)), 1.0)
     return (step, p_value) if p_value < WRONG else None
 
 
@@ -100,14 +95,14 @@ def _seen_by(steps: Steps, kept: NDArray[np.int64], step: int, p_value: float) -
     """What the steps that are kept expect of this one."""
     fit = estimated(_only(steps, np.append(kept, step)))
     at = int(np.searchsorted(kept, step))
-    without, spare = _without(fit)
+    spare = float(_spare(fit)[at])
     others, stated = estimated(_only(steps, kept)), float(steps.force[step])
     gain = others.value("gain")
-    wanted = _bent(others, stated) + float(fit.residual[at] / spare[at])
+    wanted = _bent(others, stated) + float(fit.residual[at]) / spare
     expected = stated
     for _ in range(ROUNDS):  # bends are small beside the gain: each round leaves a share of them
         expected += (wanted - _bent(others, expected)) / gain
-    return WrongStep(step, stated, expected, float(without[at] / np.sqrt(spare[at])) / abs(gain), p_value)
+    return WrongStep(step, stated, expected, others.scatter / np.sqrt(spare) / abs(gain), p_value)
 
 
 def _bent(fit: Estimated, force: float) -> float:
@@ -123,14 +118,19 @@ def doubtful_steps(
 
     Raises ValueError as `estimated`.
     """
-    least = MATERIAL * min(abs(force_of(Load((name,)), weights, place)) for name in weights)
+    least = _material(weights, place)
     wrong = [each for each in wrong_steps(steps) if abs(each.expected - each.stated) > least]
     return tuple(with_guess(each, loads[each.step], weights, place) for each in wrong)
 
 
+def _material(weights: Mapping[str, Weight], place: Place) -> float:
+    """N"""
+    return MATERIAL * min(abs(force_of(Load((name,)), weights, place)) for name in weights)
+
+
 def with_guess(wrong: WrongStep, load: Load, weights: Mapping[str, Weight], place: Place) -> WrongStep:
     """With the combination of the set that goes with the reading and changes least of what was stated."""
-    reach = max(WITHIN * wrong.std, LEAST_WITHIN * abs(wrong.expected))
+    reach = max(WITHIN * wrong.std, _material(weights, place))
     best: tuple[int, float, Load] | None = None
     for other in _others(load, tuple(weights)):
         away = abs(force_of(other, weights, place) - wrong.expected)
