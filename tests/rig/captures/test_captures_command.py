@@ -63,7 +63,29 @@ map = "laumas"
 rate = 10.0
 unit = "kg"
 decimals = 3
+[devices.hbm]
+kind = "hbm_aed"
+port = "ports/hbm"
+framing = "8N1"
+rate = 25.0
+top_rate = 100.0
+nominal_force = 500.0
+[devices.loadstar]
+kind = "loadstar"
+port = "ports/loadstar"
+baud = 230400
+rate = 575.0
+[devices.card]
+kind = "mantracourt_dsc"
+port = "ports/card"
+rate = 50.0
+unit = "N"
+[devices.meter]
+kind = "pzem"
+port = "ports/meter"
 """
+FIRST_ROWS = 9
+"""Of three streams, in which the voltage may not be known yet."""
 VESC = """
 [can.bus0]
 interface = "slcan"
@@ -99,7 +121,10 @@ def vesc_bench(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
         yield folder / "bench.toml"
 
 
-@pytest.mark.parametrize("device", ["load_cell", "motor", "flow", "thermometer", "counts", "laumas", "VESC"])
+@pytest.mark.parametrize(
+    "device",
+    ["load_cell", "motor", "flow", "thermometer", "counts", "laumas", "hbm", "loadstar", "card", "meter", "VESC"],
+)
 def test_what_is_captured_is_played_to_the_bit(request, tmp_path, device):
     path = request.getfixturevalue("vesc_bench" if device == "VESC" else "bench")
     config, name = load_bench(path), "motor" if device == "VESC" else device
@@ -110,10 +135,13 @@ def test_what_is_captured_is_played_to_the_bit(request, tmp_path, device):
     describe(file, Description(config.devices[name].kind, name, bitrate=500_000, options=options))
     assert main(["replay", str(file), "--rows", str(tmp_path / "rows")]) == 0
     played = (tmp_path / "rows").read_text(encoding="ascii")
-    if device == "motor":  # its two rounds of questions are put in an order of their own: which row is first may differ
-        assert set(exact(taken.rows).splitlines()) <= set(played.splitlines())
+    live = exact(taken.rows).splitlines(keepends=True)
+    if device == "motor":  # its two rounds of questions have no order among them
+        assert set(live) <= set(played.splitlines(keepends=True))
+    elif device == "VESC":  # the replay may begin with a frame more: it was written before the driver listened
+        assert "".join(live[FIRST_ROWS:]) in played
     else:
-        assert played.startswith(exact(taken.rows))
+        assert played.startswith("".join(live))
 
 
 def test_the_command_writes_bytes_and_description_and_drives_no_motor(bench, tmp_path, capsys):
