@@ -23,7 +23,7 @@ LEAST_TEMPERATURE = 1e-3
 """degC: a float that is smaller and not 0 is a whole number taken for a float."""
 
 
-DRIVING = frozenset((*range(0x83, 0x90), 0x9F, 0xA7, 0xA8, 0xAA, 0xFF))
+DRIVING = frozenset((*range(0x83, 0x90), 0x92, 0x9F, 0xA2, 0xA7, 0xA8, 0xAA, 0xFF))
 """Bytes with which a Pololu controller takes the next ones for a set-point, a setting or a script (Maestro guide 5.c to
 5.f, Simple Motor Controller G2 guide 6.2): a frame that has one is not sent to a device that nobody knows yet."""
 

@@ -15,6 +15,8 @@ from sim_devices.instruments.modbus.keller import Keller, KellerOptions
 from sim_devices.instruments.modbus.pzem import Pzem, PzemOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
 from sim_devices.instruments.pololu.maestro import Maestro, MaestroOptions
+from sim_devices.instruments.pololu.smc import Measured as SmcMeasured
+from sim_devices.instruments.pololu.smc import SmcG2, SmcG2Options
 from sim_devices.instruments.roboteq.controller import Roboteq
 from sim_devices.instruments.roboteq.options import Measured, RoboteqOptions
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAed, HbmAedOptions
@@ -149,6 +151,20 @@ def test_no_question_at_any_address_drives_a_maestro(address):
         assert device.pulse in (0.0, 1500.0)
     if address in DRIVING:
         assert "could drive a Pololu controller" in line.withheld[0]
+
+
+@pytest.mark.parametrize("address", [1, 2, 64, 127, 131, 133, 134, 247])
+def test_no_question_drives_a_simple_motor_controller(address):
+    """It has left its safe-start, so that the next set-point would be obeyed."""
+    device = SmcG2(SmcG2Options("smc_g2", "p"), 24.0, SmcMeasured, lambda *_, **__: None)
+    device.feed(bytes((0x83, 0x85, 0, 0)), 0.0)
+    line = DirectLine(device)
+    line.addresses = (address,)
+    for probe in ASKING.values():
+        probe.ask(line)
+        device.tick(line.t)
+        device.drive(0.0, 0.001)
+        assert device.speed == 0
 
 
 def test_a_set_point_hidden_in_an_address_would_drive_one():
