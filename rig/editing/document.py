@@ -52,7 +52,7 @@ class Document:
         new = tomlkit.parse(f"value = {toml}\n")["value"]
         table = _table(document, key[:-1], tomlkit.table)
         old = table.get(key[-1])
-        if isinstance(old, Array) and isinstance(new, Array):
+        if isinstance(old, Array) and isinstance(new, Array) and "\n" in old.as_string():
             _change_items(old, list(new))
         else:
             table[key[-1]] = new
