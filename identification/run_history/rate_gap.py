@@ -2,7 +2,9 @@
 
 The noise would hide a coupling of the thrust to the rate. What is left of the gap is any curve of the driver, and
 beside it what wanders: a share of the driver, or an amount, whichever foretells the rate better. A gap that changes
-from row to row, as that of a rotor that lags, is no wandering: it is taken as it was measured, or over few rows.
+from row to row, as that of a rotor that lags, is no wandering: it is taken as it was measured, or over few rows. While
+the command moves, a reading says when it was taken rather than how far off the rate is: where holds are long enough
+only they are asked.
 """
 
 from __future__ import annotations
@@ -11,6 +13,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed
@@ -23,6 +26,8 @@ NODES, ROWS_A_NODE = 17, 50
 LEAST_ROWS = 8
 SLOW = 4
 """Rows on either side that foretell a row best, where what is seen wanders."""
+HELD_SHARE = 0.5
+"""Of the rows, at rest between two commands: fewer are not all that is known of the gap."""
 REACHES = (1, 2, 4, 8, 16, 32, 64, 128)
 """Rows on either side."""
 
@@ -34,10 +39,12 @@ class RateGap:
     smoother: Smoother
     nodes: Floats
     by_share: bool
+    asked: NDArray[np.bool_]
+    """(m,) rows of the rate that it is found on."""
 
     def calmed(self, gap: Floats, history: History) -> Floats:
         """(M,) of a gap (m,) at the rows of the rate."""
-        c, wandering = self.smoother(gap, history.middle)
+        c, wandering = self.smoother(gap[self.asked], history.middle)
         out = spline(history.driver, self.nodes, c, 1)
         return out + (history.driver * wandering if self.by_share else wandering)
 
@@ -48,11 +55,13 @@ def rate_gap(history: History) -> RateGap | None:
     if history.static or history.rate is None or history.rate_sampled is None or rows.size < LEAST_ROWS:
         return None
     driver = driver_at_rate(history)
+    gap = without_ticks(history.rate[rows] / history.rate_per_driver - driver, history)
+    asked = held_rows(driver, gap)
+    driver, gap, rows = driver[asked], gap[asked], rows[asked]
     nodes = np.unique(np.quantile(driver, np.linspace(0.0, 1.0, min(NODES, max(rows.size // ROWS_A_NODE, 2)))))
     if nodes.size < 2:
         return None
     columns = spline(driver, nodes, np.eye(nodes.size), 1)
-    gap = without_ticks(history.rate[rows] / history.rate_per_driver - driver, history)
     left = gap - columns @ np.linalg.lstsq(columns, gap, rcond=1e-10)[0]
     one = np.ones_like(gap)
     by_share = running(left, driver).error < running(left, one).error
@@ -60,7 +69,16 @@ def rate_gap(history: History) -> RateGap | None:
         return None
     count = one if history.rate_count is None else history.rate_count[rows].astype(np.float64)
     smoother = Smoother(history.rate_sampled[rows], columns, driver if by_share else one, count, gap)
-    return None if smoother.law is None else RateGap(smoother, nodes, by_share)
+    return None if smoother.law is None else RateGap(smoother, nodes, by_share, asked)
+
+
+def held_rows(driver: Floats, gap: Floats) -> NDArray[np.bool_]:
+    """(m,) rows between which the driver moves by less than the rate's noise; all where these are too few."""
+    step = np.abs(np.diff(driver))
+    moves = np.maximum(np.append(step, 0.0), np.append(0.0, step)) / np.sqrt(12)  # of an instant anywhere between two
+    noise = float(np.median(np.abs(gap[1:-1] - 0.5 * (gap[2:] + gap[:-2])))) / (0.6745 * np.sqrt(1.5))
+    held: NDArray[np.bool_] = moves <= noise
+    return held if np.count_nonzero(held) >= max(HELD_SHARE * held.size, LEAST_ROWS) else np.ones_like(held)
 
 
 def driver_at_rate(history: History) -> Floats:

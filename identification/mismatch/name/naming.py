@@ -132,7 +132,8 @@ def _raw_effect(now: Fit, terms: tuple[Term, ...], data: Data) -> list[Floats]:
 
 def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[Term, tuple[str, ...]]:
     """Two shapes on one static curve that explain nearly the same, but for a little that one repairs of the other: the
-    curve has neither shape, and one that is not in the catalogue would do as well.
+    curve has neither shape, and one that is not in the catalogue would do as well. One that alone leaves far less than
+    the other alone is not doubted for the little that the other repairs.
 
     `less`: the fit without each term.
     """
@@ -149,7 +150,9 @@ def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[
             and max(adds) < (1 - policy.name.REPAIRED_ALONE_SHARE) * together
         ):
             share = 100 * (1 - max(adds) / together)
-            for term, beside in ((one, other), (other, one)):
+            for term, beside, own, others in ((one, other, *adds), (other, one, *reversed(adds))):
+                if own > policy.name.CLEARLY_BETTER_ALONE * others:
+                    continue  # the other alone leaves so many times what this one alone leaves
                 told = (
                     f"{beside.id.replace('_', ' ')} by itself does {share:.0f} % of what both do, and neither does all"
                 )

@@ -106,19 +106,27 @@ class Line:
         return wave_of(self.parts, run, time, angle)
 
 
+Band = tuple[float, float]
+"""Hz."""
+
+
 def find_lines(
-    runs: Sequence[Series], *, turns_unit: Literal["rev", "V s"] = "rev", ring: Ring | None = None
+    runs: Sequence[Series],
+    *,
+    turns_unit: Literal["rev", "V s"] = "rev",
+    ring: Ring | None = None,
+    skipped: Sequence[Band] = (),
 ) -> tuple[Line, ...]:
     """Every line in the residuals of one thruster's runs, the most significant first.
 
     `Series.turns`: see `turned`. Rotor-locked lines are searched where all runs have them; where the rotor stands
-    still they are silent. `ring`: of a stand that is known to ring. Runs of fewer than LINE_SAMPLES samples are left
-    out.
+    still they are silent. `ring`: of a stand that is known to ring. `skipped`: where no line of one frequency is looked
+    for. Runs of fewer than LINE_SAMPLES samples are left out.
     """
     left = [finite(r) for r in runs]
     found: list[Line] = []
     while len(found) < policy.periodic.LINES:
-        best = _best(left, turns_unit, ring)
+        best = _best(left, turns_unit, ring, skipped)
         if best is None:
             break
         found.append(_placed(best, left))
@@ -141,12 +149,14 @@ def _placed(line: Line, runs: Sequence[Series]) -> Line:
     return replace(line, band=(max(float(low) - resolution, 0.0), float(high) + resolution), power=power)
 
 
-def _best(runs: Sequence[Series], unit: Literal["rev", "V s"], ring: Ring | None) -> Line | None:
+def _best(
+    runs: Sequence[Series], unit: Literal["rev", "V s"], ring: Ring | None, skipped: Sequence[Band]
+) -> Line | None:
     alarm = policy.periodic.LINE_FALSE_ALARM
     long = [(i, r) for i, r in enumerate(runs) if r.time.size >= policy.periodic.LINE_SAMPLES]
     if not long:
         return None
-    fixed = _fixed(long)
+    fixed = _fixed(long, skipped)
     locked = None
     if all(r.turns is not None for _, r in long):
         share = policy.periodic.LOCKED_LINE_SHARE
@@ -163,7 +173,7 @@ def _best(runs: Sequence[Series], unit: Literal["rev", "V s"], ring: Ring | None
     return replace(better, rival=other) if better.gain - other.gain < policy.periodic.LINE_KINDS_CHI2 else better
 
 
-def _fixed(runs: Sequence[tuple[int, Series]]) -> Line | None:
+def _fixed(runs: Sequence[tuple[int, Series]], skipped: Sequence[Band] = ()) -> Line | None:
     """The most significant line of one frequency."""
     alarm = policy.periodic.LINE_FALSE_ALARM
     spacings = [spacing_of(r.time) for _, r in runs]
@@ -174,6 +184,8 @@ def _fixed(runs: Sequence[tuple[int, Series]]) -> Line | None:
     ratio = np.mean([s.power / s.noise for s in spectra], axis=0)
     first = int(np.ceil(max(policy.periodic.LOWEST_LINE, policy.periodic.LINE_PERIODS / max(spans)) / step))
     ratio[:first] = 0.0
+    for low, high in skipped:
+        ratio[max(int(np.floor(low / step)), 0) : int(np.ceil(high / step)) + 1] = 0.0
     trials = float(np.sum([np.sqrt(4 * np.pi * np.var(r.time)) for _, r in runs])) * (0.5 / spacing)
     for _ in range(TRIED):
         at = int(np.argmax(ratio))

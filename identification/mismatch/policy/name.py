@@ -71,6 +71,14 @@ REPAIRED_ALONE_SHARE = Threshold(
         "and neither is told."
     ),
 )
+CLEARLY_BETTER_ALONE = Threshold(
+    20.0,
+    unit="ratio of chi-squares",
+    reason=(
+        "Of two shapes on one static curve, each of which alone does nearly all, the one that leaves so many times less "
+        "has the curve's shape, and the other repairs a little of it."
+    ),
+)
 RUNS_DIFFER_P = Threshold(
     1e-3,
     unit="probability",

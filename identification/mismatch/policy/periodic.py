@@ -257,3 +257,27 @@ HIGHEST_BAND_QUALITY = Threshold(
     unit="1",
     reason="A peak that is sharper is a line, or rings for longer than a run.",
 )
+EQUAL_HOLDS = Count(
+    8,
+    unit="holds",
+    reason="Fewer repeat too seldom to make lines that stand above the noise beside them.",
+)
+HOLD_DIFFERENCE = Threshold(
+    0.02,
+    unit="share of the median hold",
+    reason="Ticks of the command and stamps differ by less; holds that differ by more do not add up over tens of them.",
+)
+EQUAL_HOLDS_SHARE = Threshold(
+    0.75,
+    unit="share of the holds",
+    reason="A plan keeps its rhythm although some levels come twice in a row, and rests are longer.",
+)
+PLAN_HARMONICS = Count(
+    30,
+    unit="multiples of the rate of steps",
+    reason=(
+        "What is left a thirtieth of a hold after each step is the last that makes such lines; mains and blade pass "
+        "lie above it."
+    ),
+    evidence="A cell behind a low pass of 10 ms, steps every 3 s: lines told at 1, 1.333, 1.667 and 2 Hz.",
+)

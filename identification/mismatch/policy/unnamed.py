@@ -115,3 +115,15 @@ TOLD_SIGMA = Threshold(
     unit="sigma",
     reason="Both amounts have errors of their own.",
 )
+FOLLOWED_NOISE = Threshold(
+    0.1,
+    unit="chi-square a sample, in units of what is left",
+    reason=(
+        "Terms without a name that took more than this of every sample did not follow noise: a residual that is large "
+        "everywhere has no place that stands out of draws of itself."
+    ),
+    evidence=(
+        "A motor that loses 60 % in its winding, without rate: 3.3 N of a winding loss and an exponent were called "
+        "noise beside 0.09 N (tests/identification/mismatch/unnamed/test_large_everywhere.py)."
+    ),
+)

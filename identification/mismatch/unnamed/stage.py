@@ -24,7 +24,7 @@ from identification.mismatch.unnamed.confirmed import not_standing
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
 from identification.mismatch.unnamed.refuted import refuted, without_refuted
-from identification.mismatch.unnamed.shares import any_curve, mended, mostly_right, scores_alone, with_shares
+from identification.mismatch.unnamed.shares import mended, mostly_right, scores_alone, with_shares
 from identification.mismatch.validate.prediction import predicting, predicts
 from identification.mismatch.validate.stage import Validated
 from identification.mismatch.validate.train_test_split import TrainTestSplit
@@ -75,11 +75,14 @@ class _Without:
 
     bare: Estimate
     left: ResidualStructure
+    taken: float = 0.0
+    """Chi-square a sample that those terms took, in units of what is left with them."""
 
     @property
     def nothing(self) -> bool:
-        """Whether no more is left than noise leaves."""
-        return self.left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM
+        """Whether no more is left than noise leaves: without a place, and no more in size."""
+        placeless = self.left.p_value >= policy.locate.RESIDUAL_FALSE_ALARM
+        return placeless and self.taken <= policy.unnamed.FOLLOWED_NOISE
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -165,7 +168,7 @@ def _shaped(
     again = partial(extend, now, selected.before, data, over, split=split, rng=rng)
     flexible = again(told.unearned)
     best = min(split.judge(split.estimate.fit).rmse, np.inf if flexible is None else flexible.held)
-    mostly = mostly_right(split, told.unearned if located.structured else any_curve(told.unearned), best)
+    mostly = mostly_right(split, told.unearned, best)
     if mostly.right:  # back: a free shape is for what they leave
         unearned = tuple(n for n in told.unearned if n not in mostly.right)
         without = _without(now, data, unearned, rng)
@@ -205,7 +208,8 @@ def _by_names(
 
 def _without(after: Estimate, data: Data, unearned: Sequence[Named], rng: np.random.Generator) -> _Without:
     bare = replace(after, fit=fit(*after.fit.less(*(n.term for n in unearned)), data, after.weights))
-    return _Without(bare, residual_structure(bare.fit, data, after.weights, rng))
+    taken = bare.fit.chi2 / after.fit.chi2 - 1.0
+    return _Without(bare, residual_structure(bare.fit, data, after.weights, rng), taken)
 
 
 def _standing(
