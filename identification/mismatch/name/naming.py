@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -150,7 +150,7 @@ def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[
             and max(adds) < (1 - policy.name.REPAIRED_ALONE_SHARE) * together
         ):
             share = 100 * (1 - max(adds) / together)
-            for term, beside, own, others in ((one, other, *adds), (other, one, *reversed(adds))):
+            for (term, own), (beside, others) in permutations(zip((one, other), adds, strict=True)):
                 if own > policy.name.CLEARLY_BETTER_ALONE * others:
                     continue  # the other alone leaves so many times what this one alone leaves
                 told = (

@@ -1,10 +1,12 @@
 """The rhythm of a plan: what a model leaves after each of many equal holds comes again as a comb of lines.
 
-Of steps every T s the residual repeats with them, so that its spectrum has lines at k / T that no disturbance makes. A
-true line there can't be told from them, and is left where it is.
+Of steps every T s the residual repeats with them: its spectrum has lines at k / T that no disturbance makes. One
+line there may be a true one; where there are several none can be told from them.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -24,3 +26,8 @@ def of_the_plan(history: History) -> tuple[tuple[float, float], ...]:
         return ()
     width = 1.0 / float(history.edges[-1] - history.edges[0])
     return tuple((k / period - width, k / period + width) for k in range(1, policy.periodic.PLAN_HARMONICS + 1))
+
+
+def within(frequency: float, bands: Sequence[tuple[float, float]]) -> bool:
+    """Whether a frequency in Hz lies in one of these bands."""
+    return any(low <= frequency <= high for low, high in bands)

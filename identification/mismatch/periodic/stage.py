@@ -19,7 +19,7 @@ from identification.mismatch.model.model import acting
 from identification.mismatch.noise.rounding_error import rounding_wave
 from identification.mismatch.periodic.full_rate import scale_std_of, series_of, with_scale
 from identification.mismatch.periodic.periodic_disturbances import Line, find_lines
-from identification.mismatch.periodic.plan_rhythm import of_the_plan
+from identification.mismatch.periodic.plan_rhythm import of_the_plan, within
 from identification.mismatch.periodic.resonances import find_bands
 from identification.mismatch.periodic.spectrum import Series
 from identification.recording import Floats
@@ -66,8 +66,10 @@ def _lines(fitted: Fit, data: Data, series: Sequence[Series]) -> tuple[Line, ...
     has_rate = all("rotation_rate" in (h.driver_quantity, *h.others) for h in data.histories)
     unit: Literal["rev", "V s"] = "rev" if has_rate else "V s"
     least = max(_of_rounding(s, h) for s, h in zip(series, data.histories, strict=True))
+    found = find_lines(series, turns_unit=unit, ring=_ring(fitted, data))
     plan = [band for h in data.histories for band in of_the_plan(h)]
-    found = find_lines(series, turns_unit=unit, ring=_ring(fitted, data), skipped=plan)
+    if sum(line.kind == "fixed" and within(line.frequency, plan) for line in found) > 1:  # one may be there by chance
+        found = find_lines(series, turns_unit=unit, ring=_ring(fitted, data), skipped=plan)
     lines = tuple(line for line in found if line.shown_amplitude > least)
     if not lines or not data.with_rate:
         return lines

@@ -75,8 +75,8 @@ CLEARLY_BETTER_ALONE = Threshold(
     20.0,
     unit="ratio of chi-squares",
     reason=(
-        "Of two shapes on one static curve, each of which alone does nearly all, the one that leaves so many times less "
-        "has the curve's shape, and the other repairs a little of it."
+        "Of two shapes on one static curve, each of which alone does nearly all, the one that leaves so many times "
+        "less has the curve's shape, and the other repairs a little of it."
     ),
 )
 RUNS_DIFFER_P = Threshold(

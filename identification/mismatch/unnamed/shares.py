@@ -115,10 +115,10 @@ def only_repairs(unearned: Sequence[Named]) -> tuple[Named, ...]:
     return tuple(n for n in unearned if all(c.kind == "repair" for c in n.checks if c.failed))
 
 
-def any_curve(unearned: Sequence[Named]) -> tuple[Named, ...]:
-    """Names that failed nothing but that with others on the same curve they make any: what one of them makes of it by
-    itself can still be said."""
-    return tuple(n for n in unearned if all(c.kind == "any_curve" for c in n.checks if c.failed))
+def nearly_right(unearned: Sequence[Named]) -> tuple[Named, ...]:
+    """Names that failed nothing but that with others on the same curve they make any, or that a parameter is not quite
+    the same everywhere: what one of them makes of it by itself can still be said."""
+    return tuple(n for n in unearned if all(c.kind in ("any_curve", "constant") for c in n.checks if c.failed))
 
 
 def repairs(named: Named) -> bool:

@@ -24,7 +24,7 @@ from identification.mismatch.unnamed.confirmed import not_standing
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
 from identification.mismatch.unnamed.refuted import refuted, without_refuted
-from identification.mismatch.unnamed.shares import mended, mostly_right, scores_alone, with_shares
+from identification.mismatch.unnamed.shares import mended, mostly_right, nearly_right, scores_alone, with_shares
 from identification.mismatch.validate.prediction import predicting, predicts
 from identification.mismatch.validate.stage import Validated
 from identification.mismatch.validate.train_test_split import TrainTestSplit
@@ -168,7 +168,7 @@ def _shaped(
     again = partial(extend, now, selected.before, data, over, split=split, rng=rng)
     flexible = again(told.unearned)
     best = min(split.judge(split.estimate.fit).rmse, np.inf if flexible is None else flexible.held)
-    mostly = mostly_right(split, told.unearned, best)
+    mostly = mostly_right(split, told.unearned if located.structured else nearly_right(told.unearned), best)
     if mostly.right:  # back: a free shape is for what they leave
         unearned = tuple(n for n in told.unearned if n not in mostly.right)
         without = _without(now, data, unearned, rng)

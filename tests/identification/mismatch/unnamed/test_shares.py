@@ -6,9 +6,9 @@ import pytest
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.name.naming import Check, name
 from identification.mismatch.unnamed.shares import (
-    any_curve,
     mended,
     mostly_right,
+    nearly_right,
     needed,
     only_repairs,
     scores_alone,
@@ -109,9 +109,11 @@ def test_of_two_shapes_that_repair_each_other_one_is_said():
 
 def test_of_shapes_that_with_others_make_any_curve_each_may_still_be_asked_what_it_makes():
     _, named = doubted(("any_curve", "any_curve"))
-    assert any_curve(named) == tuple(named)
+    assert nearly_right(named) == tuple(named)
     assert all(mended(n) for n in named), "its value means something without the others alone"
-    assert any_curve([n.asked(Check("possible", "its values", "no")) for n in named]) == ()
+    assert nearly_right([n.asked(Check("possible", "its values", "no")) for n in named]) == ()
     _, named = doubted((SHAPE, SHAPE))
-    assert any_curve(named) == ()
+    assert nearly_right(named) == ()
     assert not any(mended(n) for n in named)
+    _, named = doubted(("constant", "any_curve"))
+    assert nearly_right(named) == tuple(named)
