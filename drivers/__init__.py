@@ -16,6 +16,7 @@ from drivers.canopen import recognising as recognising_canopen
 from drivers.canopen.cia401_options import Options as Cia401Options
 from drivers.canopen.cia402_options import Options as Cia402Options
 from drivers.canopen.cia404_options import Options as Cia404Options
+from drivers.dronecan.options import Options as DronecanEscOptions
 from drivers.extras import of_extra
 from drivers.hbm import recognising as recognising_hbm
 from drivers.hbm.aed import HbmAed
@@ -88,6 +89,12 @@ def _cia402() -> Callable[..., Instrument]:
     return Cia402
 
 
+def _dronecan_esc() -> Callable[..., Instrument]:
+    from drivers.dronecan.esc import DronecanEsc
+
+    return DronecanEsc
+
+
 def _cia404() -> Callable[..., Instrument]:
     from drivers.canopen.cia404 import Cia404
 
@@ -121,6 +128,7 @@ KINDS: dict[str, Kind] = {
     "odrive_can": Kind(ODriveOptions, ODriveCan, "can", recognising_odrive.PROBE),
     "vesc_uart": Kind(over_uart.Options, over_uart.VescUart, "serial", recognising_uart.PROBE),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),
+    "dronecan_esc": Kind(DronecanEscOptions, of_extra("dronecan", "dronecan", _dronecan_esc), "can"),
     "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can", recognising_canopen.DRIVE),
     "cia401": Kind(Cia401Options, of_extra("canopen", "canopen", _cia401), "can", recognising_canopen.OUTPUT),
     "cia404": Kind(Cia404Options, of_extra("canopen", "canopen", _cia404), "can", recognising_canopen.CELL),

@@ -42,6 +42,7 @@ from sim_devices.instruments import button, can_signals
 from sim_devices.instruments.canopen import cell as canopen_cell
 from sim_devices.instruments.canopen import drive as canopen_drive
 from sim_devices.instruments.canopen import output as canopen_output
+from sim_devices.instruments.dronecan import esc as dronecan
 from sim_devices.instruments.modbus import cell as modbus_cell
 from sim_devices.instruments.modbus import keller, pzem, registers_device
 from sim_devices.instruments.odrive import axis as odrive
@@ -219,6 +220,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("button", button.Button),
         ("nortek", nortek.Nortek),
         ("keller", keller.Keller),
+        ("dronecan_esc", dronecan.DronecanEsc),
         ("odrive", odrive.ODriveAxis),
         ("scpi_supply", scpi_supply.ScpiSupply),
         ("roboteq", roboteq.Roboteq),

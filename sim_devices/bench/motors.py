@@ -11,6 +11,8 @@ from sim_devices.instruments.canopen import drive_options
 from sim_devices.instruments.canopen.drive import Drive402
 from sim_devices.instruments.canopen.output import Cia401Options, Output401
 from sim_devices.instruments.drive import Drive
+from sim_devices.instruments.dronecan import options as dronecan
+from sim_devices.instruments.dronecan.esc import DronecanEsc
 from sim_devices.instruments.motor_tap import MotorTap
 from sim_devices.instruments.odrive import options as odrive
 from sim_devices.instruments.odrive.axis import ODriveAxis
@@ -60,6 +62,10 @@ def motor(options: MotorOptions, world: World, log: Log) -> Motor:
             gain, seen = lambda: world.state.rate_per_volt, lambda: odrive.measured(world)
             axis = ODriveAxis(options, supply, gain, seen, log)
             return Motor(axis, node=axis)
+        case dronecan.DronecanEscOptions():
+            gain, told = lambda: world.state.rate_per_volt, lambda: dronecan.measured(world, options.current)
+            esc = DronecanEsc(options, supply, gain, told, log)
+            return Motor(esc, node=esc)
         case VescUartOptions():
             tap = MotorTap(world, options.pole_pairs, options.vesc_id)
             line = VescUart(Vesc(options.controller(), supply, tap.telemetry, log))

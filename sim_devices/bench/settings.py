@@ -13,6 +13,7 @@ from sim_devices.instruments.can_signals import CanSignalsOptions
 from sim_devices.instruments.canopen.cell import Cia404Options
 from sim_devices.instruments.canopen.drive_options import Cia402Options
 from sim_devices.instruments.canopen.output import Cia401Options
+from sim_devices.instruments.dronecan.options import DronecanEscOptions
 from sim_devices.instruments.modbus.keller import KellerOptions
 from sim_devices.instruments.modbus.pzem import PzemOptions
 from sim_devices.instruments.modbus.registers import ModbusCellOptions
@@ -52,6 +53,7 @@ NodeOptions = CanSignalsOptions | Cia404Options
 """Of what measures, on the CAN bus."""
 MotorOptions = (
     MaestroOptions
+    | DronecanEscOptions
     | ODriveOptions
     | RoboteqOptions
     | VescOptions
@@ -64,6 +66,7 @@ MotorOptions = (
 DeviceOptions = SerialOptions | NodeOptions | MotorOptions
 MOTORS = (
     MaestroOptions,
+    DronecanEscOptions,
     ODriveOptions,
     RoboteqOptions,
     VescOptions,
@@ -90,6 +93,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "modbus_registers": RegistersOptions,
     "can_signals": CanSignalsOptions,
     "maestro": MaestroOptions,
+    "dronecan_esc": DronecanEscOptions,
     "odrive": ODriveOptions,
     "roboteq": RoboteqOptions,
     "smc_g2": SmcG2Options,

@@ -32,6 +32,13 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
         "roboteq": {"port": "p", "nominal_bus_voltage": 48.0, "watchdog_timeout": 0.5, "rotation": "none"},
         "can_signals": {"bus": "b", "map": str(signals)},
         "scpi_supply": {"port": "p", "max_voltage": 24.0, "current_limit": 5.0},
+        "dronecan_esc": {
+            "bus": "b",
+            "node_id": 42,
+            "max_voltage": 24.0,
+            "full_voltage": 48.0,
+            "watchdog_timeout": 0.5,
+        },
         "odrive_can": {
             "bus": "b",
             "node_id": 3,
@@ -57,6 +64,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
                 "cia401",
                 "cia402",
                 "maestro",
+                "dronecan_esc",
                 "odrive_can",
                 "roboteq",
                 "scpi_supply",

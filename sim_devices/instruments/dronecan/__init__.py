@@ -1,0 +1,1 @@
+"""An ESC, as it talks DroneCAN (UAVCAN v0)."""
