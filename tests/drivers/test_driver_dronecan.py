@@ -464,7 +464,8 @@ def test_conflicts_on_the_bus(esc, motor, value, node, words):
 def test_other_escs_are_no_conflict(esc, motor):
     esc.extra += [(uavcan.equipment.esc.Status(esc_index=1), 43), (uavcan.equipment.esc.Status(esc_index=1), NODE)]
     esc.extra.append((uavcan.protocol.NodeStatus(health=3), 43))
-    collect(motor, 20)
+    rows = collect(motor, 20)
+    assert {row.values[1] for row in rows if row.stream == "motor"} == {48.0}, "those of the other index are not ours"
     assert motor.health().alive
 
 
