@@ -120,6 +120,11 @@ class HeldOutRmse:
         plainly = self.after > policy.validate.GROWN_RATIO * self.before
         return plainly or (self.after > self.before and self.growth_p < policy.validate.GROWN_P)
 
+    @property
+    def beyond_noise(self) -> bool:
+        """Whether the model's error on what was not fitted is so far above the noise that it explains too little."""
+        return self.noise > 0 and self.after > policy.validate.EXPLAINED_NOISE * self.noise
+
 
 @dataclass(frozen=True, slots=True)
 class PlanStep:

@@ -98,7 +98,8 @@ class Remainder:
     """RMSE per sample on what was not fitted, without the flexible terms, N."""
     formula: FormulaFound | None = None
     unpredictive: bool = False
-    """Whether nothing is left in what was fitted, but the model of it predicts what was not fitted worse."""
+    """Whether nothing is left in what was fitted, but the model of it predicts what was not fitted worse, or far from
+    as well as noise allows."""
 
     @property
     def told(self) -> NDArray[np.bool_]:

@@ -34,8 +34,8 @@ def decided(
     mismatch: Sequence[Mismatch] = (),
     unit: str = "N",
 ) -> Verdict:
-    """Unexplained where something is left, or where what was found predicts unfitted data worse than the baseline;
-    ambiguous where a finding has a rival that does as well; else explained.
+    """Unexplained where something is left, or where what was found predicts unfitted data worse than the baseline or
+    far from as well as noise allows; ambiguous where a finding has a rival that does as well; else explained.
 
     `mismatch`: where the baseline fails, the clearest place first; `unit`: of the errors.
     """
@@ -47,6 +47,8 @@ def decided(
         return Unexplained(known, unpredictive(wrong, held, mismatch, unit), experiment)
     if not findings:
         return Adequate()
+    if held.beyond_noise and _of_the_model(findings):
+        return Unexplained(findings, beyond_noise(held, mismatch, unit), experiment)
     if any(rival.bic_loss < policy.select.RIVALS_EQUAL_BIC for finding in findings for rival in finding.rivals):
         return Ambiguous(findings, experiment)
     return Explained(findings)
@@ -54,7 +56,21 @@ def decided(
 
 def refuted(findings: tuple[Finding, ...], held: HeldOutRmse) -> tuple[Finding, ...]:
     """Findings of the model, where it predicts unfitted data worse than the baseline does."""
-    return tuple(f for f in findings if f.effect not in NOT_OF_THE_MODEL) if held.grown else ()
+    return _of_the_model(findings) if held.grown else ()
+
+
+def _of_the_model(findings: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    return tuple(f for f in findings if f.effect not in NOT_OF_THE_MODEL)
+
+
+def beyond_noise(held: HeldOutRmse, mismatch: Sequence[Mismatch], unit: str = "N") -> Remainder:
+    """What the baseline lacks, of which what was found makes too little."""
+    place = mismatch[0] if mismatch else Mismatch("thrust", NOWHERE, 1.0, 1.0, "")
+    says = (
+        f"Something is left that shows on data that were not fitted: {held.after:.3g} {unit} there, "
+        f"{held.after / held.noise:.2g} times the {held.noise:.3g} {unit} of noise alone."
+    )
+    return Remainder(place.where, place.share, place.p_value, (), says, (), unpredictive=True)
 
 
 def unpredictive(

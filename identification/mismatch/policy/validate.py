@@ -46,6 +46,18 @@ GROWN_RATIO = Threshold(
         "compared: a parameter too many costs some thousandths."
     ),
 )
+EXPLAINED_NOISE = Threshold(
+    3.0,
+    unit="ratio of RMSE on what was not fitted to the noise of a sample",
+    reason=(
+        "An error of so many times the noise is no noise, whatever law of slow noise or of noise after steps the "
+        "fitted samples were judged by: it is not explained."
+    ),
+    evidence=(
+        "docs/proof.md: of 50 cases of the bench the largest ratio of an answer that is right and alone is 1.7; "
+        "benchmarks/diagnosis/small_motor.py: wrong `explained` answers had 6.4 and 45."
+    ),
+)
 LEAST_BLOCKS = Count(
     4,
     unit="blocks of time",

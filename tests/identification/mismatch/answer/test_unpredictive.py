@@ -26,7 +26,7 @@ from tests.identification.diagnosed_runs import NOISE
 from tests.identification.mismatch.answer.answered import SWEEP, UNEVEN, finding
 from tests.identification.mismatch.small import history, known_noise, placed, rng, selected, short
 
-GROWN = HeldOutRmse(1.0, 1.2, 0.2, "blocks of time", 1e-4)
+GROWN = HeldOutRmse(1.0, 1.2, 0.5, "blocks of time", 1e-4)
 A_LITTLE = replace(GROWN, after=1.04)
 PLACE = Mismatch("thrust", Where("command_voltage", -1.0, 1.0, "V"), 0.7, 1e-9, "70 % lies there.")
 
@@ -55,6 +55,18 @@ def test_what_is_no_part_of_the_model_stays_a_finding():
 @pytest.mark.parametrize("held", [replace(A_LITTLE, growth_p=0.02), *(replace(GROWN, after=x) for x in (0.9, 1.0))])
 def test_a_growth_that_chance_makes_changes_nothing(held):
     assert isinstance(decided((finding(),), None, None, held), Explained)
+
+
+def test_an_error_of_many_times_the_noise_is_not_explained():
+    far = HeldOutRmse(21.0, 4.1, 0.09, "blocks of time")
+    verdict = decided((finding(),), None, SWEEP, far, [PLACE])
+    assert isinstance(verdict, Unexplained)
+    assert [f.effect for f in verdict.findings] == ["dead_band"], "what was found is still said"
+    assert verdict.next_experiment == SWEEP
+    assert "4.1 N there, 46 times the 0.09 N of noise alone" in verdict.remainder.statement
+    assert isinstance(decided((finding(),), None, None, replace(far, after=0.26)), Explained)
+    line = finding("periodic_disturbance")
+    assert isinstance(decided((line,), None, None, far), Explained), "what is taken out predicts nothing"
 
 
 def test_a_little_more_needs_evidence_and_a_twentieth_none():
