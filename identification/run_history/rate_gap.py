@@ -26,6 +26,8 @@ NODES, ROWS_A_NODE = 17, 50
 LEAST_ROWS = 8
 SLOW = 4
 """Rows on either side that foretell a row best, where what is seen wanders."""
+CALMER = 0.2
+"""Of the error with which neighbours foretell a row of the gap: held rows that err less are the ones to be asked."""
 HELD_SHARE = 0.5
 """Of the rows, at rest between two commands: fewer are not all that is known of the gap."""
 REACHES = (1, 2, 4, 8, 16, 32, 64, 128)
@@ -54,9 +56,8 @@ def rate_gap(history: History) -> RateGap | None:
     rows = history.rate_rows
     if history.static or history.rate is None or history.rate_sampled is None or rows.size < LEAST_ROWS:
         return None
-    driver = driver_at_rate(history)
-    gap = without_ticks(history.rate[rows] / history.rate_per_driver - driver, history)
-    asked = held_rows(driver, gap)
+    asked = asked_rows(history)
+    driver, gap = driver_at_rate(history), gap_of_driver(history)
     driver, gap, rows = driver[asked], gap[asked], rows[asked]
     nodes = np.unique(np.quantile(driver, np.linspace(0.0, 1.0, min(NODES, max(rows.size // ROWS_A_NODE, 2)))))
     if nodes.size < 2:
@@ -70,6 +71,27 @@ def rate_gap(history: History) -> RateGap | None:
     count = one if history.rate_count is None else history.rate_count[rows].astype(np.float64)
     smoother = Smoother(history.rate_sampled[rows], columns, driver if by_share else one, count, gap)
     return None if smoother.law is None else RateGap(smoother, nodes, by_share, asked)
+
+
+def gap_of_driver(history: History) -> Floats:
+    """(m,) measured rate, in units of the driver, less the driver."""
+    assert history.rate is not None
+    measured = history.rate[history.rate_rows] / history.rate_per_driver
+    return without_ticks(measured - driver_at_rate(history), history)
+
+
+def asked_rows(history: History) -> NDArray[np.bool_]:
+    """(m,) rows of the rate that the gap is found on: those between which the driver is held, where they foretell each
+    other far better than all do; the same whatever a fit makes of the driver."""
+    driver, gap = driver_at_rate(history), gap_of_driver(history)
+    held = held_rows(driver, gap)
+    if held.all() or _missed(gap[held], driver[held]) >= CALMER * _missed(gap, driver):
+        return np.ones_like(held)
+    return held
+
+
+def _missed(gap: Floats, driver: Floats) -> float:
+    return min(running(gap, np.ones_like(gap)).error, running(gap, driver).error)
 
 
 def held_rows(driver: Floats, gap: Floats) -> NDArray[np.bool_]:

@@ -19,7 +19,7 @@ from identification.run_history.filters import Delay, delay_of
 from identification.run_history.held import Held, held_of
 from identification.run_history.history import History, Samples
 from identification.run_history.least_recently_used import LeastRecentlyUsed
-from identification.run_history.rate_gap import RateGap, rate_gap
+from identification.run_history.rate_gap import RateGap, asked_rows, rate_gap
 from identification.run_history.rotor_lag import lag_ends, lag_means
 from identification.run_history.ticks.step_response_rows import TickRows, tick_rows
 
@@ -61,6 +61,11 @@ class RememberedRun:
         """What the ticks of the command tell within the intervals; None where they tell nothing, or no sample is of
         an instant."""
         return tick_rows(self.history) if self.history.converter.instant else None
+
+    @cached_property
+    def rate_asked(self) -> NDArray[np.bool_]:
+        """(m,) rows of the rate on which its gap is found."""
+        return asked_rows(self.history)
 
     @cached_property
     def rate_gap(self) -> RateGap | None:

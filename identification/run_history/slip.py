@@ -6,11 +6,8 @@ import numpy as np
 
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed
-from identification.run_history.rate_gap import Running, held_rows, running, without_ticks
+from identification.run_history.rate_gap import running, without_ticks
 from identification.run_history.remembered import RememberedRun
-
-CALMER = 0.2
-"""Of the error with which neighbours foretell a row of the gap: held rows that err less are the ones to be asked."""
 
 
 def slip(run: RememberedRun, x: Floats, k: float) -> Floats:
@@ -23,18 +20,10 @@ def slip(run: RememberedRun, x: Floats, k: float) -> Floats:
     gap = without_ticks(history.rate[rows] / k - there, history)
     if run.rate_gap is not None:
         return run.rate_gap.calmed(gap, history)
-    time = history.rate_sampled[rows]
-    found, by_share = _foretold(gap, there)
-    held = held_rows(there, gap)
-    if not held.all():
-        calm, calm_by_share = _foretold(gap[held], there[held])
-        if calm.error < CALMER * found.error:  # the rest was when a reading was taken while the command moved
-            found, by_share, time = calm, calm_by_share, time[held]
+    asked = run.rate_asked
+    gap, there, time = gap[asked], there[asked], history.rate_sampled[rows][asked]
+    amount, share = running(gap, np.ones_like(gap)), running(gap, there)
+    by_share = share.error < amount.error
+    found = share if by_share else amount
     out: Floats = np.interp(history.middle, time, found.coefficient)
     return x * out if by_share else out
-
-
-def _foretold(gap: Floats, there: Floats) -> tuple[Running, bool]:
-    """By an amount, or by a share of x (True), whichever errs less."""
-    amount, share = running(gap, np.ones_like(gap)), running(gap, there)
-    return (share, True) if share.error < amount.error else (amount, False)

@@ -44,6 +44,7 @@ class SocketFeed:
         self._snapshots: deque[Snapshot] = deque()
         self._news = asyncio.Event()
         self._watching = False
+        self._loop: asyncio.AbstractEventLoop | None = None
         self._gone = False
         self._closed = False
         self.fault = ""
@@ -61,14 +62,18 @@ class SocketFeed:
             raise LinkError(f"{self._peer.name} is gone: the request `{request.kind}` reaches nobody")
         with self._sending:
             self._peer.send(request)
-        if self._peer.waiting:
-            asyncio.get_running_loop().add_writer(self._peer.fileno(), self._flush)
+        self._loop = asyncio.get_running_loop()
+        self._send_on()
 
     def send_from_thread(self, request: Request) -> None:
-        """What the kernel does not take now goes with the next request of the loop."""
+        """What the kernel does not take now is left to the loop, once that has sent or received anything."""
         with self._sending:
-            if not self._gone:
-                self._peer.send(request)
+            if self._gone:
+                return
+            self._peer.send(request)
+            waiting = self._peer.waiting
+        if waiting and self._loop is not None and not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._send_on)
 
     def close(self) -> None:
         if self._closed:
@@ -78,10 +83,16 @@ class SocketFeed:
             self._lose()
             self._peer.close()
 
+    def _send_on(self) -> None:
+        """The loop sends what waits, as soon as the kernel takes it."""
+        if self._peer.waiting and not self._gone:
+            asyncio.get_running_loop().add_writer(self._peer.fileno(), self._flush)
+
     def _watch(self) -> None:
         if not self._watching and not self._gone:
             self._watching = True
-            asyncio.get_running_loop().add_reader(self._peer.fileno(), self._drain)
+            self._loop = asyncio.get_running_loop()
+            self._loop.add_reader(self._peer.fileno(), self._drain)
 
     def _drain(self) -> None:
         try:

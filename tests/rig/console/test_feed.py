@@ -120,6 +120,22 @@ async def test_what_another_thread_sends_comes_whole_between_the_loop_s_own():
         assert [each for each in got if each == notes[0]] == notes
 
 
+async def test_what_the_kernel_did_not_take_of_another_thread_s_is_sent_on_by_the_loop():
+    """No further request of the loop pushes it."""
+    big = Request("note", "x" * 2_000_000)
+    async with wire() as (feed, controller):
+        feed.send(Request("stop", "console"))
+        thread = threading.Thread(target=feed.send_from_thread, args=(big,))
+        thread.start()
+        thread.join(20.0)
+        got = list(controller.receive())
+        async with asyncio.timeout(20.0):
+            while len(got) < 2:
+                await asyncio.sleep(0)
+                got += controller.receive()
+        assert got[1] == big
+
+
 async def test_another_thread_may_send_when_the_link_is_gone():
     async with wire() as (feed, controller):
         feed.close()
