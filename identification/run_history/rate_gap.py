@@ -96,6 +96,8 @@ def _missed(gap: Floats, driver: Floats) -> float:
 
 def held_rows(driver: Floats, gap: Floats) -> NDArray[np.bool_]:
     """(m,) rows between which the driver moves by less than the rate's noise; all where these are too few."""
+    if gap.size < LEAST_ROWS:
+        return np.ones(gap.size, dtype=np.bool_)
     step = np.abs(np.diff(driver))
     moves = np.maximum(np.append(step, 0.0), np.append(0.0, step)) / np.sqrt(12)  # of an instant anywhere between two
     noise = float(np.median(np.abs(gap[1:-1] - 0.5 * (gap[2:] + gap[:-2])))) / (0.6745 * np.sqrt(1.5))

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from identification.recording import Channel, Recording
 from identification.run_history.rate_gap import held_rows
@@ -49,6 +50,11 @@ def test_rows_between_which_the_driver_moves_by_more_than_the_noise_are_not_held
 def test_all_rows_are_asked_where_the_driver_never_rests():
     driver = np.linspace(0.0, 50.0, 100)
     assert held_rows(driver, 0.01 * np.random.default_rng(0).standard_normal(100)).all()
+
+
+@pytest.mark.filterwarnings("error")
+def test_too_few_rows_to_know_their_noise_are_all_asked():
+    assert held_rows(np.array([0.0, 5.0]), np.array([0.1, 0.2])).all()
 
 
 def test_a_ramp_says_when_the_rate_was_read_and_not_how_far_off_it_is():
