@@ -54,6 +54,15 @@ def hidden(estimate: Estimate, judged: Screening, data: Data) -> tuple[Unhidden,
     return told, refresh(best.fit.model, best.fit.theta, data, None, None)
 
 
+def taken_by_noise(whole: Estimate, less: Estimate, judged: Screening, data: Data) -> bool:
+    """Whether the terms that `less` lacks of the `whole` gain, estimated together with the noise, what is asked of one
+    that is hidden; `judged`: of `less`."""
+    noise = refresh(less.fit.model, less.fit.theta, data, None, None)
+    told = refresh(whole.fit.model, whole.fit.theta, data, None, noise, noise.noise)
+    lacking = set(whole.fit.model.terms) - set(less.fit.model.terms)
+    return noise.fit.deviance - told.fit.deviance > sum(asked_of(term, judged, data) for term in lacking)
+
+
 def _instants(judged: Screening, term: Term, data: Data) -> list[tuple[float, ...]]:
     """Of a jump in time the likeliest trials: which is the best depends on the noise, and that takes it for its own."""
     if not term.traits.instant:

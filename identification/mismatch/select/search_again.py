@@ -6,11 +6,13 @@ A line in the spectrum, or a peak of the noise, hides small terms and makes up o
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from functools import partial
 
 import numpy as np
 
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, fit
+from identification.mismatch.model.data import Data
 from identification.mismatch.observer import UNWATCHED, Interrupted, Observer
 from identification.mismatch.select.forward_selection import (
     NOT_ALL,
@@ -20,6 +22,8 @@ from identification.mismatch.select.forward_selection import (
     beginning,
     onwards,
 )
+from identification.mismatch.select.hidden import taken_by_noise
+from identification.mismatch.select.screening import Screening
 from identification.mismatch.select.stepwise import asked_again
 from identification.run_history.history import History
 
@@ -48,4 +52,9 @@ def _kept(system: Thruster, before: Estimate, model: Fit, rng: np.random.Generat
     if len(model.values) < 2:
         return before
     begun = system.enlarged(before, fit(model.model, model.theta, system.data, before.weights))
-    return asked_again(system, begun, lambda judged: judged.largest > judged.threshold, rng)
+    return asked_again(system, begun, partial(_missed, system.data), rng)
+
+
+def _missed(data: Data, whole: Estimate, less: Estimate, judged: Screening) -> bool:
+    """Whether a screening without a term finds something, or the noise had to take what the term did."""
+    return judged.largest > judged.threshold or taken_by_noise(whole, less, judged, data)

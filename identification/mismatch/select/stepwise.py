@@ -220,15 +220,15 @@ def pruned(system: System[T, F, S, Judged], state: S) -> S:
 
 
 def asked_again(
-    system: System[T, F, S, Judged], state: S, passes: Callable[[Judged], bool], rng: np.random.Generator
+    system: System[T, F, S, Judged], state: S, missed: Callable[[S, S, Judged], bool], rng: np.random.Generator
 ) -> S:
-    """Pruned, and without the weakest term as long as nothing passes beside what is left: a search from nothing would
-    not have come to a model that has it."""
+    """Pruned, and without the weakest term as long as that is not missed: a search from nothing would not have come to
+    a model that has it. `missed` is given the model, the one without the term, and what that one's screening says."""
     state = pruned(system, state)
     while state.fit.values:
         less = [system.without(state, term) for term in state.fit.values]
         smaller = system.replaced(state, min(less, key=lambda each: each.chi2))
-        if passes(system.judged(smaller, rng)):
+        if missed(state, smaller, system.judged(smaller, rng)):
             break
         state = smaller
     return state
