@@ -15,19 +15,18 @@ from identification.mismatch.compare.saved_model_baseline import lasting, starti
 from identification.mismatch.faults import stage as faults
 from identification.mismatch.faults import wiring
 from identification.mismatch.locate import stage as locate
-from identification.mismatch.name import stage as name
 from identification.mismatch.next_experiment import stage as next_experiment
 from identification.mismatch.observer import UNWATCHED, Observer
 from identification.mismatch.periodic import stage as periodic
 from identification.mismatch.periodic.stage import untouched
 from identification.mismatch.prepare import stage as prepare
-from identification.mismatch.prepare.channel_availability import predictable
 from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.select.forward_selection import search
 from identification.mismatch.select.search_again import search_again
 from identification.mismatch.select.stage import exchange_rivals
 from identification.mismatch.unnamed import stage as unnamed
-from identification.mismatch.validate import stage as validate
+from identification.mismatch.validate.judged import HeldBack, judged
+from identification.mismatch.validate.second_search import without_what_is_refused
 
 if TYPE_CHECKING:
     from identification.mismatch.diagnosis import Diagnosis
@@ -51,6 +50,7 @@ class Draws(NamedTuple):
     unnamed: np.random.Generator
     answer: np.random.Generator
     calm: np.random.Generator
+    beside: np.random.Generator
 
     @classmethod
     def of(cls, seed: int) -> Draws:
@@ -115,22 +115,21 @@ def traced(
     selected = exchange_rivals(found, draws.exchange, watch)  # goes back where the exchange made another model
     selected = locate.calmed(selected, draws.calm)  # back to the baseline: noise after steps looks like many effects
     watch.stage("judging by what was not fitted")
-    located = locate.run(selected, draws.locate)
-    now, data = located.estimate, selected.data
-    unseen, unpredicted = predictable(prepared.held_out, sound.unseen, now)
-    named = name.run(selected, located)
-    validated = validate.run(now, named, data, unseen)
-    completed = unnamed.run(selected, located, validated, unseen, draws.unnamed)
+    held_back = HeldBack(prepared.held_out, sound.unseen)
+    chosen = without_what_is_refused(judged(selected, held_back, draws.locate), held_back, draws.beside, watch)
+    selected, located, data = chosen.selected, chosen.located, chosen.selected.data
+    now = located.estimate
+    completed = unnamed.run(selected, located, chosen.validated, chosen.unseen, draws.unnamed)
     news = told_lines(cleaned.lines, baseline)
     experiment = None if selected.undone else next_experiment.run(now, data, completed.earned, news, limits)
     later = Later(recordings, data, completed.after)
     asked = [] if selected.undone else [*(n.term for n in completed.earned), *completed.nameless]
     novel, unasked = put_to_earlier(whole, before, later, asked)
     undone = (*selected.undone, *((NO_LINES,) if first.undone else ()))
-    notes = (*interrupted(undone), *sound.notes, *unpredicted, *unasked)
-    case = answer.Case(prepared.recordings, sound, unseen, cleaned.lines, baseline, notes)
+    notes = (*interrupted(undone), *sound.notes, *chosen.unpredicted, *unasked)
+    case = answer.Case(prepared.recordings, sound, chosen.unseen, cleaned.lines, baseline, notes)
     diagnosis = answer.run(case, answer.Found(selected, located, completed, experiment, novel), draws.answer)
-    return Trace(prepared, sound, first, cleaned, selected, located, named, validated, completed, diagnosis)
+    return Trace(prepared, sound, first, cleaned, chosen, completed, diagnosis)
 
 
 def interrupted(undone: Sequence[str]) -> tuple[str, ...]:

@@ -68,7 +68,7 @@ def score(
     and where flexible terms were chosen on the rest of these.
 
     `measured`: the runs with periodic disturbances still in them. `quiet`: noise of another model of these runs.
-    Where the error grows on other runs it is that without what is of one run's own time, if that is smaller.
+    On other runs it is that without what is of one run's own time, where that is smaller: they need not repeat it.
     """
 
     def judged(leaving: Sequence[Term] = ()) -> HeldOutRmse:
@@ -80,7 +80,7 @@ def score(
         return by_blocks(before, after, data, measured, quiet)
     found = judged()
     own = [t for t in after.fit.model.terms if t.traits.own_clock and not t.traits.delay]
-    if found.after <= found.before or not own:
+    if not own:
         return found
     without = judged(own)
     told = f"{without.what}; of one run's own time, and left out there: {', '.join(t.id for t in own)}"

@@ -12,6 +12,7 @@ from identification.mismatch.periodic.stage import Cleaned
 from identification.mismatch.prepare.stage import Prepared
 from identification.mismatch.select.forward_selection import Selected
 from identification.mismatch.unnamed.stage import Completed
+from identification.mismatch.validate.judged import Judged
 from identification.mismatch.validate.stage import Validated
 
 
@@ -24,10 +25,24 @@ class Trace:
     first: Selected
     """The model of the runs as they are: periodic disturbances are looked for in what it leaves."""
     cleaned: Cleaned
-    selected: Selected
-    """After the search was begun again, where lines or bands were found, and rivals were exchanged."""
-    located: Located
-    named: tuple[Named, ...]
-    validated: Validated
+    chosen: Judged
+    """After the search was begun again, where lines or bands were found, rivals were exchanged, and what was not fitted
+    refused no term."""
     completed: Completed
     diagnosis: Diagnosis
+
+    @property
+    def selected(self) -> Selected:
+        return self.chosen.selected
+
+    @property
+    def located(self) -> Located:
+        return self.chosen.located
+
+    @property
+    def named(self) -> tuple[Named, ...]:
+        return self.chosen.named
+
+    @property
+    def validated(self) -> Validated:
+        return self.chosen.validated

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from identification.mismatch.name.naming import name
-from identification.mismatch.unnamed.refuted import refuted, without_refuted
+from identification.mismatch.validate.refuted import refuted, without_refuted
 from identification.mismatch.validate.train_test_split import train_test_split
 from identification.physics.dead_band import DeadBand
 from identification.physics.zero_offset import ZeroOffset
