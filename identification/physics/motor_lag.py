@@ -46,6 +46,7 @@ class MotorLag:
         moving=True,
         delays=True,
         dynamics=_dynamics,
+        quick="time_constant",
         shown_over="time_since_step",
         shown_as="step",
         told_by=(("rotation_rate", "the measured rotation rate"),),

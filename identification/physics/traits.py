@@ -98,7 +98,8 @@ class Traits:
     frequency: str = ""
     """The parameter that is a frequency in Hz: beyond half the sampling rate it has an alias below."""
     quick: str = ""
-    """The parameter that is a time which the thrust samples must show: at its least it is a size without a time."""
+    """The parameter that is a time which the thrust samples must show: at its least it is a size without a time, and
+    within what their own times are known to it is a part of how they were made."""
     even: bool = False
     """Goes as x^2 whatever the sign: one curve with every other such term, unless a torque was recorded."""
     rare: bool = False

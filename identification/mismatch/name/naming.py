@@ -96,11 +96,12 @@ def _constancy(estimate: Estimate, change: list[Floats], data: Data, many: int) 
 
 
 def _unseen(now: Fit, term: Term, data: Data) -> bool:
-    """Ringing beyond half the sampling rate: between the samples it may be any other delay. Or over within a sample."""
+    """Ringing beyond half the sampling rate: between the samples it may be any other delay. Or over within a sample, or
+    within what the recording itself says of when its samples were taken."""
     known = {p.name: (p, value) for p, value in zip(term.parameters(data.scale), now.values[term], strict=True)}
     if term.traits.quick:
         least, value = known[term.traits.quick]
-        return value <= least.low * (1 + AT_LEAST)
+        return value <= max(least.low * (1 + AT_LEAST), min(h.delay_std for h in data.histories))
     spacing = min(h.spacing for h in data.histories)
     return bool(term.traits.frequency) and known[term.traits.frequency][1] > 0.5 / spacing
 

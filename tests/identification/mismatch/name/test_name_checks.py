@@ -112,6 +112,14 @@ def test_ringing_faster_than_the_samples_show():
     assert "faster" not in said(3.0)
 
 
+@pytest.mark.parametrize(("known_to", "told"), [(0.0, False), (0.001, False), (0.003, True)])
+def test_a_lag_within_what_the_times_of_the_samples_are_known_to_is_no_name(known_to, told):
+    """2 ms."""
+    data, estimate = known_noise({MotorLag(): (0.002,)}, [short()])
+    vague = replace(data, histories=tuple(replace(h, delay_std=known_to) for h in data.histories))
+    assert ("faster than the samples can show" in " ".join(failed(estimate, MotorLag(), vague, 1))) == told
+
+
 # ---------------------------------------------------------------- gains and rivals
 
 
