@@ -61,7 +61,7 @@ class TimeSkew:
         return (
             f"Time skew: the force arrives {1000 * abs(theta[0]):.3g} ms "
             f"{'after' if theta[0] > 0 else 'before'} the command that causes it; a pulse on both channels "
-            "tells whether clocks or transport."
+            "tells whether clocks, transport or an amplifier that smooths."
         )
 
 

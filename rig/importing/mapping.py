@@ -37,6 +37,10 @@ class Column:
     """Exactly this number at the start of the file means that nothing was measured yet: NaN."""
 
 
+LONGEST_DELAY = 60.0
+"""s of a converter, filter or mean: what is longer was meant in ms."""
+
+
 @dataclass(frozen=True)
 class HeaderValue:
     """A number from a line above the data: field `field` (from 1) of the line whose first field is `line`."""
@@ -82,6 +86,16 @@ class ChannelMap:
     noise_std: float | None = None
     range_min: float | None = None
     range_max: float | None = None
+    delay: float | None = None
+    """s from the quantity to its stamp, the group delay of `low_pass` in it; not given, it is that."""
+    delay_std: float | None = None
+    """s."""
+    window: float | None = None
+    """s that a value is the mean over."""
+    low_pass: float | None = None
+    """s, time constant of an amplifier or filter of first order before that."""
+    filter: str = ""
+    """In words."""
     thruster: str = ""
     axis: str = ""
     description: str = ""
@@ -246,6 +260,18 @@ def _told(check: Callable[[], object], who: str) -> None:
         raise ConfigError(f"{who}: {error}") from error
 
 
+def _check_times(channel: ChannelMap, who: str) -> None:
+    for name in ("delay", "delay_std", "window", "low_pass"):
+        value = getattr(channel, name)
+        if value is not None and not 0.0 <= value <= LONGEST_DELAY:
+            raise ConfigError(f"{who}: {name} must be between 0 and {LONGEST_DELAY:g} s, got {value}")
+    if channel.delay is not None and channel.delay < (channel.low_pass or 0.0):
+        raise ConfigError(
+            f"{who}: delay holds the group delay of low_pass ({channel.low_pass:g} s) and is at least that, "
+            f"got {channel.delay:g}"
+        )
+
+
 def _check_channel(channel: ChannelMap, who: str, parameters: Mapping[str, float]) -> None:
     if isinstance(channel.sign, str) and channel.sign not in parameters:
         raise ConfigError(f"{who}: sign must be 1, -1 or a name of [parameters], got {channel.sign!r}")
@@ -253,6 +279,7 @@ def _check_channel(channel: ChannelMap, who: str, parameters: Mapping[str, float
         raise ConfigError(f"{who} needs either column or value")
     if channel.value:
         names_in(channel.value)
+    _check_times(channel, who)
     if channel.quantity is None:
         return
     if channel.quantity not in QUANTITY_UNITS:

@@ -27,6 +27,18 @@ def test_channels_with_factor_offset_sign_and_streams_with_clocks_of_their_own(t
     assert recording.attributes["streams"]["a"] == {"source": "cell", "device_id": "7", "note": "n"}
 
 
+def test_what_an_amplifier_does_is_said_in_the_recording(tmp_path):
+    """Its group delay is in the delay, which is no less."""
+    facts = {"column": 2, "unit": "N", "quantity": "thrust", "low_pass": 0.01, "window": 0.1, "filter": "RC, 16 Hz"}
+    told = [{}, {"delay": 0.03, "delay_std": 0.002}]
+    for more, delay in zip(told, (0.01, 0.03), strict=True):
+        streams = {"a": {"channels": {"F": {**facts, **more}}}}
+        _, _, found = imported(tmp_path, "t,F\n1,1\n2,2\n", plan(streams=streams))
+        said = found["F"].acquisition
+        assert (said.low_pass, said.window, said.delay, said.filter) == (0.01, 0.1, delay, "RC, 16 Hz")
+    assert said.delay_std == 0.002
+
+
 @pytest.mark.parametrize(
     ("change", "says"),
     [
@@ -56,6 +68,8 @@ def test_maps_that_are_wrong_name_the_key(change, says):
         ({"unit": "N"}, "either column or value"),
         ({"unit": "N", "value": "__import__('os')"}, "not allowed"),
         ({"unit": "N", "collumn": 1}, "did you mean column"),
+        ({"unit": "N", "column": 1, "window": 100.0}, "window must be between 0 and 60 s, got 100"),
+        ({"unit": "N", "column": 1, "low_pass": 0.2, "delay": 0.1}, "holds the group delay of low_pass"),
     ],
 )
 def test_channels_that_are_wrong_are_refused(channel, says):
