@@ -13,8 +13,8 @@ ADVICE: Mapping[str, str] = {
     "direction": "run the same levels in both directions, then hang dead weights on the cell both ways",
     "time": "repeat the run with a rest and a tare at its beginning, middle and end, and log supply and temperatures",
     "time_since_step": (
-        "say in the recording what the cell's amplifier smooths (low_pass, window), if it does not; make large and small "
-        "steps, sampled ten times as fast, and tap the stand at rest"
+        "have the recording say what the cell's amplifier smooths (low_pass, window); "
+        "make large and small steps, sampled ten times as fast, and tap the stand at rest"
     ),
     "previous_voltage": "reach one level from above, from below and from rest, each held until it is steady",
     "direction_of_change": "run the same levels going up and going down, each held until it is steady",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -191,11 +192,15 @@ def test_a_column_is_dropped_below_its_threshold_the_worst_first():
     assert list(pruned(system, system.state(A, B)).fit.values) == [A]
 
 
+def found_any(missing, _whole, _less, judged):
+    return bool(missing & set(judged))
+
+
 def test_a_model_that_is_asked_again_loses_what_no_screening_would_have_let_in():
     """`missed` is told what a screening finds; what is below the price of a term goes without being asked."""
     system = Columns(9 * wave(0) + 6 * wave(1) + 1 * wave(2), {A: wave(0), B: wave(1), C: wave(2)})
     for missing, left in (({A, B}, [A, B]), ({A}, [A]), (set(), [])):
-        kept = asked_again(system, system.state(A, B, C), lambda _whole, _less, judged, m=missing: bool(m & set(judged)), RNG)
+        kept = asked_again(system, system.state(A, B, C), partial(found_any, missing), RNG)
         assert list(kept.fit.values) == left
 
 
