@@ -17,7 +17,7 @@ from identification.mismatch.name.naming import Named
 from identification.mismatch.validate.held_out import Score
 from identification.physics.term import Scale, Term
 
-ASKED = "the same beside a free shape as beside the terms without a name"
+ASKED = "the same without the terms that have no name"
 BOUND = "without the other terms that were refused it would take values that are not possible"
 OTHER = "without the other terms that were refused its value is another"
 WORSE = "what was not fitted is predicted better without it"

@@ -75,21 +75,24 @@ def needed(split: TrainTestSplit, right: Sequence[Named], unearned: Sequence[Nam
 
 
 def with_shares(
-    split: TrainTestSplit, named: Sequence[Named], others: Sequence[Term], best: float
+    split: TrainTestSplit, named: Sequence[Named], others: Sequence[Term], best: float, *, same_run: bool
 ) -> tuple[Named, ...]:
-    """The names with their shares: beside each other, without the terms `others`, which have no name.
+    """The names with their shares: beside each other, without the terms `others`, which have no name. Those that
+    another run need not repeat have none there.
 
-    `best`: RMSE in N of the model that predicts best, free shapes and all.
+    `best`: RMSE in N of the model that predicts best, free shapes and all; `same_run`: what was not fitted is blocks of
+    time of the runs that were.
     """
     if not named:
         return ()
     score, without = scores_alone(split, named, others)
     least = min(best, score.rmse)
-    return tuple(
-        replace(n, attained=Attained(less.rmse, score.rmse, share(less, score, least)))
-        for n in named
-        for less in (without[n.term],)
-    )
+
+    def shared(n: Named) -> Named:
+        less = without[n.term]
+        return replace(n, attained=Attained(less.rmse, score.rmse, share(less, score, least)))
+
+    return tuple(shared(n) if same_run or not n.term.traits.own_clock else n for n in named)
 
 
 def scores_alone(

@@ -20,7 +20,7 @@ from identification.mismatch.name.named_term import Check, restated
 from identification.mismatch.name.naming import Named
 from identification.mismatch.select.exchange.static_pairs import STATIC
 from identification.mismatch.select.forward_selection import Selected
-from identification.mismatch.unnamed.confirmed import not_standing
+from identification.mismatch.unnamed.confirmed import ASKED, WORSE, not_standing
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
 from identification.mismatch.unnamed.shares import mended, mostly_right, nearly_right, scores_alone, with_shares
@@ -121,12 +121,21 @@ def run(
         if without.nothing and not located.structured:
             return _noise_followed(told.earned, without, now, data)
         told = told if without.nothing else replace(told, without=without)
-        if gone := refuted(split, told.unearned, same_run=not unseen):
+        while gone := refuted(split, told.unearned, same_run=not unseen):
             now, split = without_refuted(now, gone, data, unseen)
             located = replace(located, estimate=now)
-            earned = tuple(restated(told.earned, now.fit))
-            told = _Told(earned, tuple(n for n in told.unearned if n not in gone), told.without, gone)
+            told = _asked_again(told, gone, now, split, same_run=not unseen)
     return _completed(selected, located, told, split, unseen, rng, open_ended=open_ended)
+
+
+def _asked_again(
+    told: _Told, gone: tuple[Named, ...], now: Estimate, split: TrainTestSplit, *, same_run: bool
+) -> _Told:
+    """Without the terms that have `gone`: a name that was earned beside them must predict without them too."""
+    earned = tuple(restated(told.earned, now.fit))
+    worse = refuted(split, earned, same_run=same_run)
+    left = (*(n for n in told.unearned if n not in gone), *(n.asked(Check("predicts", ASKED, WORSE)) for n in worse))
+    return _Told(tuple(n for n in earned if n not in worse), left, told.without, (*told.gone, *gone))
 
 
 def _completed(
@@ -146,7 +155,7 @@ def _completed(
     if flexible is None:
         return _by_names(selected, located, told, split, unseen, rng, open_ended=open_ended)
     now, data = located.estimate, selected.data
-    earned = with_shares(split, told.earned, told.nameless, flexible.held)
+    earned = with_shares(split, told.earned, told.nameless, flexible.held, same_run=not unseen)
     valued, known = _with_values(earned, now, flexible.estimate, data, flexible)
     bare, left = told.without.bare, told.without.left
     return Completed(flexible.estimate, valued, known, told.refused, flexible, open_ended, bare, left)
@@ -199,7 +208,8 @@ def _by_names(
         without = _without(now, data, unearned, rng)
         told = _Told((), unearned, _Without(now, located.left) if without.nothing else without, told.gone)
         after = before
-    earned = with_shares(split, told.earned, told.nameless, split.judge(split.estimate.fit).rmse)
+    held = split.judge(split.estimate.fit).rmse
+    earned = with_shares(split, told.earned, told.nameless, held, same_run=not unseen)
     stated = after if open_ended else told_by_unrest(after, data)
     valued, known = _with_values(earned, now, stated, data, None, told.nameless)
     bare, left = told.without.bare, told.without.left

@@ -30,6 +30,12 @@ def section(trace, words):
     return "\n".join(found)
 
 
+def with_rounds(trace, rounds):
+    """The same trace, its search in these rounds."""
+    selected = replace(trace.selected, rounds=rounds)
+    return replace(trace, chosen=replace(trace.chosen, selected=selected))
+
+
 def numbers(text):
     return [float(x) for x in re.findall(r"-?\d+(?:\.\d+)?(?:e[+-]?\d+)?", text)]
 
@@ -133,7 +139,7 @@ def test_the_way_back_after_a_line_is_shown(trace):
 def test_the_way_back_after_an_exchange_is_shown(trace):
     last = trace.selected.rounds[-1]
     rounds = (*trace.selected.rounds, Round((), last.screening, (), hidden=None, after=None))
-    other = replace(trace, selected=replace(trace.selected, rounds=rounds))
+    other = with_rounds(trace, rounds)
     said = section(other, "rivals")
     assert "exchanged: dead_band (shrink) -> no term; the way goes back: the search is resumed" in said
     assert "exchanged: no term -> dead_band (shrink)" in said
@@ -142,5 +148,5 @@ def test_the_way_back_after_an_exchange_is_shown(trace):
 def test_a_search_that_begins_with_a_model_and_adds_nothing_is_no_exchange(trace):
     (*_, last) = trace.selected.rounds
     assert last.model == trace.selected.after.fit.model.terms
-    other = replace(trace, selected=replace(trace.selected, rounds=(last,)))
+    other = with_rounds(trace, (last,))
     assert section(other, "rivals").startswith("none was exchanged")
