@@ -16,6 +16,7 @@ from drivers.canopen import recognising as recognising_canopen
 from drivers.canopen.cia401_options import Options as Cia401Options
 from drivers.canopen.cia402_options import Options as Cia402Options
 from drivers.canopen.cia404_options import Options as Cia404Options
+from drivers.dronecan import recognising as recognising_dronecan
 from drivers.dronecan.options import Options as DronecanEscOptions
 from drivers.extras import of_extra
 from drivers.hbm import recognising as recognising_hbm
@@ -31,6 +32,7 @@ from drivers.modbus.registers import Options as ModbusRegistersOptions
 from drivers.odrive import recognising as recognising_odrive
 from drivers.odrive.options import Options as ODriveOptions
 from drivers.odrive.over_can import ODriveCan
+from drivers.pololu import recognising as recognising_pololu
 from drivers.pololu.maestro import Maestro
 from drivers.pololu.maestro_options import Options as MaestroOptions
 from drivers.pololu.smc import SmcG2
@@ -43,6 +45,7 @@ from drivers.roboteq import anonymising as anonymising_roboteq
 from drivers.roboteq import recognising as recognising_roboteq
 from drivers.roboteq.controller import Roboteq
 from drivers.roboteq.options import Options as RoboteqOptions
+from drivers.scpi import recognising as recognising_scpi
 from drivers.scpi.options import Options as ScpiSupplyOptions
 from drivers.scpi.supply import ScpiSupply
 from drivers.serial_lines import anonymising as anonymising_lines
@@ -120,15 +123,17 @@ KINDS: dict[str, Kind] = {
     ),
     "keller": Kind(keller.Options, keller.Keller, "serial", recognising_modbus.KELLER, anonymising_modbus.asked_values),
     "pzem": Kind(pzem.Options, pzem.Pzem, "serial", recognising_modbus.PZEM, anonymising_modbus.asked_values),
-    "maestro": Kind(MaestroOptions, Maestro, "serial"),
+    "maestro": Kind(MaestroOptions, Maestro, "serial", recognising_pololu.MAESTRO),
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE, anonymising_roboteq.anonymise),
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
-    "scpi_supply": Kind(ScpiSupplyOptions, ScpiSupply, "serial"),
-    "smc_g2": Kind(SmcG2Options, SmcG2, "serial"),
+    "scpi_supply": Kind(ScpiSupplyOptions, ScpiSupply, "serial", recognising_scpi.PROBE),
+    "smc_g2": Kind(SmcG2Options, SmcG2, "serial", recognising_pololu.SMC),
     "odrive_can": Kind(ODriveOptions, ODriveCan, "can", recognising_odrive.PROBE),
     "vesc_uart": Kind(over_uart.Options, over_uart.VescUart, "serial", recognising_uart.PROBE),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),
-    "dronecan_esc": Kind(DronecanEscOptions, of_extra("dronecan", "dronecan", _dronecan_esc), "can"),
+    "dronecan_esc": Kind(
+        DronecanEscOptions, of_extra("dronecan", "dronecan", _dronecan_esc), "can", recognising_dronecan.PROBE
+    ),
     "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can", recognising_canopen.DRIVE),
     "cia401": Kind(Cia401Options, of_extra("canopen", "canopen", _cia401), "can", recognising_canopen.OUTPUT),
     "cia404": Kind(Cia404Options, of_extra("canopen", "canopen", _cia404), "can", recognising_canopen.CELL),

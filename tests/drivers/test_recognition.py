@@ -19,6 +19,8 @@ from sim_devices.instruments.pololu.smc import Measured as SmcMeasured
 from sim_devices.instruments.pololu.smc import SmcG2, SmcG2Options
 from sim_devices.instruments.roboteq.controller import Roboteq
 from sim_devices.instruments.roboteq.options import Measured, RoboteqOptions
+from sim_devices.instruments.scpi.supply import Measured as SupplyMeasured
+from sim_devices.instruments.scpi.supply import ScpiSupply, ScpiSupplyOptions
 from sim_devices.instruments.serial_lines.hbm_aed import HbmAed, HbmAedOptions
 from sim_devices.instruments.serial_lines.loadstar import Loadstar, LoadstarOptions
 from sim_devices.instruments.serial_lines.mantracourt import Mantracourt, MantracourtOptions
@@ -52,6 +54,16 @@ def roboteq(log, **options) -> Roboteq:
     return Roboteq(RoboteqOptions("roboteq", "p", **options), 48.0, Measured, log)
 
 
+def maestro(said: list[str], **options) -> Maestro:
+    made = Maestro(MaestroOptions("maestro", "p", **options), 16.0, lambda event, **_: said.append(event))
+    made.feed(bytes((0x84, 0, 0x70, 0x2E)), 0.0)  # 1500 us: arms the ESC
+    return made
+
+
+def supply(log, **options) -> ScpiSupply:
+    return ScpiSupply(ScpiSupplyOptions("scpi_supply", "p", **options), lambda: SupplyMeasured(3.0, 1.5), log)
+
+
 DEVICES = {
     "mt_sics": lambda: MtSics(MtSicsOptions("mt_sics", "p"), lambda: 12.0),
     "keller": lambda: Keller(KellerOptions("keller", "p"), lambda: 1.1e5, lambda: 18.0),
@@ -61,6 +73,9 @@ DEVICES = {
     "loadstar": lambda: Loadstar(LoadstarOptions("loadstar", "p"), lambda: 12.0),
     "mantracourt_dsc": lambda: Mantracourt(MantracourtOptions("mantracourt", "p"), lambda: 12.0),
     "pzem": lambda: Pzem(PzemOptions("pzem", "p"), lambda: 48.0, lambda: 1.5),
+    "maestro": lambda: maestro([]),
+    "smc_g2": lambda: SmcG2(SmcG2Options("smc_g2", "p"), 24.0, SmcMeasured, lambda *_, **__: None),
+    "scpi_supply": lambda: supply(lambda *_, **__: None),
 }
 
 
@@ -130,12 +145,6 @@ def test_no_question_is_an_end_of_line_alone_or_a_command():
             assert not any(request.startswith((b"!", b"^", b"@", b"%")) for request in line.requests)
 
 
-def maestro(said: list[str], **options) -> Maestro:
-    made = Maestro(MaestroOptions("maestro", "p", **options), 16.0, lambda event, **_: said.append(event))
-    made.feed(bytes((0x84, 0, 0x70, 0x2E)), 0.0)  # 1500 us: arms the ESC
-    return made
-
-
 @pytest.mark.parametrize("address", range(1, 248))
 def test_no_question_at_any_address_drives_a_maestro(address):
     """Its packets begin with a byte above 7F, and what follows may be a set-point."""
@@ -165,6 +174,17 @@ def test_no_question_drives_a_simple_motor_controller(address):
         device.tick(line.t)
         device.drive(0.0, 0.001)
         assert device.speed == 0
+
+
+def test_no_question_switches_a_supply_on_or_off():
+    said: list[str] = []
+    for probe in ASKING.values():
+        for on in (False, True):
+            device = supply(lambda event, **_: said.append(event), has_watchdog=False)
+            device.feed(b"VOLT 3\nOUTP ON\n" if on else b"VOLT 3\n", 9.0)
+            said.clear()
+            probe.ask(DirectLine(device))
+            assert (device.on, said) == (on, [])
 
 
 def test_a_set_point_hidden_in_an_address_would_drive_one():
