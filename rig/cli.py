@@ -121,7 +121,7 @@ COMMANDS: Final = {
         "rig.replay.command:replay_command", "Play a recording into the console, a capture through its driver."
     ),
     "import": Entry("rig.importing.command:import_command", "Make a recording of another program's table or log."),
-    "export": Entry("rig.exporting.command:export_command", "Write a recording as CSV, Parquet, MATLAB or MCAP."),
+    "export": Entry("rig.exporting.command:export_command", "Write a recording as tables, a twin for simulators."),
     "recover": Entry(
         "rig.recording.recover:recover_command", "Copy a recording that was not closed in order into a plain file."
     ),

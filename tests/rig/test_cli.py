@@ -54,7 +54,7 @@ def test_the_tab_key_offers_commands_without_waiting_for_them() -> None:
 
 def test_the_tab_key_offers_options_and_their_values() -> None:
     assert completed("rig export --t", 2)[0] == ["--to"]
-    assert completed("rig export --to m", 3)[0] == ["mat", "mcap"]
+    assert completed("rig export --to m", 3)[0] == ["mat", "mcap", "mss"]
 
 
 def test_the_tab_key_after_what_is_no_command_is_silent() -> None:

@@ -18,7 +18,7 @@ from scipy.io import loadmat
 from rig.cli import main
 from rig.exporting import csv_folder
 from rig.exporting.content import content_of
-from rig.exporting.targets import TARGETS
+from rig.exporting.targets import TARGETS, called
 from rig.hdf5 import load, stream_rows
 from tests.rig.exporting.conftest import EVENT
 from tests.rig.hdf5.plain_files import plain
@@ -205,8 +205,9 @@ def test_a_stream_whose_name_is_no_file_name_is_refused(tmp_path: Path, capsys: 
 
 
 def test_the_table_has_a_writer_for_every_word() -> None:
-    assert {target.of for target in TARGETS.values()} == {"recording"}
-    assert list(TARGETS) == ["csv", "parquet", "mat", "mcap"]
+    assert [word for word, target in TARGETS.items() if target.of == "recording"] == ["csv", "parquet", "mat", "mcap"]
+    assert all(callable(called(target.writer)) for target in TARGETS.values())
+    assert all(callable(called(target.carried)) for target in TARGETS.values() if target.of == "twin")
 
 
 @pytest.mark.parametrize(
@@ -216,7 +217,10 @@ def test_the_table_has_a_writer_for_every_word() -> None:
         (("T1.h5", "--to", "mat", "-o", "no/T1.mat"), "there is no folder no"),
         (("T1.h5", "--to", "csv", "--streams", "flow"), "no such stream; it has load_cell, 2nd flow, command"),
         (("T2.h5", "--to", "csv"), "T2.h5 is no file"),
-        (("twin.json", "--to", "csv"), "this takes a recording, but twin.json is a twin; a twin can't be exported"),
+        (
+            ("twin.json", "--to", "csv"),
+            "this takes a recording, but twin.json is a twin; a twin goes to table",
+        ),
         (("text.json", "--to", "mat"), "text.json is nothing that the rig makes"),
     ],
 )

@@ -1,0 +1,1 @@
+"""A twin as what simulators, autopilots and programs read: one file a kind of consumer, over one sampled curve."""
