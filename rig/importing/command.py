@@ -17,7 +17,7 @@ from rig.errors import RecordingError, RigError
 from rig.importing.convert import Imported, convert, parameters_known
 from rig.importing.json_recording import read_plain
 from rig.importing.map_options import LEVELS, Levels, assignments_of, plan_of, refuse_without_map
-from rig.importing.mapping import ImportMap, read_map, shipped
+from rig.importing.mapping import FileMap, ImportMap, read_map, shipped
 from rig.importing.reading.foreign_formats import foreign
 from rig.importing.thruster_name import thruster_of
 from rig.importing.timing.two_clocks import ESTIMATED, merged, offset_asked, offset_between
@@ -82,20 +82,22 @@ def _refuse_to_overwrite(out: Path) -> None:
         raise RecordingError(f"{out} exists; a recording is never overwritten: give another name")
 
 
-def _read(source: Path, encoding: str = "utf-8") -> bytes:
-    """Raises RecordingError for a file that is not there, and for one that is no text: what it is and what to do."""
+def _read(source: Path, form: FileMap | None = None) -> bytes:
+    """Raises RecordingError for a file that is not there, and for one that is no text where one is expected: what it is
+    and what to do."""
     try:
         data = read(source, "file to import", MOST_BYTES, RecordingError)
     except FileNotFoundError as error:
         raise RecordingError(f"{source} can't be read: {error.strerror}") from error
-    what = foreign(data, source.name, encoding)
+    text = form is None or form.kind == "text"
+    what = foreign(data, source.name, form.encoding if form else "utf-8") if text else ""
     if what:
         raise RecordingError(f"{source.name}: {what.replace('FILE', source.name)}")
     return data
 
 
 def _converted(source: Path, plan: ImportMap, given: Mapping[str, float]) -> tuple[bytes, Imported]:
-    data = _read(source, plan.file.encoding)
+    data = _read(source, plan.file)
     try:
         return data, convert(data, plan, given)
     except RigError as error:
@@ -264,7 +266,7 @@ def import_command(
         _tell_plain(import_plain(file, out, notes))
         return
     plan = plan_of(map_name, levels, where)
-    _read(file, plan.file.encoding)  # what it is comes before whose it is
+    _read(file, plan.file)  # what it is comes before whose it is
     whose, known_by = thruster_of(thruster, plan, file)
     plan = replace(plan, thruster=whose, kind=kind or plan.kind)
     second = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from identification.recording import Floats
 from rig.errors import ConfigError, RecordingError
 from rig.importing.channels import channels_of
 from rig.importing.mapping import Column, ImportMap
+from rig.importing.reading.binary.kinds import read_binary
 from rig.importing.reading.cells import Cells, columns_used, read_cells
 from rig.importing.reading.table import Refused, header_value, read_table
 from rig.importing.streams import StreamData, laid_out
@@ -45,7 +46,11 @@ def convert(data: bytes, plan: ImportMap, overrides: Mapping[str, float]) -> Imp
     """Bytes of a file into streams. Raises ConfigError for the map, RecordingError for the file."""
     parameters = _parameters(plan, overrides)
     refused = Refused()
-    table = read_table(data, plan.file, refused)
+    if plan.file.kind == "text":
+        table = read_table(data, plan.file, refused)
+    else:
+        table = read_binary(data, plan.file.kind, plan.file.message)
+        plan = replace(plan, file=replace(plan.file, missing=(*plan.file.missing, "")))
     total = len(table.rows) + refused.counts.total()
     columns = columns_used(plan, table, parameters)
     cells = read_cells(plan, table, columns, refused)

@@ -120,6 +120,10 @@ class StreamMap:
 class FileMap:
     """How the lines of a file become cells, and which lines are no data."""
 
+    kind: Literal["text", "parquet", "mat", "tdms", "mdf", "mcap", "bag", "ulog", "dataflash", "tlog"] = "text"
+    """What the file is; of the others than text `message` and `where` alone count of these keys."""
+    message: tuple[str, ...] = ()
+    """Messages, topics, groups or structs of a binary log that become the table; none: all."""
     delimiter: str = ","
     """One character, `tab` or `whitespace`."""
     header: bool = True

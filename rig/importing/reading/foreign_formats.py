@@ -8,7 +8,7 @@ from typing import Final
 
 @dataclass(frozen=True, slots=True)
 class Foreign:
-    """A format that `rig import` does not read."""
+    """A format that is no table of text."""
 
     starts: tuple[bytes, ...]
     suffixes: tuple[str, ...]
@@ -17,6 +17,8 @@ class Foreign:
     do: str
     holds: bytes = b""
     """Bytes somewhere in the file that decide as well as a suffix."""
+    kind: str = ""
+    """Of [file] in a map that reads it; empty: none does."""
 
 
 FORMATS: Final = (
@@ -25,6 +27,7 @@ FORMATS: Final = (
         (".mat",),
         "a MATLAB file of version 7.3 (HDF5 inside)",
         "in MATLAB: load it, then writetable(table(t, command, thrust), 'run.csv')",
+        kind="mat",
     ),
     Foreign(
         (b"\x89HDF\r\n\x1a\n",),
@@ -39,13 +42,21 @@ FORMATS: Final = (
         "a MATLAB file (version 5 to 7.2)",
         "in MATLAB: load it, then writetable(table(t, command, thrust), 'run.csv'); in Python: scipy.io.loadmat and "
         "numpy.savetxt",
+        kind="mat",
     ),
-    Foreign((b"#ROSBAG",), (), "a ROS 1 bag", "rostopic echo -b FILE -p /TOPIC > topic.csv, one file for each topic"),
+    Foreign(
+        (b"#ROSBAG",),
+        (),
+        "a ROS 1 bag",
+        "rostopic echo -b FILE -p /TOPIC > topic.csv, one file for each topic",
+        kind="bag",
+    ),
     Foreign(
         (b"\x89MCAP0\r\n",),
         (),
         "an MCAP log (ROS 2, Foxglove)",
         "export the topics as CSV in Foxglove or PlotJuggler, one file for each topic",
+        kind="mcap",
     ),
     Foreign(
         (b"SQLite format 3\x00",),
@@ -65,12 +76,14 @@ FORMATS: Final = (
         (),
         "a PX4 log (ULog)",
         "ulog2csv FILE (pip install pyulog) writes one CSV for each topic; time is `timestamp` in us",
+        kind="ulog",
     ),
     Foreign(
         (b"\xa3\x95",),
         (".bin",),
         "an ArduPilot dataflash log",
         "mavlogdump.py --format csv --types RCOU FILE > rcou.csv (pip install pymavlink), a file for each message type",
+        kind="dataflash",
     ),
     Foreign(
         (b"TDSm",),
@@ -78,18 +91,21 @@ FORMATS: Final = (
         "a LabVIEW TDMS file",
         "open it in Excel with the TDMS add-in and save as CSV, or in Python: nptdms.TdmsFile(FILE).as_dataframe()"
         ".to_csv('run.csv')",
+        kind="tdms",
     ),
     Foreign(
         (b"MDF     ", b"UnFinMF "),
         (),
         "a measurement file MDF/MF4 (ASAM)",
         "in Python: asammdf.MDF(FILE).export('csv', 'run'), or the same in the asammdf window",
+        kind="mdf",
     ),
     Foreign(
         (b"PAR1",),
         (),
         "a Parquet table",
         "in Python: pandas.read_parquet(FILE).to_csv('run.csv', index=False)",
+        kind="parquet",
     ),
     Foreign(
         (b"ARROW1", b"FEA1"),
@@ -132,6 +148,8 @@ def foreign(data: bytes, name: str, encoding: str = "utf-8") -> str:
     for one in FORMATS:
         decided = not one.suffixes or suffix in one.suffixes or (one.holds and one.holds in data)
         if data.startswith(one.starts) and decided:
+            if one.kind:
+                return f'this is {one.what}: say [file] kind = "{one.kind}" in the map. Or as text: {one.do}'
             return f"this is {one.what}, and rig import reads tables of text (CSV). Do: {one.do}; then import that"
     wide = data.startswith(MULTIBYTE) or encoding.lower().startswith(("utf-16", "utf-32"))
     if b"\x00" in data[:4096] and not wide:

@@ -10,7 +10,7 @@ from array import array
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Final
+from typing import Final, Protocol
 
 from rig.errors import RecordingError
 from rig.importing.mapping import ColumnRef, FileMap, HeaderValue
@@ -75,13 +75,21 @@ class Lines:
         return good
 
 
+class Rows(Protocol):
+    """Rows of cells, each with the number of its line."""
+
+    def __len__(self) -> int: ...
+
+    def __iter__(self) -> Iterator[tuple[int, Sequence[str]]]: ...
+
+
 @dataclass(frozen=True)
 class Table:
-    """The cells of a text file, and what was found out about it on the way."""
+    """The cells of a file, and what was found out about it on the way."""
 
     names: tuple[str, ...]
     """Of the header; empty without one."""
-    rows: Lines
+    rows: Rows
     """Line number and cells."""
     above: tuple[Sequence[str], ...]
     """Cells of comment and skipped lines."""
