@@ -1,4 +1,4 @@
-"""Expressions over columns: numbers, names, + - * /, abs() and sign(). Nothing else can be written or run."""
+"""Expressions over columns: numbers, names, + - * /, abs(), sign() and sqrt(). Nothing else can be written or run."""
 
 from __future__ import annotations
 
@@ -23,7 +23,11 @@ LONGEST: Final = 400
 MOST_BRACKETS: Final = 40
 MOST: Final = 1e30
 """No number of a conversion is larger, and whole ones stay floats whatever is done with them."""
-FUNCTIONS: Final[Mapping[str, Callable[[Any], Any]]] = {"abs": np.abs, "sign": np.sign}
+FUNCTIONS: Final[Mapping[str, Callable[[Any], Any]]] = {
+    "abs": np.abs,
+    "sign": np.sign,
+    "sqrt": lambda x: np.sqrt(np.where(np.asarray(x) < 0, np.nan, x)),
+}
 
 
 def names_in(text: str) -> tuple[str, ...]:
@@ -76,7 +80,7 @@ def _check(node: ast.expr, text: str, found: dict[str, None]) -> None:
         case _:
             raise ConfigError(
                 f"expression {text!r}: {ast.unparse(node)!r} is not allowed; "
-                "only numbers, names, + - * /, abs(x), sign(x)"
+                "only numbers, names, + - * /, abs(x), sign(x), sqrt(x)"
             )
 
 

@@ -55,7 +55,8 @@ def laid_out(plan: ImportMap, cells: Cells, channels: Sequence[ChannelData]) -> 
         own = [c for c in channels if c.stream == name]
         for called, part in _apart(name, own) if levels is not None else [(name, own)]:
             if part:
-                streams.append(_stream(called, stream, part, _time(plan, stream, cells, levels, part) - start, levels))
+                time = _time(plan, stream, cells, levels, part) - start
+                streams.append(_stream(called, stream, part, time, levels, apart=len(plan.file.message) > 1))
     steps = () if levels is None else _steps(levels, first, start)
     return LaidOut(tuple(streams), steps, rows, start if plan.time in cells.time else None)
 
@@ -78,11 +79,22 @@ def _time(
 
 
 def _stream(
-    name: str, stream: StreamMap, part: Sequence[ChannelData], time: Floats, levels: LevelTimes | None
+    name: str,
+    stream: StreamMap,
+    part: Sequence[ChannelData],
+    time: Floats,
+    levels: LevelTimes | None,
+    *,
+    apart: bool,
 ) -> StreamData:
-    """A level without a command stays: nobody knows what was commanded there, and it was not the level before."""
+    """A level without a command stays: nobody knows what was commanded there, and it was not the level before.
+
+    `apart`: rows are of several messages, and those of others are no rows of this stream."""
     values = np.column_stack([channel.values for channel in part])
     known = ~np.all(np.isnan(values), axis=1)
+    if apart:
+        time, values = time[known], values[known]
+        known = np.ones(len(values), np.bool_)
     if levels is not None and part[0].facts.quantity == COMMAND:
         known[:] = True
     keep = changed_rows(values) if stream.changes else known

@@ -116,7 +116,7 @@ def mcap_ros2(folder: Path) -> bytes:
     return next(path.glob("*.mcap")).read_bytes()
 
 
-def ulog() -> bytes:
+def ulog(second: str = "cell") -> bytes:
     """By PX4's ULog File Format: header, flag bits, formats, subscriptions, data."""
 
     def message(kind: bytes, content: bytes) -> bytes:
@@ -124,22 +124,63 @@ def ulog() -> bytes:
 
     out = [b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0), message(b"B", bytes(40))]
     out += [message(b"F", b"actuator_motors:uint64_t timestamp;float[2] control;")]
-    out += [message(b"F", b"cell:uint64_t timestamp;float force;")]
-    out += [message(b"A", struct.pack("<BH", 0, i) + name) for i, name in enumerate((b"actuator_motors", b"cell"))]
+    fields = "float force;" if second == "cell" else "float vx;float vy;"
+    out += [message(b"F", f"{second}:uint64_t timestamp;{fields}".encode())]
+    topics = (b"actuator_motors", second.encode())
+    out += [message(b"A", struct.pack("<BH", 0, i) + name) for i, name in enumerate(topics)]
     for t, volts, force in zip(TIME, VOLTS, THRUST, strict=True):
         stamp = round(t * 1e6) + 500_000
         out.append(message(b"D", struct.pack("<HQff", 0, stamp, volts / 16.0, 0.0)))
-        out.append(message(b"D", struct.pack("<HQf", 1, stamp + 20_000, force)))
+        values = (force,) if second == "cell" else (0.6 * force, 0.8 * force)
+        out.append(message(b"D", struct.pack(f"<HQ{len(values)}f", 1, stamp + 20_000, *values)))
     return b"".join(out)
 
 
-def dataflash() -> bytes:
+HEAD = b"\xa3\x95"
+
+
+def layout(kind: int, size: int, name: bytes, format_: bytes, labels: bytes) -> bytes:
     """By ArduPilot's LogStructure.h: FMT messages say how the others are laid out."""
-    head = b"\xa3\x95"
+    return HEAD + struct.pack("<BBB4s16s64s", 128, kind, size, name, format_, labels)
 
-    def layout(kind: int, size: int, name: bytes, format_: bytes, labels: bytes) -> bytes:
-        return head + struct.pack("<BBB4s16s64s", 128, kind, size, name, format_, labels)
 
+def dive() -> bytes:
+    """Vertical motors that turn against each other, a depth that grows, and attitude."""
+    out = [
+        layout(128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns"),
+        layout(1, 23, b"RCOU", b"QHHHHHH", b"TimeUS,C1,C2,C3,C4,C5,C6"),
+        layout(2, 15, b"CTUN", b"Qf", b"TimeUS,Alt"),
+        layout(3, 19, b"ATT", b"Qff", b"TimeUS,Roll,Pitch"),
+    ]
+    for t, volts in zip(TIME, VOLTS, strict=True):
+        stamp, pulse = round(t * 1e6), round(25 * volts)
+        out.append(HEAD + struct.pack("<BQ6H", 1, stamp, *[1500] * 4, 1500 + pulse, 1500 - pulse))
+        out.append(HEAD + struct.pack("<BQf", 2, stamp + 10_000, -0.05 * t))
+        out.append(HEAD + struct.pack("<BQff", 3, stamp + 20_000, 1.0, -2.0))
+    return b"".join(out)
+
+
+def vrx() -> bytes:
+    """Topics of VRX, as JSON."""
+    from mcap.writer import Writer
+
+    out = io.BytesIO()
+    writer = Writer(out)
+    writer.start()
+    schema = writer.register_schema("any", "jsonschema", b"{}")
+    truth = "/wamv/sensors/position/ground_truth_odometry"
+    names = ("/wamv/thrusters/left/thrust", "/wamv/thrusters/right/thrust", truth)
+    topics = {name: writer.register_channel(name, "json", schema) for name in names}
+    for t, volts in zip(TIME, VOLTS, strict=True):
+        for name in names:
+            message = {"twist": {"twist": {"linear": {"x": 0.1 * t}}}} if name == truth else {"data": 10 * volts}
+            writer.add_message(topics[name], round(t * 1e9), json.dumps(message).encode(), round(t * 1e9))
+    writer.finish()
+    return out.getvalue()
+
+
+def dataflash() -> bytes:
+    """Two messages."""
     out = [
         layout(128, 89, b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns"),
         layout(1, 15, b"RCOU", b"QHH", b"TimeUS,C1,C2"),
@@ -147,8 +188,8 @@ def dataflash() -> bytes:
     ]
     for t, volts, force in zip(TIME, VOLTS, THRUST, strict=True):
         stamp = round(t * 1e6)
-        out.append(head + struct.pack("<BQHH", 1, stamp, round(1500 + 25 * volts), 1500))
-        out.append(head + struct.pack("<BQf", 2, stamp + 20_000, force))
+        out.append(HEAD + struct.pack("<BQHH", 1, stamp, round(1500 + 25 * volts), 1500))
+        out.append(HEAD + struct.pack("<BQf", 2, stamp + 20_000, force))
     return b"".join(out)
 
 

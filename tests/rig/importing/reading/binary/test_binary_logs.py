@@ -154,3 +154,30 @@ def test_no_library_is_loaded_for_text(tmp_path):
     )
     arguments = ["import", str(tmp_path / "T1.csv"), "--map", str(tmp_path / "m.toml")]
     subprocess.run([sys.executable, "-c", code, *arguments], check=True, capture_output=True)
+
+
+def test_logs_of_a_bluerov2_by_the_shipped_maps(tmp_path):
+    (tmp_path / "dive.BIN").write_bytes(logs.dive())
+    assert main(["import", str(tmp_path / "dive.BIN"), "--map", "bluerov2_dataflash", "--set", "reverse_6=-1"]) == 0
+    recording = load(tmp_path / "dive.h5")
+    command, depth = recording.first_of("command_voltage"), recording.first_of("depth")
+    driven = logs.VOLTS[np.append(True, np.diff(logs.VOLTS) != 0)] / 16.0
+    assert command.value == pytest.approx(driven)
+    assert depth.value == pytest.approx(0.05 * logs.TIME, abs=1e-6)
+    (tmp_path / "dive.tlog").write_bytes(logs.tlog())
+    out = tmp_path / "telemetry.h5"
+    assert main(["import", str(tmp_path / "dive.tlog"), "--map", "bluerov2_tlog", "-o", str(out)]) == 0
+    risen = load(out).first_of("depth").value
+    assert risen[-1] - risen[0] == pytest.approx(logs.TIME[-1] * 100 / (998.0 * 9.80665), rel=1e-4)
+
+
+def test_a_log_of_px4_and_one_of_vrx_by_the_shipped_maps(tmp_path):
+    (tmp_path / "sea.ulg").write_bytes(logs.ulog(second="vehicle_local_position"))
+    assert main(["import", str(tmp_path / "sea.ulg"), "--map", "px4_ulog"]) == 0
+    speed = load(tmp_path / "sea.h5").first_of("speed").value
+    assert speed == pytest.approx(np.abs(logs.THRUST), rel=1e-6)
+    (tmp_path / "boat.mcap").write_bytes(logs.vrx())
+    assert main(["import", str(tmp_path / "boat.mcap"), "--map", "vrx_mcap"]) == 0
+    boat = load(tmp_path / "boat.h5")
+    assert [c.thruster for c in boat.channels if c.quantity == "command_voltage"] == ["port", "starboard"]
+    assert boat.first_of("speed").value == pytest.approx(0.1 * logs.TIME)
