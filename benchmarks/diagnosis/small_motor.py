@@ -1,12 +1,13 @@
 """A simulator that shares nothing with the simulated world: what the diagnosis says of its CSV files.
 
-    python benchmarks/diagnosis/small_motor.py [CASE ...] [--keep FOLDER]
+    python benchmarks/diagnosis/small_motor.py [CASE ...] [--amplifier-told] [--keep FOLDER]
 
 A small motor on a bench supply, by the equations of its winding, rotor and water, stepped by hand at 1 ms; its log is
 written as a laboratory would (100 rows a second, rpm, rounded columns), imported by `rig import` and asked by
 `rig diagnose`, each a process of its own. The motor loses six tenths of the largest voltage in its winding, its force
-goes through an amplifier of 10 ms that no recording mentions, and each case has one thing or two more. Told: what was
-put in, what was named, the error on what was not fitted before and after, and the noise that was put in.
+goes through an amplifier of 10 ms that no recording mentions (`--amplifier-told`: the map does), and each case has one
+thing or two more. Told: what was put in, what was named, the error on what was not fitted before and after, and the
+noise that was put in.
 """
 
 from __future__ import annotations
@@ -40,6 +41,8 @@ column = "command_V"
 quantity = "thrust"
 unit = "N"
 column = "thrust_N"
+"""
+TOLD = """low_pass = {seconds:g}
 """
 WITH_RATE = """[streams.motor.channels.rotation_rate]
 quantity = "rotation_rate"
@@ -153,12 +156,15 @@ def rig(words: Sequence[object]) -> None:
     subprocess.run([*RIG, *map(str, words)], check=True, env={**os.environ, **ONE_THREAD}, stdout=subprocess.DEVNULL)
 
 
-def asked(name: str, folder: Path) -> str:
-    """A row of the table."""
+def asked(name: str, folder: Path, *, told: bool) -> str:
+    """A row of the table. `told`: the map says what the amplifier does."""
     motor, truth = CASES[name]
     stem = folder / name.replace(", ", "-").replace(" ", "_")
     write(motor, stem.with_suffix(".csv"))
-    stem.with_suffix(".toml").write_text(MAP + (WITH_RATE if motor.rate else ""), encoding="utf-8")
+    stem.with_suffix(".toml").write_text(
+        MAP + (TOLD.format(seconds=motor.amplifier) if told else "") + (WITH_RATE if motor.rate else ""),
+        encoding="utf-8",
+    )
     rig(["import", stem.with_suffix(".csv"), "--map", stem.with_suffix(".toml"), "--thruster", "T1"])
     rig(["diagnose", stem.with_suffix(".h5"), "--json", stem.with_suffix(".json")])
     found = json.loads(stem.with_suffix(".json").read_text(encoding="utf-8"))
@@ -176,6 +182,7 @@ def asked(name: str, folder: Path) -> str:
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("cases", nargs="*", metavar="CASE", help=f"of {'; '.join(CASES)}")
+    parser.add_argument("--amplifier-told", action="store_true")
     parser.add_argument("--keep", type=Path, metavar="FOLDER")
     wanted = parser.parse_args()
     print("| case | verdict | named | not named | named besides | before / N | after / N | noise put in / N |")
@@ -184,7 +191,7 @@ def main() -> None:
         folder = wanted.keep or Path(name)
         folder.mkdir(parents=True, exist_ok=True)
         for case in wanted.cases or CASES:
-            print(asked(case, folder), flush=True)
+            print(asked(case, folder, told=wanted.amplifier_told), flush=True)
 
 
 if __name__ == "__main__":

@@ -94,10 +94,16 @@ def _driven(time: Floats, force: Floats, held: Held) -> tuple[Floats, Floats]:
     rotor coasts), and, for a measured driver, after its last row."""
     slack = 0.5 * float(np.median(np.diff(time)))
     end = np.inf if held.stepwise else held.time[-1] + slack
-    inside = (time >= held.time[0] - slack) & (time <= end)
-    for begun, ended in held.unknown:
-        inside &= (time < begun) | (time > ended + policy.prepare.AFTER_UNKNOWN_COMMAND)
+    inside = (time >= held.time[0] - slack) & (time <= end) & _commanded(time, held)
     return time[inside], force[inside]
+
+
+def _commanded(time: Floats, held: Held) -> NDArray[np.bool_]:
+    """(n,) false while nobody knows what was commanded, as where a watchdog is proved, and until the rotor rests."""
+    known = np.ones(time.size, dtype=np.bool_)
+    for begun, ended in held.unknown:
+        known &= (time < begun) | (time > ended + policy.prepare.AFTER_UNKNOWN_COMMAND)
+    return known
 
 
 def _clear_of_steps(time: Floats, force: Floats, held: Held) -> tuple[Floats, Floats]:
@@ -182,12 +188,14 @@ class _Turning:
     spacing: float
 
 
-def _turning(recording: Recording, others: Mapping[str, Floats], driven: Floats, edges: Floats) -> _Turning:
+def _turning(
+    recording: Recording, others: Mapping[str, Floats], held: Held, driven: Floats, edges: Floats
+) -> _Turning:
     channel = recording.first_of("rotation_rate")
     spacing = 0.0 if channel is None or channel.time.size < 2 else float(np.median(np.diff(channel.time)))
     if channel is None or "rotation_rate" not in others:
         return _Turning(np.empty(0), None, None, None, 1.0, spacing)
-    good = np.isfinite(channel.value)
+    good = np.isfinite(channel.value) & _commanded(channel.time, held)
     time = channel.time[good]
     per_driver = _rate_per_driver(driven, others["rotation_rate"], edges)
     return _Turning(time, *binned(time, channel.value[good], edges), per_driver, spacing)
@@ -201,7 +209,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
     driven = held.mean(edges)
     others, begun_error = warmed(recording, edges, driven, _explaining(recording, driver, held, edges, driven))
     inside = (time >= edges[0]) & (time < edges[-1])
-    turning = _turning(recording, others, driven, edges)
+    turning = _turning(recording, others, held, driven, edges)
     history = History(
         recording_id=recording.recording_id,
         driver_quantity=held.quantity,

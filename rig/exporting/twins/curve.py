@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
-from identification.mismatch.compare.simulation import Drive, simulate
+from identification.mismatch.compare.simulation import Drive, Prediction, simulate
 from identification.mismatch.prepare.preparing import Refusal
 from identification.physics.term import MEASURED
 from identification.twin import Twin, TwinTerm
@@ -28,6 +28,9 @@ SETTLED = 3.0
 """s"""
 REST = 3.0
 """s at 0 before each level."""
+RATE = "rotation_rate"
+RATE_TICK = 0.005
+"""s between the rates that the twin foretells for a term that looks at the measured one."""
 TICK = 0.02
 """s between the times of a step response."""
 STEP_RESPONSE = 2.0
@@ -129,8 +132,9 @@ def _thruster_alone(twin: Twin) -> tuple[Twin, list[str]]:
     """Without what is no force of the thruster, or goes with a channel that a command alone does not give."""
     kept: list[TwinTerm] = []
     left_out = []
+    foretold = {RATE} if twin.rate_per_driver else set()
     for each in twin.terms:
-        others = sorted(set(each.term.needs) - {"rotation_rate"})
+        others = sorted(set(each.term.needs) - foretold)
         if each.term.stage in MEASURED:
             left_out.append(f"{each.effect}: it acts in the stand or its cell, no vehicle has it")
         elif others:
@@ -151,11 +155,21 @@ def settled(twin: Twin, levels: Floats) -> tuple[Floats, Floats | None]:
 
 
 def _acted(twin: Twin, drive: Drive, times: Floats) -> tuple[Floats, Floats | None]:
-    """Just before `times`, evenly spaced."""
-    found = simulate(twin, drive, times - TICK)
+    """Just before `times`, evenly spaced. A rate that thrust follows is the one that the twin foretells."""
+    if any(RATE in term.term.needs for term in twin.terms):
+        alone = replace(twin, terms=tuple(term for term in twin.terms if RATE not in term.term.needs))
+        every = np.arange(drive.time[0], times[-1], RATE_TICK)
+        rate = _simulated(alone, drive, every).rate
+        drive = replace(drive, others={RATE: (every, np.zeros(every.size) if rate is None else rate)})
+    found = _simulated(twin, drive, times - TICK)
+    return _whole(found.thrust), None if found.rate is None else _whole(found.rate)
+
+
+def _simulated(twin: Twin, drive: Drive, times: Floats) -> Prediction:
+    found = simulate(twin, drive, times)
     if isinstance(found, Refusal):
         raise TwinError(f"{twin.thruster}: {found.reason}")
-    return _whole(found.thrust), None if found.rate is None else _whole(found.rate)
+    return found
 
 
 def _whole(values: Floats) -> Floats:

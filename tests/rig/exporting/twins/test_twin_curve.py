@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.twin import TwinLine
+from identification.twin import Twin, TwinLine, TwinNoise, TwinTerm, names_of
 from rig.cli import main
 from rig.errors import TwinError
 from rig.exporting.twins import uuv
 from rig.exporting.twins.curve import POINTS, curve_of
 from rig.exporting.twins.written import Asked, head
 from rig.twin.writing import write_twin
-from tests.rig.exporting.twins.conftest import STD, a_twin, by_hand
+from tests.rig.exporting.twins.conftest import SCALE, STD, a_twin, by_hand
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +53,21 @@ def test_what_acts_in_the_stand_is_told_and_left_out(curve):
     assert [each.split(":")[0] for each in curve.left_out] == ["load_cell_nonlinearity"]
     line = TwinLine(0.3, 0.01, 7.0, 0.01)
     assert "a line at 7 Hz (0.3 N)" in curve_of(replace(a_twin(), lines=(line,))).left_out
+
+
+def test_thrust_that_follows_the_measured_rate_follows_the_one_that_the_twin_foretells():
+    """As a bench's own twin has it: all of the thrust goes with n, and the command tells n."""
+    coupled = TwinTerm("rotation_coupling", "", {"share": 1.0}, SCALE)
+    lag = TwinTerm("motor_lag", "first_order", {"time_constant": 0.12}, SCALE)
+    alone = Twin(
+        "T1", "command_voltage", 0.3, (lag, coupled), names_of((lag, coupled)), ((0.0,) * 3,) * 3, TwinNoise(0.02, 0.0),
+        (), 0.02, 16.0, 1.9, 1.9,
+    )  # fmt: skip
+    curve = curve_of(alone)
+    assert curve.thrust == pytest.approx(0.3 * curve.driver * np.abs(curve.driver), rel=2e-3, abs=1e-3)
+    assert curve.lag == pytest.approx(0.12, rel=0.1)
+    without = curve_of(replace(alone, rate_per_driver=None))
+    assert without.left_out[0].startswith("rotation_coupling: as at its reference")
 
 
 def test_a_consumer_of_rates_wants_a_twin_that_knows_them(tmp_path, capsys):
