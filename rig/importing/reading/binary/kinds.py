@@ -71,11 +71,11 @@ def read_binary(data: bytes, name: str, wanted: Sequence[str]) -> Table:
             f"this {kind.what} can't be read, it may be cut off or damaged ({type(error).__name__}: {error})"
         ) from error
     _require(frames, wanted, kind)
-    return table_of(_ordered(frames, wanted), kind.what)
+    return table_of(_wanted(frames, wanted), kind.what)
 
 
-def _ordered(frames: Sequence[Frame], wanted: Sequence[str]) -> list[Frame]:
-    """Those that are wanted; of a file with several frames, where nothing is, the one that is no other's part."""
+def _wanted(frames: Sequence[Frame], wanted: Sequence[str]) -> list[Frame]:
+    """Those that are wanted; all where none is named."""
     return [frame for frame in frames if not wanted or frame.name in wanted]
 
 
