@@ -8,6 +8,9 @@ from typing import Literal
 
 from drivers.protocols import QUARTZ, Channel, Stream
 
+HEALTH = ("ok", "warning", "error", "critical")
+MODES = {0: "operational", 1: "in initialization", 2: "in maintenance", 3: "in a software update", 7: "offline"}
+"""Of a NodeStatus (341.NodeStatus.uavcan)."""
 LARGEST_INDEX = 19
 """RawCommand has at most 20 set-points (1030.RawCommand.uavcan)."""
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator
 
-from drivers.dronecan.watching import HEALTH, MODES
+from drivers.dronecan.options import HEALTH, MODES
 from drivers.ports.can_frame import Frame
 from drivers.recognition.can_traffic import CanProbe, Traffic
 from drivers.recognition.found import Found

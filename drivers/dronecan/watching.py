@@ -6,11 +6,9 @@ restarts"), which VESC's firmware fills with its fault code (libcanard/canard_dr
 
 from __future__ import annotations
 
-from drivers.dronecan.options import Options
+from drivers.dronecan.options import HEALTH, MODES, Options
 from drivers.dronecan.transfers import NODE_STATUS, RAW_COMMAND, RPM_COMMAND, STATUS, Received
 
-HEALTH = ("ok", "warning", "error", "critical")
-MODES = {0: "operational", 1: "in initialization", 2: "in maintenance", 3: "in a software update", 7: "offline"}
 ERROR = 2
 """Health from which on the node itself says that it can't do its work; a warning is recorded alone."""
 AGAIN = "open again"
