@@ -14,6 +14,9 @@ from rig.exporting.content import Content, content_of
 from rig.exporting.targets import TARGETS, TWIN, Target, called, target_of
 from rig.list_option import ListCommand, ListOption
 
+What = TypeVar("What")
+"""That is exported: a recording's content, or a twin with what was asked of it."""
+
 
 @click.command("export", cls=ListCommand)
 @click.argument("file", type=click.Path(path_type=Path))
@@ -71,7 +74,7 @@ def _of_twin(
     file: Path, target: Target, out: Path, diameter: float | None, pulse: tuple[float, float, float] | None
 ) -> list[str]:
     from rig.exporting.twins.curve import curve_of  # scipy
-    from rig.exporting.twins.written import PULSE, Asked, head
+    from rig.exporting.twins.written import PULSE, Asked, summary
     from rig.twin.reading import read_twin
 
     twin = read_twin(file)
@@ -80,10 +83,7 @@ def _of_twin(
         raise ConfigError(f"--pulse must be full astern < neutral < full ahead in us, got {low:g} {neutral:g} {high:g}")
     asked = Asked(twin, curve_of(twin), file.name, diameter, pulse=(low, neutral, high))
     written(asked, out, called(target.writer))
-    return [f"{out}: {asked.curve.thruster}", *head(asked, called(target.carried)(asked))[2:]]
-
-
-What = TypeVar("What")
+    return [f"{out}: {asked.curve.thruster}", *summary(asked, called(target.carried)(asked))]
 
 
 def written(content: What, out: Path, write: Callable[[What, Path], None]) -> None:

@@ -56,7 +56,9 @@ def laid_out(plan: ImportMap, cells: Cells, channels: Sequence[ChannelData]) -> 
         for called, part in _apart(name, own) if levels is not None else [(name, own)]:
             if part:
                 time = _time(plan, stream, cells, levels, part) - start
-                streams.append(_stream(called, stream, part, time, levels, apart=len(plan.file.message) > 1))
+                streams.append(
+                    _stream(called, stream, part, time, levels, apart=plan.file.kind != "text" and levels is None)
+                )
     steps = () if levels is None else _steps(levels, first, start)
     return LaidOut(tuple(streams), steps, rows, start if plan.time in cells.time else None)
 
@@ -89,7 +91,7 @@ def _stream(
 ) -> StreamData:
     """A level without a command stays: nobody knows what was commanded there, and it was not the level before.
 
-    `apart`: rows are of several messages, and those of others are no rows of this stream."""
+    `apart`: rows may be of several messages of a log, and those of others are no rows of this stream."""
     values = np.column_stack([channel.values for channel in part])
     known = ~np.all(np.isnan(values), axis=1)
     if apart:

@@ -188,9 +188,7 @@ class _Turning:
     spacing: float
 
 
-def _turning(
-    recording: Recording, others: Mapping[str, Floats], held: Held, driven: Floats, edges: Floats
-) -> _Turning:
+def _turning(recording: Recording, others: Mapping[str, Floats], held: Held, driven: Floats, edges: Floats) -> _Turning:
     channel = recording.first_of("rotation_rate")
     spacing = 0.0 if channel is None or channel.time.size < 2 else float(np.median(np.diff(channel.time)))
     if channel is None or "rotation_rate" not in others:

@@ -15,6 +15,7 @@ from rig.exporting.twins.curve import Floats
 from rig.exporting.twins.forms import one_way, points, rates_at, square
 from rig.exporting.twins.written import Asked, Carried, head, put, xml_comment
 
+ONE_COEFFICIENT = "unequal directions: one coefficient serves both"
 ASSUMED = 0.1
 """m: where the diameter is not known; k D^4 acts alone."""
 
@@ -32,9 +33,6 @@ def in_newtons(asked: Asked) -> Carried:
 def by_rate(asked: Asked) -> Carried:
     curve, k = asked.curve, coefficient(asked)
     return Carried(lambda u: k * square(2 * pi * rates_at(curve, u)), lost=(ONE_COEFFICIENT,))
-
-
-ONE_COEFFICIENT = "unequal directions: one coefficient serves both"
 
 
 def coefficient(asked: Asked) -> float:

@@ -8,10 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from rig.exporting.twins.written import Asked, Carried, band_lines, head, numbers, put, xml_comment
-
-LEAST_LAG = 1e-3
-"""s: `first_order` takes no 0."""
+from rig.exporting.twins.written import LEAST_LAG, Asked, Carried, band_lines, head, numbers, put, xml_comment
 
 
 def carried(asked: Asked) -> Carried:
@@ -30,7 +27,7 @@ def write(asked: Asked, path: Path) -> None:
             f'  <specs max_setpoint="{curve.largest:.9g}" inverted_setpoint="false" normalized_setpoint="false"/>',
             f'  <propeller {diameter}right="true"/>  <!-- its mesh and material are yours -->',
             '  <rotor_dynamics type="first_order">',
-            f'    <time_constant value="{max(curve.lag, LEAST_LAG):.6g}"/>',
+            f'    <time_constant value="{curve.lag or LEAST_LAG:.6g}"/>',
             "  </rotor_dynamics>",
             '  <thrust_model type="linear_interpolation">',
             f'    <input value="{numbers(curve.driver)}"/>',

@@ -11,12 +11,10 @@ from pathlib import Path
 import numpy as np
 
 from rig.exporting.twins.curve import Curve, Floats
-from rig.exporting.twins.written import Asked, Carried, band_lines, hashed, head, numbers, put, xml_comment
+from rig.exporting.twins.written import LEAST_LAG, Asked, Carried, band_lines, hashed, head, numbers, put, xml_comment
 
 RISE = 1e-6
 """N a point: a dead band is flat, and the inverse of what is flat is anything."""
-LEAST_LAG = 1e-3
-"""s: `FirstOrder` takes no 0."""
 
 
 def carried(asked: Asked) -> Carried:
@@ -34,7 +32,7 @@ def write(asked: Asked, path: Path) -> None:
             f'<plugin name="{asked.name}" filename="libuuv_thruster_ros_plugin.so">',
             "  <dynamics>",
             "    <type>FirstOrder</type>",
-            f"    <timeConstant>{max(curve.lag, LEAST_LAG):.6g}</timeConstant>",
+            f"    <timeConstant>{curve.lag or LEAST_LAG:.6g}</timeConstant>",
             "  </dynamics>",
             "  <conversion>",
             "    <type>LinearInterp</type>",

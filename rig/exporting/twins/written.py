@@ -13,6 +13,8 @@ from rig.exporting.twins.curve import SETTLED, STEP_RESPONSE, Curve, Floats
 
 PULSE = (1100.0, 1500.0, 1900.0)
 """us: full astern, neutral, full ahead of most ESCs."""
+LEAST_LAG = 1e-3
+"""s: written where there is none, for consumers whose first-order lag takes no 0."""
 CHECK_AT = 0.7
 """Of the largest driver: the self-check row."""
 
@@ -78,7 +80,12 @@ def loss_of(carried: Carried, curve: Curve) -> Loss:
 
 def head(asked: Asked, carried: Carried) -> list[str]:
     """Lines of text, for the comment of whatever kind the file has."""
-    return [*_origin(asked), *_losses(asked.curve, carried), *_check(asked.curve, carried), *_lost(asked, carried)]
+    return [*_origin(asked), *summary(asked, carried)]
+
+
+def summary(asked: Asked, carried: Carried) -> list[str]:
+    """What is lost, the self-check, what is not carried."""
+    return [*_losses(asked.curve, carried), *_check(asked.curve, carried), *_lost(asked.curve, carried)]
 
 
 def _origin(asked: Asked) -> Iterator[str]:
@@ -115,8 +122,7 @@ def _check(curve: Curve, carried: Carried) -> Iterator[str]:
     )
 
 
-def _lost(asked: Asked, carried: Carried) -> Iterator[str]:
-    curve = asked.curve
+def _lost(curve: Curve, carried: Carried) -> Iterator[str]:
     if curve.lag and not carried.lag:
         yield (
             f"Not carried: the lag of {curve.lag:.3g} s, {curve.without_lag:.3g} N rms in the first {STEP_RESPONSE:g} s"

@@ -27,8 +27,7 @@ def mat(data: bytes, wanted: Sequence[str]) -> list[Frame]:
         file: Any = BytesIO(data)  # a path, for its stubs
         content = loadmat(file, simplify_cells=True)
     frames = list(_frames(content, ""))
-    named = [frame for frame in frames if frame.name in wanted]
-    return named or frames[:1] if not wanted else frames
+    return frames if wanted else frames[:1]
 
 
 def _frames(content: Mapping[str, Any], place: str) -> Iterator[Frame]:

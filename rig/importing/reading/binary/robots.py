@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import tempfile
 from collections.abc import Sequence
+from importlib.util import find_spec
 from io import BytesIO
 from pathlib import Path
 
@@ -37,8 +38,6 @@ def bag(data: bytes, wanted: Sequence[str]) -> list[Frame]:
 
 def _by_rosbags(data: bytes, wanted: Sequence[str], suffix: str) -> list[Frame]:
     """It reads files alone."""
-    from importlib.util import find_spec
-
     if find_spec("rosbags") is None:
         raise RecordingError("messages of ROS 2 need the package rosbags: pip install 'thruster-rig[ros]'")
     from rosbags.highlevel import AnyReader

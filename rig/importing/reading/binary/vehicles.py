@@ -44,21 +44,21 @@ def dataflash(data: bytes, wanted: Sequence[str]) -> list[Frame]:
             while (message := log.recv_match(type=types)) is not None:
                 fields = message.to_dict()
                 if "TimeUS" in fields:
-                    gathered.add(_instance(message), fields["TimeUS"] * MICROSECOND, flat(_numbers(fields)))
+                    name = _instance(str(message.get_type()), fields)
+                    gathered.add(name, fields["TimeUS"] * MICROSECOND, flat(_numbers(fields)))
         finally:
             log.close()
     return gathered.frames()
 
 
-def _instance(message: Any) -> str:
-    kind = str(message.get_type())
-    number = message.to_dict().get("Instance", message.to_dict().get("Inst", 0))
+def _instance(kind: str, fields: dict[str, Any]) -> str:
+    number = fields.get("Instance", fields.get("Inst", 0))
     return kind if "[" in kind or not isinstance(number, int) or number == 0 else f"{kind}[{number}]"
 
 
 def tlog(data: bytes, wanted: Sequence[str]) -> list[Frame]:
     """A frame a message. Time is that of its arrival, since 1970."""
-    os.environ.setdefault("MAVLINK20", "1")
+    os.environ.setdefault("MAVLINK20", "1")  # pymavlink reads it as it is imported: version 2, which reads 1 as well
     from pymavlink import mavutil
 
     gathered = Gathered()

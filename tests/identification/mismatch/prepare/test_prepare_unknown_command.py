@@ -15,9 +15,11 @@ from tests.identification.diagnosed_runs import C, run
 
 UNKNOWN = (20.0, 22.0)
 """s: the motor holds what was commanded last until its watchdog ends that, then coasts; 0 V is commanded next."""
+RATE_NOISE = 0.002
+"""rev/s"""
 
 
-def proved(rate_noise: float = 0.002):
+def proved():
     """A rotor in water, pulled by its motor too, its command unknown for two seconds; its measured rate."""
     bare = run(seconds=120.0, rate=20.0, seed=3)
     command = bare.first_of("command_voltage")
@@ -32,7 +34,7 @@ def proved(rate_noise: float = 0.002):
         x[i] = x[i - 1] + 0.002 * (0.25 * water + 3.0 * (drive[i - 1] - x[i - 1]))
     rng = np.random.default_rng(4)
     at = np.arange(0.0, 119.9, 0.05)
-    n = np.interp(at, t, x) + rate_noise * rng.standard_normal(at.size)
+    n = np.interp(at, t, x) + RATE_NOISE * rng.standard_normal(at.size)
     thrust = bare.first_of("thrust")
     F = C * np.interp(thrust.time, t, x * np.abs(x)) + 0.05 * rng.standard_normal(thrust.time.size)
     rest = UNKNOWN[1] + 4.0

@@ -83,6 +83,17 @@ def test_channels_rates_and_units(tmp_path, name, kind, message, time, volts, fo
     assert (drive.unit, cell.unit) == ("V", "N")
 
 
+def test_where_no_message_is_named_all_are_there_and_each_stream_has_its_own_rows(tmp_path):
+    (tmp_path / "T1.BIN").write_bytes(logs.dataflash())
+    volts, force = 'column = "RCOU.C1"\nfactor = 0.04\noffset = -60', 'column = "CELL.F"'
+    text = MAP.format(kind="dataflash", message="[]", time="time", unit="s", volts=volts, force=force)
+    text = text.replace("[streams.drive.ch", "[streams.drive]\nchanges = true\n[streams.drive.ch")
+    (tmp_path / "map.toml").write_text(text)
+    assert main(["import", str(tmp_path / "T1.BIN"), "--map", str(tmp_path / "map.toml")]) == 0
+    command = load(tmp_path / "T1.h5").first_of("command_voltage")
+    assert command.value == pytest.approx(logs.VOLTS[np.append(True, np.diff(logs.VOLTS) != 0)])
+
+
 def test_telemetry_of_a_vehicle():
     table = read_binary(logs.tlog(), "tlog", ["SERVO_OUTPUT_RAW", "SCALED_PRESSURE2"])
     rows = [cells for _, cells in table.rows]
