@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -18,7 +19,7 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.noise.rounding_error import rounding_wave
 from identification.mismatch.periodic.full_rate import scale_std_of, series_of, with_scale
-from identification.mismatch.periodic.periodic_disturbances import Line, find_lines
+from identification.mismatch.periodic.periodic_disturbances import Band, Line, find_lines
 from identification.mismatch.periodic.plan_rhythm import of_the_plan, within
 from identification.mismatch.periodic.resonances import find_bands
 from identification.mismatch.periodic.spectrum import Series
@@ -68,13 +69,32 @@ def _lines(fitted: Fit, data: Data, series: Sequence[Series]) -> tuple[Line, ...
     least = max(_of_rounding(s, h) for s, h in zip(series, data.histories, strict=True))
     found = find_lines(series, turns_unit=unit, ring=_ring(fitted, data))
     plan = [band for h in data.histories for band in of_the_plan(h)]
+    skipped = _peaks(found)
     if sum(line.kind == "fixed" and within(line.frequency, plan) for line in found) > 1:  # one may be there by chance
-        found = find_lines(series, turns_unit=unit, ring=_ring(fitted, data), skipped=plan)
+        skipped += plan
+    if skipped:
+        found = find_lines(series, turns_unit=unit, ring=_ring(fitted, data), skipped=skipped)
     lines = tuple(line for line in found if line.shown_amplitude > least)
     if not lines or not data.with_rate:
         return lines
     scale_std = scale_std_of(fitted, data)
     return tuple(with_scale(line, scale_std, series) for line in lines)
+
+
+def _peaks(lines: Sequence[Line]) -> list[Band]:
+    """Hz, round lines of one frequency that stand too near to one another to be any."""
+    fixed = sorted((line for line in lines if line.kind == "fixed"), key=lambda line: line.frequency)
+    reach = policy.periodic.APART
+    return [
+        (low.frequency - reach * _resolution(low), high.frequency + reach * _resolution(high))
+        for low, high in pairwise(fixed)
+        if high.frequency - low.frequency < reach * _resolution(low)
+    ]
+
+
+def _resolution(line: Line) -> float:
+    """Hz, 1/T of the longest run."""
+    return line.band[1] - line.frequency
 
 
 def _of_rounding(series: Series, history: History) -> float:

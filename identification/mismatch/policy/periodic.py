@@ -99,6 +99,17 @@ LINE_WIDTH = Threshold(
         "is at least as wide."
     ),
 )
+APART = Threshold(
+    8.0,
+    unit="1/T",
+    reason=(
+        "A narrow resonance of the noise has as many peaks beside one another as it lasts times; two sources whose "
+        "waves are told apart by so little more than the length of the run are hardly found in one thrust."
+    ),
+    evidence=(
+        "bench/nothing/2 of draw 2028-02-02: 5.154 and 5.182 Hz, 5/T apart, in mixed noise in which nothing is hidden."
+    ),
+)
 HIGHEST_ORDER = Threshold(
     400.0,
     unit="Hz at the highest speed",

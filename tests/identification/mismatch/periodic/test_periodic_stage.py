@@ -77,6 +77,13 @@ def test_a_line_is_taken_from_every_sample_and_its_mean():
     assert clean.within == pytest.approx(squares, abs=1e-9)
 
 
+@pytest.mark.parametrize(("apart", "found"), [(5.0, 0), (40.0, 2)])
+def test_two_waves_within_a_few_turns_of_the_run_are_a_peak_of_the_noise(apart, found):
+    duration = float(np.ptp(noisy().first_of("thrust").time))
+    data, estimate = estimated({}, [noisy(change=lambda t, V, F: hum(4.0 + apart / duration)(t, V, hum(4.0)(t, V, F)))])
+    assert len(stage.run(estimate.fit, data, data.histories).lines) == found
+
+
 def test_runs_without_lines_are_handed_on_as_they_are():
     data, estimate = estimated({}, [noisy()])
     found = stage.run(estimate.fit, data, data.histories)
