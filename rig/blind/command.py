@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-import signal
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,6 +13,7 @@ import click
 from rig.blind.progress import shown
 from rig.errors import RigError
 from rig.result_path import RESULT_FILE, require_different
+from rig.workers.interrupting import interruptible
 
 if TYPE_CHECKING:
     from rig.blind.beside import Beside
@@ -55,22 +54,6 @@ def run(store: Store, jobs: Sequence[Job], lanes: int, limit: float, *, renew: b
     working = [Lane(store, str(i), limit, code, keep) for i in range(min(lanes, len(pending)))]
     with store.locked(), interruptible(), shown(len(pending)) as told:
         carry_out(pending, working, renew, told)
-
-
-@contextmanager
-def interruptible() -> Iterator[None]:
-    """`kill` and a terminal that closes are as Ctrl+C: the diagnoses are ended too. What `nohup` ignores stays so."""
-
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    heard = [s for s in (signal.SIGTERM, signal.SIGHUP) if signal.getsignal(s) is not signal.SIG_IGN]
-    before = {s: signal.signal(s, interrupt) for s in heard}
-    try:
-        yield
-    finally:
-        for s, handler in before.items():
-            signal.signal(s, handler)
 
 
 def summary(found: Collected) -> str:

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-import fcntl
 import json
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from hashlib import sha256
 from pathlib import Path
 from shutil import rmtree
 from typing import Any, Final
@@ -19,6 +17,8 @@ import identification
 from identification.recording import Floats
 from rig.blind.design import Job, Order
 from rig.errors import RigError
+from rig.workers.locking import folder_locked
+from rig.workers.version import version_of
 
 TIMEOUT: Final = "timeout"
 """The error of an answer that took longer than its `limit`."""
@@ -109,23 +109,14 @@ class Store:
     @contextmanager
     def locked(self) -> Iterator[None]:
         """While a proof works here. Raises ProofError when another one does."""
-        self.root.mkdir(parents=True, exist_ok=True)
-        with (self.root / "lock").open("ab") as file:
-            try:
-                fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError:
-                raise ProofError(f"another proof works in {self.root}; wait for it, or give another --store") from None
+        busy = ProofError(f"another proof works in {self.root}; wait for it, or give another --store")
+        with folder_locked(self.root, busy):
             yield
 
 
 def version_of_diagnosis() -> str:
     """Changes with every change of the sources of identification."""
-    folder = Path(identification.__file__).parent
-    found = sha256()
-    for path in sorted(folder.rglob("*.py")):
-        found.update(path.relative_to(folder).as_posix().encode())
-        found.update(path.read_bytes())
-    return found.hexdigest()[:12]
+    return version_of(identification)
 
 
 def _again(answer: dict[str, Any], code: str, limit: float) -> bool:

@@ -7,129 +7,21 @@ are failures of the diagnosis. A world that fails ends the proof. What is broken
 from __future__ import annotations
 
 import json
-import os
-import queue
-import select
 import subprocess
 import sys
-from collections.abc import Callable, Mapping, Sequence
-from contextlib import suppress
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from threading import Event, Lock, Thread
-from time import monotonic
-from typing import Any
+from functools import partial
 
 from rig.blind.design import Job, Kinds, Order
 from rig.blind.store import TIMEOUT, ProofError, Store
+from rig.workers.child import STOPPING, BrokenOff, Child, Ended, Overdue
+from rig.workers.lanes import drive
+
+__all__ = ["STOPPING", "BrokenOff", "Child", "Ended", "Lane", "Overdue", "carry_out", "concealable"]
 
 WORLD_LIMIT = 900.0
 """s for one case: thirty draws at 500 samples/s."""
-STOPPING = 5.0
-"""s that a process is given to end by itself."""
-ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
-
-
-class Overdue(Exception):
-    """No line came within the limit; the process was killed."""
-
-
-class Ended(Exception):
-    """The process ended instead of answering."""
-
-
-class BrokenOff(Exception):
-    """The proof ends: nothing is asked any more, and what was asked has no answer."""
-
-
-@dataclass
-class Child:
-    """A process that answers each line with a line. It is started when first asked, and again after it was killed."""
-
-    command: Sequence[str]
-    log: Path
-    """Its standard error is added here."""
-    process: subprocess.Popen[bytes] | None = None
-    dismissed: bool = False
-    """It is not asked any more."""
-    starting: Lock = field(default_factory=Lock, repr=False)
-    """So that none is started while it is dismissed: nobody would end it."""
-
-    def ask(self, line: Mapping[str, Any], limit: float) -> None:
-        """Raises Overdue after `limit` s without an answer, Ended when there will be none, BrokenOff when dismissed."""
-        try:
-            self._ask(line, limit)
-        except (Overdue, Ended, OSError, ValueError) as end:  # its pipe may be closed under us
-            if self.dismissed:
-                raise BrokenOff from end
-            raise
-
-    def dismiss(self, patience: float = STOPPING) -> None:
-        """End it for good, from any thread."""
-        with self.starting:
-            self.dismissed = True
-        self.close(patience)
-
-    def _ask(self, line: Mapping[str, Any], limit: float) -> None:
-        process = self._running()
-        assert process.stdin is not None
-        assert process.stdout is not None
-        try:
-            process.stdin.write(json.dumps(line).encode() + b"\n")
-            process.stdin.flush()
-        except OSError as error:
-            raise Ended(self._end()) from error
-        end, said = monotonic() + limit, b""
-        while not said.endswith(b"\n"):
-            ready, _, _ = select.select([process.stdout], [], [], max(end - monotonic(), 0.0))
-            if not ready:
-                self.close(0.0)
-                raise Overdue
-            piece = os.read(process.stdout.fileno(), 4096)
-            if not piece:
-                raise Ended(self._end())
-            said += piece
-
-    def close(self, patience: float = STOPPING) -> None:
-        """End it; it is killed when that takes more than `patience` s."""
-        process, self.process = self.process, None
-        if process is None:
-            return
-        with suppress(OSError):
-            if process.stdin is not None:
-                process.stdin.close()
-        try:
-            process.wait(patience)
-        except subprocess.TimeoutExpired:
-            process.kill()
-            process.wait()
-        if process.stdout is not None:
-            process.stdout.close()
-
-    def _running(self) -> subprocess.Popen[bytes]:
-        with self.starting:
-            if self.dismissed:
-                raise BrokenOff
-            if self.process is None:
-                self.process = self._started()
-            return self.process
-
-    def _started(self) -> subprocess.Popen[bytes]:
-        with self.log.open("ab") as log:
-            return subprocess.Popen(
-                self.command,
-                stdin=subprocess.PIPE,
-                stdout=subprocess.PIPE,
-                stderr=log,
-                env={**os.environ, **ONE_THREAD},
-                bufsize=0,
-                start_new_session=True,  # Ctrl+C in the terminal is for us: its death would be an answer
-            )
-
-    def _end(self) -> str:
-        process = self.process
-        self.close()
-        return f"exit status {process.returncode if process else '?'}, see {self.log}"
 
 
 def concealable() -> Kinds:
@@ -216,47 +108,13 @@ class Lane:
 
 def carry_out(jobs: Sequence[Job], lanes: Sequence[Lane], renew: bool, told: Callable[[Job], None]) -> None:
     """All jobs, in order, on all lanes; `told` after each, in this thread. Raises ProofError; Ctrl+C ends it."""
-    waiting: queue.SimpleQueue[Job] = queue.SimpleQueue()
-    done: queue.SimpleQueue[Job | BaseException] = queue.SimpleQueue()
-    stop, patience = Event(), 0.0
-    for job in jobs:
-        waiting.put(job)
-    threads = [Thread(target=_drive, args=(lane, waiting, done, stop, renew), daemon=True) for lane in lanes]
-    try:
-        for thread in threads:
-            thread.start()
-        for _ in jobs:
-            found = done.get()
-            if isinstance(found, BaseException):
-                raise found
-            told(found)
-        patience = STOPPING
-    finally:
-        stop.set()
+
+    def work(lane: Lane, job: Job) -> Job:
+        lane.carry_out(job, renew)
+        return job
+
+    def close(patience: float) -> None:
         for lane in lanes:
             lane.close(patience)
-        for thread in threads:
-            if thread.is_alive():
-                thread.join(STOPPING)
 
-
-def _drive(
-    lane: Lane,
-    waiting: queue.SimpleQueue[Job],
-    done: queue.SimpleQueue[Job | BaseException],
-    stop: Event,
-    renew: bool,
-) -> None:
-    while not stop.is_set():
-        try:
-            job = waiting.get_nowait()
-        except queue.Empty:
-            return
-        try:
-            lane.carry_out(job, renew)
-            done.put(job)
-        except BrokenOff:
-            return
-        except BaseException as error:  # noqa: BLE001  # raised again where the results are read
-            done.put(error)
-            return
+    drive(jobs, [partial(work, lane) for lane in lanes], close, told)

@@ -11,11 +11,12 @@ from time import monotonic, sleep
 import pytest
 from click.testing import CliRunner
 
-from rig.blind.command import _counted, designed, interruptible, prove_command
+from rig.blind.command import _counted, designed, prove_command
 from rig.blind.design import design
 from rig.blind.scoring.score import scored
 from rig.blind.store import ProofError, Store
 from rig.blind.workers import STOPPING, BrokenOff, Child, Lane, carry_out
+from rig.workers.interrupting import interruptible
 from tests.rig.blind_scores import CATALOGUE, WORLD, answer, finding, order, truth
 
 
