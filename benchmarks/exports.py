@@ -15,10 +15,11 @@ from pathlib import Path
 import click
 
 from rig.errors import RigError
-from rig.exporting.targets import TARGETS, TWIN, called
+from rig.exporting.targets import TARGETS, TWIN
 from rig.exporting.twins.curve import curve_of
 from rig.exporting.twins.written import Asked, loss_of
 from rig.twin.reading import read_twin
+from rig.workers.called import called
 
 PUBLISHED = {
     "table": "41 points: 0.2 %",

@@ -11,8 +11,9 @@ import click
 
 from rig.errors import ConfigError, RecordingError
 from rig.exporting.content import Content, content_of
-from rig.exporting.targets import TARGETS, TWIN, Target, called, target_of
+from rig.exporting.targets import TARGETS, TWIN, Target, target_of
 from rig.list_option import ListCommand, ListOption
+from rig.workers.called import called
 
 What = TypeVar("What")
 """That is exported: a recording's content, or a twin with what was asked of it."""

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import json
-from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Any, Final, NamedTuple
+from typing import Final, NamedTuple
 
 from rig.errors import ConfigError, RecordingError
 
@@ -80,12 +79,6 @@ def kind_of(path: Path) -> str:
             " --save-twin)"
         )
     return found.removeprefix(PREFIX)
-
-
-def called(place: str) -> Any:
-    """What a `module:function` is; the module is imported."""
-    module, _, name = place.partition(":")
-    return getattr(import_module(module), name)
 
 
 def target_of(path: Path, word: str) -> Target:

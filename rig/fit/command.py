@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import click
 
@@ -19,6 +19,7 @@ from rig.fit.comparison import alike, changed
 from rig.fit.one_pass import LONG, fit_one_pass, thrust_rows
 from rig.fit.one_pass_text import one_pass_json, one_pass_text
 from rig.fit.text import alike_text, answer_text, changed_text, set_text
+from rig.fleet.options import Fleet, fleet_of, fleet_options, refuse_beside
 from rig.recording.recover import rather_recovered
 from rig.result_path import RESULT, RESULT_FILE
 
@@ -76,6 +77,13 @@ def _not_with_one_pass(*asked: tuple[str, object]) -> None:
         )
 
 
+def _rows(files: Iterable[Path], model: Model, signal: str, method: Method, fleet: Fleet) -> int:
+    from rig.fit.row import COLUMNS, question_of
+    from rig.fleet.asking import ask_all
+
+    return ask_all(question_of(model, signal, method), COLUMNS, [str(file) for file in files], fleet)
+
+
 def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:
     """JSON where it is wanted; what a person reads on standard output, unless the JSON goes there."""
     if json_path is not None and str(json_path) == "-":
@@ -120,6 +128,7 @@ def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:
     default=None,
     help="Fit all samples in one pass, in constant memory; by default above 200,000 of them.",
 )
+@fleet_options
 def fit_command(
     files: tuple[Path, ...],
     json_path: Path | None,
@@ -130,11 +139,20 @@ def fit_command(
     method: Method,
     compare: tuple[Path, ...],
     one_pass: bool | None,
+    **asked: Any,
 ) -> None:
-    """Fit thrust = C V|V| + tare and its rivals to one or more recordings, per thruster; compare the thrusters."""
+    """Fit thrust = C V|V| + tare and its rivals to one or more recordings, per thruster; compare the thrusters.
+
+    With --jobs every file is fitted by itself, and has a row of a table.
+    """
     try:
         choice = NAMES[model or "C V|V|"]
         signal = choice.against or voltage or against or AGAINST[0]
+        fleet = fleet_of(**asked)
+        if fleet is not None:
+            refuse_beside(("--json", json_path), ("--report", report), ("--compare", compare))
+            refuse_beside(("--model dynamics", model == "dynamics"), ("--one-pass, --in-memory", one_pass is not None))
+            raise SystemExit(_rows(files, choice.model, signal, method, fleet))
         given = rather_recovered(expand(files))
         if one_pass or (one_pass is None and thrust_rows(given) > LONG):
             refused = ("--model dynamics", model == "dynamics"), ("--report", report), ("--compare", compare)

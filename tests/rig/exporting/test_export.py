@@ -18,8 +18,9 @@ from scipy.io import loadmat
 from rig.cli import main
 from rig.exporting import csv_folder
 from rig.exporting.content import content_of
-from rig.exporting.targets import TARGETS, called
+from rig.exporting.targets import TARGETS
 from rig.hdf5 import load, stream_rows
+from rig.workers.called import called
 from tests.rig.exporting.conftest import EVENT
 from tests.rig.hdf5.plain_files import plain
 from tests.rig.hdf5.test_hdf5_recover import left_open, uneven

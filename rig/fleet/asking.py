@@ -1,0 +1,74 @@
+"""Many files asked, their rows kept and written, and what came of it told."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import click
+
+from rig.fleet.columns import Column
+from rig.fleet.files import meant
+from rig.fleet.local import Local
+from rig.fleet.options import Fleet
+from rig.fleet.parquet import require_pyarrow, write_stale
+from rig.fleet.question import Question
+from rig.fleet.store import Store, opened
+from rig.fleet.work import Outcome, carry_out
+from rig.workers.interrupting import interruptible
+from rig.workers.progress import shown
+
+SHOWN = 10
+"""Sentences about files that are printed; those about recordings are all in the table."""
+EVERY = 500
+"""Files between two lines of progress in a log."""
+
+
+def ask_all(question: Question, columns: Sequence[Column], names: Sequence[str], fleet: Fleet) -> int:
+    """Rows of all files in the store, its Parquet up to date, a summary printed. Raises RigError.
+
+    Exit status: 0, or 1 where a file has no answer or can't be used.
+    """
+    require_pyarrow()
+    urls = meant(names)
+    with opened(fleet.store) as store, interruptible():
+        found, days = asked(question, columns, urls, store, fleet)
+    for sentence in _sentences(found):
+        click.echo(f"  {sentence}", err=True)
+    click.echo(f"{', '.join(_counts(found))}; {fleet.store / question.table}: {_days(len(days))} written")
+    return 1 if found.errors or found.failed else 0
+
+
+def asked(
+    question: Question, columns: Sequence[Column], urls: Sequence[str], store: Store, fleet: Fleet
+) -> tuple[Outcome, list[str]]:
+    """What came of it, and the days whose Parquet was written; also on Ctrl+C, with what came until then."""
+    engine = Local(fleet.jobs, fleet.limit, fleet.store)
+    try:
+        found = carry_out(question, urls, store, engine, lambda count: shown(count, "files", "starting", EVERY))
+    except KeyboardInterrupt:
+        write_stale(store, question.table, columns)
+        raise
+    return found, write_stale(store, question.table, columns)
+
+
+def _sentences(found: Outcome) -> Iterator[str]:
+    every = [*(each.why for each in found.failed), *found.errors.values()]
+    yield from every[:SHOWN]
+    if len(every) > SHOWN:
+        yield f"and {len(every) - SHOWN} more; the column `error` of the table has those about recordings"
+
+
+def _counts(found: Outcome) -> Iterator[str]:
+    yield f"{found.files} file{'s' if found.files != 1 else ''}"
+    yield f"{found.made} computed"
+    yield f"{found.known} known"
+    if found.same:
+        yield f"{found.same} the same as another"
+    if found.errors:
+        yield f"{len(found.errors)} can't be used"
+    if found.failed:
+        yield f"{len(found.failed)} without an answer: asked again the next time"
+
+
+def _days(count: int) -> str:
+    return f"{count} day{'s' if count != 1 else ''}"
