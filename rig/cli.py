@@ -127,6 +127,11 @@ COMMANDS: Final = {
     ),
     "list": Entry("rig.catalogue.list_command:list_command", "Recordings, campaigns and results of a folder."),
     "show": Entry("rig.catalogue.show_command:show_command", "All that is known of one recording, campaign or result."),
+    "fleet": Entry(
+        "rig.fleet_report.command:fleet_command",
+        "One page of a whole fleet: who left the limits, since when, and why.",
+        "identify",
+    ),
     "compare-fits": Entry(
         "rig.catalogue.compare_fits:compare_fits_command",
         "Has a thruster changed? Its fits in order of time.",

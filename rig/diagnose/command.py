@@ -19,6 +19,7 @@ from rig.diagnose.progress import observed
 from rig.diagnose.recording_names import file_names, told_by_name, with_names
 from rig.diagnose.vehicle import VehicleFiles, diagnose_vehicle_files, is_vehicle, refuse_for_tunnel
 from rig.errors import RecordingError, RigError
+from rig.fleet.options import Fleet, fleet_of, fleet_options, refuse_beside
 from rig.list_option import ListCommand
 from rig.recording.recover import rather_recovered
 
@@ -215,6 +216,14 @@ def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) 
         click.echo(f"next experiment written to {file}; next: rig check {file}", err=err)
 
 
+def _rows(files: Iterable[Path], seed: int, twin: Path | None, fleet: Fleet, *, any_thruster: bool) -> int:
+    from rig.diagnose.fleet.row import COLUMNS, question_of
+    from rig.fleet.asking import ask_all
+
+    question = question_of(seed, twin, any_thruster=any_thruster)
+    return ask_all(question, COLUMNS, [str(file) for file in files], fleet)
+
+
 @click.command("diagnose", cls=ListCommand)
 @click.argument("files", nargs=-1, required=True, type=PATH)
 @click.option("--twin", type=PATH, help="Diagnose against this twin (--save-twin) instead of C V|V|.")
@@ -237,6 +246,7 @@ def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) 
 @click.option("--axis", type=click.Choice(["surge", "sway", "heave", "yaw"]), help="Vehicle: only trials of this axis.")
 @seed_option
 @click.option("--explain", "wants_stages", is_flag=True, help="Also print what each stage handed on, in figures.")
+@fleet_options
 def diagnose_command(
     files: tuple[Path, ...],
     twin: Path | None,
@@ -250,6 +260,9 @@ def diagnose_command(
     axis: str | None,
     seed: int,
     wants_stages: bool,
+    jobs: int | None,
+    store: Path | None,
+    limit: float | None,
     **outputs: Any,
 ) -> None:
     """Find the physics that C V|V| leaves out of recordings of one thruster; a folder stands for its *.h5.
@@ -258,9 +271,20 @@ def diagnose_command(
 
     Ctrl+C ends the search with what it has, and the answer says what was not asked; a second time ends at once.
 
+    With --jobs every file is diagnosed by itself, and has a row of a table.
+
     Exit status 0 for every honest verdict, 2 for input that cannot be used (one sentence why), 130 if ended at once.
     """
     try:
+        fleet = fleet_of(jobs, store, limit)
+        if fleet is not None:
+            of_vehicle = any((thrusters, installation, mass, axis))
+            refuse_beside(("--holdout", holdout), ("--before", before), ("--explain", wants_stages))
+            refuse_beside(("what is known of a vehicle", of_vehicle))
+            refuse_beside(
+                *((f"--{name.replace('_path', '').replace('_', '-')}", path) for name, path in outputs.items())
+            )
+            raise SystemExit(_rows(files, seed, twin, fleet, any_thruster=any_thruster))
         wanted = wanted_of(**outputs)
         vehicle = VehicleFiles(thrusters, installation, mass, mass_std, axis or "")
         traces: list[Trace] = []

@@ -41,7 +41,8 @@ def picture(charted: Charted, rows: Sequence[Row]) -> Picture:
 
     caption = (
         "Above: each unit, with Shewhart's limits. Below: the exponentially weighted mean of the deviations, in "
-        "standard deviations of a unit, which shows a drift before any single unit is outside. Shaded: where that mean is off."
+        "standard deviations of a unit, which shows a drift before any single unit is outside. Shaded: where that "
+        "mean is off."
     )
     return Picture(figure.title, Plot(draw, alt, SIZE, DESK), caption)
 

@@ -90,8 +90,8 @@ class Line:
 
     @property
     def shown_amplitude(self) -> float:
-        """N, the largest of the waves that the samples show."""
-        return max((float(np.hypot(p.a, p.b)) for p in self.parts), default=0.0)
+        """N, of the wave that the samples show, by its mean square over all of them."""
+        return float(np.sqrt(2 * self.power))
 
     @property
     def again(self) -> bool:

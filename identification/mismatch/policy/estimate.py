@@ -64,6 +64,6 @@ ROUNDING_UNSEEN = Threshold(
 )
 ROUNDED_LEVELS = Count(
     300,
-    unit="levels",
+    unit="waves",
     reason="Each has an error of its own, which costs time; those with most samples are the ones that bend a curve.",
 )

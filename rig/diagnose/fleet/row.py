@@ -9,10 +9,13 @@ from typing import Any, Final
 from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.diagnosis import Diagnosis
 from rig.diagnose.command import diagnose_files
-from rig.errors import RigError
+from rig.errors import RecordingError, RigError
 from rig.fleet.columns import COMMON, Column
+from rig.fleet.files import sha256_of
 from rig.fleet.question import Question, Row
 from rig.hdf5 import headers
+from rig.hdf5.opening import require_file
+from rig.twin.reading import read_twin
 from rig.workers.version import version_of
 
 PARAMETER: Final = (
@@ -57,15 +60,20 @@ COLUMNS: Final = (
 """`parameters` of the final model; errors in `unit`."""
 
 
-def question_of(seed: int) -> Question:
-    """What `rig diagnose` with this seed asks of each file."""
+def question_of(seed: int, twin: Path | None = None, *, any_thruster: bool = False) -> Question:
+    """What `rig diagnose` with this seed, against this twin, asks of each file. Raises RecordingError for no twin."""
     import identification
     import rig.diagnose
     import rig.fleet
     import rig.hdf5
 
     version = version_of(identification, rig.hdf5, rig.diagnose, rig.fleet)
-    return Question("diagnoses", "rig.diagnose.fleet.row:answer", {"seed": seed}, version)
+    options: dict[str, Any] = {"seed": seed}
+    if twin is not None:
+        require_file(twin)
+        read_twin(twin)  # one that is none is told once, and not of every file
+        options |= {"twin": str(twin.absolute()), "twin_sha256": sha256_of(twin), "any_thruster": any_thruster}
+    return Question("diagnoses", "rig.diagnose.fleet.row:answer", options, version)
 
 
 def answer(path: Path, options: Mapping[str, Any]) -> Row:
@@ -78,9 +86,22 @@ def answer(path: Path, options: Mapping[str, Any]) -> Row:
         raise header
     whose = {name: header.texts.get(name, "") for name in ("thruster", "recording_id", "created")}
     try:
-        return whose | _said(diagnose_files([path], seed=options["seed"]))
+        twin = _twin(options)
+        found = diagnose_files([path], (), options["seed"], twin, any_thruster=bool(options.get("any_thruster")))
+        return whose | _said(found)
     except RigError as error:
         return whose | {"error": str(error)}
+
+
+def _twin(options: Mapping[str, Any]) -> Path | None:
+    """The one that was asked about, and no other that has its name by now. Raises RecordingError."""
+    if "twin" not in options:
+        return None
+    twin = Path(options["twin"])
+    require_file(twin)
+    if sha256_of(twin) != options["twin_sha256"]:
+        raise RecordingError(f"{twin} is not the twin that was asked about: its contents changed; ask again")
+    return twin
 
 
 def _said(found: Diagnosis) -> Row:

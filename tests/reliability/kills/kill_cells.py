@@ -219,6 +219,7 @@ def strike(live: Live, process: str, name: str) -> int:
         os.kill(pid, getattr(signal, f"SIG{name.removesuffix('CONT')}"))
     if name == "STOPCONT":
         select.select([], [], [], FROZEN)
-        os.kill(pid, signal.SIGCONT)
+        with contextlib.suppress(ProcessLookupError):  # who waited for it has ended it by now
+            os.kill(pid, signal.SIGCONT)
         at = time.monotonic_ns() if process == "device" else at
     return at

@@ -35,14 +35,27 @@ def test_the_scatter_within_levels_tells_the_error_of_their_means(noise):
     assert found == pytest.approx(float(np.mean(error**2)), rel=0.1, abs=2e-3)
 
 
-def test_alike_readings_share_one_error_and_others_have_their_own():
+def test_levels_are_off_by_what_rounding_leaves_and_alike_ones_alike():
     h = history_of(rounded(run(noise=QUIET)))
     found = rounding_errors(h, C)
-    levels = np.unique(np.round(h.driver[found.any(axis=1)]))
-    assert found.shape[1] == levels.size == 13
-    for column in found.T:
-        assert np.unique(np.round(h.driver[column > 0])).size == 1
-    assert 0.1 * STEP < found.max() <= STEP / np.sqrt(12)
+    rows = [int(np.flatnonzero(np.round(h.driver) == level)[3]) for level in range(-12, 13, 2)]
+    common = found[rows] @ found[rows].T
+    s = QUIET / STEP
+    assert np.diag(common) == pytest.approx(level_variance((s**2 + 1 / 12) * STEP**2 - 0.028 * STEP**2, STEP), rel=0.3)
+    assert np.count_nonzero(np.abs(common) > 1e-9) < 40, "levels some steps apart say nothing of each other"
+    same = np.flatnonzero(np.round(h.driver) == 8)
+    assert found[same] == pytest.approx(np.broadcast_to(found[same[3]], found[same].shape), abs=1e-9)
+
+
+def test_within_a_step_the_error_goes_up_and_down():
+    """Of readings that creep over steps: a quarter of one apart they are independent, half a one apart opposed."""
+    h = history_of(rounded(run(noise=QUIET)))
+    steps = np.linspace(4.0, 5.0, h.driver.size)
+    found = rounding_errors(replace(h, driver=np.sqrt(steps * STEP / C)), C)
+    size = np.linalg.norm(found, axis=1)
+    apart = [int(share * h.driver.size) for share in (0.0, 0.02, 0.25, 0.5)]
+    alike = found[apart] @ found[0] / (size[apart] * size[0])
+    assert alike == pytest.approx([1.0, 0.99, 0.0, -1.0], abs=0.1)
 
 
 def test_noise_that_dithers_leaves_nothing():
