@@ -46,26 +46,42 @@ def without_shared_errors(
     `spread` (n,) of a unit about its group, `good` (n,) of truths: units that count. The centre is the mean of the
     groups' medians, each weighed by what is known of it (its stated error and the error of its median). A group's
     shared error is the best linear prediction of it (Searle, Casella and McCulloch, Variance Components, 7.4), within
-    REACH of what its calibration states: what is more can't be the calibration's.
+    REACH of what its calibration states: what is more can't be the calibration's. A group whose units are nearly all
+    out has no say in the centre; its difference from it is told.
     """
     out = np.array(value, dtype=np.float64)
-    names = [int(name) for name in np.unique(group)]
-    where = {name: (group == name) for name in names}
-    counted = {name: where[name] & good for name in names}
-    told = [name for name in names if np.count_nonzero(counted[name]) >= FEWEST] or names[:1]
-    middle = {name: float(np.median(value[counted[name] if counted[name].any() else where[name]])) for name in told}
-    own = {name: float(np.median(stated[where[name]])) for name in told}
-    error = {
-        name: MEDIAN_ERROR * float(np.median(spread[where[name]])) / max(int(np.count_nonzero(counted[name])), 1) ** 0.5
-        for name in told
-    }
-    weight = {name: 1.0 / max(own[name] ** 2 + error[name] ** 2, 1e-300) for name in told}
-    centre = sum(weight[name] * middle[name] for name in told) / sum(weight.values())
+    groups = [_group(int(name), value, group, stated, spread, good) for name in np.unique(group)]
+    known = [each for each in groups if each.counted] or groups[:1]
+    centre = sum(each.weight * each.middle for each in known) / sum(each.weight for each in known)
     found = []
-    for name in told:
-        difference = middle[name] - centre
-        share = own[name] ** 2 * weight[name]
-        removed = float(np.clip(share * difference, -REACH * own[name], REACH * own[name]))
-        out[where[name]] -= removed
-        found.append(SharedError(name, int(np.count_nonzero(counted[name])), difference, own[name], removed))
+    for each in groups:
+        if each.units < FEWEST and each not in known:
+            continue
+        difference = each.middle - centre
+        share = each.stated**2 * each.weight
+        removed = float(np.clip(share * difference, -REACH * each.stated, REACH * each.stated))
+        out[group == each.name] -= removed
+        found.append(SharedError(each.name, each.units, difference, each.stated, removed))
     return out, centre, tuple(found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    name: int
+    units: int
+    counted: bool
+    """Enough of its units count to have a say in where the centre is."""
+    middle: float
+    stated: float
+    weight: float
+    """One over the variance of its median about the centre."""
+
+
+def _group(name: int, value: Floats, group: Floats, stated: Floats, spread: Floats, good: NDArray[np.bool_]) -> _Group:
+    where = group == name
+    used = where & good if np.count_nonzero(where & good) >= FEWEST else where
+    units, own = int(np.count_nonzero(used)), float(np.median(stated[where]))
+    error = MEDIAN_ERROR * float(np.median(spread[where])) / units**0.5
+    weight = 1.0 / max(own**2 + error**2, 1e-300)
+    counted = units >= FEWEST and bool(np.all(good[used]))
+    return _Group(name, units, counted, float(np.median(value[used])), own, weight)

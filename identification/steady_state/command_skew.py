@@ -105,7 +105,8 @@ def _of_log(windows: tuple[Window, ...], time: Floats, value: Floats) -> Command
     if level < LEAST_LEVEL or time.size < LEAST_SAMPLES * len(windows):
         return None
     shifts = level * np.linspace(-1.0, 1.0, 2 * SHIFTS + 1)
-    tried = [_within(windows, time, value, shift) for shift in shifts.tolist()]
+    sums = _Sums.of(windows, time, value)
+    tried = [_within(sums, shift) for shift in shifts.tolist()]
     scatter = np.array([variance for variance, _ in tried])
     steady = scatter <= AS_STEADY * float(scatter.min())
     best = int(np.argmax(np.where(steady, [follows for _, follows in tried], -np.inf)))
@@ -115,18 +116,38 @@ def _of_log(windows: tuple[Window, ...], time: Floats, value: Floats) -> Command
     return found if now > STEADIER * scatter[best] else None
 
 
-def _within(windows: tuple[Window, ...], time: Floats, value: Floats, shift: float) -> tuple[float, float]:
+@dataclass(frozen=True, eq=False, slots=True)
+class _Sums:
+    """Samples and the sums of their values up to each, and the levels that are shifted over them."""
+
+    time: Floats
+    once: Floats
+    squared: Floats
+    begin: Floats
+    end: Floats
+    driver: Floats
+    """V|V| of each level."""
+
+    @classmethod
+    def of(cls, windows: tuple[Window, ...], time: Floats, value: Floats) -> _Sums:
+        left = value - value.mean()  # so that the sums lose no digits
+        begin, end, V = np.array([(w.t_start, w.t_end, w.voltage) for w in windows]).T
+        return cls(time, _summed(left), _summed(left**2), begin, end, V * np.abs(V))
+
+
+def _summed(value: Floats) -> Floats:
+    return np.concatenate(([0.0], np.cumsum(value)))
+
+
+def _within(sums: _Sums, shift: float) -> tuple[float, float]:
     """N^2, variance of the samples about the mean of their level, levels shifted by `shift` s; and the correlation of
     those means with V|V|: thrust of the level before is as steady, but it does not follow this command."""
-    total, count = 0.0, 0
-    means, squares = [], []
-    for w in windows:
-        low, high = np.searchsorted(time, (w.t_start + shift, w.t_end + shift))
-        part = value[low:high]
-        if part.size >= LEAST_SAMPLES:
-            total, count = total + float(np.sum((part - part.mean()) ** 2)), count + part.size - 1
-            means.append(float(part.mean()))
-            squares.append(w.voltage * abs(w.voltage))
-    if len(means) < 3 or not np.ptp(means) or not np.ptp(squares):
+    low, high = np.searchsorted(sums.time, sums.begin + shift), np.searchsorted(sums.time, sums.end + shift)
+    some = high - low >= LEAST_SAMPLES
+    low, high, driver = low[some], high[some], sums.driver[some]
+    count = high - low
+    total = sums.once[high] - sums.once[low]
+    if count.size < 3 or not np.ptp(total / count) or not np.ptp(driver):
         return float("inf"), 0.0
-    return total / count, abs(float(np.corrcoef(means, squares)[0, 1]))
+    scatter = float(np.sum(sums.squared[high] - sums.squared[low] - total**2 / count))
+    return max(scatter, 0.0) / float(np.sum(count - 1)), abs(float(np.corrcoef(total / count, driver)[0, 1]))

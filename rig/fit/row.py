@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from identification.recording import Recording
+from identification.thruster.settling import settling_time
 from identification.thruster.thrust import Parameter
 from identification.thruster.thrust_data import calibration_of, gain_std
 from identification.thruster.thrust_report import verdicts
@@ -58,11 +59,14 @@ COLUMNS: Final = (
     Column("whiteness_p", "number"),
     Column("asymmetry", "number"),
     Column("asymmetry_std", "number"),
+    Column("settling_time", "number", "s"),
+    Column("settling_time_std", "number", "s"),
     Column("calibration"),
     Column("gain_std", "number"),
     Column("verdicts", "texts"),
 )
-"""`C` is the first coefficient of the model, `asymmetry` C+ over C- less one; numbers without a unit are ratios."""
+"""`C` is the first coefficient of the model, `asymmetry` C+ over C- less one, `settling_time` by which thrust is late
+after a step; numbers without a unit are ratios."""
 
 
 def question_of(model: str, against: str, method: str) -> Question:
@@ -116,7 +120,7 @@ def _fitted(path: Path, recording: Recording, options: Mapping[str, Any]) -> Row
         (long,) = fit_one_pass([path], model, against)
         return _of_one_pass(long)
     (found,) = fit_recordings([recording], model, against, method)
-    return _of_answer(found)
+    return _of_answer(found) | _settling(recording)
 
 
 def _of_answer(found: Answer) -> Row:
@@ -157,6 +161,11 @@ def _asymmetry(found: Answer) -> Row:
             spread = (plus.std_statistical / plus.value) ** 2 + (minus.std_statistical / minus.value) ** 2
             return {"asymmetry": number(ratio - 1.0), "asymmetry_std": number(abs(ratio) * spread**0.5)}
     return {}
+
+
+def _settling(recording: Recording) -> Row:
+    found = settling_time(recording)
+    return {} if found is None else {"settling_time": number(found.value), "settling_time_std": number(found.std)}
 
 
 def _parameters(found: Mapping[str, Parameter], tares: Mapping[str, Parameter]) -> Row:

@@ -59,18 +59,26 @@ def _asymmetry(row: Row, _centre: float) -> tuple[float, float, float] | None:
     return row["asymmetry"], row["asymmetry_std"], 0.0
 
 
-def _lack_of_fit(row: Row, _centre: float) -> tuple[float, float, float] | None:
-    """The cube root of a chi-square is nearly normal (Wilson and Hilferty, PNAS 17, 1931)."""
-    found = row.get("chi2_per_dof")
-    return None if found is None else (found ** (1 / 3), 0.0, 0.0)
+def _misfit(row: Row, _centre: float) -> tuple[float, float, float] | None:
+    """By what share of the usual one: the gain of the cell and C cancel."""
+    if not row.get("rmse") or not row["C"]:
+        return None
+    return float(np.log(row["rmse"] / abs(row["C"]))), 0.0, 0.0
+
+
+def _settling(row: Row, _centre: float) -> tuple[float, float, float] | None:
+    if row.get("settling_time") is None:
+        return None
+    return row["settling_time"], row["settling_time_std"], 0.0
 
 
 FIGURES: Final = (
     Figure("C", "The thruster's constant", "C is off", "both", "% of the centre", 100.0, _constant),
     Figure("asymmetry", "C+ over C-", "forward and reverse are not as alike as usual", "both", "%", 100.0, _asymmetry),
-    Figure("misfit", "What the model leaves out", "the model fits worse than usual", "high", "", 1.0, _lack_of_fit),
+    Figure("misfit", "What the model leaves out", "the model leaves out more or less", "both", "%", 100.0, _misfit),
+    Figure("settling", "How late thrust is after a step", "thrust follows otherwise", "both", "ms", 1000.0, _settling),
 )
-"""The cube root of chi-square per degree of freedom for the last."""
+"""`misfit`: the logarithm of the scatter about the model over C, which changes by a share."""
 
 
 def charts_of(rows: Sequence[Row], sigmas: float | None = None) -> tuple[Charted, ...]:

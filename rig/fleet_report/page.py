@@ -100,7 +100,7 @@ def _unit(each: Alone, told: FleetReport) -> tuple[str, ...]:
 
 def _amount(name: str, shown: float) -> str:
     unit = next(figure.unit for figure in FIGURES if figure.name == name)
-    return f"{shown:+.3g}{' %' if unit.startswith('%') else ''}"
+    return f"{shown:+.3g} {unit.split()[0]}"
 
 
 def stretch_section(told: FleetReport) -> Section:

@@ -57,22 +57,18 @@ def _order(charted: Charted, rows: Sequence[Row]) -> tuple[Floats, str]:
 
 def _axis(charted: Charted) -> str:
     figure = charted.figure
-    if figure.name == "misfit":
-        return "(χ²/dof)^⅓"
-    return f"{figure.name} off the centre / %"
+    return f"{figure.name} off the centre / {figure.unit.split()[0]}"
 
 
 def _units(axes: Axes, charted: Charted, x: Floats) -> None:
     chart = charted.chart
-    centre = chart.centre if charted.figure.name == "misfit" else 0.0
-    y = (chart.value - chart.centre + centre) * charted.figure.scale
+    y = (chart.value - chart.centre) * charted.figure.scale
     out = chart.outside
     half = chart.limit * float(np.median(chart.sigma)) * charted.figure.scale
-    middle = centre * charted.figure.scale
-    axes.axhline(middle, color=MUTED, linewidth=1.0)
-    axes.axhline(middle + half, color=MODEL, linestyle="--", linewidth=1.2, label="limits")
+    axes.axhline(0.0, color=MUTED, linewidth=1.0)
+    axes.axhline(half, color=MODEL, linestyle="--", linewidth=1.2, label="limits")
     if chart.side == "both":
-        axes.axhline(middle - half, color=MODEL, linestyle="--", linewidth=1.2)
+        axes.axhline(-half, color=MODEL, linestyle="--", linewidth=1.2)
     dots(axes, x[~out], y[~out], DATA, 1.8, "a unit")
     axes.plot(x[out], y[out], "D", color=MODEL, markersize=4.5, fillstyle="none", label="outside")
     axes.margins(y=0.08)
