@@ -76,18 +76,17 @@ def production(count: int, seed: int, *, sound: bool = False) -> Production:
 
 
 def thrust_of(unit: Unit, time: np.ndarray, command: np.ndarray) -> np.ndarray:
-    """(n,) N, as the cell reads it."""
-    lag = LAG * (2.0 if unit.hides == "lag" else 1.0)
+    """(n,) N, as the cell reads it: the command, held from its row on, turns the rotor after what is lost of it."""
     V = np.minimum(command, 10.5) if unit.hides == "ceiling" else command
-    speed = np.empty(V.size)
-    state, keep = 0.0, float(np.exp(-1.0 / (RATE * lag)))
-    for k, v in enumerate(V.tolist()):
-        state = v + (state - v) * keep
-        speed[k] = state
     half = DEAD_BAND * (3.0 if unit.hides == "dead_band" else 1.0)
-    speed = np.sign(speed) * np.maximum(np.abs(speed) - half, 0.0)
+    wanted = np.sign(V) * np.maximum(np.abs(V) - half, 0.0)
     if unit.hides == "winding":
-        speed /= 0.5 + np.sqrt(0.25 + 0.008 * np.abs(speed))
+        wanted /= 0.5 + np.sqrt(0.25 + 0.008 * np.abs(wanted))
+    lag = LAG * (2.0 if unit.hides == "lag" else 1.0)
+    speed, state, keep = np.empty(V.size), 0.0, float(np.exp(-1.0 / (RATE * lag)))
+    for k, goal in enumerate(wanted.tolist()):
+        speed[k] = state
+        state = goal + (state - goal) * keep
     force = unit.C * speed * np.abs(speed)
     force *= np.where(force < 0.0, REVERSE * (0.93 if unit.hides == "asymmetry" else 1.0), 1.0)
     if unit.hides == "reversal":

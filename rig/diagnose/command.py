@@ -216,16 +216,16 @@ def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) 
         click.echo(f"next experiment written to {file}; next: rig check {file}", err=err)
 
 
-def _rows(files: Iterable[Path], seed: int, twin: Path | None, fleet: Fleet, *, any_thruster: bool) -> int:
+def _rows(names: Sequence[str], seed: int, twin: Path | None, fleet: Fleet, *, any_thruster: bool) -> int:
     from rig.diagnose.fleet.row import COLUMNS, question_of
     from rig.fleet.asking import ask_all
 
     question = question_of(seed, twin, any_thruster=any_thruster)
-    return ask_all(question, COLUMNS, [str(file) for file in files], fleet)
+    return ask_all(question, COLUMNS, names, fleet)
 
 
 @click.command("diagnose", cls=ListCommand)
-@click.argument("files", nargs=-1, required=True, type=PATH)
+@click.argument("names", metavar="FILES...", nargs=-1, required=True, type=click.Path())
 @click.option("--twin", type=PATH, help="Diagnose against this twin (--save-twin) instead of C V|V|.")
 @click.option("--any-thruster", is_flag=True, help="The twin may be of another thruster.")
 @click.option(
@@ -248,7 +248,7 @@ def _rows(files: Iterable[Path], seed: int, twin: Path | None, fleet: Fleet, *, 
 @click.option("--explain", "wants_stages", is_flag=True, help="Also print what each stage handed on, in figures.")
 @fleet_options
 def diagnose_command(
-    files: tuple[Path, ...],
+    names: tuple[str, ...],
     twin: Path | None,
     any_thruster: bool,
     before: tuple[Path, ...],
@@ -261,6 +261,7 @@ def diagnose_command(
     seed: int,
     wants_stages: bool,
     jobs: int | None,
+    scheduler: str | None,
     store: Path | None,
     limit: float | None,
     **outputs: Any,
@@ -271,12 +272,12 @@ def diagnose_command(
 
     Ctrl+C ends the search with what it has, and the answer says what was not asked; a second time ends at once.
 
-    With --jobs every file is diagnosed by itself, and has a row of a table.
+    With --jobs every file is diagnosed by itself, and has a row of a table; a file may then be a URL.
 
     Exit status 0 for every honest verdict, 2 for input that cannot be used (one sentence why), 130 if ended at once.
     """
     try:
-        fleet = fleet_of(jobs, store, limit)
+        fleet = fleet_of(jobs, scheduler, store, limit)
         if fleet is not None:
             of_vehicle = any((thrusters, installation, mass, axis))
             refuse_beside(("--holdout", holdout), ("--before", before), ("--explain", wants_stages))
@@ -284,7 +285,8 @@ def diagnose_command(
             refuse_beside(
                 *((f"--{name.replace('_path', '').replace('_', '-')}", path) for name, path in outputs.items())
             )
-            raise SystemExit(_rows(files, seed, twin, fleet, any_thruster=any_thruster))
+            raise SystemExit(_rows(names, seed, twin, fleet, any_thruster=any_thruster))
+        files = tuple(map(Path, names))
         wanted = wanted_of(**outputs)
         vehicle = VehicleFiles(thrusters, installation, mass, mass_std, axis or "")
         traces: list[Trace] = []

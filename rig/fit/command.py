@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -77,11 +77,11 @@ def _not_with_one_pass(*asked: tuple[str, object]) -> None:
         )
 
 
-def _rows(files: Iterable[Path], model: Model, signal: str, method: Method, fleet: Fleet) -> int:
+def _rows(files: Sequence[str], model: Model, signal: str, method: Method, fleet: Fleet) -> int:
     from rig.fit.row import COLUMNS, question_of
     from rig.fleet.asking import ask_all
 
-    return ask_all(question_of(model, signal, method), COLUMNS, [str(file) for file in files], fleet)
+    return ask_all(question_of(model, signal, method), COLUMNS, files, fleet)
 
 
 def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:
@@ -95,7 +95,7 @@ def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:
 
 
 @click.command("fit")
-@click.argument("files", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.argument("files", nargs=-1, required=True, type=click.Path())
 @click.option("--json", "json_path", type=RESULT, help="Write the fit here; - is standard output.")
 @click.option("--report", type=RESULT_FILE, help="Write a page with figures here (HTML).")
 @click.option(
@@ -130,7 +130,7 @@ def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:
 )
 @fleet_options
 def fit_command(
-    files: tuple[Path, ...],
+    files: tuple[str, ...],
     json_path: Path | None,
     report: Path | None,
     model: str | None,
@@ -143,7 +143,7 @@ def fit_command(
 ) -> None:
     """Fit thrust = C V|V| + tare and its rivals to one or more recordings, per thruster; compare the thrusters.
 
-    With --jobs every file is fitted by itself, and has a row of a table.
+    With --jobs every file is fitted by itself, and has a row of a table; a file may then be a URL.
     """
     try:
         choice = NAMES[model or "C V|V|"]
@@ -153,7 +153,7 @@ def fit_command(
             refuse_beside(("--json", json_path), ("--report", report), ("--compare", compare))
             refuse_beside(("--model dynamics", model == "dynamics"), ("--one-pass, --in-memory", one_pass is not None))
             raise SystemExit(_rows(files, choice.model, signal, method, fleet))
-        given = rather_recovered(expand(files))
+        given = rather_recovered(expand(map(Path, files)))
         if one_pass or (one_pass is None and thrust_rows(given) > LONG):
             refused = ("--model dynamics", model == "dynamics"), ("--report", report), ("--compare", compare)
             _not_with_one_pass(*refused, ("--method ls", method == "ls"))

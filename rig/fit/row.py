@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -69,16 +70,21 @@ COLUMNS: Final = (
 after a step; numbers without a unit are ratios."""
 
 
-def question_of(model: str, against: str, method: str) -> Question:
-    """What `rig fit` with these options asks of each file."""
+@cache
+def version() -> str:
+    """Of the sources that have a say in a row."""
     import identification
     import rig.fit
     import rig.fleet
     import rig.hdf5
 
+    return version_of(identification, rig.hdf5, rig.fit, rig.fleet)
+
+
+def question_of(model: str, against: str, method: str) -> Question:
+    """What `rig fit` with these options asks of each file."""
     options = {"model": model, "against": against, "method": method}
-    version = version_of(identification, rig.hdf5, rig.fit, rig.fleet)
-    return Question("fits", "rig.fit.row:answer", options, version)
+    return Question("fits", "rig.fit.row:answer", options, version())
 
 
 def answer(path: Path, options: Mapping[str, Any]) -> Row:

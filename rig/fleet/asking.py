@@ -8,7 +8,6 @@ import click
 
 from rig.fleet.columns import Column
 from rig.fleet.files import meant
-from rig.fleet.local import Local
 from rig.fleet.options import Fleet
 from rig.fleet.parquet import require_pyarrow, write_stale
 from rig.fleet.question import Question
@@ -42,9 +41,8 @@ def asked(
     question: Question, columns: Sequence[Column], urls: Sequence[str], store: Store, fleet: Fleet
 ) -> tuple[Outcome, list[str]]:
     """What came of it, and the days whose Parquet was written; also on Ctrl+C, with what came until then."""
-    engine = Local(fleet.jobs, fleet.limit, fleet.store)
     try:
-        found = carry_out(question, urls, store, engine, lambda count: shown(count, "files", "starting", EVERY))
+        found = carry_out(question, urls, store, fleet.engine, lambda count: shown(count, "files", "starting", EVERY))
     except KeyboardInterrupt:
         write_stale(store, question.table, columns)
         raise

@@ -1,6 +1,6 @@
 """Files of a fleet: which are meant, what tells one from another, and how one comes to hand.
 
-A name is a path, a folder for its *.h5, or a pattern (`*`, `?`, `**` for folders below).
+A name is a path, a folder for its *.h5, or a pattern (`*`, `?`, `**` for folders below); or a URL of any of these.
 """
 
 from __future__ import annotations
@@ -12,6 +12,7 @@ from hashlib import file_digest
 from pathlib import Path
 
 from rig.errors import RecordingError
+from rig.fleet.elsewhere import fetched, is_url, named_by, sha256_of_url, stamp_of_url
 from rig.hdf5.opening import require_file
 
 RACY = 2_000_000_000
@@ -27,6 +28,8 @@ def meant(names: Iterable[str], ending: str = ".h5") -> list[str]:
 
 
 def _meant(name: str, ending: str) -> list[str]:
+    if is_url(name):
+        return named_by(name, ending)
     path = Path(name)
     if path.is_dir():
         found = sorted(path.glob(f"*{ending}"))
@@ -63,6 +66,8 @@ def stamp_of(url: str, now_ns: int) -> str:
 
     `now_ns`: by the clock of the day. Raises RecordingError.
     """
+    if is_url(url):
+        return stamp_of_url(url)
     try:
         found = Path(url).stat()
     except OSError as error:
@@ -74,6 +79,8 @@ def stamp_of(url: str, now_ns: int) -> str:
 
 def sha256_of(path: str | Path) -> str:
     """Of a file's bytes, in hexadecimal. Raises OSError."""
+    if isinstance(path, str) and is_url(path):
+        return sha256_of_url(path)
     with Path(path).open("rb") as file:
         return file_digest(file, "sha256").hexdigest()
 
@@ -81,4 +88,8 @@ def sha256_of(path: str | Path) -> str:
 @contextmanager
 def at_hand(url: str) -> Iterator[Path]:
     """The file as a path of this machine, as long as it is needed. Raises OSError."""
-    yield Path(url)
+    if is_url(url):
+        with fetched(url) as path:
+            yield path
+    else:
+        yield Path(url)

@@ -9,6 +9,7 @@ from pathlib import Path
 from rig.diagnose.fleet.row import COLUMNS, question_of
 from rig.errors import RigError
 from rig.fleet.asking import asked
+from rig.fleet.elsewhere import is_url
 from rig.fleet.options import Fleet
 from rig.fleet.question import Row
 from rig.fleet.store import Store
@@ -44,11 +45,11 @@ def diagnosed(rows: Sequence[Row], usual: Row, store: Store, fleet: Fleet, seed:
         return places.get(row["sha256"]) or str(row["url"])
 
     try:
-        twin = twin_of_usual(where(usual), store.root, seed)
+        twin = twin_of_usual(where(usual), usual["thruster"], store.root, seed)
     except (RigError, OSError) as error:
         return Diagnosed({}, why_not=f"the usual unit, {usual['thruster']}, could not be diagnosed: {error}")
     question = question_of(seed, twin, any_thruster=True)
-    there = [url for url in map(where, rows) if Path(url).is_file()]
+    there = [url for url in map(where, rows) if is_url(url) or Path(url).is_file()]
     asked(question, COLUMNS, there, store, fleet)
     wanted = {row["sha256"] for row in rows}
     known = [row for row in store.rows_of(question.table) if row["asked"] == question.asked]

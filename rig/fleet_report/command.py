@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from rig.errors import RecordingError, RigError
-from rig.fleet.options import LIMIT, STORE, Fleet
+from rig.fleet.options import LIMIT, STORE, Fleet, fleet_of
 from rig.fleet.store import Store, opened
 from rig.fleet_report.answers import Diagnosed, diagnosed
 from rig.fleet_report.departures import departures_of, to_diagnose, usual
@@ -41,9 +41,8 @@ NO_FITS = "{} holds no fits; make them first: rig fit FILES --jobs 2 --store {}"
     metavar="N",
     help="So many of the units that left their limits are diagnosed.",
 )
-@click.option(
-    "--jobs", type=click.IntRange(min=1), default=1, show_default=True, metavar="N", help="Diagnoses at once."
-)
+@click.option("--jobs", type=click.IntRange(min=1), metavar="N", help="Diagnoses at once.  [default: 1]")
+@click.option("--scheduler", metavar="tcp://HOST:PORT", help="Diagnose on the workers of a Dask cluster.")
 @click.option(
     "--sigmas",
     type=click.FloatRange(min=1.0, max=10.0),
@@ -52,7 +51,14 @@ NO_FITS = "{} holds no fits; make them first: rig fit FILES --jobs 2 --store {}"
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the diagnoses.")
 @click.option("--json", "json_path", type=RESULT, help="Write what was found here; - is standard output.")
 def fleet_command(
-    page: Path, store: Path, most: int, jobs: int, sigmas: float | None, seed: int, json_path: Path | None
+    page: Path,
+    store: Path,
+    most: int,
+    jobs: int | None,
+    scheduler: str | None,
+    sigmas: float | None,
+    seed: int,
+    json_path: Path | None,
 ) -> None:
     """Write a page of a whole fleet: which thrusters left their limits, since when, what they hide.
 
@@ -62,10 +68,11 @@ def fleet_command(
     """
     try:
         require_different(("PAGE", page), ("--json", json_path))
+        fleet = fleet_of(jobs or (None if scheduler else 1), scheduler, store, None) or Fleet(1, store, LIMIT)
         if not (store / "rows.sqlite").is_file():
             raise RecordingError(NO_FITS.format(store, store))
         with opened(store) as kept, interruptible():
-            told = fleet_report(kept, Fleet(jobs, store, LIMIT), most, sigmas, seed)
+            told = fleet_report(kept, fleet, most, sigmas, seed)
         from rig.report.page import write  # matplotlib draws on the way
 
         write(fleet_page(told), page)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any, Final
 
@@ -60,20 +61,25 @@ COLUMNS: Final = (
 """`parameters` of the final model; errors in `unit`."""
 
 
-def question_of(seed: int, twin: Path | None = None, *, any_thruster: bool = False) -> Question:
-    """What `rig diagnose` with this seed, against this twin, asks of each file. Raises RecordingError for no twin."""
+@cache
+def version() -> str:
+    """Of the sources that have a say in a row."""
     import identification
     import rig.diagnose
     import rig.fleet
     import rig.hdf5
 
-    version = version_of(identification, rig.hdf5, rig.diagnose, rig.fleet)
+    return version_of(identification, rig.hdf5, rig.diagnose, rig.fleet)
+
+
+def question_of(seed: int, twin: Path | None = None, *, any_thruster: bool = False) -> Question:
+    """What `rig diagnose` with this seed, against this twin, asks of each file. Raises RecordingError for no twin."""
     options: dict[str, Any] = {"seed": seed}
     if twin is not None:
         require_file(twin)
         read_twin(twin)  # one that is none is told once, and not of every file
         options |= {"twin": str(twin.absolute()), "twin_sha256": sha256_of(twin), "any_thruster": any_thruster}
-    return Question("diagnoses", "rig.diagnose.fleet.row:answer", options, version)
+    return Question("diagnoses", "rig.diagnose.fleet.row:answer", options, version())
 
 
 def answer(path: Path, options: Mapping[str, Any]) -> Row:
