@@ -125,6 +125,7 @@ COMMANDS: Final = {
     "recover": Entry(
         "rig.recording.recover:recover_command", "Copy a recording that was not closed in order into a plain file."
     ),
+    "pack": Entry("rig.recording.pack:pack_command", "Packed copies of recordings for an archive."),
     "list": Entry("rig.catalogue.list_command:list_command", "Recordings, campaigns and results of a folder."),
     "show": Entry("rig.catalogue.show_command:show_command", "All that is known of one recording, campaign or result."),
     "fleet": Entry(

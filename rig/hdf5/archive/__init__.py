@@ -1,0 +1,1 @@
+"""Packed copies: smaller, checked, and quick to read in part."""
