@@ -8,6 +8,7 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from datetime import UTC, date, datetime
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryFile
 
@@ -22,18 +23,21 @@ from rig.calibrate.operator import Command, Operator, Terminal
 from rig.calibrate.result import as_json, name_in_bench, write_result
 from rig.calibrate.session import Session, replaced, steps_of
 from rig.calibrate.text import told
+from rig.calibrate.wizard import Screen, Wizard
 from rig.campaign.bench import Bench, build
 from rig.campaign.loading import load_bench
 from rig.control.clocks import Clock, MonotonicClock
 from rig.errors import ConfigError, RecordingError
 from rig.fit.load_cell import GRAVITY, calibrate_table
 from rig.recording.recorder_link import RecorderLink
+from rig.screen_options import look_of, screen_options
 from rig.stages.recording_header import fresh_stamp
 
 
 @click.command("calibrate")
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--loads", type=click.Path(path_type=Path), help="Plan of the weights (TOML), for a bench file.")
+@click.option("--plain", is_flag=True, help="Ask line by line, without a screen; so it is where there is no terminal.")
 @click.option("--yes", is_flag=True, help="Nobody is asked: the [hang] command of the plan puts the weights on.")
 @click.option("--keep-bench", is_flag=True, help="Write the calibration, but do not name it in the bench file.")
 @click.option("--gravity", type=float, default=GRAVITY, show_default=True, metavar="M/S^2", help="Of a table's place.")
@@ -45,8 +49,17 @@ from rig.stages.recording_header import fresh_stamp
     metavar="SHARE",
     help="Of a table: relative standard uncertainty that all weights share.",
 )
+@screen_options
 def calibrate_command(
-    file: Path, loads: Path | None, yes: bool, keep_bench: bool, gravity: float, weights_std: float
+    file: Path,
+    loads: Path | None,
+    plain: bool,
+    yes: bool,
+    keep_bench: bool,
+    gravity: float,
+    weights_std: float,
+    colors: str,
+    bell: bool,
 ) -> int:
     """Calibrate a load cell with dead weights.
 
@@ -64,12 +77,19 @@ def calibrate_command(
     if loads is None:
         raise ConfigError(f"{file}: give the plan of the weights with --loads; docs/howto/calibrate.md has one to copy")
     plan = load_plan(loads)
-    clock = MonotonicClock()
-    operator = _operator(plan, file, yes, clock)
+    clock, look = MonotonicClock(), look_of(colors, bell)
+    if not (plain or yes) and sys.stdin.isatty() and sys.stdout.isatty():
+        wizard = Wizard(f"rig calibrate  {file}", plan)
+        work = partial(_calibrated, Asked(file, plan, wizard, keep_bench), clock)
+        return Screen(wizard, work).run(look.colors, bell=look.bell)
+    return _calibrated(Asked(file, plan, _operator(plan, file, yes, clock), keep_bench), clock)
+
+
+def _calibrated(asked: Asked, clock: Clock) -> int:
     with TemporaryFile() as log:
         recorder = RecorderLink.start(log)
         try:
-            return calibrate_bench(Asked(file, plan, operator, keep_bench), recorder, clock)
+            return calibrate_bench(asked, recorder, clock)
         finally:
             recorder.shut_down()
 

@@ -64,6 +64,8 @@ class Listener:
     """degC, the newest."""
     last: float = 0.0
     """s, of the newest reading."""
+    reading: float = nan
+    """N, the newest."""
 
     @property
     def now(self) -> float:
@@ -88,11 +90,6 @@ class Listener:
             )
         self.clock.sleep_until_ns(self.clock.now_ns() + PERIOD_NS)
 
-    def turn_for(self, seconds: float) -> None:
-        end = self.now + seconds
-        while self.now < end:
-            self.turn()
-
     def say(self, text: str, level: str = "info") -> None:
         """Into the recording's events."""
         self.recorder.event(EventRow(self.now, "warning" if level == "warning" else "info", text))
@@ -110,7 +107,7 @@ class Listener:
             self.temperature = sample.values[self.thermometer.column]
         if sample.stream == self.thrust.stream.name:
             self.last = time
-            value = sample.values[self.thrust.column]
+            value = self.reading = sample.values[self.thrust.column]
             if self.heard is not None and isfinite(value):
                 self.heard(time, value)
 

@@ -9,7 +9,7 @@ import subprocess
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import TYPE_CHECKING, Literal, Protocol
 
 import click
 
@@ -17,7 +17,26 @@ from identification.calibration.loads import Load
 from rig.calibrate.loads_file import Hang
 from rig.errors import DeviceError, RigError
 
-Answer = Literal["go", "again", "keep", "stop"]
+if TYPE_CHECKING:
+    from rig.calibrate.session import Session
+
+Answer = Literal["go", "again", "keep", "skip", "probable", "stop"]
+
+
+@dataclass(frozen=True, slots=True)
+class Back:
+    """A step of the plan, from 0, is to be hung and read again."""
+
+    index: int
+
+
+@dataclass(frozen=True, slots=True)
+class Hung:
+    """It hangs, but what hangs is other than the plan has it."""
+
+    load: Load
+
+
 TURN = Callable[[], None]
 """What goes on while somebody is waited for: readings are drained and recorded."""
 
@@ -29,11 +48,14 @@ class StoppedError(RigError):
 class Operator(Protocol):
     """Hangs what is asked for, and answers what is doubtful."""
 
-    def hang(self, prompt: str, load: Load, force: float, turn: TURN) -> Answer:
-        """`go` once it hangs; `again`: the step before is to be read again instead."""
+    def begin(self, session: Session) -> None:
+        """Who shows more of a session than what is told looks into it from here on."""
+
+    def hang(self, prompt: str, load: Load, force: float, turn: TURN) -> Answer | Back | Hung:
+        """`go` once it hangs, or Hung; `skip` it; `again`: the step before is to be read again instead, or Back."""
 
     def doubt(self, text: str, turn: TURN) -> Answer:
-        """`again` or `keep` a step whose reading does not go with the others."""
+        """`again` or `keep` a step whose reading does not go with the others, or it was the `probable` load."""
 
     def tell(self, text: str) -> None: ...
 
@@ -45,6 +67,9 @@ class Terminal:
     fd: int = 0
     _buffer: bytes = b""
     _ended: bool = False
+
+    def begin(self, session: Session) -> None:
+        del session
 
     def hang(self, prompt: str, load: Load, force: float, turn: TURN) -> Answer:
         del load, force
@@ -91,6 +116,9 @@ class Command:
     now: Callable[[], float]
     """s"""
     doubted: set[str] = field(default_factory=set)
+
+    def begin(self, session: Session) -> None:
+        del session
 
     def hang(self, prompt: str, load: Load, force: float, turn: TURN) -> Answer:
         words = self.settings.words(force, load, self.bench_dir)

@@ -16,7 +16,7 @@ from rig.editing.draft import Draft
 from rig.editing.saving import opened
 from rig.errors import ConfigError, PlanError, RigError
 from rig.operate.check import check_loaded, outlook_of, require_ports
-from rig.operate.screen_options import look_of, screen_options
+from rig.screen_options import look_of, screen_options
 
 
 def assessor(path: Path) -> Callable[[str], Assessment]:

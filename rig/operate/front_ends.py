@@ -12,7 +12,7 @@ from rig.link.front_end_messages import Request, Snapshot
 from rig.link.sockets import Peer
 from rig.operate.headless import Headless, operator_terminal
 from rig.operate.narration import narration_of
-from rig.operate.screen_options import USUAL, Look
+from rig.screen_options import USUAL, Look
 
 if TYPE_CHECKING:
     from rig.console.next_run import NextRun

@@ -16,7 +16,7 @@ from rich.style import Style
 
 from rig.link.attention import Bell, wanted_for
 from rig.link.front_end_messages import LogLine, Point, Progress, Snapshot, State
-from rig.operate.screen_options import Look
+from rig.screen_options import Look
 from rig.visible_text import console as visible_console
 
 STYLES: Final = {

@@ -21,8 +21,8 @@ from rig.operate.front_ends import Console, progress_bar
 from rig.operate.last_page import no_report_option
 from rig.operate.measured import Measured, measured, recording_of
 from rig.operate.run import follow, require_mountable, start_controller, then_next
-from rig.operate.screen_options import look_of, screen_options
 from rig.recording.ledger import FILE_NAME, Fact, Ledger, file_facts, finished_runs, read
+from rig.screen_options import look_of, screen_options
 
 
 @dataclass(frozen=True, slots=True)

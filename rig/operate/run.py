@@ -22,7 +22,7 @@ from rig.link.sockets import connect
 from rig.operate.front_ends import AGAIN, Console, FrontEnd, forget_keys, progress_bar
 from rig.operate.headless import Headless, check_alive
 from rig.operate.last_page import no_report_option, write_page
-from rig.operate.screen_options import look_of, screen_options
+from rig.screen_options import look_of, screen_options
 
 if TYPE_CHECKING:
     from rig.campaign.config import CampaignConfig

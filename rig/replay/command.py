@@ -9,7 +9,7 @@ from typing import Final
 import click
 
 from rig.errors import ConfigError
-from rig.operate.screen_options import screen_options
+from rig.screen_options import screen_options
 
 RECORDING: Final = (".h5", ".hdf5")
 
@@ -41,9 +41,9 @@ def replay_command(file: Path, speed: float | None, rows: Path | None, headless:
 def _recording(file: Path, speed: float, colors: str, bell: bool, *, headless: bool) -> int:
     from rig.hdf5.load import load  # h5py, and Textual below: only for a recording
     from rig.operate.front_ends import console_screen, progress_bar
-    from rig.operate.screen_options import look_of
     from rig.replay.player import playing
     from rig.replay.recorded import Frames
+    from rig.screen_options import look_of
 
     if speed == 0.0:
         raise ConfigError("--speed 0 is for captures: a console is shown at a speed above 0, such as 10")

@@ -13,7 +13,7 @@ from rig.link.live_runs import find_run
 from rig.operate.front_ends import console_screen, progress_bar
 from rig.operate.last_page import no_report_option
 from rig.operate.run import follow
-from rig.operate.screen_options import look_of, screen_options
+from rig.screen_options import look_of, screen_options
 
 HOST: Final = "127.0.0.1"
 PORT: Final = 8000

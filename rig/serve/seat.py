@@ -16,7 +16,7 @@ from rig.errors import RigError
 from rig.link.live_runs import find_run
 from rig.operate.front_ends import console_screen
 from rig.operate.run import follow
-from rig.operate.screen_options import Look, colors_of
+from rig.screen_options import Look, colors_of
 from rig.visible_text import visible_output
 
 

@@ -53,6 +53,9 @@ class Hanger:
     said: list[str] = field(default_factory=list)
     answers: list[str] = field(default_factory=list)
 
+    def begin(self, session):
+        pass
+
     def hang(self, prompt, load, force, turn):
         self.asked.append(prompt)
         if self.answers and (answer := self.answers.pop(0)) != "go":

@@ -2,7 +2,7 @@
 
 import pytest
 
-from rig.operate.screen_options import Look, colors_of, look_of
+from rig.screen_options import Look, colors_of, look_of
 
 
 @pytest.mark.parametrize("wanted", ["full", "16", "none"])
