@@ -91,7 +91,9 @@ def test_other_weights_a_step_left_out_and_one_read_again(tmp_path):
     assert person.shown.steps[3].load == "5kg + 2kg"
     assert person.shown.steps[6].state == "left out"
     steps = [(step.index, step.phase) for step in load(tmp_path / RECORDING).steps]
-    assert sorted(phase for index, phase in steps if index == 1) == ["free", "hold", "void"], "what was read first is void"
+    assert sorted(phase for index, phase in steps if index == 1) == ["free", "hold", "void"], (
+        "what was read first is void"
+    )
     assert 6 not in [index for index, _ in steps]
 
 
