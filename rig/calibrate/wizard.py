@@ -111,7 +111,10 @@ class Wizard:
         """Nothing more comes; `error` where it ended otherwise than planned."""
         lines = [*self.result, *([error] if error else []), *(["", *self.said] if failed else [])]
         steps = self.shown.steps if self.session is None else tuple(self._steps(self.session))
-        self.shown = Weighing(self.title, steps, self.shown.at, result=tuple(lines), ended=True, failed=failed)
+        leaves = self.session is None  # whoever waits for this thread says why
+        self.shown = Weighing(
+            self.title, steps, self.shown.at, result=tuple(lines), ended=True, failed=failed, leaves=leaves
+        )
 
     def _answer(self, turn: TURN) -> str:
         while not self.answers.empty():

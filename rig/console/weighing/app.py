@@ -78,6 +78,8 @@ class WeighingApp(App[None], inherit_bindings=False):
         before, self.now = self.now, self.shown()
         if not self.screen_stack or not self.screen_stack[0].query("#keys"):
             return  # it closes
+        if self.now.leaves:
+            self.exit()
         base = self.screen_stack[0]
         now = self.now
         asked = now.asks or now.doubt

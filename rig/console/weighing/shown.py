@@ -66,6 +66,8 @@ class Weighing:
     """At the end: what came of it."""
     ended: bool = False
     failed: bool = False
+    leaves: bool = False
+    """Nothing was begun, and there is nothing to be seen: the screen goes by itself."""
 
 
 def instruction(now: Weighing) -> str:

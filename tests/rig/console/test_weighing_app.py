@@ -92,6 +92,10 @@ def test_the_end_is_asked_for_and_q_at_the_end_leaves():
     assert (answers, running) == ([], False)
 
 
+def test_where_nothing_was_begun_the_screen_goes_by_itself():
+    assert pressed(replace(ENDED, failed=True, leaves=True))[2] is False
+
+
 def test_the_step_of_now_is_on_the_screen_also_of_a_long_plan():
     far = replace(ASKING, at=35, steps=tuple(replace(s, state="now") if s.number == 36 else s for s in STEPS))
     _, shown, _ = pressed(far)
