@@ -70,7 +70,7 @@ def limit_for(units: int, charts: int, share: float = FALSE_ALARMS) -> float:
     """Limits in sigma that all charts of a fleet without an odd unit exceed in at most `share` of cases (Bonferroni).
 
     >>> round(limit_for(2000, 6), 2), round(limit_for(20, 6), 2)
-    (4.74, 3.71)
+    (4.6, 3.53)
     """
     return float(normal_quantile(1.0 - share / (2 * units * charts)))
 

@@ -194,7 +194,7 @@ def levels_text(sweep: Sweep, most: int = 8) -> str:
     """Its levels, both ways as one.
 
     >>> levels_text(Sweep("", (0.0, 5.4, -5.4, 16.2, 0.0), 15.0, 0.9, (0.0,), 0.4))
-    '±5.4, ±16.2 V'
+    '±5.4, 16.2 V'
     """
     both = {abs(v) for v in sweep.levels if -v in sweep.levels}
     told: list[str] = []
