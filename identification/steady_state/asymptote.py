@@ -18,6 +18,8 @@ LONGEST = 0.5
 """The longest one as a share of the samples: slower ones look like a straight line and leave the constant unknown."""
 SHORTEST = 0.03
 """The shortest as a share of the samples: faster ones leave no trace after the cut."""
+REFINED, FEWEST_POINTS = 4, 5
+"""Grids at most, each between the neighbours of the best of the one before; and likely constants that are enough."""
 CREDIBLE = 1e-3
 """Time constants less likely than this, relative to the best, are left out."""
 
@@ -41,11 +43,30 @@ def asymptote(values: Floats) -> Asymptote:
 
     >>> i = np.arange(60)
     >>> found = asymptote(5 + 3 * np.exp(-i / 15) + np.where(i % 2, 0.01, -0.01))
-    >>> bool(abs(found.value - 5) < 0.03), bool(found.spread < 0.02)
+    >>> bool(abs(found.value - 5) < 0.005), bool(found.spread < 0.02)
     (True, True)
     """
     n = values.size
     constants = np.geomspace(SHORTEST * n, LONGEST * n, CONSTANTS)
+    for _ in range(REFINED):
+        shape, centred, power, size, ends, weight = _weighed(values, constants)
+        if np.count_nonzero(weight) >= FEWEST_POINTS:
+            break
+        best = int(np.argmax(weight))  # a sharp one falls between two of the grid
+        constants = np.geomspace(constants[max(best - 1, 0)], constants[min(best + 1, CONSTANTS - 1)], CONSTANTS)
+    value = float(weight @ ends)
+    near = int(np.argmin(np.where(weight > 0, np.abs(ends - value), np.inf)))
+    weights = 1 / n - shape[near].mean() * centred[near] / power[near]
+    ones = np.full(n, n**-0.5)
+    basis = np.column_stack([ones, centred[near] / np.sqrt(power[near])])
+    spread = float(np.sqrt(weight @ np.square(ends - value)))
+    return Asymptote(value, spread, weights, basis, size[near] * shape[near])
+
+
+def _weighed(values: Floats, constants: Floats) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
+    """For each time constant (k,), in samples: its shape (k, n), that less its mean, the power of this, its size, the
+    value that it leads to, and how likely it is, by itself."""
+    n = values.size
     shape = np.exp(-np.arange(n) / constants[:, None])
     centred = shape - shape.mean(axis=1, keepdims=True)
     power = np.einsum("kn,kn->k", centred, centred)
@@ -56,11 +77,4 @@ def asymptote(values: Floats) -> Asymptote:
     log = -0.5 * (n - 3) * np.log(left) - 0.5 * np.log(power)
     weight = np.exp(log - log.max())
     weight[weight < CREDIBLE] = 0.0
-    weight /= weight.sum()
-    value = float(weight @ ends)
-    near = int(np.argmin(np.where(weight > 0, np.abs(ends - value), np.inf)))
-    weights = 1 / n - shape[near].mean() * centred[near] / power[near]
-    ones = np.full(n, n**-0.5)
-    basis = np.column_stack([ones, centred[near] / np.sqrt(power[near])])
-    spread = float(np.sqrt(weight @ np.square(ends - value)))
-    return Asymptote(value, spread, weights, basis, size[near] * shape[near])
+    return shape, centred, power, size, ends, weight / weight.sum()
