@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Literal, NamedTuple, Protocol, runtime_checkable
 
@@ -63,6 +64,11 @@ class Sample(NamedTuple):
     t_ns: int
     """Arrival, `time.monotonic_ns()`."""
     values: tuple[float, ...]
+
+
+def measured(value: float) -> float:
+    """A number as it was sent; NaN for an infinite one, which no device has measured."""
+    return math.nan if math.isinf(value) else value
 
 
 @dataclass(frozen=True, slots=True)

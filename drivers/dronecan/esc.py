@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable
+from typing import Any
 
 from drivers.dronecan.options import Options, streams
 from drivers.dronecan.transfers import (
@@ -32,7 +33,7 @@ from drivers.errors import DeviceError, LinkError
 from drivers.ports.can_bus import CanBus
 from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
-from drivers.protocols import LinkHealth, Sample, Stream, Watchdog
+from drivers.protocols import LinkHealth, Sample, Stream, Watchdog, measured
 
 FULL = 8191
 """RawCommand of all that the ESC gives (1030.RawCommand.uavcan, int14)."""
@@ -223,11 +224,7 @@ class DronecanEsc:
     def _row(self, t_ns: int, transfer: Received) -> Sample | None:
         value = transfer.value
         if self._is_status(transfer, STATUS):
-            told = (
-                value.rpm / 60.0, value.voltage, value.current, value.temperature - KELVIN,
-                value.power_rating_pct / 100.0, float(value.error_count),
-            )  # fmt: skip
-            return Sample(self.name, t_ns, told)
+            return Sample(self.name, t_ns, row_of(value))
         if self._is_status(transfer, NODE_STATUS):
             state = (value.health, value.mode, value.uptime_sec, value.vendor_specific_status_code)
             return Sample(f"{self.name}_state", t_ns, tuple(float(each) for each in state))
@@ -285,3 +282,11 @@ class DronecanEsc:
             f"{text(found.value.name)}, node {found.source}, hardware {hardware.major}.{hardware.minor},"
             f" software {software.major}.{software.minor}, serial {unique}"
         )
+
+
+def row_of(status: Any) -> tuple[float, ...]:
+    """rev/s, V, A, degC, share of the power, errors: of esc.Status."""
+    return (
+        status.rpm / 60.0, measured(status.voltage), measured(status.current), measured(status.temperature - KELVIN),
+        status.power_rating_pct / 100.0, float(status.error_count),
+    )  # fmt: skip

@@ -7,11 +7,12 @@ Commands are sent with all eight bytes, which other people's devices insist on a
 
 from __future__ import annotations
 
-import math
 import struct
+from math import isfinite
 from typing import NamedTuple
 
 from drivers.ports.can_frame import Frame
+from drivers.protocols import measured
 
 HEARTBEAT, SET_AXIS_STATE, ENCODER, SET_MODE = 0x01, 0x07, 0x09, 0x0B
 SET_VELOCITY, SET_TORQUE, IQ, TEMPERATURE, BUS, CLEAR_ERRORS = 0x0D, 0x0E, 0x14, 0x15, 0x17, 0x18
@@ -106,7 +107,7 @@ def decode(frame: Frame) -> Record:
         return Heartbeat(int.from_bytes(data[:4], "little"), data[4], (data[5], data[6], data[7]))
     if kind := _PAIRS.get(command):
         first, second = struct.unpack("<ff", data[:8])
-        return kind(first, second)
+        return kind(measured(first), measured(second))
     return NotUnderstood(frame)
 
 
@@ -125,7 +126,7 @@ def set_torque(node: int, torque: float) -> Frame:
 
 
 def _number(value: float) -> float:
-    if not math.isfinite(value):
+    if not isfinite(value):
         raise ValueError(f"an ODrive set-point is a number, not {value}")
     return value
 

@@ -125,6 +125,11 @@ def test_golden_commands():
             set_velocity(3, value)
 
 
+def test_an_infinite_number_is_none():
+    told = decode(Frame(NODE << 5 | 0x09, False, struct.pack("<ff", math.inf, -math.inf)))
+    assert all(math.isnan(value) for value in told)
+
+
 def test_golden_messages():
     (beat,) = FRAMES["heartbeat"]
     assert decode(Frame(beat["id"], False, bytes.fromhex(beat["hex"])))[:2] == (beat["error"], beat["state"])
