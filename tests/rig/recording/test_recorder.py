@@ -1,21 +1,17 @@
 """The recorder process as the controller meets it: over its link, with a real process at the other end."""
 
-import contextlib
 import hashlib
 import select
 import signal
 import socket
-import subprocess
-import sys
 import time
 
 import numpy as np
 import pytest
 
-from rig.hdf5 import load, recover
+from rig.hdf5 import load
 from rig.link.recorder_messages import (
     Ack,
-    ChannelSpec,
     Close,
     Closed,
     EventRow,
@@ -24,67 +20,9 @@ from rig.link.recorder_messages import (
     Ready,
     Rows,
     StepRow,
-    StreamSpec,
 )
-from rig.link.sockets import Peer, pair
-
-STREAMS = tuple(
-    StreamSpec(name, "sim", (ChannelSpec("thrust", "thrust", "N"), ChannelSpec("raw", None, "1", integer=True)))
-    for name in ("cell_a", "cell_b")
-)
-PATIENCE = 30.0
-"""s until a test gives up waiting for a message."""
-
-
-def start(fd, **options):
-    return subprocess.Popen(
-        [sys.executable, "-m", "rig.recording.recorder", "--fd", str(fd)],
-        pass_fds=(fd,),
-        stdin=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        start_new_session=True,
-        **options,
-    )
-
-
-@contextlib.contextmanager
-def recorder(**options):
-    ours, theirs = pair("recorder")
-    process = start(theirs.fileno(), **options)
-    theirs.close()
-    try:
-        yield ours, process
-    finally:
-        ours.close()
-        try:
-            process.wait(PATIENCE)
-        finally:
-            process.kill()
-            process.wait()
-            process.stderr.close()
-
-
-def until(peer, kind):
-    """Messages up to the first of a kind."""
-    got = []
-    end = time.monotonic() + PATIENCE
-    while not any(isinstance(message, kind) for message in got):
-        assert time.monotonic() < end, f"no {kind} came; got {got[-3:]}"
-        assert not peer.closed, f"the recorder ended; got {got[-3:]}"
-        select.select([peer], [peer] if peer.waiting else [], [], 1.0)
-        peer.flush()
-        got += peer.receive()
-    return got
-
-
-def rows(stream, first, n):
-    index = np.arange(first, first + n)
-    return Rows(stream, index * 1_000_000, np.column_stack([index * 0.5, index]).astype(float))
-
-
-def opened(peer, path, **more):
-    peer.send(Open(str(path), 0, STREAMS, {"recording_id": path.stem, "thruster": "T1"}, **more))
-    until(peer, Ready)
+from rig.link.sockets import Peer
+from tests.rig.recording.killed_recorder import PATIENCE, STREAMS, kill_once, opened, recorder, rows, start, until
 
 
 def ended(peer):
@@ -247,39 +185,5 @@ def test_kill_at_any_instant_leaves_every_flushed_row(tmp_path, part):
     """Promise 15: 24 kills at random instants, among them during writing, flushing and closing. Six at a time: each
     starts a process, and beside a busy machine 24 of these take longer than a test may."""
     rng = np.random.default_rng([20, part])
-    for trial in range(6 * part, 6 * part + 6):
-        path = tmp_path / f"{trial}.h5"
-        with recorder() as (peer, process):
-            opened(peer, path)
-            deadline = time.monotonic() + rng.uniform(0.0, 1.0)
-            closing = trial % 4 == 3
-            acked, first = (0, 0), 0
-            while time.monotonic() < deadline:
-                for stream in (0, 1):
-                    peer.send(rows(stream, first, 20))
-                first += 20
-                select.select([peer], [], [], 0.002)
-                acked = ([m.rows for m in peer.receive() if isinstance(m, Ack)] or [acked])[-1]
-            if closing:
-                peer.send(Close("completed"))
-                select.select([peer], [], [], rng.uniform(0.0, 0.03))
-            process.kill()
-            process.wait()
-            acked = ([m.rows for m in peer.receive() if isinstance(m, Ack)] or [acked])[-1]
-        check_killed(path, acked, tmp_path / f"{trial}-copy.h5")
-
-
-def check_killed(path, acked, copy):
-    recording = load(path)
-    for stream, flushed in zip(("cell_a", "cell_b"), acked, strict=True):
-        thrust, raw = (channel for channel in recording.channels if channel.stream == stream)
-        n = thrust.value.size
-        assert n >= flushed
-        assert np.array_equal(thrust.value, np.arange(n) * 0.5)  # no wrong sample, none twice
-        assert np.array_equal(raw.value, np.arange(n))
-        assert np.allclose(thrust.time, np.arange(n) * 1e-3)
-    if recording.attributes["opened_as"] == "swmr":
-        recover(path, copy)
-        copied = load(copy)
-        assert copied.attributes["opened_as"] == "plain"
-        assert [c.value.size for c in copied.channels] == [c.value.size for c in recording.channels]
+    for trial in range(6):
+        kill_once(tmp_path / f"{trial}.h5", rng, closing=trial % 4 == 3)
