@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import ClassVar
 
 from identification.physics.equation import signed
-from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
+from identification.physics.term import WEIGHED, EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -30,10 +30,16 @@ class LoadCellEvenBend:
     form: ClassVar[str] = ""
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        return (Parameter("coefficient", "1/N", -MOST / scale.thrust, MOST / scale.thrust, 0.0, told="bend"),)
+        most = self._most(scale)
+        return (Parameter("coefficient", "1/N", -most, most, 0.0, told="bend"),)
+
+    def _most(self, scale: Scale) -> float:
+        """1/N: of a broken cell, or what dead weights left possible."""
+        most = MOST / scale.thrust
+        return min(most, WEIGHED * scale.cell_even) if scale.cell_even > 0 else most
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
-        return ((0.01 / scale.thrust,),)
+        return ((min(0.01 / scale.thrust, self._most(scale)),),)
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()

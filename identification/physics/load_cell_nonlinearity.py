@@ -8,7 +8,7 @@ from typing import ClassVar, Literal
 import numpy as np
 
 from identification.physics.equation import signed
-from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
+from identification.physics.term import WEIGHED, EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
@@ -32,21 +32,19 @@ class LoadCellNonlinearity:
     form: Literal["quadratic", "cubic"] = "quadratic"
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
-        power = 2 if self.form == "cubic" else 1
-        return (
-            Parameter(
-                "coefficient",
-                "1/N" if power == 1 else "1/N^2",
-                -MOST / scale.thrust**power,
-                MOST / scale.thrust**power,
-                0.0,
-                told="bend",
-            ),
-        )
+        unit = "1/N^2" if self.form == "cubic" else "1/N"
+        most = self._most(scale)
+        return (Parameter("coefficient", unit, -most, most, 0.0, told="bend"),)
+
+    def _most(self, scale: Scale) -> float:
+        """1/N or 1/N^2: of a broken cell, or what dead weights left possible."""
+        power, known = (2, scale.cell_cubic) if self.form == "cubic" else (1, scale.cell_odd)
+        most = MOST / scale.thrust**power
+        return min(most, WEIGHED * known) if known > 0 else most
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         power = 2 if self.form == "cubic" else 1
-        return ((0.02 / scale.thrust**power,),)
+        return ((min(0.02 / scale.thrust**power, self._most(scale)),),)
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
         return ()

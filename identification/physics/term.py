@@ -22,6 +22,8 @@ KELVIN = 273.15
 """At 0 degC."""
 MEASURED: tuple[Stage, ...] = ("stand", "cell")
 """Stages behind the thruster: what acts there changes what is measured, and no vehicle has it."""
+WEIGHED = 4.0
+"""Standard deviations by which a cell may bend otherwise than its dead weights said."""
 STAGES: tuple[Stage, ...] = ("command", "rotor", "hydro", "stand", "cell")
 
 
@@ -59,6 +61,13 @@ class Scale:
     """K, the lowest motor_temperature that a run began with."""
     cold_error: float = 0.0
     """K, its standard error."""
+    cell_even: float = 0.0
+    """1/N, standard deviation of what bend F^2 dead weights left the load cell; 0, here and below: not known, nobody
+    hung any or not so heavy ones."""
+    cell_odd: float = 0.0
+    """1/N, of F|F|."""
+    cell_cubic: float = 0.0
+    """1/N^2, of F^3."""
 
 
 @dataclass(frozen=True, slots=True)

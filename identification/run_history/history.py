@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.calibration.bend import CellBend
 from identification.recording import Floats
 from identification.run_history.converter import Converter
 
@@ -114,6 +115,7 @@ class History:
     """N, step of the thrust's values; 0 where they have none."""
     converter: Converter = field(default_factory=Converter)
     """Between the thrust and a sample of it."""
+    cell: CellBend = field(default_factory=CellBend)
     rate_spacing: float = 1.0
     excess: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     """(M,) or (1,): mean of driver |driver| over the interval less that of the mean driver."""

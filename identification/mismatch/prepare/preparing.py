@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.calibration.bend import CellBend, bend_left
 from identification.mismatch import policy
 from identification.mismatch.prepare.binned import binned, untorn
 from identification.mismatch.prepare.chain.quantum import quantum_of
@@ -18,6 +19,7 @@ from identification.recording import Channel, Floats, Recording
 from identification.run_history.converter import Converter
 from identification.run_history.history import CHANGED, History
 from identification.run_history.ticks.sub_interval_leads import with_leads
+from identification.thruster.thrust_data import curve_behind
 
 DRIVERS = ("command_voltage", "motor_voltage", "rotation_rate")
 """What may explain the thrust, best first."""
@@ -176,6 +178,14 @@ def _converter(recording: Recording) -> Converter:
     return Converter(thrust.acquisition.window or 0.0, thrust.acquisition.low_pass or 0.0)
 
 
+def _cell(recording: Recording) -> CellBend:
+    """How straight the cell is known to be over the forces of the run, as its dead weights say."""
+    thrust = recording.first_of("thrust")
+    assert thrust is not None
+    force = thrust.value[np.isfinite(thrust.value)]
+    return bend_left(curve_behind(thrust), force)
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class _Turning:
     """The rate as it was measured, over the intervals; fields as of History."""
@@ -236,6 +246,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         jitter=jitter_of(time),
         delay_std=_delay_std(recording, driver),
         converter=_converter(recording),
+        cell=_cell(recording),
         rate_spacing=turning.spacing,
         static=_is_table(held, time.size),
     )

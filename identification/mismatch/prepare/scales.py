@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.calibration.bend import CellBend
 from identification.physics.term import KELVIN, THERMOMETER, Scale
 from identification.run_history.history import History
 from identification.run_history.remembered import RememberedRun
@@ -39,7 +40,17 @@ def scale_of(runs: Sequence[RememberedRun], C: float) -> Scale:
         current=max((_lasting_current(h) for h in histories if "current" in h.others), default=0.0),
         neighbour=_largest(histories, "neighbour_thrust"),
         **_coldest(histories),
+        **_straightness(histories),
     )
+
+
+def _straightness(histories: Sequence[History]) -> dict[str, float]:
+    """How straight the cell is known to be, as the least that is known of a run says; 0 where one says nothing."""
+    bends = [h.cell for h in histories]
+    return {
+        f"cell_{name}": max(stds) if all(stds := [getattr(bend, name) for bend in bends]) else 0.0
+        for name in CellBend._fields
+    }
 
 
 def _largest(histories: Sequence[History], quantity: str) -> float:
