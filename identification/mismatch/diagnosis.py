@@ -245,6 +245,9 @@ class Diagnosis:
     """Of the shape of what is not explained: of a vehicle a force all the same."""
     equations: tuple[Equation, ...] = ()
     """The final model line by line, in the order in which the bench acts; of a vehicle none."""
+    gain_std: float = 0.0
+    """Relative standard uncertainty of all thrusts, and of C, by the load cell's calibration, which is not in the
+    errors of the model; 0: not stated."""
 
     @property
     def white(self) -> bool:

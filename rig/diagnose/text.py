@@ -10,6 +10,7 @@ from identification.mismatch.diagnosis import Diagnosis, Finding
 from identification.mismatch.unexplained import FlexibleShape, FormulaFound, Remainder
 from identification.mismatch.value import Value, Where
 from identification.mismatch.verdict_clauses import NOT_WHITE, degree, sureness
+from rig.diagnose.by_calibration import by_calibration
 from rig.diagnose.typed import TITLE, typed
 
 WIDTH = 100
@@ -183,7 +184,7 @@ def _bar(value: float, size: float) -> str:
 def _model(d: Diagnosis) -> Iterator[str]:
     terms = "".join(f" + {term}" for term in d.model_terms)
     named = {name: value for name, value in d.model.items() if not name.startswith("flexible:")}  # these have a table
-    yield from _para(f"Model: {d.baseline_model.split(' (')[0]}{terms}; {_values(named)}")
+    yield from _para(f"Model: {d.baseline_model.split(' (')[0]}{terms}; {_values(named)}{by_calibration(d)}")
 
 
 def _equations(d: Diagnosis) -> Iterator[str]:

@@ -37,6 +37,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, object]:
         "model": {
             "terms": list(d.model_terms),
             "parameters": _values(d.model),
+            "calibration_std": _number(d.gain_std) if d.gain_std else None,
             "equations": [{"effect": e.effect or None, "line": e.line} for e in d.equations],
         },
         "fit": {

@@ -38,6 +38,7 @@ from identification.mismatch.validate.stage import score
 from identification.physics.term import MEASURED, Term
 from identification.recording import Recording
 from identification.run_history.history import History
+from identification.thruster.thrust_data import gain_std
 from identification.twin import Twin
 
 TAKEN_BACK = (
@@ -167,6 +168,7 @@ def _told(case: Case, found: Found, drafted: Drafted, *taken_back: str) -> Diagn
         twin=draft.twin,
         not_new=new.not_new,
         equations=_equations(found.completed.stated, data, case, draft),
+        gain_std=max(gain_std(thrust) for r in case.recordings if (thrust := r.first_of("thrust")) is not None),
     )
 
 

@@ -12,6 +12,7 @@ from identification.mismatch.diagnosis import Diagnosis, NextExperiment
 from identification.mismatch.value import Value
 from identification.mismatch.verdict_clauses import NOT_WHITE, beyond_noise
 from identification.recording import Recording
+from rig.diagnose.by_calibration import by_calibration
 from rig.diagnose.recording_names import NO_NAMES, told_by_name
 from rig.diagnose.report.flexible import flexible_pictures, modelled_remarks
 from rig.diagnose.report.pictures import (
@@ -193,7 +194,7 @@ def parameter_section(d: Diagnosis) -> Section:
     table = Table("Model with its standard errors", head, rows, columns(head, "parameter", "of", "unit"))
     terms = " + ".join([d.baseline_model, *map(effect_name, d.model_terms)])
     listed = (Listing(TITLE, tuple(typed(d.equations, LISTED))),) if d.equations else ()
-    return Section("Parameters", (table, *listed), words(f"Model: {terms}."))
+    return Section("Parameters", (table, *listed), words(f"Model: {terms}{by_calibration(d)}."))
 
 
 def _parameter_row(name: str, value: Value, before: Value | None, findings: set[str]) -> tuple[str, ...]:
