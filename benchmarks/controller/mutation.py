@@ -28,9 +28,13 @@ PROJECT = Path(__file__).resolve().parents[2]
 LIMIT = 120
 """s"""
 STAGES = ("test_arming.py", "test_campaign_stops.py", "test_campaign_failures.py")
+PROOFS = ("tests/rig/safety/test_proof_edges.py", "tests/rig/sequence/test_sequencer_proof.py")
 TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
     "guard": ("rig/safety/guard.py", ("tests/rig/safety/test_guard_edges.py", "tests/rig/safety/test_guard.py")),
-    "proof": ("rig/safety/watchdog_proof.py", ("tests/rig/sequence/test_sequencer_proof.py",)),
+    "proof": (
+        "rig/safety/watchdog_proof.py",
+        ("tests/rig/safety/test_proof_edges.py", "tests/rig/sequence/test_sequencer_proof.py"),
+    ),
     "sequencer": ("rig/sequence/sequencer.py", ("tests/rig/sequence",)),
     "loop": ("rig/control/loop.py", ("tests/rig/control", "tests/rig/stages/test_campaign_failures.py")),
     "arming": ("rig/stages/arming.py", tuple(f"tests/rig/stages/{name}" for name in STAGES)),
