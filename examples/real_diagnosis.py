@@ -27,8 +27,8 @@ from rig.diagnose.command import diagnose_files
 from rig.diagnose.recording_names import file_names, told_by_name
 from rig.diagnose.report.page import write
 from rig.diagnose.text import diagnosis_text
-from rig.importing.command import import_file
 from rig.importing.mapping import read_map
+from rig.importing.one_file import import_file
 
 HERE = Path(__file__).resolve().parents[2] / "shared" / "recordings"
 

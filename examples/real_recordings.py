@@ -23,8 +23,8 @@ from identification.thruster.thrust_forms import Model
 from rig.errors import RecordingError
 from rig.fit.command import answer_text, fit_recordings
 from rig.hdf5 import load
-from rig.importing.command import import_file
 from rig.importing.mapping import read_map
+from rig.importing.one_file import import_file
 
 HERE = Path(__file__).resolve().parents[1].parent / "shared" / "recordings"
 

@@ -24,8 +24,8 @@ from rig.blind.store import version_of_diagnosis
 from rig.diagnose.command import diagnose_files
 from rig.diagnose.text import diagnosis_text
 from rig.diagnose.vehicle import VehicleFiles
-from rig.importing.command import import_file
 from rig.importing.mapping import read_map
+from rig.importing.one_file import import_file
 
 EXAMPLES = Path(__file__).resolve().parent
 HERE = EXAMPLES.parents[1] / "shared" / "recordings"

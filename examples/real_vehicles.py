@@ -18,8 +18,8 @@ from pathlib import Path
 import numpy as np
 
 from identification.vehicle.replay import Replay
-from rig.importing.command import import_file
 from rig.importing.mapping import read_map
+from rig.importing.one_file import import_file
 from rig.vehicle.answer import VehicleAnswer, identify_files
 from rig.vehicle.text import answer_text
 

@@ -16,6 +16,7 @@ from typing import Any, Final, TypeVar
 
 from rig.catalogue.entry import Entry
 from rig.catalogue.reading.files import Stamp
+from rig.sqlite_transaction import transaction
 
 T = TypeVar("T")
 
@@ -136,19 +137,6 @@ def _connected(place: Path | str) -> sqlite3.Connection:
         connection.close()
         raise
     return connection
-
-
-@contextmanager
-def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """All or nothing; other processes wait."""
-    connection.execute("BEGIN IMMEDIATE")
-    try:
-        yield
-    except BaseException:
-        with suppress(sqlite3.Error):  # what is damaged can't be rolled back either
-            connection.execute("ROLLBACK")
-        raise
-    connection.execute("COMMIT")
 
 
 def stamps(connection: sqlite3.Connection) -> dict[str, Stamp]:

@@ -14,6 +14,7 @@ from rig.catalogue.reading import files
 from rig.catalogue.reading.campaigns import read_campaign
 from rig.catalogue.reading.documents import read_document
 from rig.catalogue.reading.recordings import read_recordings
+from rig.sqlite_transaction import transaction
 
 T = TypeVar("T")
 
@@ -54,17 +55,17 @@ def refresh(connection: sqlite3.Connection, folder: Path, tell: Callable[[int, i
     known, there = index.stamps(connection), files.found(folder)
     gone = known.keys() - there.keys()
     new = sorted(path for path, stamp in there.items() if known.get(path) != stamp)
-    with index.transaction(connection):
+    with transaction(connection):
         index.forget(connection, gone)
     done = 0
     for said in _read(folder, new):
-        with index.transaction(connection):
+        with transaction(connection):
             for path, entries in said:
                 index.keep(connection, path, there[path], entries)
         done += len(said)
         tell(done, len(new))
     if gone or new:
-        with index.transaction(connection):
+        with transaction(connection):
             for statement in RELATE:
                 connection.execute(statement)
     return Refreshed(len(there), len(new), len(gone))
@@ -72,7 +73,7 @@ def refresh(connection: sqlite3.Connection, folder: Path, tell: Callable[[int, i
 
 def empty(connection: sqlite3.Connection) -> None:
     """Everything forgotten, for a rebuild."""
-    with index.transaction(connection):
+    with transaction(connection):
         connection.execute("DELETE FROM files")
 
 

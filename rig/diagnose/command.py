@@ -219,9 +219,10 @@ def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) 
 def _rows(names: Sequence[str], seed: int, twin: Path | None, fleet: Fleet, *, any_thruster: bool) -> int:
     from rig.diagnose.fleet.row import COLUMNS, question_of
     from rig.fleet.asking import ask_all
+    from rig.fleet.files import meant
 
     question = question_of(seed, twin, any_thruster=any_thruster)
-    return ask_all(question, COLUMNS, names, fleet)
+    return ask_all(question, COLUMNS, meant(names), fleet)
 
 
 @click.command("diagnose", cls=ListCommand)

@@ -80,8 +80,9 @@ def _not_with_one_pass(*asked: tuple[str, object]) -> None:
 def _rows(files: Sequence[str], model: Model, signal: str, method: Method, fleet: Fleet) -> int:
     from rig.fit.row import COLUMNS, question_of
     from rig.fleet.asking import ask_all
+    from rig.fleet.files import meant
 
-    return ask_all(question_of(model, signal, method), COLUMNS, files, fleet)
+    return ask_all(question_of(model, signal, method), COLUMNS, meant(files), fleet)
 
 
 def _tell(text: str, json_path: Path | None, said: Iterable[str]) -> None:

@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 
 import click
 
 from rig.fleet.columns import Column
-from rig.fleet.files import meant
 from rig.fleet.options import Fleet
 from rig.fleet.parquet import require_pyarrow, write_stale
-from rig.fleet.question import Question
+from rig.fleet.question import Question, Row
 from rig.fleet.store import Store, opened
 from rig.fleet.work import Outcome, carry_out
 from rig.workers.interrupting import interruptible
@@ -22,14 +21,22 @@ EVERY = 500
 """Files between two lines of progress in a log."""
 
 
-def ask_all(question: Question, columns: Sequence[Column], names: Sequence[str], fleet: Fleet) -> int:
-    """Rows of all files in the store, its Parquet up to date, a summary printed. Raises RigError.
+def ask_all(
+    question: Question,
+    columns: Sequence[Column],
+    urls: Sequence[str],
+    fleet: Fleet,
+    stands: Callable[[Row], bool] | None = None,
+) -> int:
+    """Rows of all files (`rig.fleet.files.meant`) in the store, its Parquet up to date, a summary printed.
 
+    `stands`: whether what a row says was made is still there; else it is made again. Raises RigError.
     Exit status: 0, or 1 where a file has no answer or can't be used.
     """
     require_pyarrow()
-    urls = meant(names)
     with opened(fleet.store) as store, interruptible():
+        if stands is not None:
+            store.forget(question, [row["sha256"] for row in store.answers(question) if not stands(row)])
         found, days = asked(question, columns, urls, store, fleet)
     for sentence in _sentences(found):
         click.echo(f"  {sentence}", err=True)

@@ -16,6 +16,7 @@ from typing import Final
 
 from rig.errors import RigError
 from rig.fleet.question import Question, Row
+from rig.sqlite_transaction import transaction
 from rig.workers.locking import folder_locked
 
 NAME: Final = "rows.sqlite"
@@ -64,6 +65,22 @@ class Store:
             (question.table, question.asked, question.version),
         )
         return dict(rows.fetchall())
+
+    def answers(self, question: Question) -> list[Row]:
+        """The rows without an error of what this version has answered."""
+        rows = self.connection.execute(
+            "SELECT row FROM rows WHERE tbl = ? AND asked = ? AND version = ? AND error IS NULL",
+            (question.table, question.asked, question.version),
+        )
+        return [json.loads(text) for (text,) in rows]
+
+    def forget(self, question: Question, digests: Sequence[str]) -> None:
+        """These are to be answered again: until then the rows stand, as of an earlier version."""
+        with transaction(self.connection):
+            self.connection.executemany(
+                "UPDATE rows SET version = '' WHERE tbl = ? AND asked = ? AND sha256 = ?",
+                [(question.table, question.asked, digest) for digest in digests],
+            )
 
     def keep(self, question: Question, rows: Sequence[Row]) -> None:
         """Each in place of what an earlier version answered; all or none."""
@@ -147,15 +164,3 @@ def _connected(path: Path) -> sqlite3.Connection:
         connection.close()
         raise
     return connection
-
-
-@contextmanager
-def transaction(connection: sqlite3.Connection) -> Iterator[None]:
-    """All or nothing."""
-    connection.execute("BEGIN IMMEDIATE")
-    try:
-        yield
-    except BaseException:
-        connection.rollback()
-        raise
-    connection.execute("COMMIT")

@@ -1,188 +1,20 @@
-"""`rig import`: a table or log of another program becomes a recording."""
+"""`rig import`: tables and logs of other programs become recordings."""
 
 from __future__ import annotations
 
-import hashlib
-import uuid
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
-from importlib.metadata import PackageNotFoundError, version
+from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import click
-import numpy as np
 
-from rig.errors import RecordingError, RigError
-from rig.importing.convert import Imported, convert, parameters_known
-from rig.importing.json_recording import read_plain
+from rig.errors import ConfigError
+from rig.fleet.options import Fleet, fleet_of, fleet_options, refuse_beside
 from rig.importing.map_options import LEVELS, Levels, assignments_of, plan_of, refuse_without_map
-from rig.importing.mapping import FileMap, ImportMap, read_map, shipped
-from rig.importing.reading.foreign_formats import foreign
+from rig.importing.mapping import read_map, shipped
+from rig.importing.one_file import Beside, Summary, import_file, import_plain, read_source
 from rig.importing.thruster_name import thruster_of
-from rig.importing.timing.two_clocks import ESTIMATED, merged, offset_asked, offset_between
-from rig.link.recorder_messages import Attribute, EventRow, Rows
-from rig.regular_file import read
-
-MOST_BYTES = 2**30
-"""Of a file to import: a day of ten columns at 100 Hz. What is longer is imported in parts."""
-
-
-@dataclass(frozen=True, slots=True)
-class Summary:
-    """What `import_file` did."""
-
-    path: Path
-    rows: int
-    """Rows of the file that were good."""
-    bad: int
-    sentences: tuple[str, ...]
-    """Assumptions and what was left out; the same as the events of the recording."""
-
-
-@dataclass(frozen=True, slots=True)
-class Beside:
-    """A second file with a clock of its own, to be in the same recording."""
-
-    source: Path
-    plan: ImportMap
-    offset: str | float = ESTIMATED
-    """Seconds from the first row of the first file to that of this one; `auto`: estimated; `clock`: by their stamps."""
-
-
-def import_file(
-    source: Path,
-    plan: ImportMap,
-    out: Path,
-    overrides: Mapping[str, float] | None = None,
-    notes: str = "",
-    beside: Beside | None = None,
-) -> Summary:
-    """Write `out`, a new file, from `source`. Raises ConfigError or RecordingError; then there is no `out`."""
-    _refuse_to_overwrite(out)
-    given = dict(overrides or {})
-    if beside is None:
-        data, imported = _converted(source, plan, given)
-        attributes = _attributes(source, data, plan, imported, notes)
-    else:
-        plans = (plan, beside.plan)
-        own, its = ({k: v for k, v in given.items() if k in parameters_known(p)} for p in plans)
-        own |= {name: value for name, value in given.items() if name not in its}  # unknown to both: refused by name
-        data, first = _converted(source, plan, own)
-        more, second = _converted(beside.source, beside.plan, its)
-        offset = offset_between(first, second, beside.offset)
-        imported = merged(first, second, offset, (source.name, beside.source.name))
-        attributes = _attributes(source, data, plan, imported, notes, more) | _attributes_beside(beside, more)
-    _finish(out, attributes, imported)
-    return Summary(out, imported.rows, imported.bad, (*imported.notes, *imported.warnings))
-
-
-def _refuse_to_overwrite(out: Path) -> None:
-    if out.exists():
-        raise RecordingError(f"{out} exists; a recording is never overwritten: give another name")
-
-
-def _read(source: Path, form: FileMap | None = None) -> bytes:
-    """Raises RecordingError for a file that is not there, and for one that is no text where one is expected: what it is
-    and what to do."""
-    try:
-        data = read(source, "file to import", MOST_BYTES, RecordingError)
-    except FileNotFoundError as error:
-        raise RecordingError(f"{source} can't be read: {error.strerror}") from error
-    text = form is None or form.kind == "text"
-    what = foreign(data, source.name, form.encoding if form else "utf-8") if text else ""
-    if what:
-        raise RecordingError(f"{source.name}: {what.replace('FILE', source.name)}")
-    return data
-
-
-def _converted(source: Path, plan: ImportMap, given: Mapping[str, float]) -> tuple[bytes, Imported]:
-    data = _read(source, plan.file)
-    try:
-        return data, convert(data, plan, given)
-    except RigError as error:
-        raise type(error)(f"{source.name}: {error}") from error
-
-
-def _finish(out: Path, attributes: Mapping[str, Attribute], imported: Imported) -> None:
-    part = out.with_name(out.name + ".part")
-    part.unlink(missing_ok=True)
-    _write(part, attributes, imported)
-    part.rename(out)
-
-
-def import_plain(source: Path, out: Path, notes: str = "") -> Summary:
-    """Write `out`, a new file, from JSON in the words of the recording format (`rig.importing.json_recording`)."""
-    _refuse_to_overwrite(out)
-    data = _read(source)
-    try:
-        plain = read_plain(data)
-    except RecordingError as error:
-        raise RecordingError(f"{source.name}: {error}") from error
-    digest = hashlib.sha256(data).hexdigest()
-    attributes: dict[str, Attribute] = {
-        "recording_id": str(uuid.uuid5(uuid.NAMESPACE_OID, digest)),
-        "thruster": source.stem,
-        "software": f"thruster-rig {_version()}, rig import",
-        "imported_from": source.name,
-        "imported_sha256": digest,
-    }
-    _finish(out, attributes | plain.attributes | ({"notes": notes} if notes else {}), plain.imported)
-    return Summary(out, plain.imported.rows, 0, plain.imported.notes)
-
-
-def _write(path: Path, attributes: Mapping[str, Attribute], imported: Imported) -> None:
-    from rig.hdf5 import RecordingFile  # h5py only where a file is written: rig.cli imports this module always
-
-    file = RecordingFile(path, attributes, [stream.spec for stream in imported.streams], t0_ns=0)
-    for index, stream in enumerate(imported.streams):
-        t_ns = np.rint(stream.time * 1e9).astype(np.int64)
-        file.add_rows(Rows(index, t_ns, stream.values))
-    for step in imported.steps:
-        file.add_step(step)
-    for text in imported.notes:
-        file.add_event(EventRow(0.0, "info", text))
-    for text in imported.warnings:
-        file.add_event(EventRow(0.0, "warning", text))
-    file.close("completed", "imported", 0.0)
-
-
-def _attributes(
-    source: Path, data: bytes, plan: ImportMap, imported: Imported, notes: str, beside: bytes = b""
-) -> dict[str, Attribute]:
-    """Root attributes. The id follows from files, maps and parameters: the same import has the same id."""
-    digest = hashlib.sha256(data).hexdigest()
-    other = [hashlib.sha256(beside).hexdigest()] if beside else []
-    identity = "\n".join([digest, plan.text, plan.thruster, plan.kind, *imported.notes, *other])
-    found: dict[str, Attribute] = {
-        "recording_id": str(uuid.uuid5(uuid.NAMESPACE_OID, identity)),
-        "thruster": plan.thruster or source.stem,
-        "kind": plan.kind,
-        "created": imported.created,
-        "facility": plan.facility,
-        "notes": notes,
-        "software": f"thruster-rig {_version()}, rig import",
-        "imported_from": source.name,
-        "imported_sha256": digest,
-        "imported_origin": plan.origin,
-        "import_map": plan.text,
-    }
-    return found if plan.water_density is None else found | {"water_density": plan.water_density}
-
-
-def _attributes_beside(beside: Beside, data: bytes) -> dict[str, Attribute]:
-    return {
-        "imported_with": beside.source.name,
-        "imported_with_sha256": hashlib.sha256(data).hexdigest(),
-        "import_map_with": beside.plan.text,
-    }
-
-
-def _version() -> str:
-    try:
-        return version("thruster-rig")
-    except PackageNotFoundError:
-        return "(not installed)"
+from rig.importing.timing.two_clocks import ESTIMATED, offset_asked
 
 
 def _list_maps(context: click.Context, _parameter: click.Parameter, wanted: bool) -> None:
@@ -192,15 +24,24 @@ def _list_maps(context: click.Context, _parameter: click.Parameter, wanted: bool
         context.exit()
 
 
-@click.command("import", help="Make a recording of another program's table or log, as MAP says what its columns are.")
-@click.argument("file", type=click.Path(path_type=Path))
+HELP = """Make a recording of another program's table or log, as MAP says what its columns are.
+
+With --jobs of many of them, each by itself: every file has a row of a table too; a file may then be a URL.
+"""
+
+
+@click.command("import", help=HELP)
+@click.argument("files", metavar="FILES...", nargs=-1, required=True, type=click.Path())
 @click.option(
     "--map",
     "map_name",
     help="Name of a shipped map (--list) or path of a MAP.toml; none for JSON in the words of the recording format.",
 )
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The recording to write (default: FILE with .h5)."
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="The recording to write (default: FILE with .h5); with --jobs the folder for all.",
 )
 @click.option(
     "--set",
@@ -234,9 +75,10 @@ def _list_maps(context: click.Context, _parameter: click.Parameter, wanted: bool
 @click.option(
     "--list", is_flag=True, is_eager=True, expose_value=False, callback=_list_maps, help="List the shipped maps."
 )
+@fleet_options
 def import_command(
     *,
-    file: Path,
+    files: tuple[str, ...],
     map_name: str | None,
     output: Path | None,
     assignments: tuple[str, ...],
@@ -250,8 +92,18 @@ def import_command(
     with_levels: Levels | None,
     offset: str,
     notes: str,
+    **asked: Any,
 ) -> None:
-    """Exit status 0; RigError is for the caller (rig.cli) to print."""
+    """RigError is for the caller (rig.cli) to print."""
+    fleet = fleet_of(**asked)
+    if fleet is not None:
+        refuse_beside(("--with", beside), ("--with-map", with_map), ("--with-where", with_where))
+        refuse_beside(("--with-levels", with_levels), ("--offset", offset != ESTIMATED))
+        chosen = {"levels": levels, "where": where, "thruster": thruster, "kind": kind, "notes": notes}
+        raise SystemExit(_many(files, map_name, output, assignments, chosen, fleet))
+    if len(files) > 1:
+        raise ConfigError(f"{len(files)} files were given: --jobs N imports each by itself, N at a time")
+    file = Path(files[0])
     out = output or file.with_suffix(".h5")
     if map_name is None:
         given: dict[str, object] = {
@@ -266,7 +118,7 @@ def import_command(
         _tell_plain(import_plain(file, out, notes))
         return
     plan = plan_of(map_name, levels, where)
-    _read(file, plan.file)  # what it is comes before whose it is
+    read_source(file, plan.file)  # what it is comes before whose it is
     whose, known_by = thruster_of(thruster, plan, file)
     plan = replace(plan, thruster=whose, kind=kind or plan.kind)
     second = None
@@ -274,6 +126,23 @@ def import_command(
         its_rows = with_levels or levels, where if with_where is None else with_where
         second = Beside(beside, plan_of(with_map or map_name, *its_rows), offset_asked(offset))
     _tell(import_file(file, plan, out, assignments_of(assignments), notes, second), whose, known_by)
+
+
+def _many(
+    files: tuple[str, ...],
+    map_name: str | None,
+    output: Path | None,
+    assignments: tuple[str, ...],
+    chosen: dict[str, Any],
+    fleet: Fleet,
+) -> int:
+    from rig.importing.many import import_all
+    from rig.importing.row import question_of
+
+    if map_name is None:
+        raise ConfigError("--jobs: give --map too, which says what the columns of all these files are")
+    question = question_of(map_name, output, parameters=assignments_of(assignments), **chosen)
+    return import_all(question, plan_of(map_name, None, "").file, files, fleet)
 
 
 def _tell_plain(summary: Summary) -> None:

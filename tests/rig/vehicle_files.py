@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from rig.importing.command import import_plain
+from rig.importing.one_file import import_plain
 from sim_devices.vehicle import romeo
 from sim_devices.vehicle.campaign import ALL, FRONT, REAR, sine, there_and_back
 from sim_devices.vehicle.documents import recorded

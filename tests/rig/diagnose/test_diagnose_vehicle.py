@@ -12,7 +12,7 @@ from click.testing import CliRunner, Result
 from identification.recording import Recording
 from rig.cli import rig
 from rig.diagnose.vehicle import VehicleFiles, setup_of
-from rig.importing.command import import_plain
+from rig.importing.one_file import import_plain
 from tests.rig.report_reading import open_fonts
 
 INSTALLATION = """

@@ -1,8 +1,8 @@
 """A few lines of text and a map of them, imported."""
 
 from rig.hdf5 import load
-from rig.importing.command import import_file
 from rig.importing.mapping import build_map, read_map
+from rig.importing.one_file import import_file
 
 PLAIN = {
     "about": "t",

@@ -3,8 +3,8 @@
 import pytest
 
 from rig.errors import RecordingError
-from rig.importing.command import import_file
 from rig.importing.mapping import build_map
+from rig.importing.one_file import import_file
 from tests.rig.importing.small_imports import PLAIN, imported, plan, values
 
 

@@ -9,7 +9,8 @@ from click.testing import CliRunner
 
 from rig.errors import ConfigError, RecordingError
 from rig.hdf5 import load
-from rig.importing.command import import_command, import_plain
+from rig.importing.command import import_command
+from rig.importing.one_file import import_plain
 
 DOCUMENT = {
     "format": "thruster-rig-recording",

@@ -6,8 +6,8 @@ import tracemalloc
 import pytest
 
 from rig.errors import RecordingError
-from rig.importing.command import import_file, import_plain
 from rig.importing.mapping import build_map
+from rig.importing.one_file import import_file, import_plain
 from rig.importing.reading.table import Refused, read_table
 
 FACTS = {"column": 2, "quantity": "thrust", "unit": "N"}

@@ -11,8 +11,8 @@ from rig.diagnose.command import diagnose_files
 from rig.errors import RecordingError
 from rig.fit.answer import fit_files
 from rig.hdf5 import load
-from rig.importing.command import import_file
 from rig.importing.mapping import build_map, read_map
+from rig.importing.one_file import import_file
 
 REAL = Path(__file__).parents[3].parent / "shared" / "recordings"
 LAYOUTS = {

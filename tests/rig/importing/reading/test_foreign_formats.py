@@ -3,7 +3,7 @@
 import pytest
 
 from rig.errors import RecordingError
-from rig.importing.command import import_plain
+from rig.importing.one_file import import_plain
 from rig.importing.reading.foreign_formats import foreign
 
 HDF = b"\x89HDF\r\n\x1a\n"

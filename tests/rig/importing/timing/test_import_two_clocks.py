@@ -5,8 +5,8 @@ import pytest
 
 from rig.errors import ConfigError, RecordingError
 from rig.hdf5 import load
-from rig.importing.command import Beside, import_file
 from rig.importing.mapping import build_map
+from rig.importing.one_file import Beside, import_file
 from rig.importing.timing.two_clocks import offset_asked
 
 
