@@ -47,6 +47,7 @@ VESC_UART = (
 )
 POLOLU = (b"\x70\x17\x00\x00", b"\x71\x17\x20\x00\x07")
 PZEM = (struct.pack(">8H", 1254, 523, 6558, 0, 17, 0, 0, 0xFFFF),)
+CHANNELS = tuple(RegisterChannel(0, kind, "1", scale=0.1) for kind in ("float32", "i32", "u32"))
 REGISTERS = (b"\x3f\x80\x00\x00", b"\x7f\x80\x00\x00")
 
 
@@ -99,10 +100,9 @@ def _keller(data: bytes) -> Any:
 def _registers(data: bytes) -> Any:
     """As a float and as an integer, in both orders of words."""
     words = _words(data)[:2]
-    channels = [RegisterChannel(0, kind, "1", scale=0.1) for kind in ("float32", "i32", "u32")]
     if len(words) < 2:
         return None
-    return [channel.value(words, order) for channel in channels for order in ("high_first", "low_first")]
+    return [channel.value(words, order) for channel in CHANNELS for order in ("high_first", "low_first")]
 
 
 def _modbus(data: bytes) -> Any:
