@@ -128,7 +128,7 @@ def import_plain(source: Path, out: Path, notes: str = "") -> Summary:
 
 
 def _write(path: Path, attributes: Mapping[str, Attribute], imported: Imported) -> None:
-    from rig.hdf5 import RecordingFile  # h5py only where a file is written: rig.cli imports this module always
+    from rig.hdf5 import RecordingFile  # h5py only where a file is written
 
     file = RecordingFile(path, attributes, [stream.spec for stream in imported.streams], t0_ns=0)
     for index, stream in enumerate(imported.streams):

@@ -46,7 +46,7 @@ def snapshot(thrust=1.0):
 
 def test_the_controllers_side_never_loads_hdf5():
     code = (
-        "import sys, rig.link.sockets, rig.link.recorder_messages, rig.importing.command, rig.recording.recover;"
+        "import sys, rig.link.sockets, rig.link.recorder_messages, rig.importing.one_file, rig.recording.recover;"
         "print('h5py' in sys.modules)"
     )
     assert subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout == "False\n"
