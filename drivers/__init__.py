@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from drivers.can_signals import signals as can_signals
+from drivers.canopen import anonymising as anonymising_canopen
 from drivers.canopen import recognising as recognising_canopen
 from drivers.canopen.cia401_options import Options as Cia401Options
 from drivers.canopen.cia402_options import Options as Cia402Options
@@ -19,6 +20,7 @@ from drivers.canopen.cia404_options import Options as Cia404Options
 from drivers.dronecan import recognising as recognising_dronecan
 from drivers.dronecan.options import Options as DronecanEscOptions
 from drivers.extras import of_extra
+from drivers.hbm import anonymising as anonymising_hbm
 from drivers.hbm import recognising as recognising_hbm
 from drivers.hbm.aed import HbmAed
 from drivers.hbm.options import Options as HbmAedOptions
@@ -29,6 +31,7 @@ from drivers.modbus.cell import ModbusCell
 from drivers.modbus.cell_options import Options as ModbusCellOptions
 from drivers.modbus.registers import ModbusRegisters
 from drivers.modbus.registers import Options as ModbusRegistersOptions
+from drivers.odrive import anonymising as anonymising_odrive
 from drivers.odrive import recognising as recognising_odrive
 from drivers.odrive.options import Options as ODriveOptions
 from drivers.odrive.over_can import ODriveCan
@@ -37,6 +40,7 @@ from drivers.pololu.maestro import Maestro
 from drivers.pololu.maestro_options import Options as MaestroOptions
 from drivers.pololu.smc import SmcG2
 from drivers.pololu.smc_options import Options as SmcG2Options
+from drivers.ports.anonymous import as_it_is
 from drivers.ports.transcript import Chunk
 from drivers.protocols import Instrument
 from drivers.recognition.can_traffic import CanProbe
@@ -45,6 +49,7 @@ from drivers.roboteq import anonymising as anonymising_roboteq
 from drivers.roboteq import recognising as recognising_roboteq
 from drivers.roboteq.controller import Roboteq
 from drivers.roboteq.options import Options as RoboteqOptions
+from drivers.scpi import anonymising as anonymising_scpi
 from drivers.scpi import recognising as recognising_scpi
 from drivers.scpi.options import Options as ScpiSupplyOptions
 from drivers.scpi.supply import ScpiSupply
@@ -98,22 +103,38 @@ def _dronecan_esc() -> Callable[..., Instrument]:
     return DronecanEsc
 
 
+def _anonymised_dronecan(chunks: Sequence[Chunk]) -> list[Chunk]:
+    from drivers.dronecan.anonymising import anonymise
+
+    return anonymise(chunks)
+
+
 def _cia404() -> Callable[..., Instrument]:
     from drivers.canopen.cia404 import Cia404
 
     return Cia404
 
 
+def _canopen(options: type[Any], load: Callable[[], Callable[..., Instrument]], probe: CanProbe) -> Kind:
+    return Kind(options, of_extra("canopen", "canopen", load), "can", probe, anonymising_canopen.anonymise)
+
+
 KINDS: dict[str, Kind] = {
     "mt_sics": Kind(mt_sics.Options, mt_sics.MtSics, "serial", recognising_mt_sics.PROBE, anonymising_lines.mt_sics),
-    "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial", recognising_hbm.PROBE),
+    "hbm_aed": Kind(HbmAedOptions, HbmAed, "serial", recognising_hbm.PROBE, anonymising_hbm.anonymise),
     "mantracourt_dsc": Kind(
-        mantracourt_dsc.Options, mantracourt_dsc.MantracourtDsc, "serial", recognising_cells.MANTRACOURT
+        mantracourt_dsc.Options,
+        mantracourt_dsc.MantracourtDsc,
+        "serial",
+        recognising_cells.MANTRACOURT,
+        anonymising_lines.mantracourt,
     ),
     "line_stream": Kind(
         line_stream.Options, line_stream.LineStream, "serial", recognising_streams.NUMBERS, anonymising_lines.numbers
     ),
-    "loadstar": Kind(loadstar.Options, loadstar.Loadstar, "serial", recognising_cells.LOADSTAR),
+    "loadstar": Kind(
+        loadstar.Options, loadstar.Loadstar, "serial", recognising_cells.LOADSTAR, anonymising_lines.loadstar
+    ),
     "modbus_cell": Kind(
         ModbusCellOptions, ModbusCell, "serial", recognising_modbus.CELL, anonymising_modbus.asked_values
     ),
@@ -123,18 +144,24 @@ KINDS: dict[str, Kind] = {
     ),
     "keller": Kind(keller.Options, keller.Keller, "serial", recognising_modbus.KELLER, anonymising_modbus.asked_values),
     "pzem": Kind(pzem.Options, pzem.Pzem, "serial", recognising_modbus.PZEM, anonymising_modbus.asked_values),
-    "maestro": Kind(MaestroOptions, Maestro, "serial", recognising_pololu.MAESTRO),
+    "maestro": Kind(MaestroOptions, Maestro, "serial", recognising_pololu.MAESTRO, as_it_is),
     "roboteq": Kind(RoboteqOptions, Roboteq, "serial", recognising_roboteq.PROBE, anonymising_roboteq.anonymise),
     "can_signals": Kind(can_signals.Options, can_signals.CanSignals, "can"),
-    "scpi_supply": Kind(ScpiSupplyOptions, ScpiSupply, "serial", recognising_scpi.PROBE),
-    "smc_g2": Kind(SmcG2Options, SmcG2, "serial", recognising_pololu.SMC),
-    "odrive_can": Kind(ODriveOptions, ODriveCan, "can", recognising_odrive.PROBE),
-    "vesc_uart": Kind(over_uart.Options, over_uart.VescUart, "serial", recognising_uart.PROBE),
+    "scpi_supply": Kind(ScpiSupplyOptions, ScpiSupply, "serial", recognising_scpi.PROBE, anonymising_scpi.anonymise),
+    "smc_g2": Kind(SmcG2Options, SmcG2, "serial", recognising_pololu.SMC, as_it_is),
+    "odrive_can": Kind(ODriveOptions, ODriveCan, "can", recognising_odrive.PROBE, anonymising_odrive.anonymise),
+    "vesc_uart": Kind(
+        over_uart.Options, over_uart.VescUart, "serial", recognising_uart.PROBE, anonymising_vesc.anonymise_uart
+    ),
     "vesc_can": Kind(over_can.Options, over_can.VescCan, "can", recognising_vesc.PROBE, anonymising_vesc.anonymise),
     "dronecan_esc": Kind(
-        DronecanEscOptions, of_extra("dronecan", "dronecan", _dronecan_esc), "can", recognising_dronecan.PROBE
+        DronecanEscOptions,
+        of_extra("dronecan", "dronecan", _dronecan_esc),
+        "can",
+        recognising_dronecan.PROBE,
+        _anonymised_dronecan,
     ),
-    "cia402": Kind(Cia402Options, of_extra("canopen", "canopen", _cia402), "can", recognising_canopen.DRIVE),
-    "cia401": Kind(Cia401Options, of_extra("canopen", "canopen", _cia401), "can", recognising_canopen.OUTPUT),
-    "cia404": Kind(Cia404Options, of_extra("canopen", "canopen", _cia404), "can", recognising_canopen.CELL),
+    "cia402": _canopen(Cia402Options, _cia402, recognising_canopen.DRIVE),
+    "cia401": _canopen(Cia401Options, _cia401, recognising_canopen.OUTPUT),
+    "cia404": _canopen(Cia404Options, _cia404, recognising_canopen.CELL),
 }

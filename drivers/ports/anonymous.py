@@ -10,6 +10,8 @@ from collections.abc import Callable, Sequence
 
 from drivers.ports.transcript import Chunk, Direction
 
+LINE = re.compile(rb"[^\r\n]+")
+
 
 class Pseudonyms:
     """One for each serial number, the same wherever it comes again; it cannot be turned back."""
@@ -49,6 +51,32 @@ def with_pseudonyms(chunks: Sequence[Chunk], pattern: re.Pattern[bytes]) -> list
         return pattern.sub(lambda found: _replaced(found, names.of(found[1])), data)
 
     return changed(chunks, "<", rename)
+
+
+def in_answers_to(chunks: Sequence[Chunk], question: re.Pattern[bytes], pattern: re.Pattern[bytes]) -> list[Chunk]:
+    """Group 1 of `pattern` in the line that came next after each `question` was sent: of answers that do not say which
+    question they answer."""
+    names, asked, at = Pseudonyms(), list[int](), 0
+    for chunk in chunks:
+        if chunk.direction == "<":
+            at += len(chunk.data)
+        else:
+            asked += [at] * len(question.findall(chunk.data))
+
+    def rename(data: bytes) -> bytes:
+        for begin in asked:
+            line = LINE.search(data, begin)
+            if line is not None and (found := pattern.search(line[0])):
+                start = line.start() + found.start(1)
+                data = data[:start] + names.of(found[1]) + data[start + len(found[1]) :]
+        return data
+
+    return changed(chunks, "<", rename)
+
+
+def as_it_is(chunks: Sequence[Chunk]) -> list[Chunk]:
+    """Of a wire on which nothing is ever said of whose device it is."""
+    return list(chunks)
 
 
 def _replaced(found: re.Match[bytes], name: bytes) -> bytes:

@@ -5,12 +5,15 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
-from drivers.ports.anonymous import Pseudonyms, changed, with_pseudonyms
+from drivers.ports.anonymous import Pseudonyms, changed, in_answers_to, with_pseudonyms
 from drivers.ports.transcript import Chunk
 from drivers.serial_lines.nortek_nmea import checksum
 
 MT_SICS_SERIAL = re.compile(rb'(?:^|[\r\n])I4 A "([^"\r\n]*)"')
 """Manual 11780711, I4."""
+LOADSTAR_ID = re.compile(rb"(?:^|\r)ID\r")
+MANTRACOURT_SERIAL = re.compile(rb"!\d{3}:SER[LH]\?")
+"""DCell & DSC user manual, table of commands."""
 NORTEK = re.compile(rb"\$(PNOR[A-Z0-9]*)([^$*\r\n]*)\*[0-9A-Fa-f]{2}")
 NORTEK_VALUES = (b"PNORC", b"PNORS")
 """Sentences of velocities and sensors; Signature Integrator's Guide p. 68-77."""
@@ -21,6 +24,16 @@ NORTEK_HEAD = re.compile(rb"\d{4,}")
 def mt_sics(chunks: Sequence[Chunk]) -> list[Chunk]:
     """I4 gives the serial number. There is no checksum."""
     return with_pseudonyms(chunks, MT_SICS_SERIAL)
+
+
+def loadstar(chunks: Sequence[Chunk]) -> list[Chunk]:
+    """`ID` asks for the serial number."""
+    return in_answers_to(chunks, LOADSTAR_ID, re.compile(rb"(.+)"))
+
+
+def mantracourt(chunks: Sequence[Chunk]) -> list[Chunk]:
+    """SERL and SERH are the serial number; a number keeps its form."""
+    return in_answers_to(chunks, MANTRACOURT_SERIAL, re.compile(rb"[+-](\d+)"))
 
 
 def nortek(chunks: Sequence[Chunk]) -> list[Chunk]:

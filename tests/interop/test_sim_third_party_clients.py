@@ -43,6 +43,20 @@ def test_labmcp_weighs_on_our_load_cell(bench, third_party):
         balance.close()
 
 
+def test_pynmea2_reads_the_sentences_of_our_flow_meter(bench, third_party):
+    """Signed velocities, checksum and form, by a parser that knows Nortek's sentences."""
+    pynmea2, serial = third_party("pynmea2"), third_party("serial")
+    with serial.Serial(str(bench.links / "flow"), 9600, timeout=5.0) as port:
+        port.readline()  # where it was joined
+        told = [pynmea2.parse(port.readline().decode("ascii").strip(), check=True) for _ in range(3)]
+    for sentence in told:
+        assert (type(sentence).__name__, sentence.cn, sentence.cp) == ("NORC1", 1, 0.5)
+        assert all(abs(each) < 0.2 for each in (sentence.vx, sentence.vy, sentence.vz, sentence.vz2))
+        assert (sentence.amp1, sentence.amp4) == (68.0, 68.0)
+        assert (sentence.r1, sentence.r4) == (97, 97)
+    assert len({sentence.vx for sentence in told}) > 1, "its noise"
+
+
 def test_pybldc_finds_our_vesc_through_our_adapter(bench, third_party):
     pybldc = third_party("pybldc")
     client = pybldc.PyBldcCan(logging.getLogger("pybldc"), 23, interface="slcan", channel=str(bench.links / "can0"))

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from drivers.ports.transcript import Chunk, read_transcript
+from drivers.vesc.uart_packets import framed
 from rig.campaign.loading import load_bench
 from rig.captures.capturing import Bound, by_driver, without_names, write
 from rig.captures.description import Description
@@ -260,6 +261,77 @@ def test_serial_numbers_are_replaced_consistently_and_checksums_are_good():
         value ^= byte
     assert int(check, 16) == value
     assert anonymous("roboteq", b"UID=12:345\rA=3\r") == b"UID=00:001\rA=3\r"
+    assert anonymous("hbm_aed", b"0\r\nHBM,AD104C,0012345,P72\r\n") == b"0\r\nHBM,AD104C,0000001,P72\r\n"
+
+
+def test_answers_that_do_not_say_to_what_are_told_by_their_questions():
+    chunks = [
+        Chunk(0, ">", b"!001:SERL?\r"), Chunk(1, "<", b"+123"), Chunk(2, "<", b"45.0\r"), Chunk(3, ">", b"!001:SYS?\r"),
+        Chunk(4, "<", b"+12345.6\r"), Chunk(5, ">", b"!001:SERH?\r"), Chunk(6, "<", b"+00002.0\r"),
+    ]  # fmt: skip
+    said = b"".join(chunk.data for chunk in without_names_of("mantracourt_dsc", chunks) if chunk.direction == "<")
+    assert said == b"+00001.0\r+12345.6\r+00002.0\r"
+    chunks = [Chunk(0, ">", b"ID\r"), Chunk(1, "<", b"F1234\r\n"), Chunk(2, ">", b"W\r"), Chunk(3, "<", b"1234\r\n")]
+    said = b"".join(chunk.data for chunk in without_names_of("loadstar", chunks) if chunk.direction == "<")
+    assert said == b"F0001\r\n1234\r\n"
+    chunks = [Chunk(0, ">", b"*IDN?\n"), Chunk(1, "<", b"Maker,PS-1,MY5500,1.2\n24.00\n")]
+    said = b"".join(chunk.data for chunk in without_names_of("scpi_supply", chunks) if chunk.direction == "<")
+    assert said == b"Maker,PS-1,MY0001,1.2\n24.00\n"
+
+
+def test_the_uuid_of_a_vesc_on_uart_becomes_a_number_and_the_rest_is_as_it_was():
+    uuid = bytes(range(1, 13))
+    answer = framed(b"\0\x06\x05SIX\0" + uuid + b"\x01\x02")
+    values = framed(bytes.fromhex("32 00 00 81 cf 013a 00fa 000004d2 00000237 00fc ffffe49c 01e1 02"))
+    said = anonymous("vesc_uart", b"\x02\xff" + answer + values + answer)
+    assert said == b"\x02\xff" + framed(b"\0\x06\x05SIX\0" + bytes(11) + b"\x01\x01\x02") + values + framed(
+        b"\0\x06\x05SIX\0" + bytes(11) + b"\x01\x01\x02"
+    )
+
+
+def test_the_serial_number_of_a_canopen_device_becomes_a_number():
+    said = without_names_of(
+        "cia402",
+        [
+            Chunk(0, "<", b"585#43 18 10 04 78 56 34 12"), Chunk(1, "<", b"585#43 18 10 03 78 56 34 12"),
+            Chunk(2, "<", b"185#37 02 00 00 00 00 00"), Chunk(3, "<", b"586#43 18 10 04 01 00 00 00"),
+            Chunk(4, "<", b"585#43 18 10 04 78 56 34 12"),
+        ],
+    )  # fmt: skip
+    assert [chunk.data for chunk in said] == [
+        b"585#43 18 10 04 01 00 00 00", b"585#43 18 10 03 78 56 34 12", b"185#37 02 00 00 00 00 00",
+        b"586#43 18 10 04 02 00 00 00", b"585#43 18 10 04 01 00 00 00",
+    ]  # fmt: skip
+
+
+def test_the_unique_id_of_a_dronecan_node_becomes_a_number_and_its_checksum_is_good():
+    pytest.importorskip("dronecan", reason="dronecan is not installed (pip install -e .[dronecan])")
+    from dronecan import uavcan
+    from dronecan.transport import Transfer
+
+    from drivers.dronecan.transfers import Assembler
+    from drivers.ports.can_frame import Frame, frame_of
+
+    told = uavcan.protocol.GetNodeInfo.Response(name="org.maker.esc")
+    told.hardware_version.unique_id = list(range(100, 116))
+    told.hardware_version.certificate_of_authenticity = [7, 8, 9]
+    transfer = Transfer(
+        payload=told, source_node_id=42, dest_node_id=10, transfer_id=3, transfer_priority=30,
+        service_not_message=True, request_not_response=False,
+    )  # fmt: skip
+    frames = [Frame(each.message_id, True, bytes(each.bytes)) for each in transfer.to_frames()]
+    chunks = [Chunk(at, "<", str(frame).encode()) for at, frame in enumerate(frames)]
+    said = without_names_of("dronecan_esc", chunks)
+    assembler = Assembler()
+    whole = [assembler.feed(frame_of(chunk.data)) for chunk in said][-1]
+    assert bytes(whole.value.hardware_version.unique_id) == bytes(15) + b"\x01"
+    assert bytes(whole.value.hardware_version.certificate_of_authenticity) == bytes(3)
+    assert bytes(whole.value.name) == b"org.maker.esc"
+    assert [frame_of(chunk.data).id for chunk in said] == [frame.id for frame in frames]
+    with pytest.raises(ConfigError, match="is not whole"):
+        without_names_of("dronecan_esc", chunks[:-1])
+    with pytest.raises(ConfigError, match="without an identifier"):
+        without_names_of("dronecan_esc", [Chunk(0, "<", b"1E000100#00 00 00 00 00 00 00 C0")])
 
 
 @pytest.mark.parametrize(
@@ -269,7 +341,9 @@ def test_serial_numbers_are_replaced_consistently_and_checksums_are_good():
         ("line_stream", b"\r\n12\r\nowner: Anna, 12\r\n13\r\n", b"", "may say more than a number"),
         ("modbus_cell", b"\x01\x03", b"\x01\x11\xc0\x2c", "is none of the rig's drivers"),
         ("vesc_can", b"00000517#00 01", b"", "which may hold the UUID"),
-        ("hbm_aed", b"x", b"", "of a hbm_aed can't be anonymised"),
+        ("modbus_registers", b"x", b"", "of a modbus_registers can't be anonymised"),
+        ("odrive_can", b"066#00 01 02 03 04 05 06 00", b"", "may be Address, which may hold the serial number"),
+        ("cia404", b"585#41 08 10 00 12 00 00 00", b"", "begins a text of the device"),
     ],
 )
 def test_what_may_name_somebody_is_refused(kind, came, sent, why):
