@@ -63,6 +63,7 @@ from drivers.serial_lines import (
     recognising_cells,
     recognising_mt_sics,
     recognising_streams,
+    sartorius_sbi,
 )
 from drivers.vesc import anonymising as anonymising_vesc
 from drivers.vesc import over_can, over_uart, recognising_uart
@@ -131,6 +132,9 @@ KINDS: dict[str, Kind] = {
     ),
     "line_stream": Kind(
         line_stream.Options, line_stream.LineStream, "serial", recognising_streams.NUMBERS, anonymising_lines.numbers
+    ),
+    "sartorius_sbi": Kind(
+        sartorius_sbi.Options, sartorius_sbi.SartoriusSbi, "serial", anonymise=anonymising_lines.sartorius
     ),
     "loadstar": Kind(
         loadstar.Options, loadstar.Loadstar, "serial", recognising_cells.LOADSTAR, anonymising_lines.loadstar

@@ -49,7 +49,7 @@ from sim_devices.instruments.odrive import axis as odrive
 from sim_devices.instruments.pololu import maestro, smc
 from sim_devices.instruments.roboteq import controller as roboteq
 from sim_devices.instruments.scpi import supply as scpi_supply
-from sim_devices.instruments.serial_lines import hbm_aed, line_sender, loadstar, mantracourt, mt_sics, nortek
+from sim_devices.instruments.serial_lines import hbm_aed, line_sender, loadstar, mantracourt, mt_sics, nortek, sartorius
 from sim_devices.instruments.vesc import controller as vesc
 from sim_devices.vehicle.body import AXES, Body
 from sim_devices.vehicle.settings import Noise as VehicleNoise
@@ -213,6 +213,7 @@ def test_every_fault_and_command_of_the_simulated_bench() -> None:
         ("maestro", maestro.Maestro),
         ("smc_g2", smc.SmcG2),
         ("mantracourt_dsc", mantracourt.Mantracourt),
+        ("sartorius_sbi", sartorius.Sartorius),
         ("line", line_sender.LineSender),
         ("modbus_cell", modbus_cell.ModbusCell),
         ("modbus_registers", registers_device.RegistersDevice),

@@ -14,7 +14,14 @@ from drivers.modbus.register_map import RegisterChannel
 from drivers.pololu import packets
 from drivers.roboteq import lines as roboteq_lines
 from drivers.scpi import lines as scpi_lines
-from drivers.serial_lines import line_stream, loadstar_lines, mantracourt_lines, mt_sics_lines, nortek_nmea
+from drivers.serial_lines import (
+    line_stream,
+    loadstar_lines,
+    mantracourt_lines,
+    mt_sics_lines,
+    nortek_nmea,
+    sartorius_lines,
+)
 from drivers.vesc import uart_packets
 
 Decode = Callable[[bytes], Any]
@@ -37,6 +44,7 @@ MODBUS = tuple(
 ROBOTEQ = (b"A=100:200\r", b"V=135:246:4730\r", b"BS=-3100\r", b"+\r-\r", b"FID=Roboteq v2.1\r", b"!G 1 250\r")
 LOADSTAR = (b"      2.5000\r\n", b"-0000C1\r", b" 7FFFFF\r", b"A\r\n", b"FCM DI-1000\r\n")
 MANTRACOURT = (b"+00123.456\r", b"-1.5\r", b"?\r", b"+8192\r")
+SARTORIUS = (b"N     +   123.56 g  \r\n", b"-    12.5[6]   \r\n", b"Stat     Err  54    \r\n", b"     High     \r\n")
 HBM = (b"+ 512000,31,008\r\n", b"0\r\n", b"AED_AD104\r\n", b"?\r\n")
 HBM_BINARY = (b"\x00\x0d\x0a\x08\r\n" * 6, b"\xff\xfe\x00\x02\r\n" * 5)
 SCPI = (b"24.003", b"+1.2000E+01V", b"ON", b'-113,"Undefined header"', b"9.9E37", b'+0,"No error"')
@@ -66,6 +74,7 @@ def decoders() -> dict[str, tuple[tuple[bytes, ...], Decode]]:
         "Roboteq": (ROBOTEQ, roboteq_lines.Decoder().feed),
         "Loadstar": (LOADSTAR, loadstar_lines.Decoder().feed),
         "Mantracourt": (MANTRACOURT, mantracourt_lines.Decoder().feed),
+        "Sartorius": (SARTORIUS, sartorius_lines.Decoder().feed),
         "HBM, text": (HBM, hbm_frames.Decoder().feed),
         "HBM, binary": (HBM_BINARY, binary.feed),
         "SCPI": (SCPI, _scpi),

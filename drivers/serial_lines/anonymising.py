@@ -14,6 +14,7 @@ MT_SICS_SERIAL = re.compile(rb'(?:^|[\r\n])I4 A "([^"\r\n]*)"')
 LOADSTAR_ID = re.compile(rb"(?:^|\r)ID\r")
 MANTRACOURT_SERIAL = re.compile(rb"!\d{3}:SER[LH]\?")
 """DCell & DSC user manual, table of commands."""
+SARTORIUS_SERIAL = re.compile(rb"\x1bx2_")
 NORTEK = re.compile(rb"\$(PNOR[A-Z0-9]*)([^$*\r\n]*)\*[0-9A-Fa-f]{2}")
 NORTEK_VALUES = (b"PNORC", b"PNORS")
 """Sentences of velocities and sensors; Signature Integrator's Guide p. 68-77."""
@@ -34,6 +35,11 @@ def loadstar(chunks: Sequence[Chunk]) -> list[Chunk]:
 def mantracourt(chunks: Sequence[Chunk]) -> list[Chunk]:
     """SERL and SERH are the serial number; a number keeps its form."""
     return in_answers_to(chunks, MANTRACOURT_SERIAL, re.compile(rb"[+-](\d+)"))
+
+
+def sartorius(chunks: Sequence[Chunk]) -> list[Chunk]:
+    """ESC x2_ asks for the serial number."""
+    return in_answers_to(chunks, SARTORIUS_SERIAL, re.compile(rb"(\S+)\s*$"))
 
 
 def nortek(chunks: Sequence[Chunk]) -> list[Chunk]:

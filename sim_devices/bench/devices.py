@@ -25,6 +25,7 @@ from sim_devices.instruments.serial_lines.mantracourt import Mantracourt, Mantra
 from sim_devices.instruments.serial_lines.mt_sics import MtSics
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.serial_lines.nortek import Nortek, NortekOptions
+from sim_devices.instruments.serial_lines.sartorius import Sartorius, SartoriusOptions
 from sim_devices.wires.serial_line import Wire
 from sim_devices.world import World
 from sim_devices.world.noise import Noise, Normals
@@ -46,6 +47,8 @@ def serial_device(
             return HbmAed(options, read)
         case MantracourtOptions():
             return Mantracourt(options, read)
+        case SartoriusOptions():
+            return Sartorius(options, read)
         case LineOptions():
             return LineSender(options, read)
         case LoadstarOptions():
@@ -80,7 +83,14 @@ def turnaround(options: SerialOptions) -> float:
     so that the last piece ends half of it later.
     """
     match options:
-        case KellerOptions() | PzemOptions() | ModbusCellOptions() | RegistersOptions() | MantracourtOptions():
+        case (
+            KellerOptions()
+            | PzemOptions()
+            | ModbusCellOptions()
+            | RegistersOptions()
+            | MantracourtOptions()
+            | SartoriusOptions()
+        ):
             return options.turnaround
         case HbmAedOptions():
             return 0.5 / options.top_rate

@@ -29,6 +29,7 @@ from sim_devices.instruments.serial_lines.loadstar import LoadstarOptions
 from sim_devices.instruments.serial_lines.mantracourt import MantracourtOptions
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
 from sim_devices.instruments.serial_lines.nortek import NortekOptions
+from sim_devices.instruments.serial_lines.sartorius import SartoriusOptions
 from sim_devices.instruments.vesc.controller import VescOptions
 from sim_devices.instruments.vesc.over_uart import VescUartOptions
 from sim_devices.tables import WorldError, build, check_known
@@ -39,6 +40,7 @@ SerialOptions = (
     MtSicsOptions
     | HbmAedOptions
     | MantracourtOptions
+    | SartoriusOptions
     | LineOptions
     | LoadstarOptions
     | PzemOptions
@@ -83,6 +85,7 @@ KINDS: dict[str, type[DeviceOptions]] = {
     "mt_sics": MtSicsOptions,
     "hbm_aed": HbmAedOptions,
     "mantracourt_dsc": MantracourtOptions,
+    "sartorius_sbi": SartoriusOptions,
     "line": LineOptions,
     "loadstar": LoadstarOptions,
     "button": ButtonOptions,

@@ -24,6 +24,7 @@ def test_every_kind_is_an_instrument_and_only_the_motor_commands(tmp_path):
         "maestro": {"port": "p", "channel": 0, "full_voltage": 48.0, "dead_zone": 25.0, "watchdog_timeout": 0.5},
         "hbm_aed": {"port": "p", "rate": 25.0, "top_rate": 100.0, "nominal_force": 500.0},
         "mantracourt_dsc": {"port": "p", "rate": 50.0, "unit": "N"},
+        "sartorius_sbi": {"port": "p", "rate": 10.0},
         "line_stream": {"port": "p", "pattern": r"(?P<value>\d+)", "rate": 10.0, "line_characters": 10},
         "modbus_cell": {"port": "p", "map": "laumas", "rate": 10.0, "unit": "kg", "decimals": 3},
         "modbus_registers": {"port": "p", "map": str(channels), "rate": 1.0},

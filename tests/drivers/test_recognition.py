@@ -26,6 +26,7 @@ from sim_devices.instruments.serial_lines.loadstar import Loadstar, LoadstarOpti
 from sim_devices.instruments.serial_lines.mantracourt import Mantracourt, MantracourtOptions
 from sim_devices.instruments.serial_lines.mt_sics import MtSics
 from sim_devices.instruments.serial_lines.mt_sics_options import MtSicsOptions
+from sim_devices.instruments.serial_lines.sartorius import Sartorius, SartoriusOptions
 from sim_devices.instruments.vesc.codec import Telemetry
 from sim_devices.instruments.vesc.controller import Vesc, VescOptions
 from sim_devices.wires.can_frame import CanFrame
@@ -72,6 +73,7 @@ DEVICES = {
     "hbm_aed": lambda: HbmAed(HbmAedOptions("hbm_aed", "p"), lambda: 12.0),
     "loadstar": lambda: Loadstar(LoadstarOptions("loadstar", "p"), lambda: 12.0),
     "mantracourt_dsc": lambda: Mantracourt(MantracourtOptions("mantracourt", "p"), lambda: 12.0),
+    "sartorius_sbi": lambda: Sartorius(SartoriusOptions("sartorius_sbi", "p"), lambda: 12.0),
     "pzem": lambda: Pzem(PzemOptions("pzem", "p"), lambda: 48.0, lambda: 1.5),
     "maestro": lambda: maestro([]),
     "smc_g2": lambda: SmcG2(SmcG2Options("smc_g2", "p"), 24.0, SmcMeasured, lambda *_, **__: None),

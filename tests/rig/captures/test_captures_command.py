@@ -274,6 +274,9 @@ def test_answers_that_do_not_say_to_what_are_told_by_their_questions():
     chunks = [Chunk(0, ">", b"ID\r"), Chunk(1, "<", b"F1234\r\n"), Chunk(2, ">", b"W\r"), Chunk(3, "<", b"1234\r\n")]
     said = b"".join(chunk.data for chunk in without_names_of("loadstar", chunks) if chunk.direction == "<")
     assert said == b"F0001\r\n1234\r\n"
+    chunks = [Chunk(0, ">", b"\x1bx2_\r\n"), Chunk(1, "<", b"          37454321  \r\n+   123.56 g  \r\n")]
+    said = b"".join(chunk.data for chunk in without_names_of("sartorius_sbi", chunks) if chunk.direction == "<")
+    assert said == b"          00000001  \r\n+   123.56 g  \r\n"
     chunks = [Chunk(0, ">", b"*IDN?\n"), Chunk(1, "<", b"Maker,PS-1,MY5500,1.2\n24.00\n")]
     said = b"".join(chunk.data for chunk in without_names_of("scpi_supply", chunks) if chunk.direction == "<")
     assert said == b"Maker,PS-1,MY0001,1.2\n24.00\n"
