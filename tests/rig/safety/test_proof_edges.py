@@ -91,7 +91,7 @@ def test_voltage_rises_by_its_slew_and_no_further():
 def test_nothing_is_cut_off_before_rate_and_current_have_settled():
     proof = spinning()
     assert proof.advance(below(1.3), NEEDED) == ProofStep(4.0)
-    proof.advance(1.3, NEEDED)
+    assert proof.advance(1.3, NEEDED) == ProofStep(4.0), "once more, and no longer"
     assert proof.advance(1.4, NEEDED).volts is None
     slow = spinning()
     slow.advance(1.3, below(NEEDED))
@@ -105,7 +105,7 @@ def test_what_flow_turned_before_is_no_answer_to_the_voltage():
     proof = spinning(idle=1.0)
     proof.advance(1.3, -0.99)
     assert proof.advance(1.4, 2.99).volts == 4.0
-    proof.advance(1.5, -1.0)
+    assert proof.advance(1.5, -1.0).volts == 4.0
     assert proof.advance(1.6, -1.0).volts is None
 
 
