@@ -3,7 +3,7 @@
 #   make test   every check and every test
 # and one that takes a night (make prove-short: minutes):
 #   make prove  the blind proof of the diagnosis, resumable, with its report in build/prove
-# and one that takes half an hour on a machine that does nothing else:
+# and one that takes an hour and a half on a machine that does nothing else:
 #   make reliability  the 35 promises of docs/reliability.md, measured as often as they say
 PYTHON ?= python3
 VENV := .venv

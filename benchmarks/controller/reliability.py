@@ -1,6 +1,6 @@
 """The 35 promises of docs/reliability.md: every test that the page names for them, as often as they say.
 
-    make reliability                                            all of it, half an hour on a calm machine
+    make reliability                                            all of it, an hour and a half on a calm machine
     python benchmarks/controller/reliability.py [NUMBER ...]    those only; the others keep what is known of them
     python benchmarks/controller/reliability.py --short ...     as often as `make test` does
     python benchmarks/controller/reliability.py --collect       runs nothing: sums up what `make test` has left
