@@ -346,7 +346,7 @@ def test_the_unique_id_of_a_dronecan_node_becomes_a_number_and_its_checksum_is_g
         ("vesc_can", b"00000517#00 01", b"", "which may hold the UUID"),
         ("modbus_registers", b"x", b"", "of a modbus_registers can't be anonymised"),
         ("odrive_can", b"066#00 01 02 03 04 05 06 00", b"", "may be Address, which may hold the serial number"),
-        ("cia404", b"585#41 08 10 00 12 00 00 00", b"", "begins a text of the device"),
+        ("cia404", b"585#41 00 20 01 12 00 00 00", b"", "begins a text of the device"),
     ],
 )
 def test_what_may_name_somebody_is_refused(kind, came, sent, why):
