@@ -17,7 +17,7 @@ UPLOADED, SEGMENTED = 0x43, 0x41
 
 
 def anonymise(chunks: Sequence[Chunk]) -> list[Chunk]:
-    """Serial numbers count from 1. Raises ValueError where a text was read that is not the model's, and may be a name."""
+    """Serial numbers count from 1. Raises ValueError where a text was read that is not the model's but a name, say."""
     names: dict[bytes, int] = {}
     return [chunk._replace(data=str(_renamed(frame_of(chunk.data), names)).encode()) for chunk in chunks]
 
