@@ -99,6 +99,7 @@ def test_nothing_is_cut_off_before_rate_and_current_have_settled():
     unknown = spinning()
     unknown.advance(1.3, None)
     assert unknown.advance(1.4, None).volts == 4.0
+    assert "the propeller turns 0.00 rev/s" in unknown.advance(2.5, None).verdict.cause
 
 
 def test_what_flow_turned_before_is_no_answer_to_the_voltage():
