@@ -12,6 +12,7 @@ from drivers.hbm import frames as hbm_frames
 from drivers.modbus import keller, pzem, rtu
 from drivers.modbus.register_map import RegisterChannel
 from drivers.pololu import packets
+from drivers.ports.lines import LineCutter
 from drivers.roboteq import lines as roboteq_lines
 from drivers.scpi import lines as scpi_lines
 from drivers.serial_lines import (
@@ -74,7 +75,7 @@ def decoders() -> dict[str, tuple[tuple[bytes, ...], Decode]]:
         "Roboteq": (ROBOTEQ, roboteq_lines.Decoder().feed),
         "Loadstar": (LOADSTAR, loadstar_lines.Decoder().feed),
         "Mantracourt": (MANTRACOURT, mantracourt_lines.Decoder().feed),
-        "Sartorius": (SARTORIUS, sartorius_lines.Decoder().feed),
+        "Sartorius": (SARTORIUS, _sartorius),
         "HBM, text": (HBM, hbm_frames.Decoder().feed),
         "HBM, binary": (HBM_BINARY, binary.feed),
         "SCPI": (SCPI, _scpi),
@@ -128,6 +129,10 @@ def _pololu(data: bytes) -> Any:
     decoder.expect(4)
     records = decoder.feed(data)
     return [records, [each.words for each in records if isinstance(each, packets.Answer)]]
+
+
+def _sartorius(data: bytes) -> Any:
+    return [sartorius_lines.decode(line) for line in LineCutter().feed(data)]
 
 
 def _pzem(data: bytes) -> Any:

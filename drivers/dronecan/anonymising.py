@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from dronecan import UAVCANException
 from dronecan.transport import Frame as LibraryFrame
 from dronecan.transport import Transfer
 
@@ -46,7 +47,7 @@ def _renamed(frames: list[Frame], names: dict[bytes, int]) -> list[Frame]:
     transfer = Transfer()
     try:
         transfer.from_frames([LibraryFrame(frame.id, frame.data) for frame in frames])
-    except Exception as error:
+    except (UAVCANException, ValueError, IndexError) as error:  # IndexError: shorter than its CRC or array
         raise ValueError(f"an answer to GetNodeInfo can't be read ({error}), and may hold the unique id") from error
     version = transfer.payload.hardware_version
     unique = bytes(version.unique_id)

@@ -12,8 +12,6 @@ import math
 import re
 from typing import NamedTuple
 
-from drivers.ports.lines import LineCutter
-
 SHORT, LONG = 14, 20
 """Characters of an answer without CR LF, without and with identifier."""
 ANSWER_CHARACTERS = LONG + 2
@@ -78,13 +76,3 @@ def decode(line: bytes) -> Record:
     if error or said == "OFF":
         return Fault(f"Err {error[1]}" if error else said)
     return Text(text.strip())
-
-
-class Decoder:
-    """Bytes in any portions -> records."""
-
-    def __init__(self) -> None:
-        self._lines = LineCutter()
-
-    def feed(self, data: bytes) -> list[Record]:
-        return [decode(line) for line in self._lines.feed(data)]

@@ -116,6 +116,7 @@ class History:
     converter: Converter = field(default_factory=Converter)
     """Between the thrust and a sample of it."""
     cell: CellBend = field(default_factory=CellBend)
+    """How straight dead weights left the load cell."""
     rate_spacing: float = 1.0
     excess: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
     """(M,) or (1,): mean of driver |driver| over the interval less that of the mean driver."""

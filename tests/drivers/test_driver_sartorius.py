@@ -10,7 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import DeviceError
-from drivers.serial_lines.sartorius_lines import Decoder, Fault, Text, Unreadable, Weight, decode, encode
+from drivers.ports.lines import LineCutter
+from drivers.serial_lines.sartorius_lines import Fault, Text, Unreadable, Weight, decode, encode
 from drivers.serial_lines.sartorius_sbi import Options, SartoriusSbi
 from tests.drivers.collecting import FOLDER
 from tests.drivers.scripted_peer import Peer, wait_until
@@ -90,7 +91,7 @@ def test_weights_come_back(hundredths, unit, identifier):
 
 @given(st.binary(max_size=60))
 def test_garbage_is_followed_by_a_good_line(garbage):
-    assert Decoder().feed(garbage + b"\r\n+   123.56 g  \r\n")[-1] == Weight(123.56, "g")
+    assert decode(LineCutter().feed(garbage + b"\r\n+   123.56 g  \r\n")[-1]) == Weight(123.56, "g")
 
 
 @pytest.mark.parametrize(
