@@ -59,6 +59,7 @@ async def in_browser(first: Operator, server: Operator, place: Place, pictures: 
             await seat.page.press(letter)
         await seat.presses("Enter", "kept", "kelp")
         await asyncio.to_thread(place.until_driven)
+        await seat.presses("a", "a step is measured", "ended early on request")
         await seat.presses("m", "marked", "marked bad by the operator")
         pressed = time.monotonic_ns()
         await seat.presses("F9", "stopped", "ABORTED")
