@@ -22,6 +22,7 @@ from can.interfaces import VALID_INTERFACES
 from can.interfaces.slcan import slcanBus
 
 from drivers.errors import LinkError
+from drivers.ports.arrivals import Arrivals
 from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
 from drivers.ports.refusals import why_not_open
@@ -69,6 +70,8 @@ class CanBus:
         self._inboxes: tuple[tuple[Callable[[Frame], bool], Inbox[Frame]], ...] = ()
         self._received = 0
         self._bad = BadRecords()
+        self._lines = SlcanLines(self._bad, self._wanted)
+        self._arrivals = Arrivals(self._decode, self._failed)
 
     @property
     def alive(self) -> bool:
@@ -79,6 +82,7 @@ class CanBus:
         if self._bus is not None:
             return
         self.error, self._bad, self._received = None, BadRecords(), 0
+        self._lines, self._arrivals = SlcanLines(self._bad, self._wanted), Arrivals(self._decode, self._failed)
         self._closing.clear()
         if self._wire is not None:
             self._transcript = Transcript(Path(self._capture)) if self._capture else None
@@ -100,13 +104,19 @@ class CanBus:
         self._reader.start()
 
     def subscribe(self, accept: Callable[[Frame], bool], capacity: int = CAPACITY) -> Inbox[Frame]:
-        """An inbox that gets every frame for which `accept` is true, from now until the bus is closed."""
-        inbox: Inbox[Frame] = Inbox(capacity, self._wire)
+        """An inbox that gets every frame for which `accept` is true, from now until the bus is closed.
+
+        `accept` judges by the identifier: frames of one that nobody accepts are not made.
+        """
+        inbox: Inbox[Frame] = Inbox(capacity, self._wire, self._arrivals)
+        self._arrivals.decode()
         self._inboxes = (*self._inboxes, (accept, inbox))
+        self._lines.forget()
         return inbox
 
     def unsubscribe(self, inbox: Inbox[Frame]) -> None:
         self._inboxes = tuple(pair for pair in self._inboxes if pair[1] is not inbox)
+        self._lines.forget()
 
     def send(self, frame: Frame) -> None:
         """Send once. Raises LinkError when the bus is closed, lost, or takes nothing for 0.2 s."""
@@ -127,8 +137,11 @@ class CanBus:
         return time.monotonic_ns() if self._wire is None else round(self._wire.now() * 1e9)
 
     def health(self) -> LinkHealth:
+        self._arrivals.decode()
         dropped = sum(inbox.dropped for _, inbox in self._inboxes)
-        return LinkHealth(self.alive, self._received, self._bad.count, self._bad.first, self.error, dropped)
+        return LinkHealth(
+            self.alive, self._received + self._lines.sound, self._bad.count, self._bad.first, self.error, dropped
+        )
 
     def close(self) -> None:
         """Stop reading and let the adapter go. Safe to call twice and after a failure."""
@@ -151,8 +164,7 @@ class CanBus:
         port = SerialOverWire(wire)
         bus.serialPortOrig = port  # type: ignore[assignment]  # all that slcanBus asks of a port
 
-        lines = SlcanLines(self._bad)
-        wire.connect(lambda t_ns, data: self._deliver(t_ns, lines.feed(data)))
+        wire.connect(self._arrived)
         bus.set_bitrate(self._bitrate)
         return bus
 
@@ -176,27 +188,56 @@ class CanBus:
     def _read(self, bus: can.BusABC) -> None:
         end: str | None = f"the reader of {self._channel} stopped on an error of this program (see the log)"
         try:
-            read = self._slcan_reader(bus) if isinstance(bus, slcanBus) else lambda: _next_frame(bus, self._bad)
-            while not self._closing.is_set():
-                frames = read()
-                if frames:
-                    self._deliver(time.monotonic_ns(), frames)
+            if isinstance(bus, slcanBus):
+                self._read_lines(bus)
+            else:
+                self._read_frames(bus)
             end = None
         except (can.CanError, OSError) as error:
             end = f"{self._channel} was lost ({error}): check adapter, cable and power, then open it again"
         finally:
             self.error = self.error or end
-            for _, inbox in self._inboxes:
-                inbox.end()
+            self._arrivals.decode()
+            self._end_inboxes()
 
-    def _slcan_reader(self, bus: slcanBus) -> Callable[[], list[Frame]]:
+    def _read_lines(self, bus: slcanBus) -> None:
         set_low_latency(bus.serialPortOrig)
-        chunk, lines = chunk_reader(bus.serialPortOrig), SlcanLines(self._bad)
-        return lambda: lines.feed(chunk())
+        read = chunk_reader(bus.serialPortOrig)
+        while not self._closing.is_set():
+            if data := read():
+                self._arrived(time.monotonic_ns(), data)
+
+    def _read_frames(self, bus: can.BusABC) -> None:
+        """Of any other adapter, one by one."""
+        while not self._closing.is_set():
+            if frames := _next_frame(bus, self._bad):
+                self._received += len(frames)
+                self._deliver(time.monotonic_ns(), frames)
+
+    def _arrived(self, t_ns: int, data: bytes) -> None:
+        """What an slcan adapter says; a transcript has all of it at once."""
+        self._arrivals.add(t_ns, data)
+        if self._transcript is not None:
+            self._arrivals.decode()
+
+    def _decode(self, t_ns: int, data: bytes) -> None:
+        if frames := self._lines.feed(data):
+            self._deliver(t_ns, frames)
+
+    def _wanted(self, identifier: int, extended: bool) -> bool:
+        empty = Frame(identifier, extended, b"")
+        return self._transcript is not None or any(accept(empty) for accept, _ in self._inboxes)
+
+    def _failed(self) -> None:
+        self.error = self.error or f"the decoder of {self._channel} stopped on an error of this program (see the log)"
+        self._end_inboxes()
+
+    def _end_inboxes(self) -> None:
+        for _, inbox in self._inboxes:
+            inbox.end()
 
     def _deliver(self, t_ns: int, frames: list[Frame]) -> None:
         """To each device its own of the frames that came together at `t_ns`."""
-        self._received += len(frames)
         if self._transcript is not None:
             for frame in frames:
                 self._transcript.write(t_ns, "<", str(frame).encode())

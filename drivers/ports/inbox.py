@@ -6,7 +6,10 @@ import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from typing import Generic, Protocol, TypeVar
+
+from drivers.ports.arrivals import Arrivals
 
 Record = TypeVar("Record")
 
@@ -36,14 +39,18 @@ class Passing(Protocol):
 
 
 class Inbox(Generic[Record]):
-    """Records with their arrival time. One thread puts, one takes. When full the oldest go, and are counted."""
+    """Records with their arrival time. Many may put, one takes. When full the oldest go, and are counted."""
 
-    def __init__(self, capacity: int, passing: Passing | None = None) -> None:
-        """`passing`: the time that `wait_for` waits in; None: the machine's."""
+    def __init__(self, capacity: int, passing: Passing | None = None, arrivals: Arrivals | None = None) -> None:
+        """`passing`: the time that `wait_for` waits in; None: the machine's.
+
+        `arrivals`: bytes whose decoder puts into this inbox, decoded when somebody looks into it.
+        """
         if capacity < 1:
             raise ValueError(f"inbox capacity must be at least 1, not {capacity}")
-        self.received = 0
-        self.dropped = 0
+        self._received = 0
+        self._dropped = 0
+        self._arrivals = arrivals
         self._capacity = capacity
         self._rows: deque[tuple[int, Record]] = deque(maxlen=capacity)
         self._arrival = threading.Condition()
@@ -51,16 +58,29 @@ class Inbox(Generic[Record]):
         self._wait: Callable[[float], object] = self._arrival.wait if passing is None else passing.wait
         self._open = True
 
+    @property
+    def received(self) -> int:
+        """Records so far."""
+        self._look()
+        return self._received
+
+    @property
+    def dropped(self) -> int:
+        """Records that went because the inbox was full."""
+        self._look()
+        return self._dropped
+
     def put(self, t_ns: int, records: Sequence[Record]) -> None:
         """Add records that arrived together at `t_ns` (`time.monotonic_ns()`)."""
         with self._arrival:
-            self.dropped += max(0, len(self._rows) + len(records) - self._capacity)
+            self._dropped += max(0, len(self._rows) + len(records) - self._capacity)
             self._rows.extend([(t_ns, record) for record in records])
-            self.received += len(records)
+            self._received += len(records)
             self._arrival.notify_all()
 
     def take_all(self) -> list[tuple[int, Record]]:
         """Everything since the last call; never blocks on the wire."""
+        self._look()
         with self._arrival:
             rows = list(self._rows)
             self._rows.clear()
@@ -72,7 +92,7 @@ class Inbox(Generic[Record]):
         With `take` it leaves the inbox; records that do not match stay where they are.
         """
         deadline = self._now() + timeout
-        with self._arrival:
+        with nullcontext() if self._arrivals is None else self._arrivals.awaited(), self._arrival:
             while True:
                 for index, (_, record) in enumerate(self._rows):
                     if match(record):
@@ -89,3 +109,7 @@ class Inbox(Generic[Record]):
         with self._arrival:
             self._open = False
             self._arrival.notify_all()
+
+    def _look(self) -> None:
+        if self._arrivals is not None:
+            self._arrivals.decode()

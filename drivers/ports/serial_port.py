@@ -16,6 +16,7 @@ from typing import Generic, TypeVar
 import serial
 
 from drivers.errors import LinkError
+from drivers.ports.arrivals import Arrivals
 from drivers.ports.inbox import Inbox
 from drivers.ports.lines import bits_per_character
 from drivers.ports.refusals import why_not_open
@@ -64,7 +65,7 @@ class SerialPort(Generic[Record]):
         self.error: str | None = None
         self._name = name
         self._feed = feed
-        self.inbox: Inbox[Record] = Inbox(settings.capacity, wire)
+        self._arrivals, self.inbox = self._empty()
         self._serial: serial.Serial | None = None
         self._transcript: Transcript | None = None
         self._reader: threading.Thread | None = None
@@ -81,7 +82,7 @@ class SerialPort(Generic[Record]):
             raise LinkError(f"{self._name}: {self.settings.port} is already open")
         self.error = None
         self._closing.clear()
-        self.inbox = Inbox(self.settings.capacity, self._wire)
+        self._arrivals, self.inbox = self._empty()
         if self._wire is not None:
             self._transcript = self._new_transcript()
             self._wire.connect(self._arrived)
@@ -101,6 +102,22 @@ class SerialPort(Generic[Record]):
         self._reader = threading.Thread(target=self._read, args=(port,), name=f"read {self._name}", daemon=False)
         self._reader.start()
         self._opened = True
+
+    def _empty(self) -> tuple[Arrivals, Inbox[Record]]:
+        """Bytes that came go through `feed` into the inbox."""
+
+        def decode(t_ns: int, data: bytes) -> None:
+            if records := self._feed(data):
+                inbox.put(t_ns, records)
+
+        def failed() -> None:
+            why = f"the decoder of {self.settings.port} stopped on an error of this program (see the log)"
+            self.error = self.error or why
+            inbox.end()
+
+        arrivals = Arrivals(decode, failed)
+        inbox: Inbox[Record] = Inbox(self.settings.capacity, self._wire, arrivals)
+        return arrivals, inbox
 
     def _new_transcript(self) -> Transcript | None:
         if not self.settings.capture:
@@ -187,14 +204,13 @@ class SerialPort(Generic[Record]):
             end = f"{self.settings.port} was lost ({error}): check cable and power, then open it again"
         finally:
             self.error = self.error or end
+            self._arrivals.decode()
             self.inbox.end()
 
     def _arrived(self, t_ns: int, data: bytes) -> None:
         if self._transcript is not None:
             self._transcript.write(t_ns, "<", data)
-        records = self._feed(data)
-        if records:
-            self.inbox.put(t_ns, records)
+        self._arrivals.add(t_ns, data)
 
 
 def chunk_reader(port: serial.Serial) -> Callable[[], bytes]:

@@ -27,13 +27,15 @@ class ThrustRest:
         self._rows: deque[tuple[float, float]] = deque()
         self._tare: float | None = None
         self._told: float | None = None
-        self._noise = self._largest = 0.0
+        self._noise = self._largest = self._mean = 0.0
 
     def add(self, rows: tuple[tuple[float, float], ...]) -> None:
         """(s, N), raw; the newest say how large the thrust is."""
         self._rows.extend(row for row in rows if isfinite(row[1]))
         while len(self._rows) > LEAST_ROWS and self._rows[0][0] < self._rows[-1][0] - WINDOW:
             self._rows.popleft()
+        if self._rows:
+            self._mean = fmean([value for _, value in self._rows])
         if self._tare is not None and len(self._rows) >= LEAST_ROWS:
             self._largest = max(self._largest, abs(self._mean - self._tare))
 
@@ -47,10 +49,6 @@ class ThrustRest:
     def doubt(self) -> None:
         """A later tare was not stable: the zero may have moved, and witnesses nothing until one is accepted."""
         self._tare = None
-
-    @property
-    def _mean(self) -> float:
-        return fmean(value for _, value in self._rows)
 
     @property
     def within(self) -> float:
@@ -72,4 +70,4 @@ class ThrustRest:
             return None
         if abs(self._mean - self._tare) <= self.within:
             return True
-        return None if len({value for _, value in fresh}) == 1 else False
+        return False if any(value != fresh[0][1] for _, value in fresh) else None

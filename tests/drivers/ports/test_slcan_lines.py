@@ -9,7 +9,7 @@ from can.interfaces.slcan import slcanBus
 
 from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords
-from drivers.ports.slcan_lines import LONGEST, SlcanLines
+from drivers.ports.slcan_lines import LONGEST, REMEMBERED, SlcanLines
 
 
 def frames(count: int, seed: int) -> list[Frame]:
@@ -131,3 +131,28 @@ def test_what_never_ends_is_not_kept():
     assert len(lines._rest) <= LONGEST
     assert bad.count == 1000
     assert lines.feed(b"\rt0011FF\r") == [Frame(1, False, b"\xff")]
+
+
+def test_what_nobody_wants_is_counted_and_not_made():
+    asked = []
+
+    def wanted(identifier, extended):
+        asked.append((identifier, extended))
+        return (identifier, extended) == (0x123, True)
+
+    lines = SlcanLines(BadRecords(), wanted)
+    both = b"T0000012310A\rt12310B\r"
+    assert lines.feed(both) == lines.feed(both) == [Frame(0x123, True, b"\x0a")]
+    assert lines.sound == 4
+    assert asked == [(0x123, True), (0x123, False)]
+    lines.forget()
+    lines.feed(both)
+    assert asked == [(0x123, True), (0x123, False)] * 2
+
+
+def test_not_every_identifier_is_remembered_for_ever():
+    lines = SlcanLines(BadRecords(), lambda identifier, extended: False)
+    for identifier in range(3 * REMEMBERED):
+        lines.feed(b"T%08X0\r" % identifier)
+    assert len(lines._remembered) <= REMEMBERED
+    assert lines.sound == 3 * REMEMBERED

@@ -1,0 +1,58 @@
+"""Bytes as they came, with their stamps, between the thread that reads a wire and whoever wants to know what they say.
+
+The reader only stamps: a full bus wakes it a thousand times a second, and what it does then it does with a cold cache
+and against the control loop. The loop decodes when it drains, all at once, for half the price
+(benchmarks/controller/full_buses.py). While somebody waits for an answer the reader decodes at once.
+"""
+
+from __future__ import annotations
+
+import threading
+import traceback
+from collections import deque
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+MOST = 64
+"""Chunks that are kept; a reader that finds so many decodes them itself, so that memory is bounded without a drain."""
+
+
+class Arrivals:
+    """One thread adds, any may decode; each chunk is decoded once, in the order in which they came."""
+
+    def __init__(self, decode: Callable[[int, bytes], None], failed: Callable[[], None]) -> None:
+        """`decode(t_ns, data)`: one chunk. `failed`: told when that raises, which is an error of this program."""
+        self._decode, self._failed = decode, failed
+        self._chunks: deque[tuple[int, bytes]] = deque()
+        self._lock = threading.Lock()
+        self._waiting = 0
+
+    def add(self, t_ns: int, data: bytes) -> None:
+        """What came at `t_ns`."""
+        self._chunks.append((t_ns, data))
+        if self._waiting or len(self._chunks) >= MOST:
+            self.decode()
+
+    def decode(self) -> None:
+        """All that has come."""
+        if not self._chunks:
+            return
+        with self._lock:
+            while self._chunks:
+                try:
+                    self._decode(*self._chunks.popleft())
+                except Exception:  # noqa: BLE001  a wire is lost by it, not the loop that drains
+                    traceback.print_exc()
+                    self._failed()
+
+    @contextmanager
+    def awaited(self) -> Iterator[None]:
+        """What comes meanwhile is decoded as it comes; what has come is."""
+        with self._lock:
+            self._waiting += 1
+        try:
+            self.decode()
+            yield
+        finally:
+            with self._lock:
+                self._waiting -= 1
