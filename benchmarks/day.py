@@ -5,8 +5,7 @@
 A simulated bench of `rig init`, real commands and consoles; each step says what the screen has to show, and the bench's
 truth log what the motor did. All that stood on the screen, with the key that led to it, goes into the transcript
 (build/day.txt).
-Prints each chapter with its time. Status 0 only when all was as it has to be; 1 else, with what was not. Calibration is
-the bench file's `[calibration.load_cell]`: there is no calibration at the console.
+Prints each chapter with its time. Status 0 only when all was as it has to be; 1 else, with what was not.
 """
 
 from __future__ import annotations
@@ -39,6 +38,7 @@ def one_terminal(folder: Path, transcript: Transcript) -> None:
         for chapter in (
             day.check_a_port_that_is_gone,
             day.edit,
+            day.calibrate,
             day.preflight,
             day.first_thruster,
             day.trip,

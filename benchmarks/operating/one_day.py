@@ -8,6 +8,7 @@ import tomllib
 from dataclasses import dataclass
 
 from benchmarks.operating.at_keys import DayError, Operator
+from benchmarks.operating.calibrating import calibrate
 from benchmarks.operating.place import Place
 from benchmarks.operating.preparing import STOP_WITHIN
 
@@ -65,6 +66,11 @@ class Day:
         here.window.type(value)
         keys = f"{way} ... C-u {value}"
         here.sees(f"{field_name.strip()} = {value}", rf"{field_name} +{re.escape(value)}", *wanted, keys=keys)
+
+    def calibrate(self) -> None:
+        """With dead weights, a wrong one once."""
+        self.chapter("rig calibrate: weights by hand, once another than the screen says")
+        calibrate(self.operator, self.place)
 
     def preflight(self) -> None:
         """With a cable that comes out while one looks on."""
