@@ -10,8 +10,8 @@ from drivers.ports.can_frame import Frame, frame_of
 from drivers.ports.transcript import Chunk
 from drivers.ports.wire import Arrived
 
-BEFORE = 1.0
-"""s before the first chunk at which the time of the wire begins."""
+BEFORE = 0.1
+"""s before the first chunk at which the time of the wire begins: a driver that only listens waits from there on."""
 LEFT_OUT = 0.5
 """s after which a question of the transcript that the driver has not put is passed over."""
 SAME_AMONG = 4

@@ -85,6 +85,7 @@ unit = "N"
 kind = "pzem"
 port = "ports/meter"
 """
+BENCHES = Path(__file__).parents[3] / "benches"
 FIRST_ROWS = 9
 """Of three streams, in which the voltage may not be known yet."""
 VESC = """
@@ -143,6 +144,20 @@ def test_what_is_captured_is_played_to_the_bit(request, tmp_path, device):
         assert "".join(live[FIRST_ROWS:]) in played
     else:
         assert played.startswith("".join(live))
+
+
+@pytest.mark.parametrize("name", ["odrive", "dronecan", "cia402"])
+def test_a_motor_that_tells_its_state_by_itself_is_played(tmp_path, name):
+    """Each on the bench that comes with it; messages of ten a second and of one, which the driver waits for."""
+    made = BENCHES / name
+    for _ in started(tmp_path, (made / "world.toml").read_text(), (made / "bench.toml").read_text()):
+        config, file = load_bench(tmp_path / "bench.toml"), tmp_path / "bytes.txt"
+        taken = by_driver(config, "motor", file, Bound(2.5, 10**7), MonotonicClock())
+    options, bitrate = config.devices["motor"].options, config.can[config.devices["motor"].options.bus].bitrate
+    describe(file, Description(config.devices["motor"].kind, "motor", bitrate=bitrate, options=options))
+    assert main(["replay", str(file), "--rows", str(tmp_path / "rows")]) == 0
+    live = exact(taken.rows).splitlines(keepends=True)
+    assert "".join(live[len(live) // 3 :]) in (tmp_path / "rows").read_text(encoding="ascii")
 
 
 def test_the_command_writes_bytes_and_description_and_drives_no_motor(bench, tmp_path, capsys):
