@@ -145,6 +145,14 @@ class OneWay(Protocol):
 
 
 @runtime_checkable
+class Coarse(Protocol):
+    """A motor controller whose set-points are steps: what it is told is near what it is asked for, not the same."""
+
+    def told(self, volts: float) -> float:
+        """V of the set-point that `command(volts)` sends."""
+
+
+@runtime_checkable
 class ForceSensor(Instrument, Protocol):
     """An instrument whose first stream has a `thrust` channel."""
 

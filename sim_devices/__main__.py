@@ -95,10 +95,11 @@ def calibrate(world: Path, links: Path | None, seed: int | None, campaign: Path,
         folder = links or load(world).links
         with running(world, folder, seed) as bench:
             status = rig(words)
-            constants = bench.truth("header")[0]["C"]
+            header = bench.truth("header")[0]
     except (WorldError, RuntimeError) as error:
         fail(str(error))
     made = sorted(set(output.glob(f"*/{FITS}")) - before)
+    constants = {thruster: C * header["command_gain"] ** 2 for thruster, C in header["C"].items()}  # of V commanded
     rows = [row for fits in made for row in compare(fits, constants)]
     click.echo(table(rows))
     for recording in (each for fits in made for each in sorted(fits.parent.glob("*.h5"))):

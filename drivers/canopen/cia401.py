@@ -108,6 +108,9 @@ class Cia401:
         first = (*self._bad.first, *bus.first_bad)[:5]
         return LinkHealth(alive, inbox.received, bus.bad + self._bad.count, first, error, inbox.dropped)
 
+    def told(self, volts: float) -> float:
+        return (self._options.counts(volts) - self._options.offset) / self._options.counts_per_volt
+
     def command(self, volts: float) -> None:
         """Our heartbeat and one RPDO. Raises ValueError beyond max_voltage; LinkError from the bus, and for a voltage
         that the module is not ready for: 0 is sent in its place."""

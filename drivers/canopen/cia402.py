@@ -102,6 +102,9 @@ class Cia402:
             dropped=inbox.dropped,
         )
 
+    def told(self, volts: float) -> float:
+        return self._options.volts(self._options.counts(volts))
+
     def command(self, volts: float) -> None:
         """Our heartbeat and one RPDO of controlword and set-point. Raises ValueError beyond max_voltage; LinkError from
         the bus, and for a set-point that the drive is not ready for: 0 is sent in its place."""

@@ -148,6 +148,12 @@ class Options:
             return round(volts * self.rate_per_volt / self.rate_per_count)
         return round(1e3 * volts * (self.torque_per_volt or 0.0) / (self.rated_torque or math.inf))
 
+    def volts(self, counts: int) -> float:
+        """Of the command that is this set-point."""
+        if self.rate_per_volt is not None:
+            return counts * self.rate_per_count / self.rate_per_volt
+        return counts * (self.rated_torque or 0.0) / (1e3 * (self.torque_per_volt or math.inf))
+
     @property
     def motor_fields(self) -> tuple[Field, ...]:
         """TPDO 1."""

@@ -125,6 +125,12 @@ class DronecanEsc:
             dropped=self._inbox.dropped,
         )
 
+    def told(self, volts: float) -> float:
+        return self._raw(volts) * self._options.full_voltage / FULL
+
+    def _raw(self, volts: float) -> int:
+        return round(volts / self._options.full_voltage * FULL)
+
     def command(self, volts: float) -> None:
         """RawCommand of so many volts, once; NodeStatus (and ArmingStatus) of ours twice a second with it.
 
@@ -167,8 +173,7 @@ class DronecanEsc:
 
     def _set(self, volts: float) -> None:
         """The places before ours get 0: another ESC of this bus stands still."""
-        value = round(volts / self._options.full_voltage * FULL)
-        self._send(self._sender.raw_command([0] * self._options.esc_index + [value]))
+        self._send(self._sender.raw_command([0] * self._options.esc_index + [self._raw(volts)]))
         self._fed_ns = self._bus.now_ns()
 
     def _tell_state(self, now_ns: int) -> None:

@@ -102,6 +102,9 @@ class Maestro:
         alive = self._port.alive and error is None
         return LinkHealth(alive, inbox.received, self._bad.count, self._bad.first, error, inbox.dropped)
 
+    def told(self, volts: float) -> float:
+        return self._options.volts(self._options.target(volts))
+
     def command(self, volts: float) -> None:
         """The pulse of `volts` (`Options.target`), once, and at `rate` the question for a row behind it.
 

@@ -126,6 +126,15 @@ class Options:
         begin = self.neutral + math.copysign(self.dead_zone, volts)
         return round(QUARTERS * (begin + (end - begin) * abs(volts) / self.full_voltage))
 
+    def volts(self, target: int) -> float:
+        """The command that has this pulse; 0 within the dead zone."""
+        beyond = abs(target / QUARTERS - self.neutral) - self.dead_zone
+        if beyond <= 0.0:
+            return 0.0
+        end = self.max_pulse if target > QUARTERS * self.neutral else self.min_pulse
+        share = beyond / (abs(end - self.neutral) - self.dead_zone)
+        return math.copysign(share * self.full_voltage, target - QUARTERS * self.neutral)
+
 
 def streams(name: str, options: Options) -> tuple[Stream, ...]:
     step = MICROSECOND / QUARTERS

@@ -87,6 +87,12 @@ class SmcG2:
         alive = self._port.alive and error is None
         return LinkHealth(alive, inbox.received, self._bad.count, self._bad.first, error, inbox.dropped)
 
+    def told(self, volts: float) -> float:
+        return self._speed_of(volts) * self._options.nominal_bus_voltage / FULL
+
+    def _speed_of(self, volts: float) -> int:
+        return round(FULL * volts / self._options.nominal_bus_voltage)
+
     def command(self, volts: float) -> None:
         """Speed 3200 volts / nominal bus voltage, once, and at `rate` the questions of a row behind it. A command of 0
         leaves safe-start as well.
@@ -122,7 +128,7 @@ class SmcG2:
     # -- what goes ---------------------------------------------------------------------------------------------------
 
     def _send(self, volts: float, now_ns: int) -> None:
-        speed = round(FULL * volts / self._options.nominal_bus_voltage)
+        speed = self._speed_of(volts)
         begun, given_up = self._asking.begin(now_ns, 2 * len(self._options.variables))
         if given_up:
             self._bad.add(given_up)

@@ -111,6 +111,12 @@ class Roboteq:
         alive = self._port.alive and error is None
         return LinkHealth(alive, inbox.received, self._bad.count, self._bad.first, error, inbox.dropped)
 
+    def told(self, volts: float) -> float:
+        return self._thousandths(volts) * self._options.nominal_bus_voltage / FULL
+
+    def _thousandths(self, volts: float) -> int:
+        return round(FULL * volts / self._options.nominal_bus_voltage)
+
     def command(self, volts: float) -> None:
         """`!G` volts / nominal bus voltage, once, in thousandths. Raises ValueError beyond max_voltage; LinkError from
         the wire, and for a set-point after a silence in which the watchdog ended: 0 is sent in its place."""
@@ -118,7 +124,7 @@ class Roboteq:
             raise ValueError(f"{self.name}: command must be within +-{self.max_voltage:g} V, not {volts}")
         silence = (self._port.now_ns() - self._fed_ns) * 1e-9
         lapsed = volts != 0.0 and silence >= self._options.watchdog_timeout
-        self._send(go(self._options.channel, 0 if lapsed else round(FULL * volts / self._options.nominal_bus_voltage)))
+        self._send(go(self._options.channel, 0 if lapsed else self._thousandths(volts)))
         if lapsed:
             raise LinkError(
                 f"{self.name}: nothing was commanded for {silence:.2f} s, longer than the watchdog of"

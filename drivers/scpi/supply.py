@@ -101,6 +101,9 @@ class ScpiSupply:
         alive = self._port.alive and problem is None
         return LinkHealth(alive, inbox.received, self._bad.count, self._bad.first, problem, inbox.dropped)
 
+    def told(self, volts: float) -> float:
+        return round(volts / self._options.resolution) * self._options.resolution
+
     def command(self, volts: float) -> None:
         """`VOLT`, at most `command_rate` times a second, 0 at once; the first that is not 0 switches the output on.
 
@@ -141,8 +144,7 @@ class ScpiSupply:
         self._fed_ns = self._port.now_ns()
 
     def _set(self, volts: float, now_ns: int) -> None:
-        resolution = self._options.resolution
-        level = round(volts / resolution) * resolution
+        level = self.told(volts)
         if level == 0.0 and self._lapsed:
             clear = (self._options.protection_clear,) if self._options.protection_clear else ()
             self._say(ZERO_BEFORE_ON, OFF, *clear)

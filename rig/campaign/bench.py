@@ -12,7 +12,7 @@ from drivers.errors import LinkError as DriverLinkError
 from drivers.extras import MissingExtra
 from drivers.ports.can_bus import CanBus
 from drivers.ports.wire import Wire
-from drivers.protocols import Instrument, MotorController, Sample, Stream
+from drivers.protocols import Coarse, Instrument, MotorController, Sample, Stream
 from rig.campaign.calibrated import Calibrated
 from rig.campaign.config import BenchConfig, CanBusConfig
 from rig.errors import ConfigError, DeviceError, LinkError
@@ -39,6 +39,11 @@ class Bench:
                 " name a motor controller"
             )
         return motor
+
+    def told(self, volts: float) -> float:
+        """V of the set-point that the motor controller gets for a command of `volts`."""
+        motor = self.instruments[self.config.motor]
+        return motor.told(volts) if isinstance(motor, Coarse) else volts
 
     def streams(self) -> Iterator[tuple[str, Stream]]:
         """(device name, stream) of every device, in the order of the bench file."""

@@ -310,7 +310,8 @@ class Loop:
         rows = [sample for sample in samples if sample.t_ns >= since]
         if self._recorded_command != (volts,):
             self._recorded_command = (volts,)
-            rows.append(Sample(COMMAND_STREAM, sent_ns, (nan if volts is None else volts,)))
+            told = nan if volts is None else self.bench.told(volts)
+            rows.append(Sample(COMMAND_STREAM, sent_ns, (told,)))
         self.recorder.rows(rows)
         if self.watcher is not None:
             self.watcher.rows(rows, sent_ns * 1e-9)

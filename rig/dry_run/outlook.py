@@ -27,6 +27,8 @@ class Outlook:
     """N; None: the campaign gives no expected_C."""
     energies: Mapping[str, Energy | str] = field(default_factory=dict)
     """Thruster -> what its run takes, or why that is not known."""
+    told: Mapping[float, float] = field(default_factory=dict)
+    """V held by the plan -> V that the motor controller can be told, where they differ."""
 
     def rows(self) -> tuple[tuple[str, str], ...]:
         """(what, in words), in the order of a report."""
@@ -37,6 +39,7 @@ class Outlook:
             ("one run", f"{clock(self.run.expected)} expected, {clock(self.run.worst)} at worst"),
             ("campaign", f"{clock(self.total.expected)} expected, {clock(self.total.worst)} at worst"),
             ("holds", "; ".join(told_levels(levels(self.steps))) or "none: the plan moves all the time"),
+            *(("set-points", text) for text in told_set_points(self.told)),
             ("peak voltage", f"{self.peak_voltage:g} V"),
             ("peak thrust", thrust),
             *(("energy", text) for text in told_energies(self.energies)),
@@ -76,6 +79,17 @@ def told_levels(found: Iterable[Level]) -> list[str]:
         + (" at each" if len(volts) > 1 else "")
         for (holds, seconds), volts in groups.items()
     ]
+
+
+def told_set_points(told: Mapping[float, float]) -> list[str]:
+    """Levels that the motor controller can't be told exactly, the two ways of one level together.
+
+    >>> told_set_points({5.0: 4.992, -5.0: -4.992})
+    ['5 V is 4.992 V: the nearest that the motor controller can be told; recordings and fits have it']
+    """
+    near = dict(sorted((abs(asked), abs(volts)) for asked, volts in told.items()))
+    pairs = ", ".join(f"{asked:.5g} V is {volts:.5g} V" for asked, volts in near.items())
+    return [f"{pairs}: the nearest that the motor controller can be told; recordings and fits have it"] if near else []
 
 
 def told_energies(energies: Mapping[str, Energy | str]) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import click
@@ -28,6 +28,9 @@ from rig.sequence.sequencer import settings_for
 from rig.sequence.steady import LEAST_SAMPLES
 from rig.visible_text import console
 
+SAME = 1e-4
+"""Relative: a set-point so near to the level of the plan is the level."""
+
 
 @dataclass(frozen=True, slots=True)
 class CheckReport:
@@ -45,6 +48,8 @@ class CheckReport:
     """N, expected_C V^2; None: the campaign gives no expected_C and the peak thrust was not checked."""
     overridden: tuple[Disarmed, ...] = ()
     """Protections that the files take away, with their reasons."""
+    told: Mapping[float, float] = field(default_factory=dict)
+    """V held by the plan -> V that the motor controller can be told, where they differ."""
 
 
 def check_campaign(path: Path) -> CheckReport:
@@ -75,7 +80,10 @@ def check_loaded(campaign: CampaignConfig) -> CheckReport:
         run.expected + (runs - 1) * later.expected,
         run.worst + (runs - 1) * later.worst + runs * campaign.bench.mount.timeout,
     )
-    return CheckReport(campaign, tuple(campaign.plan), run, total, campaign.plan.peak(), thrust, overridden)
+    steps = tuple(campaign.plan)
+    told = {step.voltage: bench.told(step.voltage) for step in steps if step.phase == "hold"}
+    coarse = {asked: volts for asked, volts in told.items() if abs(volts - asked) > SAME * abs(asked)}
+    return CheckReport(campaign, steps, run, total, campaign.plan.peak(), thrust, overridden, coarse)
 
 
 def _ports(bench: BenchConfig) -> Iterator[tuple[str, str]]:
@@ -193,7 +201,9 @@ def _require_samples(campaign: CampaignConfig, force: Instrument) -> None:
 def outlook_of(report: CheckReport, powers: Mapping[str, PowerCurve | str]) -> Outlook:
     """The report's numbers with the energy by what is known of each thruster's power."""
     energies = energies_of(report.steps, powers)
-    return Outlook(report.steps, report.run, report.total, report.peak_voltage, report.peak_thrust, energies)
+    return Outlook(
+        report.steps, report.run, report.total, report.peak_voltage, report.peak_thrust, energies, report.told
+    )
 
 
 def known_powers(campaign: CampaignConfig) -> dict[str, PowerCurve | str]:

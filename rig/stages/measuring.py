@@ -6,6 +6,7 @@ from collections.abc import Iterable, Set
 from dataclasses import replace
 
 from identification.recording import VOID
+from rig.campaign.bench import Bench
 from rig.campaign.plan import TARE_AGAIN, Step
 from rig.control.loop import Decision, Inputs
 from rig.control.status import Held, Status
@@ -109,6 +110,7 @@ def _tell_tare(witness: ThrustRest, output: Output, tares: Set[int]) -> None:
 def _take(session: Session, output: Output, t0_ns: int, begun: float) -> None:
     """Show and record what the sequencer finished in this tick; its times are s since `begun`."""
     status, offset = session.status, begun - t0_ns * 1e-9
+    output = _as_told(output, session.bench)
     status.take(output)
     if output.outcome in ("aborted", "tripped"):
         status.outcome, status.cause = output.outcome, output.cause
@@ -126,6 +128,16 @@ def _take(session: Session, output: Output, t0_ns: int, begun: float) -> None:
     session.given_up.update(output.given_up)
     for line in output.events:
         session.event_log.say(round((begun + line.time) * 1e9), line.level, line.text)
+
+
+def _as_told(output: Output, bench: Bench) -> Output:
+    """With the levels that the motor controller was really told: a plan has 5 V where a controller of thousandths of
+    48 V has 4.992 V, and C goes with their square."""
+    if not (output.rows or output.points):
+        return output
+    rows = [replace(row, command_voltage=bench.told(row.command_voltage)) for row in output.rows]
+    points = [replace(point, voltage=bench.told(point.voltage)) for point in output.points]
+    return output._replace(rows=tuple(rows), points=tuple(points))
 
 
 def _forget_point(status: Status, step: int) -> None:

@@ -68,13 +68,14 @@ class Bench:
         self.drive: Drive | None = None
         """What turns the thruster."""
         self._after_step: Callable[[float], None] | None = None
+        self._command_gain = 1.0
         self.serial: dict[str, tuple[SerialDevice, PtyPort, float]] = {}
         """device name -> device, its port, its turnaround (s)."""
         self.adapters = {name: (Adapter(), self._port(name, None)) for name in settings.can.adapters}
         for name, options in settings.devices.items():
             self._add(name, options)
         self._script = script(settings.faults)
-        self.log("header", seed=settings.seed, **header_fields(settings.world))
+        self.log("header", seed=settings.seed, command_gain=self._command_gain, **header_fields(settings.world))
 
     def _port(self, name: str, baud: int | None) -> PtyPort:
         return PtyPort(self.settings.links / name, Wire(baud, self._wire_rng))
@@ -82,7 +83,7 @@ class Bench:
     def _add(self, name: str, options: DeviceOptions) -> None:
         if isinstance(options, MOTORS):
             made = motor(options, self.world, self.log)
-            self.drive, self._after_step = made.drive, made.after_step
+            self.drive, self._after_step, self._command_gain = made.drive, made.after_step, made.gain
             if made.node is not None:
                 self.nodes[name] = made.node
             if made.serial is not None:

@@ -39,6 +39,8 @@ class Motor(NamedTuple):
     """Device, port, baud."""
     after_step: Callable[[float], None] | None = None
     """Called after each world step with its length, s."""
+    gain: float = 1.0
+    """V at the motor for 1 V of command."""
 
 
 def motor(options: MotorOptions, world: World, log: Log) -> Motor:
@@ -73,7 +75,7 @@ def motor(options: MotorOptions, world: World, log: Log) -> Motor:
             return Motor(line, serial=(line, options.port, options.baud), after_step=tap.after_step)
         case Cia401Options():
             output = Output401(options, supply, log)
-            return Motor(output, node=output)
+            return Motor(output, node=output, gain=options.gain)
         case scpi.ScpiSupplyOptions():
             bench_supply = scpi.ScpiSupply(options, lambda: scpi.measured(world), log)
             return Motor(bench_supply, serial=(bench_supply, options.port, options.baud))

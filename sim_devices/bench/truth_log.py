@@ -1,7 +1,7 @@
 """The truth log: what the motor really did, one JSON object a line, flushed line by line.
 
 Every line has `event`, `t_ns` (time.monotonic_ns of this machine, the clock of the rig) and `thruster`.
-`header`: the true constants.
+`header`: the true constants; `command_gain`: V at the motor for 1 V of command (an amplifier between them).
 `command`: a set-point accepted by the drive that differs from the one before: `mode`, `value`, and `volts` where the
 mode has any (a duty; 0 for every command of nothing, also of no current; null for currents and speeds).
 `state`: command and applied volts, rotation rate (rev/s), current (A), thrust and force (N), at most at 100 Hz.

@@ -4,6 +4,7 @@ after the controller's watchdog the motor stays where it is."""
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from drivers.errors import DeviceError, LinkError
@@ -95,6 +96,23 @@ def test_a_campaign_finds_the_truth_and_proves_the_watchdog(tmp_path, motor):
     rotation = recording.first_of("rotation_rate")
     assert len(rotation.time) / rotation.time[-1] == pytest.approx(50.0, rel=0.05)
     assert not [event.text for event in recording.events if "could not be understood" in event.text]
+
+
+def test_levels_between_two_set_points_are_recorded_as_the_controller_was_told(tmp_path):
+    """5 V is 4.992 V for a controller of thousandths of 48 V, 9.1 V is 9.12 V."""
+    campaign = files(tmp_path)
+    asked = "[5.0, -5.0, 9.1, -9.1, 13.0, -13.0]"
+    text = campaign.read_text().replace("[7.2, -7.2, 12.0, -12.0, 16.8, -16.8, 19.2, -19.2]", asked)
+    campaign.write_text(text, encoding="utf-8")
+    path, _ = record_in_virtual_time(campaign, tmp_path / "run", bench(), ("some-id", "2026-01-01"))
+    recording = load(path)
+    held = {round(abs(step.command_voltage), 6) for step in recording.steps if step.phase == "hold"}
+    assert held == {4.992, 9.12, 13.008}
+    steps = recording.first_of("command_voltage").value / 0.048
+    assert np.abs(steps - np.round(steps))[np.isfinite(steps)].max() < 1e-6
+    (fitted,) = fit_recordings([recording])
+    constant = fitted.fit.parameters["C"]
+    assert abs(constant.value - TRUTH) < 3.0 * constant.std < 0.004 * TRUTH
 
 
 @pytest.mark.parametrize(
