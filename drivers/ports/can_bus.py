@@ -25,6 +25,7 @@ from drivers.errors import LinkError
 from drivers.ports.arrivals import Arrivals
 from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
+from drivers.ports.punctual import on_time
 from drivers.ports.refusals import why_not_open
 from drivers.ports.serial_port import chunk_reader, set_low_latency
 from drivers.ports.slcan_lines import SlcanLines
@@ -187,6 +188,7 @@ class CanBus:
 
     def _read(self, bus: can.BusABC) -> None:
         end: str | None = f"the reader of {self._channel} stopped on an error of this program (see the log)"
+        on_time()
         try:
             if isinstance(bus, slcanBus):
                 self._read_lines(bus)

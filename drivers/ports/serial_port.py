@@ -19,6 +19,7 @@ from drivers.errors import LinkError
 from drivers.ports.arrivals import Arrivals
 from drivers.ports.inbox import Inbox
 from drivers.ports.lines import bits_per_character
+from drivers.ports.punctual import on_time
 from drivers.ports.refusals import why_not_open
 from drivers.ports.transcript import Transcript
 from drivers.ports.wire import Wire
@@ -193,6 +194,7 @@ class SerialPort(Generic[Record]):
 
     def _read(self, port: serial.Serial) -> None:
         end: str | None = f"the reader of {self.settings.port} stopped on an error of this program (see the log)"
+        on_time()
         try:
             read = chunk_reader(port)
             while not self._closing.is_set():
