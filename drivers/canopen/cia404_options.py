@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from drivers.acquisition import Acquisition
 from drivers.canopen.frames import Field
 from drivers.force_units import NEWTONS_PER_UNIT
-from drivers.ports.lines import HOST_DELAY_STD, check_acquisition, check_gain_std, check_low_pass
 
 VALUES = {"float32": (0x6130, 32, False), "int16": (0x7130, 16, True), "int32": (0x9130, 32, True)}
 """Process value of an analogue input: index, bits, whether the integer has a sign."""
@@ -15,7 +15,7 @@ STATUS = 0x6150
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class Options(Acquisition):
     """`[devices.<name>]` of kind cia404."""
 
     bus: str
@@ -37,22 +37,8 @@ class Options:
     """Each value comes with its status (0x6150); false: the device cannot send that."""
     sign: Literal[1, -1] = 1
     """+1: the cell's positive direction is forward thrust."""
-    gain_std: float | None = None
-    """Relative standard uncertainty (1 sigma) of the calibration, from the certificate."""
-    noise_std: float | None = None
-    """N, known noise of one value (1 sigma)."""
     resolution: float | None = None
     """N, one step of a float32 value."""
-    delay: float = 0.0
-    """s by which a value is behind the force: conversion, filter (0x61A0, 0x61A1)."""
-    delay_std: float = HOST_DELAY_STD
-    """s, 1 sigma, of this delay and the computer's."""
-    window: float | None = None
-    """s that a value is the mean of."""
-    low_pass: float | None = None
-    """s, time constant of a first-order low pass that a value went through; its group delay is in delay."""
-    filter: str = ""
-    """What the amplifier does to a value, in words."""
     range_min: float | None = None
     """N"""
     range_max: float | None = None
@@ -82,9 +68,7 @@ class Options:
             raise ValueError(f"cia404 unit must be one of {', '.join(NEWTONS_PER_UNIT)}, not {self.unit!r}")
         if self.decimals is not None and (self.value == "float32" or not 0 <= self.decimals <= 9):
             raise ValueError(f"cia404 decimals are those of an integer value, 0 to 9, not {self.decimals}")
-        check_gain_std("cia404", self.gain_std)
-        check_acquisition("cia404", delay=self.delay, delay_std=self.delay_std, window=self.window)
-        check_low_pass("cia404", self.low_pass, self.delay)
+        self.check_acquisition("cia404")
 
     @property
     def period_ms(self) -> int:

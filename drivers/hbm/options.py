@@ -7,13 +7,10 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from drivers.acquisition import Acquisition
 from drivers.hbm.frames import ASCII, BINARY, CHARACTERS, FULL_SCALE
 from drivers.ports.lines import (
-    HOST_DELAY_STD,
-    check_acquisition,
-    check_gain_std,
     check_line_rate,
-    check_low_pass,
     line_time,
 )
 from drivers.ports.serial_port import SerialSettings
@@ -28,8 +25,8 @@ LARGEST = 8_388_607
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
-    """`[devices.<name>]` of kind hbm_aed."""
+class Options(Acquisition):
+    """`[devices.<name>]` of kind hbm_aed. No `window`: 1 / rate where rate is below top_rate, as the manual says."""
 
     port: str
     rate: float
@@ -52,20 +49,6 @@ class Options:
     """ASF; None: as it is set."""
     sign: Literal[1, -1] = 1
     """+1: the cell's positive direction is forward thrust."""
-    gain_std: float | None = None
-    """Relative standard uncertainty (1 sigma) of the calibration, from the certificate."""
-    noise_std: float | None = None
-    """N, known noise of one value (1 sigma)."""
-    delay: float = 0.0
-    """s by which a value is behind the force, without the line: group delay of the filter that is set."""
-    delay_std: float = HOST_DELAY_STD
-    """s, 1 sigma, of this delay and the computer's."""
-    window: float | None = None
-    """s that a value is the mean of; None: 1 / rate where rate is below top_rate, as the manual says."""
-    low_pass: float | None = None
-    """s, time constant of a first-order low pass that a value went through; its group delay is in delay."""
-    filter: str = ""
-    """What the electronics do to a value, in words."""
     range_min: float | None = None
     """N"""
     range_max: float | None = None
@@ -87,9 +70,7 @@ class Options:
         for name, stage in (("filter_mode", self.filter_mode), ("filter_stage", self.filter_stage)):
             if stage is not None and not 0 <= stage <= 99:
                 raise ValueError(f"hbm_aed {name} must be 0 to 99, not {stage}")
-        check_gain_std("hbm_aed", self.gain_std)
-        check_acquisition("hbm_aed", delay=self.delay, delay_std=self.delay_std, window=self.window)
-        check_low_pass("hbm_aed", self.low_pass, self.delay)
+        self.check_acquisition("hbm_aed")
         if not 0.0 < self.timeout <= 60.0:
             raise ValueError(f"hbm_aed timeout must be between 0 and 60 s, not {self.timeout}")
 

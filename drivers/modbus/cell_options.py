@@ -6,23 +6,20 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Literal
 
+from drivers.acquisition import Acquisition
 from drivers.force_units import NEWTONS_PER_UNIT
 from drivers.modbus.maps import Reading, RegisterMap, WordOrder, load_map, span
 from drivers.modbus.rtu import REQUEST_CHARACTERS, Read, gap
 from drivers.ports.lines import (
-    HOST_DELAY_STD,
     bits_per_character,
-    check_acquisition,
-    check_gain_std,
     check_line_rate,
-    check_low_pass,
     line_time,
 )
 from drivers.ports.serial_port import SerialSettings
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class Options(Acquisition):
     """`[devices.<name>]` of kind modbus_cell."""
 
     port: str
@@ -43,22 +40,8 @@ class Options:
     """None: the map's."""
     sign: Literal[1, -1] = 1
     """+1: the cell's positive direction is forward thrust."""
-    gain_std: float | None = None
-    """Relative standard uncertainty (1 sigma) of the calibration, from the certificate."""
-    noise_std: float | None = None
-    """N, known noise of one reading (1 sigma)."""
     resolution: float | None = None
     """N, one division of the display; None: what the device says, or one of its last decimal."""
-    delay: float = 0.0
-    """s by which a value is behind the force, without the line: filter, half a conversion period, turnaround."""
-    delay_std: float = HOST_DELAY_STD
-    """s, 1 sigma, of this delay and the computer's."""
-    window: float | None = None
-    """s that a reading is the mean of."""
-    low_pass: float | None = None
-    """s, time constant of a first-order low pass that a reading went through; its group delay is in delay."""
-    filter: str = ""
-    """What the transmitter does to a reading, in words."""
     range_min: float | None = None
     """N"""
     range_max: float | None = None
@@ -84,9 +67,7 @@ class Options:
         if self.sign not in (1, -1):
             raise ValueError(f"modbus_cell sign must be 1 or -1, not {self.sign}")
         self._check_scale(found, reading)
-        check_gain_std("modbus_cell", self.gain_std)
-        check_acquisition("modbus_cell", delay=self.delay, delay_std=self.delay_std, window=self.window)
-        check_low_pass("modbus_cell", self.low_pass, self.delay)
+        self.check_acquisition("modbus_cell")
 
     def _check_scale(self, found: RegisterMap, reading: Reading) -> None:
         """The number on the wire needs a unit and a decimal point: from the device, or from here."""

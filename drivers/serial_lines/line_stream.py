@@ -15,15 +15,12 @@ import re
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from drivers.acquisition import Acquisition
 from drivers.errors import DeviceError, LinkError
 from drivers.ports.inbox import BadRecords
 from drivers.ports.lines import (
-    HOST_DELAY_STD,
     LineCutter,
-    check_acquisition,
-    check_gain_std,
     check_line_rate,
-    check_low_pass,
     line_time,
     printable,
 )
@@ -80,7 +77,7 @@ class Decoder:
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class Options(Acquisition):
     """`[devices.<name>]` of kind line_stream."""
 
     port: str
@@ -108,19 +105,6 @@ class Options:
     """Text sent before closing."""
     tare: str = ""
     """Text that zeroes the instrument; empty: it cannot."""
-    delay: float = 0.0
-    """s by which a value is behind the quantity: conversion and group delay of a filter, without the line."""
-    delay_std: float = HOST_DELAY_STD
-    """s, 1 sigma, of this delay and the computer's."""
-    window: float | None = None
-    """s that a value is the mean of."""
-    low_pass: float | None = None
-    """s, time constant of a first-order low pass that a value went through; its group delay is in delay."""
-    filter: str = ""
-    """What the instrument does to a value, in words."""
-    gain_std: float | None = None
-    """Relative standard uncertainty (1 sigma) of scale."""
-    noise_std: float | None = None
     timeout: float = 3.0
     """s for the first line after opening; an Arduino restarts when its port is opened."""
     capture: str = ""
@@ -139,9 +123,7 @@ class Options:
             raise ValueError(
                 f"line_stream pattern needs a group (?P<value>...) or (?P<raw>...) and knows only {sorted(GROUPS)}"
             )
-        check_acquisition("line_stream", delay=self.delay, delay_std=self.delay_std, window=self.window)
-        check_gain_std("line_stream", self.gain_std)
-        check_low_pass("line_stream", self.low_pass, self.delay)
+        self.check_acquisition("line_stream")
         if not math.isfinite(self.scale) or self.scale == 0.0 or not math.isfinite(self.offset):
             raise ValueError(f"line_stream scale must be finite and not 0, offset finite: {self.scale}, {self.offset}")
         if self.threshold is not None and not math.isfinite(self.threshold):

@@ -13,14 +13,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+from drivers.acquisition import Acquisition
 from drivers.errors import DeviceError, LinkError
 from drivers.ports.inbox import BadRecords
 from drivers.ports.lines import (
-    HOST_DELAY_STD,
-    check_acquisition,
-    check_gain_std,
     check_line_rate,
-    check_low_pass,
     line_time,
     printable,
 )
@@ -45,7 +42,7 @@ SETTLE = 0.1
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class Options(Acquisition):
     """`[devices.<name>]` of kind loadstar."""
 
     port: str
@@ -59,22 +56,8 @@ class Options:
     """+1: the cell's positive direction is forward thrust."""
     unit: str | None = None
     """Unit the interface must be set to; None takes the one it has when opened."""
-    gain_std: float | None = None
-    """Relative standard uncertainty (1 sigma) of the calibration, from the certificate."""
-    noise_std: float | None = None
-    """N, known noise of one reading (1 sigma)."""
     resolution: float | None = None
     """N, one digit or one count."""
-    delay: float = 0.0
-    """s by which a value is behind the force, without the line."""
-    delay_std: float = HOST_DELAY_STD
-    """s, 1 sigma, of this delay and the computer's."""
-    window: float | None = None
-    """s that a reading is the mean of."""
-    low_pass: float | None = None
-    """s, time constant of a first-order low pass that a reading went through; its group delay is in delay."""
-    filter: str = ""
-    """What the interface does to a reading, in words."""
     range_min: float | None = None
     """N"""
     range_max: float | None = None
@@ -93,9 +76,7 @@ class Options:
             raise ValueError(f"loadstar sign must be 1 or -1, not {self.sign}")
         if self.unit is not None and self.unit.lower() not in UNITS:
             raise ValueError(f"loadstar unit must be one of {', '.join(UNITS)} (in any case), not {self.unit!r}")
-        check_gain_std("loadstar", self.gain_std)
-        check_acquisition("loadstar", delay=self.delay, delay_std=self.delay_std, window=self.window)
-        check_low_pass("loadstar", self.low_pass, self.delay)
+        self.check_acquisition("loadstar")
         if not 0.0 < self.timeout <= 60.0:
             raise ValueError(f"loadstar timeout must be between 0 and 60 s, not {self.timeout}")
 

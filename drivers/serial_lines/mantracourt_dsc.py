@@ -15,15 +15,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
+from drivers.acquisition import Acquisition
 from drivers.errors import DeviceError, LinkError
 from drivers.force_units import NEWTONS_PER_UNIT
 from drivers.ports.inbox import BadRecords
 from drivers.ports.lines import (
-    HOST_DELAY_STD,
-    check_acquisition,
-    check_gain_std,
     check_line_rate,
-    check_low_pass,
     line_time,
     printable,
 )
@@ -52,7 +49,7 @@ EARLY = 0.25
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class Options(Acquisition):
     """`[devices.<name>]` of kind mantracourt_dsc."""
 
     port: str
@@ -66,22 +63,8 @@ class Options:
     framing: str = "8N1"
     sign: Literal[1, -1] = 1
     """+1: the cell's positive direction is forward thrust."""
-    gain_std: float | None = None
-    """Relative standard uncertainty (1 sigma) of the calibration, from the certificate."""
-    noise_std: float | None = None
-    """N, known noise of one value (1 sigma)."""
     resolution: float | None = None
     """N, one digit of SYS (DP digits after its point)."""
-    delay: float = 0.0
-    """s by which a value is behind the force, without the line: filter, and half the time between two values."""
-    delay_std: float = HOST_DELAY_STD
-    """s, 1 sigma, of this delay and the computer's."""
-    window: float | None = None
-    """s that a value is the mean of."""
-    low_pass: float | None = None
-    """s, time constant of a first-order low pass that a value went through; its group delay is in delay."""
-    filter: str = ""
-    """What the card does to a value, in words."""
     range_min: float | None = None
     """N"""
     range_max: float | None = None
@@ -100,9 +83,7 @@ class Options:
             raise ValueError(f"mantracourt_dsc station must be 1 to 999, not {self.station}")
         if self.sign not in (1, -1):
             raise ValueError(f"mantracourt_dsc sign must be 1 or -1, not {self.sign}")
-        check_gain_std("mantracourt_dsc", self.gain_std)
-        check_acquisition("mantracourt_dsc", delay=self.delay, delay_std=self.delay_std, window=self.window)
-        check_low_pass("mantracourt_dsc", self.low_pass, self.delay)
+        self.check_acquisition("mantracourt_dsc")
         if not ANSWER_TIME <= self.timeout <= 10.0:
             raise ValueError(f"mantracourt_dsc timeout must be between {ANSWER_TIME} and 10 s, not {self.timeout}")
 

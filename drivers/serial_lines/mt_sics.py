@@ -13,15 +13,12 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from drivers.acquisition import Acquisition
 from drivers.errors import DeviceError, LinkError
 from drivers.force_units import NEWTONS_PER_UNIT
 from drivers.ports.inbox import BadRecords
 from drivers.ports.lines import (
-    HOST_DELAY_STD,
-    check_acquisition,
-    check_gain_std,
     check_line_rate,
-    check_low_pass,
     line_time,
     printable,
 )
@@ -48,7 +45,7 @@ GENERAL_ERRORS = ("ES", "ET", "EL")
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class Options(Acquisition):
     """`[devices.<name>]` of kind mt_sics."""
 
     port: str
@@ -62,22 +59,8 @@ class Options:
     """+1: the cell's positive direction is forward thrust."""
     unit: str | None = None
     """Unit the device must be set to; None takes the one it has when opened."""
-    gain_std: float | None = None
-    """Relative standard uncertainty (1 sigma) of the calibration, from the certificate."""
-    noise_std: float | None = None
-    """N, known noise of one reading (1 sigma)."""
     resolution: float | None = None
     """N, one digit of the display."""
-    delay: float = 0.0
-    """s by which a value is behind the force, without the line: conversion, group delay of the filter that is set."""
-    delay_std: float = HOST_DELAY_STD
-    """s, 1 sigma, of this delay and the computer's."""
-    window: float | None = None
-    """s that a reading is the mean of."""
-    low_pass: float | None = None
-    """s, time constant of a first-order low pass that a reading went through; its group delay is in delay."""
-    filter: str = ""
-    """What the module does to a reading, in words."""
     range_min: float | None = None
     """N"""
     range_max: float | None = None
@@ -94,9 +77,7 @@ class Options:
             raise ValueError(f"mt_sics sign must be 1 or -1, not {self.sign}")
         if self.unit is not None and self.unit not in NEWTONS_PER_UNIT:
             raise ValueError(f"mt_sics unit must be one of {', '.join(NEWTONS_PER_UNIT)}, not {self.unit!r}")
-        check_gain_std("mt_sics", self.gain_std)
-        check_acquisition("mt_sics", delay=self.delay, delay_std=self.delay_std, window=self.window)
-        check_low_pass("mt_sics", self.low_pass, self.delay)
+        self.check_acquisition("mt_sics")
         if not 0.0 < self.timeout <= 60.0:
             raise ValueError(f"mt_sics timeout must be between 0 and 60 s, not {self.timeout}")
 

@@ -11,16 +11,13 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
+from drivers.acquisition import Acquisition
 from drivers.errors import DeviceError, LinkError
 from drivers.force_units import NEWTONS_PER_UNIT
 from drivers.ports.inbox import BadRecords
 from drivers.ports.lines import (
-    HOST_DELAY_STD,
     LineCutter,
-    check_acquisition,
-    check_gain_std,
     check_line_rate,
-    check_low_pass,
     line_time,
     printable,
 )
@@ -47,7 +44,7 @@ EARLY = 0.25
 
 
 @dataclass(frozen=True, slots=True)
-class Options:
+class Options(Acquisition):
     """`[devices.<name>]` of kind sartorius_sbi."""
 
     port: str
@@ -59,22 +56,8 @@ class Options:
     framing: str = "8O1"
     sign: Literal[1, -1] = 1
     """+1: the balance's positive direction is forward thrust."""
-    gain_std: float | None = None
-    """Relative standard uncertainty (1 sigma) of the calibration, from the certificate."""
-    noise_std: float | None = None
-    """N, known noise of one reading (1 sigma)."""
     resolution: float | None = None
     """N, one digit of the display."""
-    delay: float = 0.0
-    """s by which a reading is behind the force, without the line: filter, and half the time between two readings."""
-    delay_std: float = HOST_DELAY_STD
-    """s, 1 sigma, of this delay and the computer's."""
-    window: float | None = None
-    """s that a reading is the mean of."""
-    low_pass: float | None = None
-    """s, time constant of a first-order low pass that a reading went through; its group delay is in delay."""
-    filter: str = ""
-    """What the balance does to a reading, in words."""
     range_min: float | None = None
     """N"""
     range_max: float | None = None
@@ -91,9 +74,7 @@ class Options:
             raise ValueError(f"sartorius_sbi unit must be one of {', '.join(NEWTONS_PER_UNIT)}, not {self.unit!r}")
         if self.sign not in (1, -1):
             raise ValueError(f"sartorius_sbi sign must be 1 or -1, not {self.sign}")
-        check_gain_std("sartorius_sbi", self.gain_std)
-        check_acquisition("sartorius_sbi", delay=self.delay, delay_std=self.delay_std, window=self.window)
-        check_low_pass("sartorius_sbi", self.low_pass, self.delay)
+        self.check_acquisition("sartorius_sbi")
         if not 0.0 < self.timeout <= 10.0:
             raise ValueError(f"sartorius_sbi timeout must be between 0 and 10 s, not {self.timeout}")
 
