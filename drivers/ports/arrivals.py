@@ -21,11 +21,13 @@ class Arrivals:
     """One thread adds, any may decode; each chunk is decoded once, in the order in which they came."""
 
     def __init__(self, decode: Callable[[int, bytes], None], failed: Callable[[], None]) -> None:
-        """`decode(t_ns, data)`: one chunk. `failed`: told when that raises, which is an error of this program."""
+        """`decode(t_ns, data)`: one chunk. `failed`: told when that raises, which is an error of this program: the wire
+        is lost by it, and nothing that comes is decoded any more."""
         self._decode, self._failed = decode, failed
         self._chunks: deque[tuple[int, bytes]] = deque()
         self._lock = threading.Lock()
         self._waiting = 0
+        self._broken = False
 
     def add(self, t_ns: int, data: bytes) -> None:
         """What came at `t_ns`."""
@@ -39,11 +41,17 @@ class Arrivals:
             return
         with self._lock:
             while self._chunks:
-                try:
-                    self._decode(*self._chunks.popleft())
-                except Exception:  # noqa: BLE001  a wire is lost by it, not the loop that drains
-                    traceback.print_exc()
-                    self._failed()
+                t_ns, data = self._chunks.popleft()
+                if not self._broken:
+                    self._decode_one(t_ns, data)
+
+    def _decode_one(self, t_ns: int, data: bytes) -> None:
+        try:
+            self._decode(t_ns, data)
+        except Exception:  # noqa: BLE001  of any kind: it must not end the loop that drains
+            self._broken = True
+            traceback.print_exc()
+            self._failed()
 
     @contextmanager
     def awaited(self) -> Iterator[None]:
