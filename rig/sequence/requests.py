@@ -85,7 +85,9 @@ def _extend(run: Sequencer, time: float) -> None:
 def _bad(run: Sequencer, time: float) -> None:
     row = run.journal.void_last()
     if row is None:
-        run.journal.say(time, "warning", "bad ignored: no step was measured since the last one was marked")
+        run.journal.say(
+            time, "warning", "bad ignored: no step was measured to its end yet, or the last one is marked already"
+        )
         return
     run.journal.given_up.append(row.index)
     where = f"{row.phase} at {row.command_voltage:g} V, {row.t_start:.2f} to {row.t_end:.2f} s"

@@ -240,7 +240,7 @@ def test_what_was_measured_last_is_marked_by_a_row_of_its_own():
     assert (void.index, void.t_start, void.t_end) == (hold.index, hold.t_start, hold.t_end)
     assert ran.outputs[number + 5].given_up == (hold.index,)
     assert ran.said("marked bad by the operator: step")
-    assert ran.said("bad ignored: no step was measured since")
+    assert ran.said("bad ignored: no step was measured to its end")
     assert ran.last.outcome == "completed"
 
 
