@@ -13,6 +13,8 @@ from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+Chunk = tuple[int, bytes]
+"""When it came (ns), and what."""
 MOST = 64
 """Chunks that are kept; a reader that finds so many decodes them itself, so that memory is bounded without a drain."""
 
@@ -20,11 +22,11 @@ MOST = 64
 class Arrivals:
     """One thread adds, any may decode; each chunk is decoded once, in the order in which they came."""
 
-    def __init__(self, decode: Callable[[int, bytes], None], failed: Callable[[], None]) -> None:
-        """`decode(t_ns, data)`: one chunk. `failed`: told when that raises, which is an error of this program: the wire
+    def __init__(self, decode: Callable[[list[Chunk]], None], failed: Callable[[], None]) -> None:
+        """`decode`: chunks in their order. `failed`: told when that raises, which is an error of this program: the wire
         is lost by it, and nothing that comes is decoded any more."""
         self._decode, self._failed = decode, failed
-        self._chunks: deque[tuple[int, bytes]] = deque()
+        self._chunks: deque[Chunk] = deque()
         self._lock = threading.Lock()
         self._waiting = 0
         self._broken = False
@@ -40,18 +42,15 @@ class Arrivals:
         if not self._chunks:
             return
         with self._lock:
-            while self._chunks:
-                t_ns, data = self._chunks.popleft()
-                if not self._broken:
-                    self._decode_one(t_ns, data)
-
-    def _decode_one(self, t_ns: int, data: bytes) -> None:
-        try:
-            self._decode(t_ns, data)
-        except Exception:  # noqa: BLE001  of any kind: it must not end the loop that drains
-            self._broken = True
-            traceback.print_exc()
-            self._failed()
+            chunks = [self._chunks.popleft() for _ in range(len(self._chunks))]  # the reader may add meanwhile
+            if self._broken or not chunks:
+                return
+            try:
+                self._decode(chunks)
+            except Exception:  # noqa: BLE001  of any kind: it must not end the loop that drains
+                self._broken = True
+                traceback.print_exc()
+                self._failed()
 
     @contextmanager
     def awaited(self) -> Iterator[None]:

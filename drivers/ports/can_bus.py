@@ -22,7 +22,7 @@ from can.interfaces import VALID_INTERFACES
 from can.interfaces.slcan import slcanBus
 
 from drivers.errors import LinkError
-from drivers.ports.arrivals import Arrivals
+from drivers.ports.arrivals import Arrivals, Chunk
 from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
 from drivers.ports.punctual import on_time
@@ -214,7 +214,8 @@ class CanBus:
         while not self._closing.is_set():
             if frames := _next_frame(bus, self._bad):
                 self._received += len(frames)
-                self._deliver(time.monotonic_ns(), frames)
+                now_ns = time.monotonic_ns()
+                self._deliver([(now_ns, frame) for frame in frames])
 
     def _arrived(self, t_ns: int, data: bytes) -> None:
         """What an slcan adapter says; a transcript has all of it at once."""
@@ -222,9 +223,9 @@ class CanBus:
         if self._transcript is not None:
             self._arrivals.decode()
 
-    def _decode(self, t_ns: int, data: bytes) -> None:
-        if frames := self._lines.feed(data):
-            self._deliver(t_ns, frames)
+    def _decode(self, chunks: list[Chunk]) -> None:
+        if rows := [(t_ns, frame) for t_ns, data in chunks for frame in self._lines.feed(data)]:
+            self._deliver(rows)
 
     def _wanted(self, identifier: int, extended: bool) -> bool:
         empty = Frame(identifier, extended, b"")
@@ -238,14 +239,14 @@ class CanBus:
         for _, inbox in self._inboxes:
             inbox.end()
 
-    def _deliver(self, t_ns: int, frames: list[Frame]) -> None:
-        """To each device its own of the frames that came together at `t_ns`."""
+    def _deliver(self, rows: list[tuple[int, Frame]]) -> None:
+        """To each device its own of the frames, with when they came."""
         if self._transcript is not None:
-            for frame in frames:
+            for t_ns, frame in rows:
                 self._transcript.write(t_ns, "<", str(frame).encode())
         for accept, inbox in self._inboxes:
-            if accepted := [frame for frame in frames if accept(frame)]:
-                inbox.put(t_ns, accepted)
+            if accepted := [row for row in rows if accept(row[1])]:
+                inbox.put(accepted)
 
 
 def _next_frame(bus: can.BusABC, bad: BadRecords) -> list[Frame]:

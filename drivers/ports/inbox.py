@@ -70,12 +70,12 @@ class Inbox(Generic[Record]):
         self._look()
         return self._dropped
 
-    def put(self, t_ns: int, records: Sequence[Record]) -> None:
-        """Add records that arrived together at `t_ns` (`time.monotonic_ns()`)."""
+    def put(self, rows: Sequence[tuple[int, Record]]) -> None:
+        """Add records, each with when it came (ns, `time.monotonic_ns()`)."""
         with self._arrival:
-            self._dropped += max(0, len(self._rows) + len(records) - self._capacity)
-            self._rows.extend([(t_ns, record) for record in records])
-            self._received += len(records)
+            self._dropped += max(0, len(self._rows) + len(rows) - self._capacity)
+            self._rows.extend(rows)
+            self._received += len(rows)
             self._arrival.notify_all()
 
     def take_all(self) -> list[tuple[int, Record]]:

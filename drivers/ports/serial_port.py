@@ -16,7 +16,7 @@ from typing import Generic, TypeVar
 import serial
 
 from drivers.errors import LinkError
-from drivers.ports.arrivals import Arrivals
+from drivers.ports.arrivals import Arrivals, Chunk
 from drivers.ports.inbox import Inbox
 from drivers.ports.lines import bits_per_character
 from drivers.ports.punctual import on_time
@@ -107,9 +107,9 @@ class SerialPort(Generic[Record]):
     def _empty(self) -> tuple[Arrivals, Inbox[Record]]:
         """Bytes that came go through `feed` into the inbox."""
 
-        def decode(t_ns: int, data: bytes) -> None:
-            if records := self._feed(data):
-                inbox.put(t_ns, records)
+        def decode(chunks: list[Chunk]) -> None:
+            if rows := [(t_ns, record) for t_ns, data in chunks for record in self._feed(data)]:
+                inbox.put(rows)
 
         def failed() -> None:
             why = f"the decoder of {self.settings.port} stopped on an error of this program (see the log)"

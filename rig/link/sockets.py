@@ -20,6 +20,8 @@ MAX_PATH: Final = 107
 """Longest AF_UNIX path in bytes: sun_path of 108 with its end mark, unix(7)."""
 READ_AT_ONCE: Final = 16 * 2**20
 """Bytes taken by one `receive`, so that a fast writer cannot hold the caller's loop."""
+AT_ONE_CALL: Final = 2**16
+"""Bytes asked of the kernel at once: room for twice as many is mapped anew each time, also when nothing has come."""
 
 
 class Overrun(LinkError):
@@ -116,7 +118,7 @@ class Peer:
         taken = 0
         while not self.closed and taken < self._at_once:
             try:
-                data = self._socket.recv(min(2**18, self._at_once))
+                data = self._socket.recv(min(AT_ONE_CALL, self._at_once))
             except BlockingIOError:
                 return
             except ConnectionResetError:

@@ -14,11 +14,12 @@ class Told:
     def __init__(self) -> None:
         self.chunks, self.threads, self.failures = [], [], 0
 
-    def __call__(self, t_ns, data):
-        self.chunks.append((t_ns, data))
-        self.threads.append(threading.current_thread())
-        if data == b"!":
-            raise KeyError("a mistake")
+    def __call__(self, chunks):
+        for t_ns, data in chunks:
+            self.chunks.append((t_ns, data))
+            self.threads.append(threading.current_thread())
+            if data == b"!":
+                raise KeyError("a mistake")
 
     def failed(self):
         self.failures += 1
@@ -89,7 +90,7 @@ LOOKS = {
 @pytest.mark.parametrize("way", LOOKS)
 def test_every_way_to_look_into_an_inbox_decodes(way):
     look, wanted = LOOKS[way]
-    arrivals = Arrivals(lambda t_ns, data: inbox.put(t_ns, [data]), lambda: None)
+    arrivals = Arrivals(lambda chunks: inbox.put(chunks), lambda: None)
     inbox = Inbox(10, arrivals=arrivals)
     arrivals.add(7, b"x")
     assert look(inbox) == wanted
@@ -97,7 +98,7 @@ def test_every_way_to_look_into_an_inbox_decodes(way):
 
 
 def test_who_waits_is_woken_by_what_a_reader_adds():
-    arrivals = Arrivals(lambda t_ns, data: inbox.put(t_ns, [data]), lambda: None)
+    arrivals = Arrivals(lambda chunks: inbox.put(chunks), lambda: None)
     inbox = Inbox(10, arrivals=arrivals)
     found = []
     waiter = threading.Thread(target=lambda: found.append(inbox.wait_for(lambda data: data == b"2", 30.0)))

@@ -155,8 +155,8 @@ def test_a_transcript_that_is_none(tmp_path):
 
 def test_an_inbox_that_nobody_empties_drops_the_oldest_and_counts():
     inbox = Inbox(3)
-    inbox.put(1, [1, 2])
-    inbox.put(2, [3, 4, 5])
+    inbox.put([(1, 1), (1, 2)])
+    inbox.put([(2, 3), (2, 4), (2, 5)])
     assert [r for _, r in inbox.take_all()] == [3, 4, 5]
     assert (inbox.received, inbox.dropped) == (5, 2)
     with pytest.raises(ValueError, match="at least 1"):
