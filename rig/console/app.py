@@ -8,6 +8,7 @@ from typing import ClassVar, Final
 
 from textual import events
 from textual.app import ComposeResult
+from textual.await_complete import AwaitComplete
 from textual.binding import Binding, BindingType
 from textual.containers import Container, Horizontal, Vertical, VerticalScroll
 from textual.filter import LineFilter
@@ -22,6 +23,7 @@ from rig.console.dialogs import LeaveDialog, NoteDialog
 from rig.console.feed import Feed
 from rig.console.few_colors import filters_for
 from rig.console.history import CompareDialog, HistoryApp, HistoryPanel
+from rig.console.interpreter import forget_closed
 from rig.console.key_help import KeyHelp
 from rig.console.keys_in_order import KeysInOrder
 from rig.console.panels import (
@@ -207,6 +209,11 @@ class ConsoleApp(ChoosingApp, DiagnosingApp, HistoryApp, inherit_bindings=False)
     async def on_event(self, event: events.Event) -> None:
         """Keys come here first, and those that a widget has not used a second time."""
         await self.in_order.handle(event, super().on_event)
+
+    def pop_screen(self) -> AwaitComplete:
+        """Of any dialog that closes."""
+        forget_closed()
+        return super().pop_screen()
 
     def action_view(self, name: str) -> None:
         self.chosen = name

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 import gc
 import sys
+from collections.abc import Callable
 from typing import Final
+
+from textual._styles_cache import StylesCache
 
 SETTLED: Final = 2.0
 """s after which a screen has all that it keeps."""
+_CLEAR: Final[Callable[[], None] | None] = getattr(getattr(StylesCache, "get_inner_outer", None), "cache_clear", None)
+"""Of a method of Textual whose lru_cache is of all widgets there ever were; None: of this Textual it is not."""
 SWITCH: Final = 0.001
 """s that a thread waits for another one's turn; Python's own is 5 ms, and a key that is read takes several turns."""
 
@@ -17,3 +22,10 @@ def settle() -> None:
     sys.setswitchinterval(SWITCH)
     gc.collect()
     gc.freeze()
+
+
+def forget_closed() -> None:
+    """Let go what closed dialogs have drawn, which Textual's cache keeps of the last hundred of them: then a full
+    collection, and each dialog that is opened begins one, takes 200 ms and more."""
+    if _CLEAR is not None:
+        _CLEAR()
