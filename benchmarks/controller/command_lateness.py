@@ -14,6 +14,8 @@ import argparse
 import os
 import sys
 import tempfile
+from contextlib import redirect_stderr, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -50,8 +52,10 @@ def recorded(folder: Path, many: int) -> tuple[Floats, Floats]:
         text = text.replace(old, new)
     (folder / "campaign.toml").write_text(text, encoding="utf-8")
     with running(folder / "world.toml", folder / "ports") as bench, busy(many):
-        if rig(["run", str(folder / "campaign.toml"), "--headless", "--no-report"]):
-            raise SystemExit("the campaign did not complete")
+        with redirect_stdout(StringIO()), redirect_stderr(StringIO()) as said:
+            status = rig(["run", str(folder / "campaign.toml"), "--headless", "--no-report"])
+        if status:
+            raise SystemExit(f"the campaign did not complete: {said.getvalue()[-500:]}")
         taken = [line for line in bench.truth("command") if line["volts"] is not None]
     (path,) = folder.glob("out/*/*.h5")
     (command,) = load(path).all_of("command_voltage")

@@ -216,6 +216,10 @@ class Day:
         ids = re.findall(rf"(?m)^\S+ \S+ +([0-9a-f]{{8}}) +{name} ", screen)
         here.runs(f"rig show {ids[-1]} recordings | head -34", "all that is known of one", name, "thrust", "N")
         here.runs("rig list recordings --what campaigns", "the campaigns", "first", "next experiment")
-        here.runs("rig list recordings --what calibrations", "what they were measured under", r"gain_std 0\.0\d+ %, in 5 recordings")
+        here.runs(
+            "rig list recordings --what calibrations",
+            "what they were measured under",
+            r"gain_std 0\.0\d+ %, in 5 recordings",
+        )
         compare = f"rig compare-fits --thruster {name} recordings"
         here.runs(compare, "has it changed?", "2 fits in order of time", rf"{name} has (not )?changed")
