@@ -93,7 +93,7 @@ class _Bus:
 
     def subscribe(self, match: Callable[[Frame], bool]) -> Inbox[Frame]:
         self.match, self.inbox = match, Inbox[Frame](64)
-        self.inbox.put(0, self._first)
+        self.inbox.put([(0, frame) for frame in self._first])
         return self.inbox
 
     def unsubscribe(self, inbox: Inbox[Frame]) -> None:
@@ -164,7 +164,7 @@ def _signals() -> Decode:
     def decode(data: bytes) -> Any:
         frame = _frame(data)
         if bus.match(frame):
-            bus.inbox.put(0, [frame])
+            bus.inbox.put([(0, frame)])
         return [list(sample.values) for sample in device.drain()]
 
     return decode
