@@ -4,8 +4,8 @@
 
 A mutant is the module with one change: a comparison moved or turned, an operator exchanged, a number one larger, a
 condition turned or left out, a statement left out, a return without its value. Texts, type annotations and decorators
-are left alone. Each is run in a process of its own, `LIMIT` s at most (a mutant that hangs is killed too); the
-first test that fails kills it. Prints the survivors with their lines, then how many were made and killed.
+are left alone. Each is run in a process of its own, `LIMIT` s of a processor at most (a mutant that hangs is killed
+too); the first test that fails kills it. Prints the survivors with their lines, then how many were made and killed.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ from typing import NamedTuple
 
 PROJECT = Path(__file__).resolve().parents[2]
 LIMIT = 120
-"""s"""
+"""s of a processor: beside other work a mutant gets as much as alone."""
+HANGS = 900
+"""s by the clock, for one that waits and computes nothing."""
 STAGES = ("test_arming.py", "test_campaign_stops.py", "test_campaign_failures.py")
 PROOFS = ("tests/rig/safety/test_proof_edges.py", "tests/rig/sequence/test_sequencer_proof.py")
 TARGETS: dict[str, tuple[str, tuple[str, ...]]] = {
@@ -163,7 +165,8 @@ def survives(module: str, source: str, tests: tuple[str, ...]) -> bool:
     child = os.fork()
     if child == 0:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.alarm(LIMIT)
+        signal.alarm(HANGS)
+        signal.setitimer(signal.ITIMER_PROF, LIMIT)
         status = 1
         with contextlib.suppress(BaseException):
             nowhere = os.open(os.devnull, os.O_WRONLY)
