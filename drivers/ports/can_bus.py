@@ -11,7 +11,6 @@ import contextlib
 import difflib
 import fcntl
 import os
-import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -25,28 +24,25 @@ from drivers.errors import LinkError
 from drivers.ports.arrivals import Arrivals, Chunk
 from drivers.ports.can_frame import Frame
 from drivers.ports.inbox import BadRecords, Inbox
-from drivers.ports.punctual import on_time
+from drivers.ports.own_reader import OwnReader
+from drivers.ports.reader import READ_TIMEOUT
 from drivers.ports.refusals import why_not_open
-from drivers.ports.serial_port import chunk_reader, set_low_latency
+from drivers.ports.serial_port import read, set_low_latency
 from drivers.ports.slcan_lines import SlcanLines
 from drivers.ports.transcript import Transcript
 from drivers.ports.wire import SerialOverWire, Wire
 from drivers.protocols import LinkHealth
 
-READ_TIMEOUT = 0.05
-"""s; how soon an idle reader notices that it shall stop."""
 SEND_TIMEOUT = 0.2
 """s; an adapter that takes no bytes for this long has lost its bus or its cable. Time spent preempted counts for
 pyserial too, even when every byte went out at once: hence well above a scheduling hiccup, and below the lateness that
 the loop allows."""
-JOIN_TIMEOUT = 2.0
-"""s; forty times what the reader needs to stop."""
 CAPACITY = 100_000
 """Frames kept per device between two drains; 25 s of a full 500 kbit/s bus."""
 
 
 class CanBus:
-    """A bus with one reader thread; each device gets its own inbox of the frames it accepts."""
+    """One bus; each device gets its own inbox of the frames it accepts."""
 
     def __init__(self, interface: str, channel: str, bitrate: int, capture: str = "", wire: Wire | None = None) -> None:
         """`wire`: to an slcan adapter, used instead of the port `channel`, with its stamps and in its time."""
@@ -65,9 +61,9 @@ class CanBus:
         self._interface, self._channel, self._bitrate, self._capture = interface, channel, bitrate, capture
         self._bus: can.BusABC | None = None
         self._lock: int | None = None
-        self._reader: threading.Thread | None = None
+        self._unread: Callable[[], None] | None = None
+        """Ends the reading."""
         self._transcript: Transcript | None = None
-        self._closing = threading.Event()
         self._inboxes: tuple[tuple[Callable[[Frame], bool], Inbox[Frame]], ...] = ()
         self._received = 0
         self._bad = BadRecords()
@@ -84,7 +80,6 @@ class CanBus:
             return
         self.error, self._bad, self._received = None, BadRecords(), 0
         self._lines, self._arrivals = SlcanLines(self._bad, self._wanted), Arrivals(self._decode, self._failed)
-        self._closing.clear()
         if self._wire is not None:
             self._transcript = Transcript(Path(self._capture)) if self._capture else None
             self._bus = self._over(self._wire)
@@ -99,10 +94,7 @@ class CanBus:
                 f"CAN bus {self._interface} on {self._channel} at {self._bitrate} bit/s does not open:"
                 f" {why_not_open(error)}"
             ) from error
-        self._reader = threading.Thread(
-            target=self._read, args=(self._bus,), name=f"read {self._channel}", daemon=False
-        )
-        self._reader.start()
+        self._unread = self._read(self._bus)
 
     def subscribe(self, accept: Callable[[Frame], bool], capacity: int = CAPACITY) -> Inbox[Frame]:
         """An inbox that gets every frame for which `accept` is true, from now until the bus is closed.
@@ -146,16 +138,15 @@ class CanBus:
 
     def close(self) -> None:
         """Stop reading and let the adapter go. Safe to call twice and after a failure."""
-        self._closing.set()
-        if self._reader is not None:
-            self._reader.join(JOIN_TIMEOUT)
+        if self._unread is not None:
+            self._unread()
         if self._bus is not None:
             _shut_down(self._bus)
         if self._lock is not None:
             os.close(self._lock)
         if self._transcript is not None:
             self._transcript.close()
-        self._bus = self._reader = self._lock = self._transcript = None
+        self._bus = self._unread = self._lock = self._transcript = None
         self._inboxes = ()
 
     def _over(self, wire: Wire) -> can.BusABC:
@@ -186,36 +177,24 @@ class CanBus:
             raise
         return descriptor
 
-    def _read(self, bus: can.BusABC) -> None:
-        end: str | None = f"the reader of {self._channel} stopped on an error of this program (see the log)"
-        on_time()
-        try:
-            if isinstance(bus, slcanBus):
-                self._read_lines(bus)
-            else:
-                self._read_frames(bus)
-            end = None
-        except (can.CanError, OSError) as error:
-            end = f"{self._channel} was lost ({error}): check adapter, cable and power, then open it again"
-        finally:
-            self.error = self.error or end
-            self._arrivals.decode()
-            self._end_inboxes()
+    def _read(self, bus: can.BusABC) -> Callable[[], None]:
+        """From now on; returns what ends that."""
+        if isinstance(bus, slcanBus):
+            set_low_latency(bus.serialPortOrig)
+            return read(bus.serialPortOrig, self._channel, self._arrived, self._lost)
+        return OwnReader(self._channel, lambda: self._take_frame(bus), self._lost, (can.CanError, OSError)).end
 
-    def _read_lines(self, bus: slcanBus) -> None:
-        set_low_latency(bus.serialPortOrig)
-        read = chunk_reader(bus.serialPortOrig)
-        while not self._closing.is_set():
-            if data := read():
-                self._arrived(time.monotonic_ns(), data)
-
-    def _read_frames(self, bus: can.BusABC) -> None:
+    def _take_frame(self, bus: can.BusABC) -> None:
         """Of any other adapter, one by one."""
-        while not self._closing.is_set():
-            if frames := _next_frame(bus, self._bad):
-                self._received += len(frames)
-                now_ns = time.monotonic_ns()
-                self._deliver([(now_ns, frame) for frame in frames])
+        if frames := _next_frame(bus, self._bad):
+            self._received += len(frames)
+            now_ns = time.monotonic_ns()
+            self._deliver([(now_ns, frame) for frame in frames])
+
+    def _lost(self, why: str) -> None:
+        self.error = self.error or why
+        self._arrivals.decode()
+        self._end_inboxes()
 
     def _arrived(self, t_ns: int, data: bytes) -> None:
         """What an slcan adapter says; a transcript has all of it at once."""

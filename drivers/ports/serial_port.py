@@ -1,12 +1,9 @@
-"""A serial port with one reader thread that stamps what arrives. With can_bus.py the only place that opens wires."""
+"""A serial port: what arrives is stamped and decoded. With can_bus.py the only place that opens wires."""
 
 from __future__ import annotations
 
 import contextlib
-import os
-import select
 import termios
-import threading
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -19,21 +16,16 @@ from drivers.errors import LinkError
 from drivers.ports.arrivals import Arrivals, Chunk
 from drivers.ports.inbox import Inbox
 from drivers.ports.lines import bits_per_character
-from drivers.ports.punctual import on_time
+from drivers.ports.own_reader import OwnReader
+from drivers.ports.reader import READ_TIMEOUT, READER, Lost, Port
 from drivers.ports.refusals import why_not_open
 from drivers.ports.transcript import Transcript
-from drivers.ports.wire import Wire
+from drivers.ports.wire import Arrived, Wire
 
 Record = TypeVar("Record")
 
-READ_TIMEOUT = 0.05
-"""s; how soon an idle reader notices that it shall stop."""
 WRITE_TIMEOUT = 0.2
 """s; a port that takes no bytes for this long has lost its device."""
-CHUNK = 65_536
-"""Bytes taken at once, at most."""
-JOIN_TIMEOUT = 2.0
-"""s; forty times what the reader needs to stop."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +61,8 @@ class SerialPort(Generic[Record]):
         self._arrivals, self.inbox = self._empty()
         self._serial: serial.Serial | None = None
         self._transcript: Transcript | None = None
-        self._reader: threading.Thread | None = None
-        self._closing = threading.Event()
+        self._unread: Callable[[], None] | None = None
+        """Ends the reading."""
         self._opened = False
 
     @property
@@ -82,7 +74,6 @@ class SerialPort(Generic[Record]):
         if self._opened:
             raise LinkError(f"{self._name}: {self.settings.port} is already open")
         self.error = None
-        self._closing.clear()
         self._arrivals, self.inbox = self._empty()
         if self._wire is not None:
             self._transcript = self._new_transcript()
@@ -100,8 +91,7 @@ class SerialPort(Generic[Record]):
             port.close()
             raise
         self._serial = port
-        self._reader = threading.Thread(target=self._read, args=(port,), name=f"read {self._name}", daemon=False)
-        self._reader.start()
+        self._unread = read(port, self.settings.port, self._arrived, self._lost)
         self._opened = True
 
     def _empty(self) -> tuple[Arrivals, Inbox[Record]]:
@@ -179,35 +169,22 @@ class SerialPort(Generic[Record]):
 
     def close(self) -> None:
         """Stop the reader and let the port go. Safe to call twice and after a failure."""
-        self._closing.set()
         if self._wire is not None:
             self._wire.disconnect()
-        if self._reader is not None:
-            self._reader.join(JOIN_TIMEOUT)
+        if self._unread is not None:
+            self._unread()
         if self._serial is not None:
             with contextlib.suppress(OSError):
                 self._serial.close()
         if self._transcript is not None:
             self._transcript.close()
-        self._reader = self._serial = self._transcript = None
+        self._unread = self._serial = self._transcript = None
         self._opened = False
 
-    def _read(self, port: serial.Serial) -> None:
-        end: str | None = f"the reader of {self.settings.port} stopped on an error of this program (see the log)"
-        on_time()
-        try:
-            read = chunk_reader(port)
-            while not self._closing.is_set():
-                data = read()
-                if data:
-                    self._arrived(time.monotonic_ns(), data)
-            end = None
-        except OSError as error:
-            end = f"{self.settings.port} was lost ({error}): check cable and power, then open it again"
-        finally:
-            self.error = self.error or end
-            self._arrivals.decode()
-            self.inbox.end()
+    def _lost(self, why: str) -> None:
+        self.error = self.error or why
+        self._arrivals.decode()
+        self.inbox.end()
 
     def _arrived(self, t_ns: int, data: bytes) -> None:
         if self._transcript is not None:
@@ -215,30 +192,22 @@ class SerialPort(Generic[Record]):
         self._arrivals.add(t_ns, data)
 
 
-def chunk_reader(port: serial.Serial) -> Callable[[], bytes]:
-    """What has arrived, or nothing after READ_TIMEOUT. Raises OSError when the device is gone.
+def read(port: serial.Serial, label: str, arrived: Arrived, lost: Lost) -> Callable[[], None]:
+    """From now on tell `arrived` what comes. Returns what ends that: after it nobody is told any more.
 
-    One poll and one read a chunk; pyserial's own read takes four system calls and half as much again in Python.
+    pyserial's own read takes four system calls and half as much again in Python: the descriptor is read, if it has one.
     """
     try:
         descriptor = port.fileno()
     except (OSError, NotImplementedError, AttributeError):  # loop:// and rfc2217:// have none
-        return lambda: port.read(port.in_waiting or 1)
-    poller = select.poll()
-    poller.register(descriptor, select.POLLIN)
+        return OwnReader(label, lambda: _look(port, arrived), lost, (OSError,)).end
+    READER.watch(descriptor, Port(label, arrived, lost))
+    return lambda: READER.forget(descriptor)
 
-    def read() -> bytes:
-        if not poller.poll(READ_TIMEOUT * 1e3):
-            return b""
-        try:
-            data = os.read(descriptor, CHUNK)
-        except BlockingIOError:  # woken for nothing
-            return b""
-        if not data:
-            raise OSError("the device has gone")
-        return data
 
-    return read
+def _look(port: serial.Serial, arrived: Arrived) -> None:
+    if data := port.read(port.in_waiting or 1):
+        arrived(time.monotonic_ns(), data)
 
 
 def _open_serial(settings: SerialSettings) -> serial.Serial:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections import deque
-from math import isfinite
-from statistics import fmean, pstdev
+from collections.abc import Sequence
+from math import fsum, isfinite
+from statistics import pstdev
 
 WINDOW = 0.2
 """s of rows that the mean is taken of, and at least `LEAST_ROWS` of a slow sensor."""
@@ -24,19 +25,25 @@ class ThrustRest:
     def __init__(self, limit: float | None = None) -> None:
         """`limit`: N from the tare that count as none; None: what the noise and the largest thrust allow."""
         self._limit = limit
-        self._rows: deque[tuple[float, float]] = deque()
+        self._times: deque[float] = deque()
+        self._values: deque[float] = deque()
+        """N, of the same rows: their mean is taken in every tick, of hundreds of a fast sensor."""
         self._tare: float | None = None
         self._told: float | None = None
         self._noise = self._largest = self._mean = 0.0
 
     def add(self, rows: tuple[tuple[float, float], ...]) -> None:
         """(s, N), raw; the newest say how large the thrust is."""
-        self._rows.extend(row for row in rows if isfinite(row[1]))
-        while len(self._rows) > LEAST_ROWS and self._rows[0][0] < self._rows[-1][0] - WINDOW:
-            self._rows.popleft()
-        if self._rows:
-            self._mean = fmean([value for _, value in self._rows])
-        if self._tare is not None and len(self._rows) >= LEAST_ROWS:
+        for time, value in rows:
+            if isfinite(value):
+                self._times.append(time)
+                self._values.append(value)
+        while len(self._times) > LEAST_ROWS and self._times[0] < self._times[-1] - WINDOW:
+            self._times.popleft()
+            self._values.popleft()
+        if self._values:
+            self._mean = fsum(self._values) / len(self._values)
+        if self._tare is not None and len(self._values) >= LEAST_ROWS:
             self._largest = max(self._largest, abs(self._mean - self._tare))
 
     def tared(self, mean: float) -> None:
@@ -44,7 +51,7 @@ class ThrustRest:
         if mean == self._told:
             return
         self._told = self._tare = mean
-        self._noise = pstdev(value for _, value in self._rows) if self._rows else 0.0
+        self._noise = pstdev(self._values) if self._values else 0.0
 
     def doubt(self) -> None:
         """A later tare was not stable: the zero may have moved, and witnesses nothing until one is accepted."""
@@ -59,15 +66,20 @@ class ThrustRest:
 
     def push(self, now: float) -> float | None:
         """N from the tare, mean of the newest rows; None without a tare or fresh rows."""
-        fresh = [row for row in self._rows if row[0] >= now - OLDEST]
-        return None if self._tare is None or len(fresh) < LEAST_ROWS else self._mean - self._tare
+        return None if self._tare is None or len(self._fresh(now)) < LEAST_ROWS else self._mean - self._tare
 
     def judge(self, now: float) -> bool | None:
         """True: back at its tare; False: something pushes; None: no witness (no tare, no fresh rows, or a value that
         stands still elsewhere, as a stuck sensor does)."""
-        fresh = [row for row in self._rows if row[0] >= now - OLDEST]
+        fresh = self._fresh(now)
         if self._tare is None or len(fresh) < LEAST_ROWS:
             return None
         if abs(self._mean - self._tare) <= self.within:
             return True
-        return False if any(value != fresh[0][1] for _, value in fresh) else None
+        return False if any(value != fresh[0] for value in fresh) else None
+
+    def _fresh(self, now: float) -> Sequence[float]:
+        """N, of the rows that still witness."""
+        if self._times and self._times[0] >= now - OLDEST:
+            return self._values
+        return [value for time, value in zip(self._times, self._values, strict=True) if time >= now - OLDEST]

@@ -228,7 +228,7 @@ def test_a_pulled_cable_and_silence():
         device = opened(peer)
         peer.unplug()
         wait_until(lambda: device.drain() is not None and not device.health().alive)
-        assert "check cable" in device.health().error
+        assert "check adapter, cable" in device.health().error
         device.close()
         device.close()
     with Peer(quiet, terminator=b"\r") as peer, pytest.raises(DeviceError, match="came nothing"):

@@ -336,7 +336,7 @@ def test_a_pulled_cable():
         device = opened(peer)
         peer.unplug()
         wait_until(lambda: device.drain() is not None and not device.health().alive)
-        assert "check cable" in device.health().error
+        assert "cable and power" in device.health().error
         with pytest.raises(LinkError):
             device.command(0.0)
         device.close()

@@ -11,7 +11,7 @@ import pytest
 
 from drivers.modbus import keller
 from drivers.ports.can_bus import CanBus
-from drivers.ports.serial_port import READ_TIMEOUT
+from drivers.ports.reader import READ_TIMEOUT
 from drivers.serial_lines.line_stream import LineStream, Options
 from rig.safety.guard import Vitals, allowances, check
 from tests.drivers.collecting import quiet
@@ -74,15 +74,15 @@ def test_reader_of_a_can_bus(report, prompt):
     prompt(seen, max(3 * PERIOD, 2 * READ_TIMEOUT), died)
 
 
-@pytest.mark.parametrize("which", ["poll", "read"])
-def test_poller_of_a_transmitter(which, report, prompt):
+@pytest.mark.parametrize(("which", "name"), [("poller", "poll cell"), ("reader", "reader")])
+def test_poller_of_a_transmitter(which, name, report, prompt):
     with Peer(transmitter, terminator=None) as peer:
         before = set(threading.enumerate())
         device = keller.Keller("cell", keller.Options(peer.port, rate=1 / PERIOD, baud=115_200, timeout=0.5))
         device.open()
-        (thread,) = [each for each in readers(before) if each.name == f"{which} cell"]
+        (thread,) = [each for each in readers(before) if each.name == name]
         died = kill(thread)
         seen = seen_after(device, died)
-        report(f"{'poller' if which == 'poll' else 'reader'} of a transmitter dies, to the trip", seen, "s")
+        report(f"{which} of a transmitter dies, to the trip", seen, "s")
         device.close()
     prompt(seen, 3 * PERIOD, died)

@@ -13,7 +13,7 @@ from drivers.ports.serial_port import SerialPort, SerialSettings
 master, slave = pty.openpty()
 port = SerialPort("cell", SerialSettings(os.ttyname(slave), 9600), lambda data: [data])
 port.open()
-(reader,) = [t for t in threading.enumerate() if t.name == "read cell"]
+(reader,) = [t for t in threading.enumerate() if t.name == "reader"]
 wanted = {wanted}
 deadline = time.monotonic() + 10.0
 while (found := (os.sched_getscheduler(reader.native_id) & ~os.SCHED_RESET_ON_FORK,
