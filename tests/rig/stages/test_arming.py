@@ -1,12 +1,17 @@
 """What is opened, judged and asked for before a propeller may turn, by itself."""
 
+from dataclasses import replace
+from datetime import date
+
 import pytest
 
+from rig.campaign.config import CalibrationConfig
 from rig.link.front_end_messages import Request
 from rig.recording.ledger import read
 from rig.stages.arming import FLOW_PATIENCE, FLOW_WINDOW, SETTLE_ROWS, UNSEEN, Flow, preflight
 from rig.stages.connecting import Links
 from rig.stages.session import Stopped
+from tests.rig.stages.played import play
 from tests.rig.virtual_bench import virtual
 from tests.rig.virtual_devices import flow_meter
 
@@ -118,3 +123,54 @@ def test_flow_is_the_mean_of_its_last_seconds(tmp_path):
         (check,) = flow.checks(readings, first + FLOW_WINDOW + 0.1)
         assert (check.verdict, check.text[:8]) == ("passed", "0.5 m/s ")
         assert Flow(None, 0.0).checks(readings, 0.0) == []
+
+
+@pytest.mark.parametrize(("refuses", "rows"), [("", SETTLE_ROWS), ("load_cell: no cable", 0)])
+def test_rates_are_judged_after_some_rows_of_devices_that_are_all_there(tmp_path, refuses, rows):
+    with virtual(tmp_path) as world:
+        world.cell.refuses = refuses
+        waited, turn_for = [], world.session.turn_for
+        world.session.turn_for = lambda seconds: (waited.append(seconds), turn_for(seconds))
+        ask(world, 1.0, "stop")
+        with pytest.raises(Stopped):
+            preflight(world.session)
+        assert sum(waited) == pytest.approx(rows * SLOWEST)
+
+
+def test_a_device_that_comes_later_is_taken(tmp_path):
+    with virtual(tmp_path) as world:
+        world.cell.refuses = "load_cell: no cable"
+        world.clock.at.append((now(world) + 1.0, lambda: setattr(world.cell, "refuses", "")))
+        ask(world, 10.0)
+        preflight(world.session)
+        assert "load_cell is back: virtual cell 2" in world.texts
+
+
+def test_a_calibration_that_is_over_warns_and_lets_it_start(tmp_path):
+    over = CalibrationConfig(date(2020, 1, 1), date(2021, 1, 1))
+    with virtual(tmp_path) as world:
+        config = replace(world.session.campaign.bench, calibration={"load_cell": over})
+        world.session.campaign = replace(world.session.campaign, bench=config)
+        ask(world, 1.0)
+        preflight(world.session)
+        (line,) = [line for line in world.session.status.log if "load_cell calibration" in line.text]
+        assert line.level == "warning"
+        assert "valid until 2021-01-01: over" in line.text
+
+
+def test_what_the_preflight_found_stands_in_every_recording(tmp_path):
+    with virtual(tmp_path) as world:
+        play(world)
+        assert [e.text for e in world.recorder.events if e.text.startswith("preflight: watchdog: 0.5 s")]
+
+
+def test_flow_that_is_no_longer_measured_is_forgotten(tmp_path):
+    meter = flow_meter(0.5)
+    with virtual(tmp_path, inputs=(meter,)) as world:
+        Links(world.session).open_all()
+        readings, flow = world.session.loop.readings, Flow(0.5, patient_until=0.0)
+        world.session.turn_for(1.0)
+        (check,) = flow.checks(readings, world.session.loop.now)
+        assert check.verdict == "passed"
+        (check,) = flow.checks(readings, world.session.loop.now + 10 * FLOW_WINDOW)
+        assert check.verdict == "warning", "nothing is measured"
