@@ -169,6 +169,12 @@ def test_ticks_must_not_run_backwards():
         sequencer.advance(Tick(nan))
 
 
+def test_two_ticks_at_one_instant_are_one():
+    sequencer = Sequencer(SHORT, SETTINGS)
+    first, second = (sequencer.advance(Tick(1.0)) for _ in range(2))
+    assert (second.state, second.volts, second.step_elapsed) == (first.state, first.volts, first.step_elapsed)
+
+
 def test_steps_beyond_the_range_and_no_steps_are_refused():
     with pytest.raises(PlanError, match="commands 30 V, but at most 24 V"):
         Sequencer([Step(0, "hold", 30.0, 1.0, 1.0)], SETTINGS)

@@ -1,0 +1,111 @@
+"""The control loop where little decides: before its first tick, at its limits, and what it hands to whom."""
+
+from dataclasses import replace
+
+import pytest
+
+from rig.campaign.config import LimitConfig
+from rig.control.loop import IDLE, Decision, Inputs
+from rig.link.front_end_messages import Request
+from tests.rig.control.test_loop import driven
+from tests.rig.virtual_bench import virtual
+
+
+def test_before_the_first_tick_nothing_was_driven_and_nothing_is_late(tmp_path):
+    with virtual(tmp_path) as world:
+        loop = world.session.loop
+        assert (loop.command, loop.has_driven, loop.driven_since, loop.lateness) == (0.0, False, None, 0.0)
+        loop.tick(world.motor, lambda _: IDLE)
+        assert (loop.lateness, loop.late.worst, loop.has_driven) == (0.0, 0.0, False)
+
+
+def test_rotation_is_guarded_though_nothing_limits_it(tmp_path):
+    with virtual(tmp_path) as world:
+        loop = world.session.loop
+        assert loop.rotation_channel == "motor.rotation_rate"
+        assert {"load_cell.thrust", "motor.rotation_rate"} <= {one.channel for one in loop.guarded_channels}
+
+
+def test_a_thrust_that_counts_as_none_is_that_of_the_bench_file_from_the_beginning(tmp_path, monkeypatch):
+    names = {"rotation_rate": "speed"}
+
+    def without_a_rate(self):
+        (stream,) = streams.fget(self)
+        channels = tuple(replace(c, quantity=None, name=names.get(c.name, c.name)) if c.name in names else c
+                         for c in stream.channels)  # fmt: skip
+        return (replace(stream, channels=channels),)
+
+    with virtual(tmp_path) as world:
+        streams = type(world.motor).streams
+        monkeypatch.setattr(type(world.motor), "streams", property(without_a_rate))
+        bench = replace(
+            world.session.bench, config=replace(world.session.bench.config, rest_thrust=1.5, rest_current=2.5)
+        )
+        loop = replace(world.session.loop, bench=bench)
+        assert loop.rotation_channel is None
+        assert loop.thrust_rest.within == 1.5
+
+
+@pytest.mark.parametrize(("held_up", "sent"), [(0.235, [6.0]), (0.26, [0.0])])
+def test_a_set_point_may_be_as_old_as_the_lateness_and_one_period(tmp_path, held_up, sent):
+    """0.25 s and 20 ms; the one before it went 20 ms before this tick began."""
+    with driven(tmp_path) as (world, _, __):
+        before = len(world.motor.sent)
+
+        def decide(_: Inputs) -> Decision:
+            world.clock.stall(held_up)
+            return Decision(6.0)
+
+        world.session.loop.tick(world.motor, decide)
+        assert [volts for _, volts in world.motor.sent[before:]] == sent
+
+
+def test_a_motor_that_does_not_follow_is_seen_in_a_run(tmp_path):
+    with driven(tmp_path) as (world, turn, trips):
+        world.session.recorder.streams = ("load_cell", "motor", "command")
+        world.session.loop.begin_recording(world.clock.now_ns())
+        world.motor.ignores, world.motor.volts = True, 0.0
+        turn(10.0)
+        assert trips
+
+
+def test_what_pushes_is_known_from_the_tare(tmp_path):
+    pushed = []
+    with virtual(tmp_path) as world:
+        loop = world.session.loop
+
+        def decide(inputs: Inputs) -> Decision:
+            pushed.append((inputs.push, inputs.thrust_rest))
+            return Decision(6.0)
+
+        for _ in range(20):
+            loop.tick(world.motor, lambda _: IDLE)
+        loop.thrust_rest.tared(0.7)
+        for _ in range(50):
+            loop.tick(world.motor, decide)
+    push, rests = pushed[-1]
+    assert push == pytest.approx(0.4 * 36.0, abs=1.0)
+    assert rests is False
+
+
+def test_a_stop_is_told_in_the_tick_in_which_it_comes(tmp_path):
+    with driven(tmp_path) as (world, turn, _):
+        loop, told = world.session.loop, []
+        turn(0.2)
+        loop.publish = told.append
+        loop.tick(world.motor, lambda _: IDLE)
+        told.clear()
+        loop.signals.append(Request("stop", "a key"))
+        loop.tick(world.motor, lambda _: IDLE)
+        assert len(told) == 1
+
+
+def test_a_current_just_below_its_limit_goes_on_and_just_above_ends(tmp_path):
+    with driven(tmp_path) as (world, turn, trips):
+        assert LimitConfig("motor.current", max=30.0) in world.session.loop.bench.config.limits
+        world.motor.extra_current = 17.9
+        turn(1.0)
+        assert not trips, "12 A and 17.9 A are below 30 A"
+        world.motor.extra_current = 18.1
+        turn(1.0)
+        assert trips[0][1] == "limit"
