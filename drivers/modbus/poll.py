@@ -32,7 +32,7 @@ class ModbusPoll:
         self._gap = gap(settings.baud, bits_per_character(settings.framing))
         self._decoder = Decoder()
         self._turn = threading.Lock()
-        self._port: SerialPort[Record] = SerialPort(name, settings, self._feed, wire)
+        self._port: SerialPort[Record] = SerialPort(name, settings, self._feed, wire, at_once=True)
         self._unanswered: deque[tuple[int, Record]] = deque(maxlen=1000)
         self._requests: tuple[Read, ...] = ()
         self._at = 0

@@ -50,9 +50,19 @@ class SerialPort(Generic[Record]):
     """Bytes go through `feed` (pure: bytes -> records) and wait in a bounded inbox with their arrival time."""
 
     def __init__(
-        self, name: str, settings: SerialSettings, feed: Callable[[bytes], Sequence[Record]], wire: Wire | None = None
+        self,
+        name: str,
+        settings: SerialSettings,
+        feed: Callable[[bytes], Sequence[Record]],
+        wire: Wire | None = None,
+        *,
+        at_once: bool = False,
     ) -> None:
-        """`wire`: used instead of the port that `settings` names, with its stamps and in its time."""
+        """`wire`: used instead of the port that `settings` names, with its stamps and in its time.
+
+        `at_once`: `feed` hears what comes when it comes, in the reader's thread, as where it asks on by what it hears.
+        """
+        self._at_once = at_once
         self.settings = settings
         self._wire = wire
         self.error: str | None = None
@@ -127,7 +137,7 @@ class SerialPort(Generic[Record]):
         try:
             port.write(data)
         except OSError as error:
-            self.error = f"{self.settings.port} refused {len(data)} bytes ({error}): check cable and power"
+            self.error = f"{self.settings.port} refused {len(data)} bytes ({error}): check adapter, cable and power"
             raise LinkError(f"{self._name}: {self.error}") from error
         if self._transcript is not None:
             self._transcript.write(sent_ns, ">", data)
@@ -190,6 +200,8 @@ class SerialPort(Generic[Record]):
         if self._transcript is not None:
             self._transcript.write(t_ns, "<", data)
         self._arrivals.add(t_ns, data)
+        if self._at_once:
+            self._arrivals.decode()
 
 
 def read(port: serial.Serial, label: str, arrived: Arrived, lost: Lost) -> Callable[[], None]:

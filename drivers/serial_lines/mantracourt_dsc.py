@@ -103,7 +103,7 @@ class MantracourtDsc:
         self._options = options
         self._decoder = Decoder()
         settings = SerialSettings(options.port, options.baud, options.framing, options.capture)
-        self._port: SerialPort[Record | Row] = SerialPort(name, settings, self._feed, wire)
+        self._port: SerialPort[Record | Row] = SerialPort(name, settings, self._feed, wire, at_once=True)
         self._turn = threading.Lock()
         self._reset()
 

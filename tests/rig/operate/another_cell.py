@@ -51,22 +51,3 @@ def world(cell: SerialOptions) -> VirtualBench:
     host = Host(adapter=3e-4, work=5e-4, reader_late=2e-4, loop_late=3e-4)
     devices = {**settings.devices, "load_cell": cell}
     return VirtualBench(replace(settings, world=made, devices=devices, seed=5, step=0.005), host, "bus0")
-
-
-class Faulty:
-    """The bench, whose cell gets a fault once the motor was driven with 12 V for two seconds."""
-
-    def __init__(self, bench: VirtualBench, fault: str) -> None:
-        self.bench, self.wires, self._fault = bench, bench.wires, fault
-        self.begun: float | None = None
-
-    def now_ns(self) -> int:
-        return self.bench.now_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        self.bench.sleep_until_ns(t_ns)
-        if self.begun is None and self.bench.commands:
-            since, volts = self.bench.commands[-1]
-            if abs(volts - 12.0) < 0.01 and self.bench.now() - since > 2.0:
-                self.begun = self.bench.now()
-                self.bench.fault("load_cell", self._fault)

@@ -14,6 +14,7 @@ from rig.operate.check import check_campaign
 from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
+from tests.rig.faulty_bench import Faulty
 
 BENCH = Path(__file__).parents[3] / "benches" / "roboteq_hbm"
 CAMPAIGN = """
@@ -80,25 +81,6 @@ def test_a_campaign_with_roboteq_and_hbm_finds_the_truth_of_the_world(tmp_path, 
     assert abs(found_C["value"] - TRUTH) < 2.0 * found_C["std"]
 
 
-class Faulty:
-    """The bench, whose cell gets a fault once the motor was driven with 12 V for two seconds."""
-
-    def __init__(self, bench: VirtualBench, fault: str, amount: float) -> None:
-        self.bench, self.wires, self._fault = bench, bench.wires, (fault, amount)
-        self.begun: float | None = None
-
-    def now_ns(self) -> int:
-        return self.bench.now_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        self.bench.sleep_until_ns(t_ns)
-        if self.begun is None and self.bench.commands:
-            since, volts = self.bench.commands[-1]
-            if abs(volts - 12.0) < 0.01 and self.bench.now() - since > 2.0:
-                self.begun = self.bench.now()
-                self.bench.fault("load_cell", *self._fault)
-
-
 @pytest.mark.parametrize(
     ("fault", "amount", "within", "cause"),
     [
@@ -111,7 +93,7 @@ class Faulty:
     ],
 )
 def test_a_fault_of_the_cell_ends_the_run(tmp_path, fault, amount, within, cause):
-    bench = Faulty(world(), fault, amount)
+    bench = Faulty(world(), "load_cell", fault, amount)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path), tmp_path / "run", bench, ("some-id", "2026-01-01"))
     assert bench.begun is not None
@@ -121,7 +103,7 @@ def test_a_fault_of_the_cell_ends_the_run(tmp_path, fault, amount, within, cause
 
 
 def test_a_line_that_loses_bytes_costs_rows_and_is_told(tmp_path):
-    bench = Faulty(world(), "shifted", 0.01)
+    bench = Faulty(world(), "load_cell", "shifted", 0.01)
     path, _ = record_in_virtual_time(files(tmp_path), tmp_path / "run", bench, ("some-id", "2026-01-01"))
     recording = load(path)
     assert recording.outcome == "completed"

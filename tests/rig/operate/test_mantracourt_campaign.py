@@ -7,7 +7,8 @@ from rig.cli import record_in_virtual_time
 from rig.fit.answer import fit_recordings
 from rig.hdf5.load import load
 from sim_devices.instruments.serial_lines.mantracourt import MantracourtOptions
-from tests.rig.operate.another_cell import RUN, TRUTH, Faulty, files, world
+from tests.rig.faulty_bench import Faulty
+from tests.rig.operate.another_cell import RUN, TRUTH, files, world
 
 CELL = """kind = "mantracourt_dsc"
 port = "ports/load_cell"
@@ -54,7 +55,7 @@ def test_a_slow_card_gives_each_value_once_and_the_preflight_says_so(tmp_path):
     ],
 )
 def test_a_fault_of_the_card_ends_the_run(tmp_path, fault, cause):
-    bench = Faulty(world(card()), fault)
+    bench = Faulty(world(card()), "load_cell", fault)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path, CELL), tmp_path / "run", bench, RUN)
     assert bench.begun is not None

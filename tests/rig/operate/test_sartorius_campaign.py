@@ -7,7 +7,8 @@ from rig.cli import record_in_virtual_time
 from rig.fit.answer import fit_recordings
 from rig.hdf5.load import load
 from sim_devices.instruments.serial_lines.sartorius import SartoriusOptions
-from tests.rig.operate.another_cell import RUN, TRUTH, Faulty, files, world
+from tests.rig.faulty_bench import Faulty
+from tests.rig.operate.another_cell import RUN, TRUTH, files, world
 
 CELL = """kind = "sartorius_sbi"
 port = "ports/load_cell"
@@ -48,7 +49,7 @@ def test_the_truth_of_the_world_is_found(tmp_path):
     ],
 )
 def test_a_fault_of_the_balance_ends_the_run(tmp_path, fault, cause):
-    bench = Faulty(world(balance()), fault)
+    bench = Faulty(world(balance()), "load_cell", fault)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path, CELL), tmp_path / "run", bench, RUN)
     assert bench.begun is not None

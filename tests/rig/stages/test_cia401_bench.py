@@ -20,6 +20,7 @@ from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
 from sim_devices.wires.can_frame import CanFrame
+from tests.rig.faulty_bench import Faulty
 
 pytest.importorskip("canopen")
 BENCH = Path(__file__).parents[3] / "benches" / "cia401"
@@ -66,25 +67,6 @@ def files(folder: Path) -> Path:
     return folder / "campaign.toml"
 
 
-class Faulty:
-    """The bench, whose `device` gets a fault once 5 V were at the output for two seconds."""
-
-    def __init__(self, world: VirtualBench, device: str, fault: str, amount: float) -> None:
-        self.bench, self.wires, self._fault = world, world.wires, (device, fault, amount)
-        self.begun: float | None = None
-
-    def now_ns(self) -> int:
-        return self.bench.now_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        self.bench.sleep_until_ns(t_ns)
-        if self.begun is None and self.bench.commands:
-            since, volts = self.bench.commands[-1]
-            if abs(volts - 5.0) < 0.01 and self.bench.now() - since > 2.0:
-                self.begun = self.bench.now()
-                self.bench.fault(*self._fault)
-
-
 def test_a_campaign_finds_the_truth_and_never_confirms_its_rest(tmp_path):
     """As each bench without a rotation rate (docs/devices/roboteq.md)."""
     world = bench()
@@ -122,7 +104,7 @@ def test_the_watchdog_cannot_be_proved_on_this_bench(tmp_path):
     ],
 )
 def test_a_fault_ends_the_run(tmp_path, device, fault, amount, cause):
-    world = Faulty(bench(), device, fault, amount)
+    world = Faulty(bench(), device, fault, amount, volts=5.0)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path), tmp_path / "run", world, STAMP)
     assert world.begun is not None

@@ -21,6 +21,7 @@ from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
 from sim_devices.wires.can_frame import CanFrame
+from tests.rig.faulty_bench import Faulty
 
 BENCH = Path(__file__).parents[3] / "benches" / "cia402"
 CAMPAIGN = """
@@ -65,25 +66,6 @@ def files(folder: Path, **motor) -> Path:
     (folder / "bench.toml").write_text(text, encoding="utf-8")
     (folder / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
     return folder / "campaign.toml"
-
-
-class Faulty:
-    """The bench, whose motor gets a fault once it was driven with `volts` for two seconds."""
-
-    def __init__(self, world: VirtualBench, volts: float, fault: str, amount: float) -> None:
-        self.bench, self.wires, self._volts, self._fault = world, world.wires, volts, (fault, amount)
-        self.begun: float | None = None
-
-    def now_ns(self) -> int:
-        return self.bench.now_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        self.bench.sleep_until_ns(t_ns)
-        if self.begun is None and self.bench.commands:
-            since, volts = self.bench.commands[-1]
-            if abs(volts - self._volts) < 0.01 and self.bench.now() - since > 2.0:
-                self.begun = self.bench.now()
-                self.bench.fault("motor", *self._fault)
 
 
 def fitted_C(path: Path):
@@ -154,7 +136,7 @@ def test_rate_per_volt_is_what_a_volt_is(tmp_path):
     ],
 )
 def test_a_fault_ends_the_run(tmp_path, fault, amount, within, cause):
-    world = Faulty(bench(), 12.0, fault, amount)
+    world = Faulty(bench(), "motor", fault, amount)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path), tmp_path / "run", world, STAMP)
     assert world.begun is not None

@@ -21,6 +21,7 @@ from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
 from sim_devices.instruments.canopen.cell import Cia404Options
+from tests.rig.faulty_bench import Faulty
 
 pytest.importorskip("canopen")
 BENCH = Path(__file__).parents[3] / "benches" / "cia402"
@@ -66,25 +67,6 @@ def files(folder: Path, keys: str) -> Path:
     return folder / "campaign.toml"
 
 
-class Faulty:
-    """The bench, whose cell gets a fault once the motor was driven with 12 V for two seconds."""
-
-    def __init__(self, world: VirtualBench, fault: str) -> None:
-        self.bench, self.wires, self._fault = world, world.wires, fault
-        self.begun: float | None = None
-
-    def now_ns(self) -> int:
-        return self.bench.now_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        self.bench.sleep_until_ns(t_ns)
-        if self.begun is None and self.bench.commands:
-            since, volts = self.bench.commands[-1]
-            if abs(volts - 12.0) < 0.01 and self.bench.now() - since > 2.0:
-                self.begun = self.bench.now()
-                self.bench.fault("load_cell", self._fault)
-
-
 @pytest.mark.parametrize(
     ("keys", "cell", "channels"),
     [
@@ -123,7 +105,7 @@ def test_a_campaign_finds_the_truth(tmp_path, keys, cell, channels):
     ],
 )
 def test_a_fault_ends_the_run(tmp_path, fault, cause):
-    world = Faulty(bench(), fault)
+    world = Faulty(bench(), "load_cell", fault)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path, "rate = 100.0"), tmp_path / "run", world, STAMP)
     zeros = [t for t, volts in world.bench.commands if volts == 0.0 and t >= world.begun]

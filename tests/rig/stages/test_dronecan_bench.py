@@ -19,6 +19,7 @@ from rig.recording.ledger import read
 from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
+from tests.rig.faulty_bench import Faulty
 
 BENCH = Path(__file__).parents[3] / "benches" / "dronecan"
 CAMPAIGN = """
@@ -61,25 +62,6 @@ def files(folder: Path, *changes: tuple[str, str]) -> Path:
     (folder / "bench.toml").write_text(text[: text.index("[mount]")], encoding="utf-8")
     (folder / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
     return folder / "campaign.toml"
-
-
-class Faulty:
-    """The bench, whose motor gets a fault once it was driven with `volts` for two seconds."""
-
-    def __init__(self, world: VirtualBench, volts: float, fault: str, amount: float) -> None:
-        self.bench, self.wires, self._volts, self._fault = world, world.wires, volts, (fault, amount)
-        self.begun: float | None = None
-
-    def now_ns(self) -> int:
-        return self.bench.now_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        self.bench.sleep_until_ns(t_ns)
-        if self.begun is None and self.bench.commands:
-            since, volts = self.bench.commands[-1]
-            if abs(volts - self._volts) < 0.01 and self.bench.now() - since > 2.0:
-                self.begun = self.bench.now()
-                self.bench.fault("motor", *self._fault)
 
 
 def test_a_campaign_finds_the_truth_and_proves_the_watchdog(tmp_path):
@@ -133,7 +115,7 @@ def test_without_the_arming_status_that_it_wants_the_run_ends(tmp_path):
     ],
 )
 def test_a_fault_ends_the_run(tmp_path, fault, amount, within, cause):
-    world = Faulty(bench(), 12.0, fault, amount)
+    world = Faulty(bench(), "motor", fault, amount)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path), tmp_path / "run", world, ("some-id", "2026-01-01"))
     assert world.begun is not None
@@ -145,7 +127,7 @@ def test_a_fault_ends_the_run(tmp_path, fault, amount, within, cause):
 
 
 def test_an_esc_that_ignores_its_commands_stops_by_its_own_watchdog(tmp_path):
-    world = Faulty(bench(), 12.0, "ignores_commands", 0.1)
+    world = Faulty(bench(), "motor", "ignores_commands", 0.1)
     with pytest.raises(RuntimeError, match=r"contradict|does not"):
         record_in_virtual_time(files(tmp_path), tmp_path / "run", world, ("some-id", "2026-01-01"))
     assert world.bench.drive.volts is None

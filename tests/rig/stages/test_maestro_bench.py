@@ -18,6 +18,7 @@ from rig.recording.ledger import read
 from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
+from tests.rig.faulty_bench import Faulty
 from tests.rig.operate.test_modbus_campaign import CAMPAIGN
 
 BENCH = Path(__file__).parents[3] / "benches" / "maestro"
@@ -45,25 +46,6 @@ def files(folder: Path, *changes: tuple[str, str]) -> Path:
     (folder / "bench.toml").write_text(text, encoding="utf-8")
     (folder / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
     return folder / "campaign.toml"
-
-
-class Faulty:
-    """The bench, one of whose devices gets a fault once the motor was driven with `volts` for 1.5 s."""
-
-    def __init__(self, world: VirtualBench, volts: float, device: str, fault: str, amount: float) -> None:
-        self.bench, self.wires, self._volts, self._fault = world, world.wires, volts, (device, fault, amount)
-        self.begun: float | None = None
-
-    def now_ns(self) -> int:
-        return self.bench.now_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        self.bench.sleep_until_ns(t_ns)
-        if self.begun is None and self.bench.commands:
-            since, volts = self.bench.commands[-1]
-            if abs(volts - self._volts) < 0.1 and self.bench.now() - since > 1.5:
-                self.begun = self.bench.now()
-                self.bench.fault(*self._fault)
 
 
 def test_the_same_campaign_finds_the_truth_with_another_bench_file_alone(tmp_path, capsys):
@@ -124,7 +106,7 @@ def test_raw_counts_at_a_thousand_a_second(tmp_path):
     ],
 )  # fmt: skip
 def test_a_fault_ends_the_run(tmp_path, device, fault, amount, within, cause):
-    world = Faulty(bench(load_cell=SLOW), 12.0, device, fault, amount)
+    world = Faulty(bench(load_cell=SLOW), device, fault, amount, after=1.5)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path, SLOW_FILE), tmp_path / "run", world, ID)
     assert world.begun is not None
@@ -135,7 +117,7 @@ def test_a_fault_ends_the_run(tmp_path, device, fault, amount, within, cause):
 
 
 def test_a_propeller_that_goes_on_is_never_called_at_rest(tmp_path):
-    world = Faulty(bench(load_cell=SLOW), 12.0, "motor", "redrives", 0.45)
+    world = Faulty(bench(load_cell=SLOW), "motor", "redrives", 0.45, after=1.5)
     with pytest.raises(RuntimeError):
         record_in_virtual_time(files(tmp_path, SLOW_FILE), tmp_path / "run", world, ID)
     told = [event.text for event in load(tmp_path / "run" / "T2.h5").events]

@@ -18,6 +18,7 @@ from rig.recording.ledger import read
 from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
+from tests.rig.faulty_bench import Faulty
 
 BENCH = Path(__file__).parents[3] / "benches" / "roboteq"
 CAMPAIGN = """
@@ -58,25 +59,6 @@ def files(folder: Path) -> Path:
     (folder / "bench.toml").write_text(text, encoding="utf-8")
     (folder / "campaign.toml").write_text(CAMPAIGN, encoding="utf-8")
     return folder / "campaign.toml"
-
-
-class Faulty:
-    """The bench, whose motor gets a fault once it was driven with `volts` for two seconds."""
-
-    def __init__(self, world: VirtualBench, volts: float, fault: str, amount: float) -> None:
-        self.bench, self.wires, self._volts, self._fault = world, world.wires, volts, (fault, amount)
-        self.begun: float | None = None
-
-    def now_ns(self) -> int:
-        return self.bench.now_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        self.bench.sleep_until_ns(t_ns)
-        if self.begun is None and self.bench.commands:
-            since, volts = self.bench.commands[-1]
-            if abs(volts - self._volts) < 0.01 and self.bench.now() - since > 2.0:
-                self.begun = self.bench.now()
-                self.bench.fault("motor", *self._fault)
 
 
 @pytest.mark.parametrize("motor", [{}, {"echo": False, "at_zero": "coast"}], ids=["as delivered", "quiet, coasting"])
@@ -130,7 +112,7 @@ def test_levels_between_two_set_points_are_recorded_as_the_controller_was_told(t
     ],
 )
 def test_a_fault_ends_the_run(tmp_path, fault, amount, within, cause):
-    world = Faulty(bench(), 12.0, fault, amount)
+    world = Faulty(bench(), "motor", fault, amount)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path), tmp_path / "run", world, ("some-id", "2026-01-01"))
     assert world.begun is not None
@@ -183,7 +165,7 @@ def test_without_a_rate_a_run_is_measured_and_its_rest_is_never_confirmed(tmp_pa
 def test_a_line_that_loses_bytes_costs_rows_and_is_told(tmp_path):
     world = bench()
     path, _ = record_in_virtual_time(
-        files(tmp_path), tmp_path / "run", Faulty(world, 12.0, "shifted", 0.01), ("some-id", "2026-01-01")
+        files(tmp_path), tmp_path / "run", Faulty(world, "motor", "shifted", 0.01), ("some-id", "2026-01-01")
     )
     recording = load(path)
     assert recording.outcome == "completed"

@@ -18,6 +18,7 @@ from rig.recording.ledger import read
 from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
+from tests.rig.faulty_bench import Faulty
 
 BENCH = Path(__file__).parents[3] / "benches" / "scpi_supply"
 CAMPAIGN = """
@@ -65,25 +66,6 @@ def files(folder: Path, *changes: tuple[str, str]) -> Path:
     return folder / "campaign.toml"
 
 
-class Faulty:
-    """The bench, whose motor gets a fault once it was driven with 12 V for 1.5 s."""
-
-    def __init__(self, world: VirtualBench, fault: str, amount: float) -> None:
-        self.bench, self.wires, self._fault = world, world.wires, (fault, amount)
-        self.begun: float | None = None
-
-    def now_ns(self) -> int:
-        return self.bench.now_ns()
-
-    def sleep_until_ns(self, t_ns: int) -> None:
-        self.bench.sleep_until_ns(t_ns)
-        if self.begun is None and self.bench.commands:
-            since, volts = self.bench.commands[-1]
-            if abs(volts - 12.0) < 0.01 and self.bench.now() - since > 1.5:
-                self.begun = self.bench.now()
-                self.bench.fault("motor", *self._fault)
-
-
 def pass_time(world: VirtualBench, seconds: float) -> None:
     world.sleep_until_ns(world.now_ns() + round(seconds * 1e9))
 
@@ -118,7 +100,7 @@ def test_a_campaign_finds_the_truth_and_proves_the_watchdog(tmp_path):
     ],
 )
 def test_a_fault_ends_the_run(tmp_path, fault, amount, within, cause):
-    world = Faulty(bench(), fault, amount)
+    world = Faulty(bench(), "motor", fault, amount, after=1.5)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path), tmp_path / "run", world, ID)
     assert world.begun is not None

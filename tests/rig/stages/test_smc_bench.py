@@ -17,8 +17,8 @@ from rig.recording.ledger import read
 from sim_devices.bench.settings import load as load_world
 from sim_devices.bench.virtual import VirtualBench
 from sim_devices.bench.virtual_wire import Host
+from tests.rig.faulty_bench import Faulty
 from tests.rig.operate.test_modbus_campaign import CAMPAIGN
-from tests.rig.stages.test_roboteq_bench import Faulty
 
 BENCH = Path(__file__).parents[3] / "benches" / "smc_g2"
 TRUTH = 0.3985 * 1.0002
@@ -71,7 +71,7 @@ def test_a_campaign_finds_the_truth_of_the_world(tmp_path):
     ],
 )
 def test_a_fault_ends_the_run(tmp_path, fault, amount, within, cause):
-    world = Faulty(bench(), 12.0, fault, amount)
+    world = Faulty(bench(), "motor", fault, amount)
     with pytest.raises(RuntimeError, match=cause):
         record_in_virtual_time(files(tmp_path), tmp_path / "run", world, ID)
     assert world.begun is not None
