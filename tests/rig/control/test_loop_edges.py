@@ -7,6 +7,7 @@ import pytest
 from rig.campaign.config import LimitConfig
 from rig.control.loop import IDLE, Decision, Inputs
 from rig.link.front_end_messages import Request
+from rig.link.recorder_messages import Rows
 from tests.rig.control.test_loop import driven
 from tests.rig.virtual_bench import virtual
 
@@ -109,3 +110,21 @@ def test_a_current_just_below_its_limit_goes_on_and_just_above_ends(tmp_path):
         world.motor.extra_current = 18.1
         turn(1.0)
         assert trips[0][1] == "limit"
+
+
+@pytest.mark.parametrize("motor", [True, False], ids=["silent on purpose", "no motor yet"])
+def test_what_was_not_sent_is_stamped_with_its_tick(tmp_path, motor):
+    with driven(tmp_path) as (world, _, __):
+        session, loop = world.session, world.session.loop
+        session.recorder.streams = ("load_cell", "motor", "command")
+        loop.begin_recording(world.clock.now_ns())
+
+        def nothing(_: Inputs) -> Decision:
+            world.clock.stall(0.010)
+            return Decision(None if motor else 3.0)
+
+        began = world.clock.now_ns()
+        loop.tick(session.motor if motor else None, nothing)
+        world.recorder.step(0.0)
+        (row,) = [r for r in world.recorder.of(Rows) if r.stream == 2]
+        assert row.t_ns[0] == began

@@ -175,6 +175,13 @@ def test_two_ticks_at_one_instant_are_one():
     assert (second.state, second.volts, second.step_elapsed) == (first.state, first.volts, first.step_elapsed)
 
 
+@pytest.mark.parametrize(("gap", "outcome"), [(0.25, "running"), (0.26, "tripped")])
+def test_a_tick_may_be_as_late_as_is_allowed(gap, outcome):
+    sequencer = Sequencer(SHORT, replace(SETTINGS, lapse=0.25))
+    sequencer.advance(Tick(1.0))
+    assert sequencer.advance(Tick(1.0 + gap)).outcome == outcome
+
+
 def test_steps_beyond_the_range_and_no_steps_are_refused():
     with pytest.raises(PlanError, match="commands 30 V, but at most 24 V"):
         Sequencer([Step(0, "hold", 30.0, 1.0, 1.0)], SETTINGS)

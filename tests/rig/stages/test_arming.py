@@ -174,3 +174,14 @@ def test_flow_that_is_no_longer_measured_is_forgotten(tmp_path):
         assert check.verdict == "passed"
         (check,) = flow.checks(readings, world.session.loop.now + 10 * FLOW_WINDOW)
         assert check.verdict == "warning", "nothing is measured"
+
+
+@pytest.mark.parametrize(
+    ("before", "told"),
+    [((), "start"), (({"fact": "run"},), "start"), (({"fact": "start", "identities": {}}, {"fact": "run"}), "resume")],
+)
+def test_a_campaign_that_had_begun_is_resumed(tmp_path, before, told):
+    with virtual(tmp_path, before=before) as world:
+        ask(world, 1.0)
+        preflight(world.session)
+    assert [fact["fact"] for fact in read(tmp_path)][-1] == told
