@@ -13,7 +13,7 @@ OPENINGS = 6
 
 def kept() -> int:
     gc.collect()
-    return sum(isinstance(each, StylesCache) for each in gc.get_objects())
+    return sum(type(each) is StylesCache for each in gc.get_objects())
 
 
 def test_nothing_is_kept_of_dialogs_that_have_closed():

@@ -47,7 +47,7 @@ def test_each_part_says_where_it_goes_on(cut):
     ids = {run["recording_id"]: Path(run["recording"]) for run in runs}
     went_on = [load(path) for path in ids.values() if "continues" in load(path).attributes]
     assert went_on
-    for recording in (each for each in went_on if each.steps):
+    for recording in (each for each in went_on if any(row.index >= 0 for row in each.steps)):
         before = load(ids[str(recording.attributes["continues"])])
         assert before.thruster == recording.thruster
         assert any("it goes on at step" in event.text for event in recording.events)
