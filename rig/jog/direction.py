@@ -43,11 +43,14 @@ class Direction:
 
 
 def direction_of(recording: Recording, volts: float) -> Direction:
-    """From the steps at `volts`, also those that were cut, and the tare before them."""
+    """From the holds on the side of `volts`, also those that were cut, and the tare before them.
+
+    A jog has one voltage; what a motor controller of coarse set-points made of it stands in the steps.
+    """
     held = [
         (step.t_start + SETTLE, step.t_end)
         for step in recording.steps
-        if step.phase in ("hold", "free") and step.command_voltage == volts and step.t_end - step.t_start > SETTLE
+        if step.phase in ("hold", "free") and step.command_voltage * volts > 0.0 and step.t_end - step.t_start > SETTLE
     ]
     seconds = sum(end - start for start, end in held)
     rest = [(step.t_start, step.t_end) for step in recording.steps if step.phase == "tare"]

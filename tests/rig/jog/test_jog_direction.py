@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.recording import Channel, Recording, Step
-from rig.jog.direction import direction_of, sentences
+from rig.jog.direction import SETTLE, direction_of, sentences
 
 
 def run(thrust: float, rotation: float | None, volts: float = 3.0, held: float = 3.0, cut: bool = False) -> Recording:
@@ -40,6 +40,12 @@ def run(thrust: float, rotation: float | None, volts: float = 3.0, held: float =
 @pytest.mark.parametrize("cut", [False, True], ids=["whole", "let go"])
 def test_each_way_of_being_wired(thrust, rotation, said, cut):
     assert said in sentences(direction_of(run(thrust, rotation, cut=cut), 3.0), "cell")[-1]
+
+
+def test_what_a_coarse_motor_controller_made_of_the_voltage_is_that_voltage():
+    found = direction_of(run(3.5, 3.0, volts=2.976), 3.0)
+    assert found.held == pytest.approx(3.0 - SETTLE)
+    assert sentences(found, "cell")[-1].startswith("as it should be")
 
 
 def test_a_negative_command_is_judged_by_its_own_sign():
