@@ -258,3 +258,10 @@ def test_a_mark_after_a_sweep_never_falls_on_the_hold_before_it():
     journal.row("ramp", sweep, -4.0, 1.0, 3.0)
     assert journal.void_last() is None
     assert [row.phase for row in journal.rows] == ["hold", "ramp"]
+
+
+@pytest.mark.parametrize(("how", "level"), [({"trip": TRIP}, "trip"), (asks("stop"), "warning")])
+def test_a_trip_is_told_as_one_and_a_stop_is_not(how, level):
+    ran = run(SHORT, FIXED, at={100: how})
+    (event,) = [event for event in ran.events if event.text.endswith(": command 0 V")]
+    assert event.level == level
