@@ -128,3 +128,32 @@ def test_what_was_not_sent_is_stamped_with_its_tick(tmp_path, motor):
         world.recorder.step(0.0)
         (row,) = [r for r in world.recorder.of(Rows) if r.stream == 2]
         assert row.t_ns[0] == began
+
+
+@pytest.mark.parametrize("unattended", [True, False])
+def test_an_operator_who_is_gone_ends_it_where_one_is_needed(tmp_path, unattended):
+    with virtual(tmp_path, unattended=unattended) as world:
+        loop, trips = world.session.loop, []
+        front = world.front()
+
+        def decide(inputs: Inputs) -> Decision:
+            if inputs.trip:
+                trips.append(inputs.trip)
+            return Decision(0.0 if trips else 6.0)
+
+        def turn(ticks: int) -> None:
+            for _ in range(ticks):
+                front.send(Request("lease"))
+                loop.tick(world.motor, decide)
+
+        turn(20)
+        loop.begin_guarding()
+        turn(20)
+        assert not trips
+        front.close()
+        for _ in range(3):
+            loop.tick(world.motor, decide)
+    assert bool(trips) is not unattended
+    if trips:
+        assert trips[0].source == "lease"
+        assert "the last front end has closed its connection" in trips[0].cause
