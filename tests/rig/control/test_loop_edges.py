@@ -4,10 +4,14 @@ from dataclasses import replace
 
 import pytest
 
+from drivers.errors import LinkError
+from drivers.protocols import Sample
 from rig.campaign.config import LimitConfig
 from rig.control.loop import IDLE, Decision, Inputs
+from rig.control.motor_watch import RestByThrust
 from rig.link.front_end_messages import Request
 from rig.link.recorder_messages import Rows
+from rig.safety.lost_time import HostClocks
 from tests.rig.control.test_loop import driven
 from tests.rig.virtual_bench import virtual
 
@@ -157,3 +161,88 @@ def test_an_operator_who_is_gone_ends_it_where_one_is_needed(tmp_path, unattende
     if trips:
         assert trips[0].source == "lease"
         assert "the last front end has closed its connection" in trips[0].cause
+
+
+def test_rows_of_the_force_device_are_s_since_an_instant(tmp_path):
+    with virtual(tmp_path) as world:
+        samples = (
+            Sample("load_cell", 900_000_000, (1.0,)), Sample("load_cell", 1_000_000_000, (2.0,)),
+            Sample("motor", 1_100_000_000, (3.0, 4.0)), Sample("load_cell", 1_250_000_000, (5.0,)),
+        )  # fmt: skip
+        rows = world.session.loop.thrust_rows(samples, 1_000_000_000)
+        assert rows == ((0.0, 2.0), (pytest.approx(0.25), 5.0))
+
+
+@pytest.mark.parametrize(("allowed", "rests"), [(11.9, False), (12.0, True), (12.1, True)])
+def test_current_is_a_witness_of_rest_where_there_is_no_rate(tmp_path, allowed, rests):
+    seen = []
+    with driven(tmp_path) as (world, _, __):
+        loop = world.session.loop
+        loop.tick(world.motor, lambda inputs: (seen.append(inputs.current_rest), Decision(6.0))[1])
+        loop.rest_by_thrust = RestByThrust(1.0, "motor.current", allowed)
+        loop.tick(world.motor, lambda inputs: (seen.append(inputs.current_rest), Decision(6.0))[1])
+        world.motor.silent = True
+        world.clock.stall(0.24)
+        loop.tick(world.motor, lambda inputs: (seen.append(inputs.current_rest), Decision(6.0))[1])
+    assert seen == [None, rests, None], "12 A; not asked for, asked for, too old"
+
+
+def test_what_a_wire_refused_is_told_until_it_is_opened_anew(tmp_path):
+    with driven(tmp_path) as (world, turn, trips):
+        takes = world.motor.command
+
+        def refuses(volts: float) -> None:
+            raise LinkError("its wire takes nothing")
+
+        world.motor.command = refuses
+        turn(0.1)
+        world.motor.command = takes
+        assert trips[0][1:] == ("link", "the motor did not take a command: its wire takes nothing")
+        trips.clear()
+        world.session.loop.begin_link()
+        turn(0.5)
+        assert not trips
+
+
+def test_a_recording_begins_anew_and_ends(tmp_path):
+    with driven(tmp_path) as (world, turn, _):
+        loop = world.session.loop
+        world.session.recorder.streams = ("load_cell", "motor", "command")
+        world.clock.stall(0.1)
+        turn(0.1)
+        assert loop.late.worst > 0.05
+        before, begun = loop.motor_watch.consistency, []
+        before.begin_run = lambda: begun.append(True)
+        loop.begin_recording(world.clock.now_ns())
+        assert (loop.late.worst, begun) == (0.0, [True])
+        turn(0.1)
+        world.recorder.step(0.0)
+        recorded = len(world.recorder.of(Rows))
+        assert recorded
+        loop.end_recording()
+        turn(0.2)
+        world.recorder.step(0.0)
+        assert len(world.recorder.of(Rows)) == recorded
+
+
+def test_a_clock_that_is_set_is_told_once_and_nothing_else_is(tmp_path):
+    with virtual(tmp_path) as world:
+        loop, told, utc = world.session.loop, [], [0]
+        loop.host = lambda: HostClocks(0, utc[0])
+        loop.tick(world.motor, lambda _: IDLE)
+        utc[0] = 3_000_000_000
+        loop.tick(world.motor, lambda _: IDLE)
+        loop.notice = told.append
+        loop.tick(world.motor, lambda _: IDLE)
+        utc[0] = 5_000_000_000
+        loop.tick(world.motor, lambda _: IDLE)
+        loop.tick(world.motor, lambda _: IDLE)
+    assert told == ["the clock of this machine was set by +2.000 s; no time here is by it"]
+
+
+def test_a_rate_that_is_found_frozen_is_no_rate(tmp_path, monkeypatch):
+    with driven(tmp_path) as (world, _, __):
+        loop = world.session.loop
+        assert loop.rotation(loop.now) is not None
+        monkeypatch.setattr(type(loop.motor_watch), "believed", False)
+        assert loop.rotation(loop.now) is None
