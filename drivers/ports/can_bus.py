@@ -61,7 +61,7 @@ class CanBus:
         self._interface, self._channel, self._bitrate, self._capture = interface, channel, bitrate, capture
         self._bus: can.BusABC | None = None
         self._lock: int | None = None
-        self._unread: Callable[[], None] | None = None
+        self._stop_reading: Callable[[], None] | None = None
         """Ends the reading."""
         self._transcript: Transcript | None = None
         self._inboxes: tuple[tuple[Callable[[Frame], bool], Inbox[Frame]], ...] = ()
@@ -94,7 +94,7 @@ class CanBus:
                 f"CAN bus {self._interface} on {self._channel} at {self._bitrate} bit/s does not open:"
                 f" {why_not_open(error)}"
             ) from error
-        self._unread = self._read(self._bus)
+        self._stop_reading = self._read(self._bus)
 
     def subscribe(self, accept: Callable[[Frame], bool], capacity: int = CAPACITY) -> Inbox[Frame]:
         """An inbox that gets every frame for which `accept` is true, from now until the bus is closed.
@@ -138,15 +138,15 @@ class CanBus:
 
     def close(self) -> None:
         """Stop reading and let the adapter go. Safe to call twice and after a failure."""
-        if self._unread is not None:
-            self._unread()
+        if self._stop_reading is not None:
+            self._stop_reading()
         if self._bus is not None:
             _shut_down(self._bus)
         if self._lock is not None:
             os.close(self._lock)
         if self._transcript is not None:
             self._transcript.close()
-        self._bus = self._unread = self._lock = self._transcript = None
+        self._bus = self._stop_reading = self._lock = self._transcript = None
         self._inboxes = ()
 
     def _over(self, wire: Wire) -> can.BusABC:

@@ -71,7 +71,7 @@ class SerialPort(Generic[Record]):
         self._arrivals, self.inbox = self._empty()
         self._serial: serial.Serial | None = None
         self._transcript: Transcript | None = None
-        self._unread: Callable[[], None] | None = None
+        self._stop_reading: Callable[[], None] | None = None
         """Ends the reading."""
         self._opened = False
 
@@ -101,7 +101,7 @@ class SerialPort(Generic[Record]):
             port.close()
             raise
         self._serial = port
-        self._unread = read(port, self.settings.port, self._arrived, self._lost)
+        self._stop_reading = read(port, self.settings.port, self._arrived, self._lost)
         self._opened = True
 
     def _empty(self) -> tuple[Arrivals, Inbox[Record]]:
@@ -181,14 +181,14 @@ class SerialPort(Generic[Record]):
         """Stop the reader and let the port go. Safe to call twice and after a failure."""
         if self._wire is not None:
             self._wire.disconnect()
-        if self._unread is not None:
-            self._unread()
+        if self._stop_reading is not None:
+            self._stop_reading()
         if self._serial is not None:
             with contextlib.suppress(OSError):
                 self._serial.close()
         if self._transcript is not None:
             self._transcript.close()
-        self._unread = self._serial = self._transcript = None
+        self._stop_reading = self._serial = self._transcript = None
         self._opened = False
 
     def _lost(self, why: str) -> None:
