@@ -27,6 +27,7 @@ from identification.mismatch.select.limits.clipping import contradiction
 from identification.mismatch.select.stepwise import stands
 from identification.physics.term import Term
 from identification.recording import Floats
+from identification.run_history.history import TURNING
 
 Named = NamedTerm[Term, Fit]
 CLIPPING = "what else was recorded clips with it, or does not"
@@ -101,9 +102,20 @@ def _unseen(now: Fit, term: Term, data: Data) -> bool:
     known = {p.name: (p, value) for p, value in zip(term.parameters(data.scale), now.values[term], strict=True)}
     if term.traits.quick:
         least, value = known[term.traits.quick]
-        return value <= max(least.low * (1 + AT_LEAST), min(h.delay_std for h in data.histories))
+        usual = _usual_time(term, now.values[term], data) or value
+        return value <= least.low * (1 + AT_LEAST) or usual <= min(h.delay_std for h in data.histories)
     spacing = min(h.spacing for h in data.histories)
     return bool(term.traits.frequency) and known[term.traits.frequency][1] > 0.5 / spacing
+
+
+def _usual_time(term: Term, theta: tuple[float, ...], data: Data) -> float | None:
+    """s that a rotor takes to follow at the median level: a quadratic one takes longer at small ones. None of others."""
+    rotor = term.traits.dynamics(term, theta, data.scale.driver).rotor if term.traits.dynamics else None
+    if rotor is None:
+        return None
+    size = np.abs(np.concatenate([h.driver for h in data.histories]))
+    quadratic, linear = rotor
+    return 1 / (2 * quadratic * float(np.median(size[size > TURNING * data.scale.driver])) + linear)
 
 
 def _cancelled(now: Fit, term: Term, change: list[Floats], data: Data) -> list[Term]:
