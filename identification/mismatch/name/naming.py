@@ -109,7 +109,7 @@ def _unseen(now: Fit, term: Term, data: Data) -> bool:
 
 
 def _usual_time(term: Term, theta: tuple[float, ...], data: Data) -> float | None:
-    """s that a rotor takes to follow at the median level: a quadratic one takes longer at small ones. None of others."""
+    """S that a rotor takes to follow at the median level: a quadratic one takes longer at small ones. None of others."""
     rotor = term.traits.dynamics(term, theta, data.scale.driver).rotor if term.traits.dynamics else None
     if rotor is None:
         return None
