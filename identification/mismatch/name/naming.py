@@ -109,7 +109,7 @@ def _unseen(now: Fit, term: Term, data: Data) -> bool:
 
 
 def _usual_time(term: Term, theta: tuple[float, ...], data: Data) -> float | None:
-    """S that a rotor takes to follow at the median level: a quadratic one takes longer at small ones. None of others."""
+    """Time in s of a rotor at the median level: a quadratic one takes longer at small ones. None of other terms."""
     rotor = term.traits.dynamics(term, theta, data.scale.driver).rotor if term.traits.dynamics else None
     if rotor is None:
         return None
