@@ -89,21 +89,25 @@ class StreamWriter:
     def write(self) -> None:
         if not self._waiting:
             return
-        t_ns = np.concatenate([rows.t_ns for rows in self._waiting])
-        values = np.concatenate([rows.values for rows in self._waiting])
+        t_ns, values = self._in_order(*_joined(self._waiting))
         self._waiting.clear()
-        highest = np.maximum(np.maximum.accumulate(t_ns), self._latest)
-        keep = t_ns >= highest
-        self._latest = int(highest[-1])
-        if not keep.all():
-            self.dropped += int(np.count_nonzero(~keep))
-            t_ns, values = t_ns[keep], values[keep]
         span = Span(self.rows, len(t_ns))
         for column, channel, value in zip(
             self._channels, self.spec.channels, np.ascontiguousarray(values.T), strict=True
         ):
             column.append(_counts(value) if channel.integer else value, span)
         self._time.append((t_ns - self._t0_ns) * 1e-9, span)
+
+    def _in_order(self, t_ns: NDArray[np.int64], values: NDArray[np.float64]) -> tuple[NDArray[Any], NDArray[Any]]:
+        """Without the rows whose time was before that of a row already there, which are counted."""
+        if t_ns[0] >= self._latest and not (t_ns[1:] < t_ns[:-1]).any():
+            self._latest = int(t_ns[-1])
+            return t_ns, values
+        highest = np.maximum(np.maximum.accumulate(t_ns), self._latest)
+        keep = t_ns >= highest
+        self._latest = int(highest[-1])
+        self.dropped += int(np.count_nonzero(~keep))
+        return t_ns[keep], values[keep]
 
 
 class RecordingFile:
@@ -227,6 +231,12 @@ def _channel(group: h5py.Group, spec: ChannelSpec) -> h5py.Dataset:
         facts["missing_value"] = MISSING
     _attributes(dataset, facts)
     return dataset
+
+
+def _joined(waiting: Sequence[Rows]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    if len(waiting) == 1:
+        return waiting[0].t_ns, waiting[0].values
+    return np.concatenate([rows.t_ns for rows in waiting]), np.concatenate([rows.values for rows in waiting])
 
 
 def _counts(values: NDArray[np.float64]) -> NDArray[np.int64]:
