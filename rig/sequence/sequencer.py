@@ -184,8 +184,7 @@ class Sequencer:
         self.next_step(time)
 
     def end_row(self, time: float, cut: bool = False) -> None:
-        volts = self._target if self.state == "ramp" and not cut else self._command
-        self.journal.row(self.state, self.step, volts, self.since, time, cut=cut)
+        self.journal.row(self.state, self.step, self._command, self.since, time, cut=cut)
 
     # one handler per state; True: the state has changed, ask the new one in this same tick
 

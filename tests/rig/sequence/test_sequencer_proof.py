@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from test_sequencer import FIXED, PERIOD, PROOF, SHORT, World, run
+from test_sequencer import FIXED, PERIOD, PROOF, SHORT, World, asks, run
 
 from rig.safety.watchdog_proof import Proof, Proved, Refused
 from rig.sequence.sequencer import Sequencer
@@ -140,3 +140,12 @@ def test_a_motor_that_was_proved_in_an_earlier_run_is_proved_at_the_first_rest()
     proofs = [row for row in ran.rows if row.index == -1]
     assert len(proofs) == 1
     assert proofs[0].t_start > min(row.t_end for row in ran.rows if row.phase == "hold")
+
+
+def test_a_stop_in_the_silence_of_the_proof_is_in_the_rows_at_0_volts():
+    silent = run(SHORT, SETTINGS)
+    number = next(i for i, output in enumerate(silent.outputs) if output.volts is None) + 2
+    ran = run(SHORT, SETTINGS, at={number: asks("stop")})
+    assert ran.outputs[number - 1].volts is None
+    assert ran.outputs[number].volts == 0.0
+    assert (ran.rows[0].index, ran.rows[0].phase, ran.rows[0].command_voltage) == (-1, "free", 0.0)

@@ -265,3 +265,10 @@ def test_a_trip_is_told_as_one_and_a_stop_is_not(how, level):
     ran = run(SHORT, FIXED, at={100: how})
     (event,) = [event for event in ran.events if event.text.endswith(": command 0 V")]
     assert event.level == level
+
+
+def test_without_a_tare_a_point_is_what_the_cell_reads():
+    tared = run(SHORT, FIXED, World(offset=0.7))
+    bare = run([step for step in SHORT if step.phase != "tare"], FIXED, World(offset=0.7))
+    for with_tare, without in zip(tared.points, bare.points, strict=True):
+        assert without.thrust == pytest.approx(with_tare.thrust + 0.7, abs=0.1)
