@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
 
-def content_of_mat(data: bytes) -> dict[str, Any]:
+def content_of_mat(path: Path) -> dict[str, Any]:
     """Structs as mappings, arrays as MATLAB has them: in the file they lie the other way round. Raises OSError."""
-    with h5py.File(BytesIO(data), "r") as file:
+    with h5py.File(path, "r") as file:
         return _content(file)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -42,14 +43,15 @@ class Imported:
     """s on the file's own clock where the recording's time is 0; None where the file has no time."""
 
 
-def convert(data: bytes, plan: ImportMap, overrides: Mapping[str, float]) -> Imported:
-    """Bytes of a file into streams. Raises ConfigError for the map, RecordingError for the file."""
+def convert(content: bytes | Path, plan: ImportMap, overrides: Mapping[str, float]) -> Imported:
+    """The bytes of a text, or the place of another file, into streams. Raises ConfigError for the map, RecordingError
+    for the file."""
     parameters = _parameters(plan, overrides)
     refused = Refused()
-    if plan.file.kind == "text":
-        table = read_table(data, plan.file, refused)
+    if isinstance(content, bytes):
+        table = read_table(content, plan.file, refused)
     else:
-        table = read_binary(data, plan.file.kind, plan.file.message)
+        table = read_binary(content, plan.file.kind, plan.file.message)
         plan = replace(plan, file=replace(plan.file, missing=(*plan.file.missing, "")))
     total = len(table.rows) + refused.counts.total()
     columns = columns_used(plan, table, parameters)

@@ -18,10 +18,12 @@ from rig.importing.mapping import FileMap, ImportMap
 from rig.importing.reading.foreign_formats import foreign
 from rig.importing.timing.two_clocks import ESTIMATED, merged, offset_between
 from rig.link.recorder_messages import Attribute, EventRow, Rows
-from rig.regular_file import read
+from rig.regular_file import beginning, read
 
 MOST_BYTES = 2**30
-"""Of a file to import: a day of ten columns at 100 Hz. What is longer is imported in parts."""
+"""Of a text to import: a day of ten columns at 100 Hz. What is longer is imported in parts. Of other files only what
+the map asks for is kept."""
+WHAT = "file to import"
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,17 +60,17 @@ def import_file(
     _refuse_to_overwrite(out)
     given = dict(overrides or {})
     if beside is None:
-        data, imported = _converted(source, plan, given)
-        attributes = _attributes(source, data, plan, imported, notes)
+        digest, imported = _converted(source, plan, given)
+        attributes = _attributes(source, digest, plan, imported, notes)
     else:
         plans = (plan, beside.plan)
         own, its = ({k: v for k, v in given.items() if k in parameters_known(p)} for p in plans)
         own |= {name: value for name, value in given.items() if name not in its}  # unknown to both: refused by name
-        data, first = _converted(source, plan, own)
+        digest, first = _converted(source, plan, own)
         more, second = _converted(beside.source, beside.plan, its)
         offset = offset_between(first, second, beside.offset)
         imported = merged(first, second, offset, (source.name, beside.source.name))
-        attributes = _attributes(source, data, plan, imported, notes, more) | _attributes_beside(beside, more)
+        attributes = _attributes(source, digest, plan, imported, notes, more) | _attributes_beside(beside, more)
     _finish(out, attributes, imported)
     return Summary(out, imported.rows, imported.bad, (*imported.notes, *imported.warnings))
 
@@ -78,26 +80,37 @@ def _refuse_to_overwrite(out: Path) -> None:
         raise RecordingError(f"{out} exists; a recording is never overwritten: give another name")
 
 
-def read_source(source: Path, form: FileMap | None = None) -> bytes:
-    """Raises RecordingError for a file that is not there, and for one that is no text where one is expected: what it is
-    and what to do."""
+def read_source(source: Path, form: FileMap | None = None) -> bytes | Path:
+    """The bytes of a text; where a file that is none is expected, the file itself. Raises RecordingError for one that
+    is not there, and for one that is no text where one is expected: what it is and what to do."""
+    text = form is None or form.kind == "text"
     try:
-        data = read(source, "file to import", MOST_BYTES, RecordingError)
+        if not text:
+            beginning(source, WHAT, 1, RecordingError)
+            return source
+        data = read(source, WHAT, MOST_BYTES, RecordingError)
     except FileNotFoundError as error:
         raise RecordingError(f"{source} can't be read: {error.strerror}") from error
-    text = form is None or form.kind == "text"
-    what = foreign(data, source.name, form.encoding if form else "utf-8") if text else ""
+    what = foreign(data, source.name, form.encoding if form else "utf-8")
     if what:
         raise RecordingError(f"{source.name}: {what.replace('FILE', source.name)}")
     return data
 
 
-def _converted(source: Path, plan: ImportMap, given: Mapping[str, float]) -> tuple[bytes, Imported]:
-    data = read_source(source, plan.file)
+def _converted(source: Path, plan: ImportMap, given: Mapping[str, float]) -> tuple[str, Imported]:
+    """SHA-256 of the file, and what is in it."""
+    content = read_source(source, plan.file)
     try:
-        return data, convert(data, plan, given)
+        return _digest(content), convert(content, plan, given)
     except RigError as error:
         raise type(error)(f"{source.name}: {error}") from error
+
+
+def _digest(content: bytes | Path) -> str:
+    if isinstance(content, bytes):
+        return hashlib.sha256(content).hexdigest()
+    with content.open("rb") as file:
+        return hashlib.file_digest(file, "sha256").hexdigest()
 
 
 def _finish(out: Path, attributes: Mapping[str, Attribute], imported: Imported) -> None:
@@ -111,11 +124,12 @@ def import_plain(source: Path, out: Path, notes: str = "") -> Summary:
     """Write `out`, a new file, from JSON in the words of the recording format (`rig.importing.json_recording`)."""
     _refuse_to_overwrite(out)
     data = read_source(source)
+    assert isinstance(data, bytes)
     try:
         plain = read_plain(data)
     except RecordingError as error:
         raise RecordingError(f"{source.name}: {error}") from error
-    digest = hashlib.sha256(data).hexdigest()
+    digest = _digest(data)
     attributes: dict[str, Attribute] = {
         "recording_id": str(uuid.uuid5(uuid.NAMESPACE_OID, digest)),
         "thruster": source.stem,
@@ -144,12 +158,10 @@ def _write(path: Path, attributes: Mapping[str, Attribute], imported: Imported) 
 
 
 def _attributes(
-    source: Path, data: bytes, plan: ImportMap, imported: Imported, notes: str, beside: bytes = b""
+    source: Path, digest: str, plan: ImportMap, imported: Imported, notes: str, *beside: str
 ) -> dict[str, Attribute]:
     """Root attributes. The id follows from files, maps and parameters: the same import has the same id."""
-    digest = hashlib.sha256(data).hexdigest()
-    other = [hashlib.sha256(beside).hexdigest()] if beside else []
-    identity = "\n".join([digest, plan.text, plan.thruster, plan.kind, *imported.notes, *other])
+    identity = "\n".join([digest, plan.text, plan.thruster, plan.kind, *imported.notes, *beside])
     found: dict[str, Attribute] = {
         "recording_id": str(uuid.uuid5(uuid.NAMESPACE_OID, identity)),
         "thruster": plan.thruster or source.stem,
@@ -166,10 +178,10 @@ def _attributes(
     return found if plan.water_density is None else found | {"water_density": plan.water_density}
 
 
-def _attributes_beside(beside: Beside, data: bytes) -> dict[str, Attribute]:
+def _attributes_beside(beside: Beside, digest: str) -> dict[str, Attribute]:
     return {
         "imported_with": beside.source.name,
-        "imported_with_sha256": hashlib.sha256(data).hexdigest(),
+        "imported_with_sha256": digest,
         "import_map_with": beside.plan.text,
     }
 

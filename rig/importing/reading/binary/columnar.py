@@ -4,52 +4,75 @@ from __future__ import annotations
 
 import gc
 import sys
-from collections.abc import Sequence
-from io import BytesIO
-from typing import Any
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
 
 import numpy as np
 
 from rig.errors import RecordingError
-from rig.importing.reading.binary.frames import Floats, Frame, numeric
+from rig.importing.reading.binary.frames import Columns, Floats, Frame, numeric
+
+NUMBERS: Final = "biufmM"
+"""Kinds of numpy that are numbers or times."""
 
 
-def parquet(data: bytes, _wanted: Sequence[str]) -> list[Frame]:
+def parquet(path: Path, _wanted: Sequence[str]) -> list[Frame]:
     """One frame; times as s since 1970."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
-    table = pq.read_table(pa.BufferReader(data))
-    found = {name: numeric(table[name].to_numpy()) for name in table.column_names}
-    return [Frame("", {name: values for name, values in found.items() if values is not None})]
+    kinds = (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean, pa.types.is_temporal)
+    schema = pq.read_schema(path)
+    names = [field.name for field in schema if any(kind(field.type) for kind in kinds)]
+
+    def column(name: str) -> Floats:
+        return _as_numbers(name, pq.read_table(path, columns=[name])[name].to_numpy())
+
+    return [Frame("", Columns(names, column))]
 
 
-def tdms(data: bytes, _wanted: Sequence[str]) -> list[Frame]:
+def _as_numbers(name: str, values: Any) -> Floats:
+    found = numeric(values)
+    if found is None:
+        raise RecordingError(f"{name} is no column of numbers")
+    return found
+
+
+def tdms(path: Path, _wanted: Sequence[str]) -> list[Frame]:
     """A frame a group; where its channels have unequal rates, or lengths without a rate, a frame a channel,
     `group/channel`. Of a file that was cut off the rows that are whole."""
     from nptdms import TdmsFile
 
     frames = []
-    for group in TdmsFile.read(BytesIO(data)).groups():
-        found = {channel.name: channel for channel in group.channels() if numeric(channel[:]) is not None}
-        lengths = {len(channel) for channel in found.values()}
-        steps = {channel.properties.get("wf_increment") for channel in found.values()}
-        if found and len(steps) == 1 and (len(lengths) == 1 or steps != {None}):
-            rows = min(lengths)
-            time = _track(next(iter(found.values())))
-            columns = {name: _values(channel)[:rows] for name, channel in found.items()}
-            frames.append(Frame(group.name, columns, None if time is None else time[:rows]))
-        else:
-            frames += [
-                Frame(f"{group.name}/{name}", {name: _values(channel)}, _track(channel))
-                for name, channel in found.items()
-            ]
+    with TdmsFile.open(path) as file:
+        for group in file.groups():
+            found = {channel.name: channel for channel in group.channels() if channel.dtype.kind in NUMBERS}
+            lengths = {len(channel) for channel in found.values()}
+            steps = {channel.properties.get("wf_increment") for channel in found.values()}
+            if found and len(steps) == 1 and (len(lengths) == 1 or steps != {None}):
+                rows = min(lengths)
+                time = _track(next(iter(found.values())))
+                columns = Columns(found, partial(_tdms_column, path, group.name, rows))
+                frames.append(Frame(group.name, columns, None if time is None else time[:rows]))
+            else:
+                frames += [
+                    Frame(
+                        f"{group.name}/{name}",
+                        Columns([name], partial(_tdms_column, path, group.name, len(channel))),
+                        _track(channel),
+                    )
+                    for name, channel in found.items()
+                ]
     return frames
 
 
-def _values(channel: Any) -> Floats:
-    found = numeric(channel[:])
-    return np.zeros(0) if found is None else found
+def _tdms_column(path: Path, group: str, rows: int, name: str) -> Floats:
+    from nptdms import TdmsFile
+
+    with TdmsFile.open(path) as file:
+        return _as_numbers(name, file[group][name][:rows])
 
 
 def _track(channel: Any) -> Floats | None:
@@ -59,14 +82,14 @@ def _track(channel: Any) -> Floats | None:
     return None if step is None else np.asarray(first + float(step) * np.arange(len(channel)), np.float64)
 
 
-def _opened_mdf(data: bytes) -> Any:
+def _opened_mdf(path: Path) -> Any:
     """Raises RecordingError. What its constructor did not finish its destructor complains of on the terminal, once the
     error is gone: here, where nobody hears it."""
     from asammdf import MDF
 
     failed, told = "", sys.unraisablehook
     try:
-        return MDF(BytesIO(data))
+        return MDF(path)
     except Exception as error:  # noqa: BLE001 - whatever it raises for bytes that it does not understand
         failed = f"{type(error).__name__}: {error}"
     sys.unraisablehook = lambda _: None
@@ -77,22 +100,28 @@ def _opened_mdf(data: bytes) -> Any:
     raise RecordingError(f"this measurement file MDF/MF4 can't be read, it may be cut off or damaged ({failed})")
 
 
-def mdf(data: bytes, _wanted: Sequence[str]) -> list[Frame]:
+def mdf(path: Path, _wanted: Sequence[str]) -> list[Frame]:
     """A frame a channel group, by its name or `group<i>`, its time that of the group's master."""
     frames: list[Frame] = []
-    with _opened_mdf(data) as file:
+    with _opened_mdf(path) as file:
         groups: Sequence[Any] = file.groups
         for i, group in enumerate(groups):
-            columns: dict[str, Floats] = {}
-            time: Floats | None = None
-            for j, channel in enumerate(group.channels):
-                signal = file.get(group=i, index=j, ignore_invalidation_bits=True)
-                values = numeric(signal.samples)
-                if j == file.masters_db.get(i):
-                    time = np.asarray(signal.timestamps, np.float64)
-                elif values is not None:
-                    columns[channel.name] = values
-                    time = np.asarray(signal.timestamps, np.float64) if time is None else time
+            master = file.masters_db.get(i)
+            places = {channel.name: j for j, channel in enumerate(group.channels) if j != master}
+            numbers = {name: j for name, j in places.items() if _is_number(file, i, j)}
+            time = np.asarray(file.get_master(i), np.float64) if master is not None or numbers else None
             name = str(getattr(group.channel_group, "acq_name", "") or f"group{i}")
+            columns = Columns(numbers, partial(_mdf_column, path, i, numbers))
             frames.append(Frame(name if all(name != f.name for f in frames) else f"group{i}", columns, time))
     return frames
+
+
+def _is_number(file: Any, group: int, index: int) -> bool:
+    """By its first row, as the file's conversions make it."""
+    first = file.get(group=group, index=index, record_offset=0, record_count=1, ignore_invalidation_bits=True)
+    return numeric(first.samples) is not None
+
+
+def _mdf_column(path: Path, group: int, places: Mapping[str, int], name: str) -> Floats:
+    with _opened_mdf(path) as file:
+        return _as_numbers(name, file.get(group=group, index=places[name], ignore_invalidation_bits=True).samples)

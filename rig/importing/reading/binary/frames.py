@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import tempfile
+from array import array
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
-from math import isnan
+from functools import partial
+from itertools import repeat
+from math import isnan, nan
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,6 +22,35 @@ from rig.importing.reading.table import Table
 Floats = NDArray[np.float64]
 TIME = "time"
 """Column of the log's own time in s, where it has one."""
+MOST_ELEMENTS = 256
+"""Of an array in a message: a longer one is a picture or a scan, no quantities of a thruster."""
+
+
+class Columns(Mapping[str, Floats]):
+    """Columns by name, each read when it is first asked for: a map asks for a few."""
+
+    def __init__(self, names: Iterable[str], read: Callable[[str], Floats]) -> None:
+        self._names, self._read = dict.fromkeys(names), read
+        self._known: dict[str, Floats] = {}
+
+    def __getitem__(self, name: str) -> Floats:
+        if name not in self._known:
+            if name not in self._names:
+                raise KeyError(name)
+            try:
+                self._known[name] = self._read(name)
+            except RecordingError:
+                raise
+            except Exception as error:  # whatever a library of somebody else raises for bytes it does not understand
+                told = f"({type(error).__name__}: {error})"
+                raise RecordingError(f"column {name} can't be read, it may be cut off or damaged {told}") from error
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,34 +63,39 @@ class Frame:
     time: Floats | None = None
     """(n,) s, on the log's clock; None: it has none but in its columns."""
 
+    @property
+    def rows(self) -> int:
+        longest = self.time if self.time is not None else next(iter(self.columns.values()), np.zeros(0))
+        return int(longest.size)
+
 
 class Rows:
     """Rows of columns that are numbers, each as cells of text: read as a text's would be."""
 
-    def __init__(self, columns: Sequence[Floats], count: int) -> None:
-        self._columns, self._count = columns, count
+    def __init__(self, columns: Mapping[str, Floats], count: int) -> None:
+        self._columns, self._names, self._count = columns, tuple(columns), count
 
     def __len__(self) -> int:
         return self._count
 
     def __iter__(self) -> Iterator[tuple[int, Sequence[str]]]:
         for i in range(self._count):
-            yield i + 1, Row(self._columns, i)
+            yield i + 1, Row(self._columns, self._names, i)
 
 
 class Row(Sequence[str]):
     """One of them; a cell is made when it is asked for."""
 
-    def __init__(self, columns: Sequence[Floats], place: int) -> None:
-        self._columns, self._place = columns, place
+    def __init__(self, columns: Mapping[str, Floats], names: Sequence[str], place: int) -> None:
+        self._columns, self._names, self._place = columns, names, place
 
     def __len__(self) -> int:
-        return len(self._columns)
+        return len(self._names)
 
     def __getitem__(self, at: Any) -> Any:
         if isinstance(at, slice):
             return [self[i] for i in range(*at.indices(len(self)))]
-        value = float(self._columns[at][self._place])
+        value = float(self._columns[self._names[at]][self._place])
         return "" if isnan(value) else repr(value)
 
 
@@ -66,30 +106,39 @@ def table_of(frames: Sequence[Frame], what: str) -> Table:
         raise RecordingError(f"this {what} has no column of numbers in what the map asks for ([file] message)")
     if len(frames) == 1:
         (frame,) = frames
-        own = dict(frame.columns)
+        own = frame.columns
         if frame.time is not None and TIME not in own:
-            own = {TIME: frame.time, **own}
-        return _table(own)
+            own = _with_time(frame.time, {name: partial(own.__getitem__, name) for name in own})
+        return _table(own, frame.rows)
     untimed = [frame.name for frame in frames if frame.time is None]
     if untimed:
         raise RecordingError(f"{', '.join(untimed)}: without a time it can't be put among others; import it by itself")
     times = np.concatenate([frame.time for frame in frames if frame.time is not None])
     order = np.argsort(times, kind="stable")
-    merged: dict[str, Floats] = {TIME: times[order]}
+    merged: dict[str, Callable[[], Floats]] = {}
     begins = 0
     for frame in frames:
-        for name, values in frame.columns.items():
-            whole = np.full(times.size, np.nan)
-            whole[begins : begins + values.size] = values
-            merged[f"{frame.name}.{name}"] = whole[order]
-        begins += 0 if frame.time is None else frame.time.size
-    return _table(merged)
+        among = partial(_among, frame.columns, begins, order)
+        merged |= {f"{frame.name}.{name}": partial(among, name) for name in frame.columns}
+        begins += frame.rows
+    return _table(_with_time(times[order], merged), times.size)
 
 
-def _table(columns: Mapping[str, Floats]) -> Table:
-    count = max((values.size for values in columns.values()), default=0)
-    values = [np.asarray(each, np.float64) for each in columns.values()]
-    return Table(tuple(columns), Rows(values, count), (), len(columns), "", latin=False)
+def _with_time(time: Floats, others: Mapping[str, Callable[[], Floats]]) -> Columns:
+    made = {TIME: lambda: time, **others}
+    return Columns(made, lambda name: made[name]())
+
+
+def _among(columns: Mapping[str, Floats], begins: int, order: NDArray[np.intp], name: str) -> Floats:
+    """Values of a frame whose rows begin there, with nothing in the rows of the others."""
+    whole = np.full(order.size, np.nan)
+    values = columns[name]
+    whole[begins : begins + values.size] = values
+    return whole[order]
+
+
+def _table(columns: Mapping[str, Floats], count: int) -> Table:
+    return Table(tuple(columns), Rows(columns, count), (), len(columns), "", latin=False)
 
 
 def numeric(values: Any) -> Floats | None:
@@ -105,13 +154,15 @@ def numeric(values: Any) -> Floats | None:
 
 
 def flat(value: Any, name: str = "") -> Iterator[tuple[str, float]]:
-    """Numbers of a message, by dotted names: fields of objects and mappings, `[i]` of arrays from 0."""
+    """Numbers of a message, by dotted names: fields of objects and mappings, `[i]` of short arrays from 0."""
     if isinstance(value, bool | int | float | np.number):
         yield name, float(value)
     elif isinstance(value, Mapping):
         for key, inner in value.items():
             yield from flat(inner, f"{name}.{key}" if name else str(key))
     elif isinstance(value, list | tuple | np.ndarray):
+        if len(value) > MOST_ELEMENTS:
+            return
         for i, inner in enumerate(value):
             yield from flat(inner, f"{name}[{i}]")
     elif hasattr(value, "__dataclass_fields__"):
@@ -123,24 +174,36 @@ class Gathered:
     """Messages one by one into frames; a field that a message has not is NaN there."""
 
     def __init__(self) -> None:
-        self._times: dict[str, list[float]] = {}
-        self._values: dict[str, dict[str, list[float]]] = {}
+        self._times: dict[str, array[float]] = {}
+        self._values: dict[str, dict[str, array[float]]] = {}
 
     def add(self, name: str, time: float, fields: Iterator[tuple[str, float]]) -> None:
-        times = self._times.setdefault(name, [])
+        times = self._times.setdefault(name, array("d"))
         columns = self._values.setdefault(name, {})
         for field, value in fields:
-            column = columns.setdefault(field, [])
-            column.extend([np.nan] * (len(times) - len(column)))
+            column = columns.setdefault(field, array("d"))
+            column.extend(repeat(nan, len(times) - len(column)))
             column.append(value)
         times.append(time)
 
     def frames(self) -> list[Frame]:
-        out = []
-        for name, times in self._times.items():
-            columns = {
-                field: np.array(column + [np.nan] * (len(times) - len(column)))
-                for field, column in self._values[name].items()
-            }
-            out.append(Frame(name, columns, np.array(times)))
-        return out
+        return [Frame(name, self._columns(name), np.array(times)) for name, times in self._times.items()]
+
+    def _columns(self, name: str) -> dict[str, Floats]:
+        rows, found = len(self._times[name]), {}
+        for field, column in self._values[name].items():
+            column.extend(repeat(nan, rows - len(column)))
+            found[field] = np.array(column)
+        return found
+
+
+@contextmanager
+def called(path: Path, suffix: str) -> Iterator[Path]:
+    """The file by a name with that suffix, for a library that goes by it."""
+    if path.suffix == suffix:
+        yield path
+        return
+    with tempfile.TemporaryDirectory() as folder:
+        name = Path(folder, f"log{suffix}")
+        name.symlink_to(path.resolve())
+        yield name

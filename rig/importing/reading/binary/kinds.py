@@ -5,14 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from importlib import import_module
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Final, NamedTuple
 
 from rig.errors import ConfigError, RecordingError
 from rig.importing.reading.binary.frames import Frame, table_of
 from rig.importing.reading.table import Table
+from rig.regular_file import beginning
 
-Read = Callable[[bytes, Sequence[str]], list[Frame]]
-"""Bytes of a file and the messages, topics, groups or variables that are wanted; none: all."""
+Read = Callable[[Path, Sequence[str]], list[Frame]]
+"""A file and the messages, topics, groups or variables that are wanted; none: all. What is not wanted is not kept."""
+HEAD = 16
+"""Bytes by which a kind is known."""
 
 
 class Kind(NamedTuple):
@@ -52,18 +56,22 @@ def kind_named(name: str) -> Kind:
     return kind
 
 
-def read_binary(data: bytes, name: str, wanted: Sequence[str]) -> Table:
-    """Raises RecordingError for a file of another kind, a damaged one, and one without what is wanted."""
+def read_binary(path: Path, name: str, wanted: Sequence[str]) -> Table:
+    """Raises RecordingError for a file of another kind, a damaged one, and one without what is wanted.
+
+    The file is read as far as it is wanted: columns of tables when they are asked for.
+    """
     kind = kind_named(name)
-    if not data:
+    head = beginning(path, kind.what, HEAD, RecordingError)
+    if not head:
         raise RecordingError(f"this {kind.what} is empty: it has no bytes")
-    if kind.starts and not data.startswith(kind.starts):
+    if kind.starts and not head.startswith(kind.starts):
         raise RecordingError(
-            f'the map says [file] kind = "{name}", but this is no {kind.what}: it begins with {data[:8].hex(" ")}'
+            f'the map says [file] kind = "{name}", but this is no {kind.what}: it begins with {head[:8].hex(" ")}'
         )
     read: Read = getattr(import_module(f"rig.importing.reading.binary.{kind.module}"), kind.function)
     try:
-        frames = read(data, wanted)
+        frames = read(path, wanted)
     except RecordingError:
         raise
     except Exception as error:  # whatever a library of somebody else raises for bytes that it does not understand

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from io import BytesIO
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,17 +15,20 @@ HEAD = 512
 """Bytes that MATLAB puts before the HDF5 of a file of version 7.3."""
 
 
-def mat(data: bytes, wanted: Sequence[str]) -> list[Frame]:
+def mat(path: Path, wanted: Sequence[str]) -> list[Frame]:
     """A frame a struct, `a.b`, of its vectors of one length; those of the file itself are the frame ``."""
-    if data.startswith(LATEST) or data[HEAD : HEAD + len(LATEST)] == LATEST:
-        from rig.hdf5.matlab import content_of_mat
+    with path.open("rb") as opened:
+        head = opened.read(HEAD + len(LATEST))
+        if head.startswith(LATEST) or head[HEAD:] == LATEST:
+            from rig.hdf5.matlab import content_of_mat
 
-        content = content_of_mat(data)
-    else:
-        from scipy.io import loadmat
+            content = content_of_mat(path)
+        else:
+            from scipy.io import loadmat
 
-        file: Any = BytesIO(data)  # a path, for its stubs
-        content = loadmat(file, simplify_cells=True)
+            opened.seek(0)
+            file: Any = opened  # a path, for its stubs
+            content = loadmat(file, simplify_cells=True)
     frames = list(_frames(content, ""))
     return frames if wanted else frames[:1]
 

@@ -3,26 +3,24 @@
 from __future__ import annotations
 
 import os
-import tempfile
 from collections.abc import Sequence
-from io import BytesIO
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from rig.importing.reading.binary.frames import Frame, Gathered, flat, numeric
+from rig.importing.reading.binary.frames import Frame, Gathered, called, flat, numeric
 
 MICROSECOND = 1e-6
 
 
-def ulog(data: bytes, wanted: Sequence[str]) -> list[Frame]:
+def ulog(path: Path, wanted: Sequence[str]) -> list[Frame]:
     """A frame a topic; the second instance of one is `topic.1`. Time is its `timestamp`."""
     from pyulog import ULog
 
     topics = sorted({name.partition(".")[0] for name in wanted}) or None
     frames = []
-    for topic in ULog(BytesIO(data), topics).data_list:
+    for topic in ULog(str(path), topics).data_list:
         found = {name: numeric(values) for name, values in topic.data.items()}
         columns = {name: values for name, values in found.items() if values is not None}
         name = topic.name if topic.multi_id == 0 else f"{topic.name}.{topic.multi_id}"
@@ -30,24 +28,21 @@ def ulog(data: bytes, wanted: Sequence[str]) -> list[Frame]:
     return frames
 
 
-def dataflash(data: bytes, wanted: Sequence[str]) -> list[Frame]:
+def dataflash(path: Path, wanted: Sequence[str]) -> list[Frame]:
     """A frame a message, `BAT` or of the second instance `BAT[1]`. Time is its `TimeUS`."""
     from pymavlink.DFReader import DFReader_binary
 
     gathered = Gathered()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "log.bin")
-        path.write_bytes(data)
-        log = DFReader_binary(str(path))
-        try:
-            types = sorted({name.partition("[")[0] for name in wanted}) or None
-            while (message := log.recv_match(type=types)) is not None:
-                fields = message.to_dict()
-                if "TimeUS" in fields:
-                    name = _instance(str(message.get_type()), fields)
-                    gathered.add(name, fields["TimeUS"] * MICROSECOND, flat(_numbers(fields)))
-        finally:
-            log.close()
+    log = DFReader_binary(str(path))
+    try:
+        types = sorted({name.partition("[")[0] for name in wanted}) or None
+        while (message := log.recv_match(type=types)) is not None:
+            fields = message.to_dict()
+            if "TimeUS" in fields:
+                name = _instance(str(message.get_type()), fields)
+                gathered.add(name, fields["TimeUS"] * MICROSECOND, flat(_numbers(fields)))
+    finally:
+        log.close()
     return gathered.frames()
 
 
@@ -56,16 +51,14 @@ def _instance(kind: str, fields: dict[str, Any]) -> str:
     return kind if "[" in kind or not isinstance(number, int) or number == 0 else f"{kind}[{number}]"
 
 
-def tlog(data: bytes, wanted: Sequence[str]) -> list[Frame]:
+def tlog(path: Path, wanted: Sequence[str]) -> list[Frame]:
     """A frame a message. Time is that of its arrival, since 1970."""
     os.environ.setdefault("MAVLINK20", "1")  # pymavlink reads it as it is imported: version 2, which reads 1 as well
     from pymavlink import mavutil
 
     gathered = Gathered()
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder, "log.tlog")
-        path.write_bytes(data)
-        log = mavutil.mavlink_connection(str(path))
+    with called(path, ".tlog") as named:
+        log = mavutil.mavlink_connection(str(named))
         try:
             while (message := log.recv_match(type=list(wanted) or None)) is not None:
                 if message.get_type() != "BAD_DATA":
