@@ -40,6 +40,7 @@ def test_time_to_zero_is_in_the_run_and_its_rows():
     ran = run(SHORT, SETTINGS)
     assert ran.last.time_to_zero_s == pytest.approx(0.9, abs=0.1)
     assert (ran.rows[0].index, ran.rows[0].phase) == (-1, "free")
+    assert ran.said("watchdog proved: at rest 0.9")
     silence = [i for i, o in enumerate(ran.outputs) if o.volts is None]
     assert ran.outputs[silence[-1] + 1].volts == 0.0  # the first command after the lapse
     assert ran.outputs[0].state == "proving"

@@ -28,7 +28,8 @@ def parquet(path: Path, _wanted: Sequence[str]) -> list[Frame]:
     names = [field.name for field in schema if any(kind(field.type) for kind in kinds)]
 
     def column(name: str) -> Floats:
-        return _as_numbers(name, pq.read_table(path, columns=[name])[name].to_numpy())
+        with pq.ParquetFile(path) as file:
+            return _as_numbers(name, file.read(columns=[name])[name].to_numpy())
 
     return [Frame("", Columns(names, column))]
 
@@ -100,20 +101,25 @@ def _opened_mdf(path: Path) -> Any:
     raise RecordingError(f"this measurement file MDF/MF4 can't be read, it may be cut off or damaged ({failed})")
 
 
-def mdf(path: Path, _wanted: Sequence[str]) -> list[Frame]:
+def mdf(path: Path, wanted: Sequence[str]) -> list[Frame]:
     """A frame a channel group, by its name or `group<i>`, its time that of the group's master."""
     frames: list[Frame] = []
     with _opened_mdf(path) as file:
         groups: Sequence[Any] = file.groups
         for i, group in enumerate(groups):
-            master = file.masters_db.get(i)
-            places = {channel.name: j for j, channel in enumerate(group.channels) if j != master}
-            numbers = {name: j for name, j in places.items() if _is_number(file, i, j)}
-            time = np.asarray(file.get_master(i), np.float64) if master is not None or numbers else None
             name = str(getattr(group.channel_group, "acq_name", "") or f"group{i}")
-            columns = Columns(numbers, partial(_mdf_column, path, i, numbers))
-            frames.append(Frame(name if all(name != f.name for f in frames) else f"group{i}", columns, time))
+            name = name if all(name != frame.name for frame in frames) else f"group{i}"
+            asked = not wanted or name in wanted
+            frames.append(_mdf_group(path, file, i, name) if asked else Frame(name, {}))
     return frames
+
+
+def _mdf_group(path: Path, file: Any, i: int, name: str) -> Frame:
+    master = file.masters_db.get(i)
+    places = {channel.name: j for j, channel in enumerate(file.groups[i].channels) if j != master}
+    numbers = {name: j for name, j in places.items() if _is_number(file, i, j)}
+    time = np.asarray(file.get_master(i), np.float64) if master is not None or numbers else None
+    return Frame(name, Columns(numbers, partial(_mdf_column, path, i, numbers)), time)
 
 
 def _is_number(file: Any, group: int, index: int) -> bool:
