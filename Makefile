@@ -46,6 +46,7 @@ test: $(VENV)/.test
 	$(TESTING) $(BIN)/python -m pytest -n 2 --dist worksteal -m "not alone" --cov --cov-report= --durations=15
 	$(TESTING) $(BIN)/python -m pytest -n 2 --dist worksteal -m alone --reruns 3 --only-rerun 'did not get where the test begins' --cov --cov-append --cov-report=term:skip-covered --durations=15
 	$(BIN)/python tests/coverage_floor.py
+	$(TESTING) $(BIN)/python tests/newest_python.py
 	$(BIN)/python benchmarks/controller/reliability.py --collect
 
 reliability: $(VENV)/.test
