@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.recording import Channel, Floats, Recording
 from identification.steady_state.holds import Window
@@ -105,11 +106,9 @@ def _of_log(windows: tuple[Window, ...], time: Floats, value: Floats) -> Command
     if level < LEAST_LEVEL or time.size < LEAST_SAMPLES * len(windows):
         return None
     shifts = level * np.linspace(-1.0, 1.0, 2 * SHIFTS + 1)
-    sums = _Sums.of(windows, time, value)
-    tried = [_within(sums, shift) for shift in shifts.tolist()]
-    scatter = np.array([variance for variance, _ in tried])
+    scatter, follows = _within(_Sums.of(windows, time, value), shifts)
     steady = scatter <= AS_STEADY * float(scatter.min())
-    best = int(np.argmax(np.where(steady, [follows for _, follows in tried], -np.inf)))
+    best = int(np.argmax(np.where(steady, follows, -np.inf)))
     found, now = CommandSkew(float(shifts[best]), level, table=False), scatter[SHIFTS]
     if found.share < LEAST_SHARE or 0 < found.seconds < SLOW:
         return None
@@ -139,15 +138,30 @@ def _summed(value: Floats) -> Floats:
     return np.concatenate(([0.0], np.cumsum(value)))
 
 
-def _within(sums: _Sums, shift: float) -> tuple[float, float]:
-    """N^2, variance of the samples about the mean of their level, levels shifted by `shift` s; and the correlation of
-    those means with V|V|: thrust of the level before is as steady, but it does not follow this command."""
-    low, high = np.searchsorted(sums.time, sums.begin + shift), np.searchsorted(sums.time, sums.end + shift)
+def _within(sums: _Sums, shifts: Floats) -> tuple[Floats, Floats]:
+    """(S,) each, of levels shifted by `shifts` s: N^2, variance of the samples about the mean of their level; and the
+    correlation of those means with V|V|. Thrust of the level before is as steady, but does not follow this command."""
+    low, high = (np.searchsorted(sums.time, edge + shifts[:, None]) for edge in (sums.begin, sums.end))
     some = high - low >= LEAST_SAMPLES
-    low, high, driver = low[some], high[some], sums.driver[some]
-    count = high - low
+    count = np.where(some, high - low, 1)
     total = sums.once[high] - sums.once[low]
-    if count.size < 3 or not np.ptp(total / count) or not np.ptp(driver):
-        return float("inf"), 0.0
-    scatter = float(np.sum(sums.squared[high] - sums.squared[low] - total**2 / count))
-    return max(scatter, 0.0) / float(np.sum(count - 1)), abs(float(np.corrcoef(total / count, driver)[0, 1]))
+    scatter = np.sum(sums.squared[high] - sums.squared[low] - total**2 / count, axis=1, where=some)
+    means, drivers = total / count, np.broadcast_to(sums.driver, some.shape)
+    told = (np.count_nonzero(some, axis=1) >= 3) & _moves(means, some) & _moves(drivers, some)
+    mean, driver = _beside_mean(means, some), _beside_mean(drivers, some)
+    sizes = np.sum(mean**2, axis=1) * np.sum(driver**2, axis=1)
+    samples = np.maximum(np.sum(count - 1, axis=1, where=some), 1)
+    follows = np.abs(np.sum(mean * driver, axis=1)) / np.sqrt(np.where(told, sizes, 1.0))
+    return np.where(told, np.maximum(scatter, 0.0) / samples, np.inf), np.where(told, follows, 0.0)
+
+
+def _moves(x: Floats, some: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Of each row of `x`, whether what is `some` differs."""
+    highest, lowest = np.max(x, axis=1, where=some, initial=-np.inf), np.min(x, axis=1, where=some, initial=np.inf)
+    return np.asarray(highest > lowest, dtype=np.bool_)
+
+
+def _beside_mean(x: Floats, some: NDArray[np.bool_]) -> Floats:
+    """Each row of `x` less the mean of what is `some`, and 0 where it is not."""
+    mean = np.sum(x, axis=1, where=some) / np.maximum(np.count_nonzero(some, axis=1), 1)
+    return np.where(some, x - mean[:, None], 0.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
-from functools import cached_property
+from functools import cache, cached_property
 from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from typing import Any, TypeAlias
@@ -50,8 +50,12 @@ def software(question: Question) -> str:
     >>> software(Question("fits", "rig.fit.one:answer", {}, "0123456789ab")).endswith(", sources 0123456789ab")
     True
     """
+    return f"thruster-rig {_known()}, sources {question.version}"
+
+
+@cache
+def _known() -> str:
     try:
-        known = version("thruster-rig")
+        return version("thruster-rig")
     except PackageNotFoundError:
-        known = "(not installed)"
-    return f"thruster-rig {known}, sources {question.version}"
+        return "(not installed)"
