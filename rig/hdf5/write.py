@@ -84,7 +84,8 @@ class StreamWriter:
             raise RecordingError(
                 f"stream {self.spec.name} has {len(self.spec.channels)} channels, not rows of shape {rows.values.shape}"
             )
-        self._waiting.append(rows)
+        if len(rows.t_ns):
+            self._waiting.append(rows)
 
     def write(self) -> None:
         if not self._waiting:

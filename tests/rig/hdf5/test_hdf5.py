@@ -64,6 +64,15 @@ def test_what_is_written_is_loaded(tmp_path):
     assert [event.text for event in recording.events] == ["tare 1.25 N"]
 
 
+def test_an_empty_batch_writes_nothing(tmp_path):
+    file = written(tmp_path / "r.h5")
+    file.add_rows(rows(1, [], np.empty((0, 1))))
+    assert file.flush() == (2, 1)
+    file.add_rows(rows(1, [], np.empty((0, 1))))
+    assert file.flush() == (2, 1)
+    file.close("completed", "", 2.0)
+
+
 def test_a_closed_file_says_so_twice_and_its_tables_hold_no_variable_strings(tmp_path):
     path = tmp_path / "r.h5"
     written(path).close("tripped", "over-current 41 A", 2.0)
