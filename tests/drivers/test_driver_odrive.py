@@ -47,8 +47,8 @@ def options(**changed):
 class Axis:
     """Somebody else on the virtual bus: says its messages again and again, notes what it is sent."""
 
-    def __init__(self, channel, obeys=True):
-        self.state, self.error, self.parts, self.obeys = 1, 0, (0, 0, 0), obeys
+    def __init__(self, channel, obeys=True, state=1):
+        self.state, self.error, self.parts, self.obeys = state, 0, (0, 0, 0), obeys
         self.messages = {0x09: (1.0, -12.5), 0x14: (2.0, 1.5), 0x17: (48.0, 0.5), 0x15: (30.0, 40.0)}
         self.heard = []
         self._bus = can.Bus(channel, interface="virtual")
@@ -89,7 +89,8 @@ class Axis:
 
 @pytest.fixture
 def axis(request):
-    with Axis(request.node.name) as axis:
+    """`indirect`: its state when it is first heard."""
+    with Axis(request.node.name, state=getattr(request, "param", 1)) as axis:
         yield axis
 
 
@@ -325,16 +326,17 @@ def test_an_axis_that_leaves_its_loop_is_a_fault(axis, motor):
     assert motor.health().error == "motor is idle and not in closed loop control: is it calibrated?"
 
 
+@pytest.mark.parametrize("axis", [8], indirect=True)
 def test_an_axis_that_was_left_driving_is_made_idle(bus, axis):
-    axis.state = 8
     device = ODriveCan("motor", options(), bus)
     device.open()
     assert axis.heard == [(0x07, bytes((1, *[0] * 7)))]
     device.close()
 
 
+@pytest.mark.parametrize("axis", [8], indirect=True)
 def test_an_axis_that_does_not_become_idle_is_refused(bus, axis):
-    axis.state, axis.obeys = 8, False
+    axis.obeys = False
     device = ODriveCan("motor", options(), bus)
     with pytest.raises(DeviceError, match="was closed loop control and does not become idle"):
         device.open()
