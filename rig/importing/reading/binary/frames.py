@@ -198,7 +198,7 @@ class Gathered:
 
 
 @contextmanager
-def called(path: Path, suffix: str) -> Iterator[Path]:
+def with_its_suffix(path: Path, suffix: str) -> Iterator[Path]:
     """The file by a name with that suffix, for a library that goes by it."""
     if path.suffix == suffix:
         yield path

@@ -8,7 +8,7 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from rig.errors import RecordingError
-from rig.importing.reading.binary.frames import Frame, Gathered, called, flat
+from rig.importing.reading.binary.frames import Frame, Gathered, flat, with_its_suffix
 
 JSON = "json"
 
@@ -45,7 +45,7 @@ def _by_rosbags(path: Path, wanted: Sequence[str], suffix: str) -> list[Frame]:
 
     gathered = Gathered()
     with (
-        called(path, suffix) as log,
+        with_its_suffix(path, suffix) as log,
         AnyReader([log], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader,
     ):
         there = [c for c in reader.connections if not wanted or c.topic in wanted]

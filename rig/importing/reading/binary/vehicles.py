@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from rig.importing.reading.binary.frames import Frame, Gathered, called, flat, numeric
+from rig.importing.reading.binary.frames import Frame, Gathered, flat, numeric, with_its_suffix
 
 MICROSECOND = 1e-6
 
@@ -57,7 +57,7 @@ def tlog(path: Path, wanted: Sequence[str]) -> list[Frame]:
     from pymavlink import mavutil
 
     gathered = Gathered()
-    with called(path, ".tlog") as named:
+    with with_its_suffix(path, ".tlog") as named:
         log = mavutil.mavlink_connection(str(named))
         try:
             while (message := log.recv_match(type=list(wanted) or None)) is not None:
