@@ -108,6 +108,9 @@ class Mock:
     async def _main(self):
         bus = can.Bus(self._channel, interface="virtual")
         mock = self._module.ODriveCANMock(3, bus)
+        mock.notifier.remove_listener(mock.can_reader)  # it would hand over from a thread what is the loop's own
+        mock.notifier.stop()
+        mock.notifier = can.Notifier(bus, [mock.can_reader], loop=asyncio.get_running_loop())
         tasks = [asyncio.create_task(each) for each in (mock.heartbeat_loop(0.02), mock.encoder_loop(0.01))]
         tasks.append(asyncio.create_task(mock.message_handler()))
         self.mock = mock
