@@ -1,7 +1,8 @@
 """The engine of many machines: a cluster of Dask workers, asked through its scheduler.
 
-Each order is a task whose name is the key of its answer, so that a task that is there already is not begun twice. A
-worker that dies gives its tasks to the others; one that ends worker after worker is told by name.
+Each order is a task whose name is the table's and the key of its answer, so that a task that is there already is not
+begun twice. By the first part workers keep what they know of a kind of task, and of ten thousand kinds too. A worker
+that dies gives its tasks to the others; one that ends worker after worker is told by name.
 """
 
 from __future__ import annotations
@@ -69,8 +70,9 @@ class DaskCluster:
 
         def given() -> Any:
             order = waiting.pop()
-            at[order.key] = order
-            return client.submit(ask, order.url, question, key=order.key, pure=True, retries=1)
+            name = f"{question.table}-{order.key}"
+            at[name] = order
+            return client.submit(ask, order.url, question, key=name, pure=True, retries=1)
 
         with client:
             running = as_completed([given() for _ in range(min(AT_ONCE, len(waiting)))], loop=client.loop)

@@ -9,6 +9,7 @@ import sys
 import pyarrow.dataset
 import pytest
 from click.testing import CliRunner
+from distributed import Client
 
 from rig.fit.command import fit_command
 from rig.fleet import dask_cluster
@@ -77,6 +78,7 @@ def test_the_rows_of_a_cluster_are_those_of_this_machine_also_when_a_worker_is_k
     (root / "torn.h5").write_bytes((root / "0.h5").read_bytes()[:3000])
     monkeypatch.setattr(dask_cluster, "_answer", kills_at(5, workers[0], dask_cluster._answer))
     told = rig_fit(root, "--scheduler", address, "--store", tmp_path / "there")
+    assert kinds(address) == ["fits"], "workers remember each kind of task: files must not be kinds"
     assert (told.exit_code, "25 files, 25 computed, 0 known, 1 can't be used" in told.output) == (1, True), told.output
     assert rig_fit(root, "--jobs", 1, "--store", tmp_path / "here").exit_code == 1
     here, there = table(tmp_path / "here"), table(tmp_path / "there")
@@ -84,6 +86,12 @@ def test_the_rows_of_a_cluster_are_those_of_this_machine_also_when_a_worker_is_k
     assert workers[0].poll() == -signal.SIGKILL
     again = rig_fit(root, "--scheduler", "tcp://127.0.0.1:1", "--store", tmp_path / "there")
     assert "0 computed, 25 known" in again.output, "nobody is asked for what is known"
+
+
+def kinds(address):
+    """Of tasks, that a cluster has heard of."""
+    with Client(address, set_as_default=False) as client:
+        return client.run_on_scheduler(lambda dask_scheduler: list(dask_scheduler.task_prefixes))
 
 
 def kills_at(number, worker, answer):
