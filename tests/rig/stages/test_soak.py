@@ -68,5 +68,6 @@ def test_a_long_run_takes_no_more_memory_and_loses_no_sample(tmp_path, report):
     end = looks.memory[-1][0]
     settled = next(size for t, size in looks.memory if t >= WARM * end)
     growth = max(size for _, size in looks.memory) / settled - 1.0
+    report("memory after a quarter", settled, "MiB")
     report("growth of memory", 100 * growth, "%")
     assert growth < GROWTH
