@@ -31,6 +31,11 @@ from rig.hdf5.layout import (
 from rig.link.recorder_messages import Attribute, ChannelSpec, EventRow, Rows, StepRow, StreamSpec
 
 SET_BY_WRITER: Final = ("format", "format_version", "complete", "outcome")
+CACHED_BYTES: Final = 64 * 1024
+"""Of chunks in memory, for each column: nothing behind the chunk that grows is wanted again. HDF5's own 8 MiB fill up
+over hours, a column after the other."""
+CACHED_SLOTS: Final = 53
+"""Of the table of a column's chunks in memory, a prime number."""
 
 
 class Span:
@@ -120,7 +125,10 @@ class RecordingFile:
         """Create the file with its whole layout. Raises RecordingError when it exists or can't be laid out."""
         _check_names(attributes, streams)
         try:
-            self._file = h5py.File(path, "x", libver=LIBVER, fs_strategy="page", fs_page_size=PAGE_BYTES)
+            self._file = h5py.File(
+                path, "x", libver=LIBVER, fs_strategy="page", fs_page_size=PAGE_BYTES, rdcc_nbytes=CACHED_BYTES,
+                rdcc_nslots=CACHED_SLOTS,
+            )  # fmt: skip
         except OSError as error:
             raise RecordingError(f"{path}: cannot create the recording: {error}") from error
         self.path = path
