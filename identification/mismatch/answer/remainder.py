@@ -9,6 +9,7 @@ from identification.mismatch import policy
 from identification.mismatch.answer.advice import what_to_do
 from identification.mismatch.locate.places import says, where_of
 from identification.mismatch.model.data import Data
+from identification.mismatch.name.naming import Named
 from identification.mismatch.unexplained import Remainder
 from identification.mismatch.unnamed.flexible import foremost
 from identification.mismatch.unnamed.flexible_shape import with_flexible
@@ -30,7 +31,7 @@ def remainder_of(completed: Completed, data: Data, unseen: Sequence[History]) ->
     judged = next((g for g in left.groups if g.covariate.quantity == quantity), left.groups[0])
     where, share, table = where_of(judged, bare.fit, data, bare.weights)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.failed_checks)}" for n in unearned)
-    text = f"Something is left that no term of the catalogue carries: {says(where, share, judged.covariate.what)}"
+    text = f"{_what(unearned)}: {says(where, share, judged.covariate.what)}"
     repairs = bool(unearned) and len(only_repairs(unearned)) == len(unearned)
     if repairs:
         names = " or ".join(n.term.id.replace("_", " ") for n in unearned)
@@ -39,3 +40,11 @@ def remainder_of(completed: Completed, data: Data, unseen: Sequence[History]) ->
     found = with_flexible(found, flexible, data, unseen)
     tried = refused([(n.term.id, n.failed_checks[0]) for n in unearned]) if unearned and not repairs else ""
     return replace(found, statement=" ".join(filter(None, [found.statement, what_to_do(quantity), tried])))
+
+
+def _what(unearned: Sequence[Named]) -> str:
+    """What is left, in a word: what would carry it is no name where the samples can't tell whose it is."""
+    quick = [any(check.kind == "sampled" and check.failed for check in n.checks) for n in unearned]
+    if quick and all(quick):
+        return "Something quick is left, of which the samples do not say whose it is"
+    return "Something is left that no term of the catalogue carries"

@@ -33,6 +33,7 @@ Named = NamedTerm[Term, Fit]
 CLIPPING = "what else was recorded clips with it, or does not"
 REPAIR = "no repair of another shape"
 """What is asked of two shapes on one static curve."""
+TOO_FAST = "it is faster than the samples can show"
 AT_LEAST = 0.01
 """Of the least time that samples can show: what is no longer ends there."""
 
@@ -43,7 +44,7 @@ def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check
     `many`: terms of the model, all of which are asked.
     """
     at = _told(term, estimate.fit.values[term], data)
-    ended, unseen = at_bound(term, estimate.fit, data, estimate.weights), _unseen(estimate.fit, term, data)
+    ended = at_bound(term, estimate.fit, data, estimate.weights)
     elsewhere = contradiction(estimate.fit, term, estimate.noise, data)
     change = _raw_effect(estimate.fit, (term,), data)
     cancelled = _cancelled(estimate.fit, term, change, data)
@@ -51,7 +52,7 @@ def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check
         Check(
             "possible", "its values are possible", f"it would take values that are not possible: {at}" if ended else ""
         ),
-        Check("sampled", "the samples can show it", "it is faster than the samples can show" if unseen else ""),
+        Check("sampled", "the samples can show it", _why_unseen(estimate.fit, term, data)),
         *((Check("clipping", CLIPPING, elsewhere),) if term.traits.limits else ()),
         *(Check("undone", "no other term undoes it", f"it and {other.id} nearly cancel") for other in cancelled),
         *(() if cancelled else (Check("undone", "no other term undoes it"),)),
@@ -96,16 +97,28 @@ def _constancy(estimate: Estimate, change: list[Floats], data: Data, many: int) 
         yield part_check(what, column, basis, residual, policy.name.PART_DIFFERENCE, tests)
 
 
-def _unseen(now: Fit, term: Term, data: Data) -> bool:
+def _why_unseen(now: Fit, term: Term, data: Data) -> str:
     """Ringing beyond half the sampling rate: between the samples it may be any other delay. Or over within a sample, or
-    within what the recording itself says of when its samples were taken."""
+    within what the recording itself says of when its samples were taken. Empty where the samples show it."""
     known = {p.name: (p, value) for p, value in zip(term.parameters(data.scale), now.values[term], strict=True)}
     if term.traits.quick:
         least, value = known[term.traits.quick]
         usual = _usual_time(term, now.values[term], data) or value
-        return value <= least.low * (1 + AT_LEAST) or usual <= min(h.delay_std for h in data.histories)
+        if value <= least.low * (1 + AT_LEAST):
+            return TOO_FAST
+        return _within_its_own_times(usual, min(h.delay_std for h in data.histories))
     spacing = min(h.spacing for h in data.histories)
-    return bool(term.traits.frequency) and known[term.traits.frequency][1] > 0.5 / spacing
+    beyond = bool(term.traits.frequency) and known[term.traits.frequency][1] > 0.5 / spacing
+    return TOO_FAST if beyond else ""
+
+
+def _within_its_own_times(time: float, known_to: float) -> str:
+    if time > known_to:
+        return ""
+    return (
+        f"it takes {1e3 * time:.3g} ms, and the recording knows its own times to {1e3 * known_to:.3g} ms: that may be"
+        " the rotor's, the force sensor's or a part of how the samples were made"
+    )
 
 
 def _usual_time(term: Term, theta: tuple[float, ...], data: Data) -> float | None:

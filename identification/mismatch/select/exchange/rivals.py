@@ -148,6 +148,9 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
         if at_bound(other, new, data, estimate.weights) or contradiction(new, other, estimate.noise, data):
             continue
         loss = new.chi2 - now.chi2 + constant_moved(new, data) - moved
+        if loss + extra < policy.select.RIVAL_STATED_BIC:  # it counts by how well it can do, not by how far it came
+            new = fit(new.model, new.theta, data, estimate.weights, near=new)
+            loss = new.chi2 - now.chi2 + constant_moved(new, data) - moved
         out.append(RivalTerm(other, new, float(loss + extra), float(loss + 2 * more)))
     return sorted(out, key=lambda rival: rival.bic_loss)
 

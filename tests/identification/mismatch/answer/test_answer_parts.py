@@ -26,7 +26,9 @@ from identification.mismatch.locate.residual_structure_test import residual_stru
 from identification.mismatch.name.naming import name
 from identification.mismatch.unnamed.stage import Completed
 from identification.mismatch.value import Value
+from identification.physics.motor_lag import MotorLag
 from identification.physics.zero_offset import ZeroOffset
+from identification.recording import Acquisition
 from tests.identification.diagnosed_runs import NOISE, C, dead_band
 from tests.identification.mismatch.answer.answered import BAND, LEFT, SWEEP, draft, finding, told
 from tests.identification.mismatch.small import known_noise, rng, selected, short
@@ -174,3 +176,23 @@ def test_what_is_not_determined_is_told_by_what_it_is():
     assert lost.parameters["at"].told == "instant"
     known = finding_of(replace(named, std=(0.1, 0.2)), data.scale, {})
     assert "do not determine" not in known.statement
+
+
+def test_what_the_samples_cannot_show_the_owner_of_is_something_quick():
+    """A rotor that lags by 80 ms, in a recording whose times are known to 120."""
+    recording = short(seconds=120.0, rate=25.0, change=lambda t, V, _F: C * np.abs(lagged(t, V)) * lagged(t, V))
+    command, thrust = recording.channels
+    vague = replace(thrust, acquisition=Acquisition(delay=0.0, delay_std=0.12))
+    found, *_ = told(replace(recording, channels=(command, vague)), {MotorLag(): (0.08,)})
+    assert found.verdict == "unexplained"
+    statement = found.unexplained.statement
+    assert statement.startswith("Something quick is left, of which the samples do not say whose it is: ")
+    assert "ms, and the recording knows its own times to 120 ms: that may be the rotor's" in statement
+
+
+def lagged(t, V, time_constant=0.08):
+    """V behind a first-order lag, each sample's value held until the next."""
+    x, share = np.zeros_like(V), 1.0 - np.exp(-(t[1] - t[0]) / time_constant)
+    for i in range(1, V.size):
+        x[i] = x[i - 1] + share * (V[i - 1] - x[i - 1])
+    return x

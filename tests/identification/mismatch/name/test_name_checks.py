@@ -117,7 +117,7 @@ def test_a_lag_within_what_the_times_of_the_samples_are_known_to_is_no_name(know
     """2 ms."""
     data, estimate = known_noise({MotorLag(): (0.002,)}, [short()])
     vague = replace(data, histories=tuple(replace(h, delay_std=known_to) for h in data.histories))
-    assert ("faster than the samples can show" in " ".join(failed(estimate, MotorLag(), vague, 1))) == told
+    assert ("the recording knows its own times to 3 ms" in " ".join(failed(estimate, MotorLag(), vague, 1))) == told
 
 
 @pytest.mark.parametrize(("form", "told"), [("first_order", True), ("quadratic", False)])
@@ -126,7 +126,7 @@ def test_a_lag_that_is_slower_at_small_levels_is_judged_by_the_usual_one(form, t
     lag = MotorLag(form)
     data, estimate = known_noise({lag: (0.002,)}, [short()])
     vague = replace(data, histories=tuple(replace(h, delay_std=0.003) for h in data.histories))
-    assert ("faster than the samples can show" in " ".join(failed(estimate, lag, vague, 1))) == told
+    assert ("the recording knows its own times to 3 ms" in " ".join(failed(estimate, lag, vague, 1))) == told
 
 
 # ---------------------------------------------------------------- gains and rivals
