@@ -16,6 +16,8 @@ from rig.report.style import BAND, DATA, MODEL, MUTED, Plot, dots, drawable, lab
 
 SIZE, DESK = (4.5, 5.0), (9.0, 5.0)
 """inches."""
+VAGUE = "not outside: known no better"
+"""A unit beyond the lines, which are those of the usual one; its bar is its own limits."""
 
 
 def picture(charted: Charted, rows: Sequence[Row]) -> Picture:
@@ -63,14 +65,17 @@ def _axis(charted: Charted) -> str:
 def _units(axes: Axes, charted: Charted, x: Floats) -> None:
     chart = charted.chart
     y = (chart.value - chart.centre) * charted.figure.scale
-    out = chart.outside
-    half = chart.limit * float(np.median(chart.sigma)) * charted.figure.scale
+    out, own = chart.outside, chart.limit * chart.sigma * charted.figure.scale
+    half = float(np.median(own))
+    vague = ~out & (np.abs(y) > half if chart.side == "both" else y > half)
     axes.axhline(0.0, color=MUTED, linewidth=1.0)
     axes.axhline(half, color=MODEL, linestyle="--", linewidth=1.2, label="limits")
     if chart.side == "both":
         axes.axhline(-half, color=MODEL, linestyle="--", linewidth=1.2)
     dots(axes, x[~out], y[~out], DATA, 1.8, "a unit")
     axes.plot(x[out], y[out], "D", color=MODEL, markersize=4.5, fillstyle="none", label="outside")
+    if vague.any():
+        axes.errorbar(x[vague], y[vague], own[vague], fmt="o", color=DATA, markersize=3.0, linewidth=1.0, label=VAGUE)
     axes.margins(y=0.08)
 
 

@@ -4,12 +4,14 @@ import json
 
 import pytest
 from click.testing import CliRunner
+from matplotlib.figure import Figure
 
 from rig.fit.command import fit_command
 from rig.fleet_report.command import fleet_command
 from rig.fleet_report.departures import departures_of, to_diagnose
 from rig.fleet_report.figures_of_units import charts_of
 from rig.fleet_report.page import FleetReport, fleet_page, lead
+from rig.fleet_report.pictures import VAGUE, picture
 from rig.fleet_report.units import units_of
 from rig.report.page import html
 from tests.rig.fleet.small_recordings import folder, write
@@ -73,6 +75,16 @@ def test_who_left_the_limits_and_since_when(rows):
     assert abs(stretch.places[0] - 120) <= 3
     assert abs(stretch.places[-1] - 159) <= 3
     assert stretch.size == pytest.approx(-3.0, abs=0.5)
+
+
+@pytest.mark.parametrize(("std", "told"), [(0.001, False), (0.1, True)])
+def test_a_unit_beyond_the_lines_that_is_known_no_better_has_its_own_limits_as_a_bar(rows, std, told):
+    rows[50] = fitted(50, asymmetry=0.2, asymmetry_std=std)
+    charted = next(each for each in charts_of(rows) if each.figure.name == "asymmetry")
+    assert charted.chart.outside[50] != told
+    figure = Figure()
+    picture(charted, rows).plot.draw(figure)
+    assert (VAGUE in [text.get_text() for text in figure.axes[0].get_legend().texts]) == told
 
 
 def test_who_is_diagnosed(rows):
