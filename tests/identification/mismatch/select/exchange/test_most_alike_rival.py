@@ -1,9 +1,12 @@
-"""The rival that is most alike is refitted though its trials promise little; one that is less so is not."""
+"""Which rivals are refitted, and how far: the most alike, and those that are stated to their end."""
 
 import numpy as np
+import pytest
 
 from identification.mismatch.estimate.estimate import fit_without
+from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.select.exchange.likeness import alike, worth_refitting
+from identification.mismatch.select.exchange import rivals
 from identification.mismatch.select.exchange.rivals import FIRST_LIKENESS, swaps
 from tests.identification.mismatch.small import known_noise, short
 from tests.identification.physics.one_term import term
@@ -40,3 +43,12 @@ def test_nor_is_one_that_is_hardly_alike():
     like, promised, refitted = asked(WEAK, 0.9, lambda t, V, F: np.where(V < 0, 0.9 * F, F), LAG)
     assert 0.3 < like < FIRST_LIKENESS
     assert (promised, refitted) == (False, [])
+
+
+def test_a_rival_that_is_stated_is_told_at_its_best_however_slow_its_way(monkeypatch):
+    monkeypatch.setattr(rivals, "RIVAL_STEPS", 1)
+    data, estimate = known_noise({BENT: (2e-5,)}, [short(bent, noise=5.0)], 5.0)
+    (rival,) = swaps(estimate, BENT, fit_without(estimate, BENT, data), data, [BENT, LINEAR])
+    best = fit(rival.fit.model, rival.fit.theta, data, estimate.weights)
+    assert rival.fit.chi2 == pytest.approx(best.chi2, abs=0.02)
+    assert rival.bic_loss == pytest.approx(best.chi2 - estimate.fit.chi2, abs=0.02)
