@@ -5,8 +5,8 @@ import pytest
 
 from identification.mismatch.estimate.estimate import fit_without
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.select.exchange.likeness import alike, worth_refitting
 from identification.mismatch.select.exchange import rivals
+from identification.mismatch.select.exchange.likeness import alike, worth_refitting
 from identification.mismatch.select.exchange.rivals import FIRST_LIKENESS, swaps
 from tests.identification.mismatch.small import known_noise, short
 from tests.identification.physics.one_term import term
