@@ -1,6 +1,7 @@
 """The control loop where little decides: before its first tick, at its limits, and what it hands to whom."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -11,6 +12,7 @@ from rig.control.loop import IDLE, Decision, Inputs
 from rig.control.motor_watch import RestByThrust
 from rig.link.front_end_messages import Request
 from rig.link.recorder_messages import Rows
+from rig.safety import guard
 from rig.safety.lost_time import HostClocks
 from tests.rig.control.test_loop import driven
 from tests.rig.virtual_bench import virtual
@@ -246,3 +248,61 @@ def test_a_rate_that_is_found_frozen_is_no_rate(tmp_path, monkeypatch):
         assert loop.rotation(loop.now) is not None
         monkeypatch.setattr(type(loop.motor_watch), "believed", False)
         assert loop.rotation(loop.now) is None
+
+
+@pytest.mark.parametrize("unattended", [True, False])
+def test_the_guard_is_told_how_long_the_motor_is_driven_and_who_was_seen(tmp_path, monkeypatch, unattended):
+    seen, check = [], guard.check
+
+    def noted(channels, newest, vitals, allowed):
+        seen.append(vitals)
+        return check(channels, newest, vitals, allowed)
+
+    with virtual(tmp_path, unattended=unattended) as world:
+        loop, front = world.session.loop, world.front()
+        monkeypatch.setattr(guard, "check", noted)
+        front.send(Request("lease"))
+        loop.tick(world.motor, lambda _: IDLE)
+        loop.begin_guarding()
+        loop.tick(world.motor, lambda _: IDLE)
+        for _ in range(4):
+            loop.tick(world.motor, lambda _: Decision(6.0))
+        front.close()
+    assert seen[0].driven == 0.0
+    assert [vitals.driven for vitals in seen[1:]] == pytest.approx([0.0, 0.02, 0.04, 0.06], abs=1e-6)
+    assert [vitals.lease_age is None for vitals in seen] == [unattended] * 5
+    if not unattended:
+        assert seen[-1].lease_age == pytest.approx(0.1, abs=0.025)
+
+
+def test_paces_are_told_whether_the_tick_before_commanded_anything(tmp_path):
+    with driven(tmp_path) as (world, _, __):
+        loop, told = world.session.loop, []
+        loop._paces = SimpleNamespace(advance=lambda _vitals, _samples, *, commanded: told.append(commanded))
+        for volts in (6.0, None, 0.0):
+            loop.tick(world.motor, lambda _, volts=volts: Decision(volts))
+        loop.tick(world.motor, lambda _: IDLE)
+    assert told == [True, True, False, True]
+
+
+def test_a_motor_that_is_not_let_go_is_told(tmp_path):
+    with driven(tmp_path) as (world, turn, trips):
+
+        def refuses() -> None:
+            raise LinkError("its wire takes no release")
+
+        world.motor.release = refuses
+        world.session.loop.zero(world.motor)
+        turn(0.1)
+        assert trips[0][1:] == ("link", "the motor did not take a command: its wire takes no release")
+
+
+def test_after_a_lapse_nothing_but_0_leaves_whoever_decides(tmp_path):
+    with virtual(tmp_path) as world:
+        loop = world.session.loop
+        loop.tick(world.motor, lambda _: Decision(6.0))
+        loop.tick(world.motor, lambda _: (world.clock.stall(0.5), Decision(6.0))[1])
+        before = len(world.motor.sent)
+        for _ in range(3):
+            loop.tick(world.motor, lambda _: Decision(6.0))
+        assert [volts for _, volts in world.motor.sent[before - 1 :]] == [0.0] * 4
