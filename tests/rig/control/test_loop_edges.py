@@ -267,12 +267,23 @@ def test_the_guard_is_told_how_long_the_motor_is_driven_and_who_was_seen(tmp_pat
         loop.tick(world.motor, lambda _: IDLE)
         for _ in range(4):
             loop.tick(world.motor, lambda _: Decision(6.0))
+        for _ in range(2):
+            loop.tick(world.motor, lambda _: IDLE)
         front.close()
-    assert seen[0].driven == 0.0
-    assert [vitals.driven for vitals in seen[1:]] == pytest.approx([0.0, 0.02, 0.04, 0.06], abs=1e-6)
-    assert [vitals.lease_age is None for vitals in seen] == [unattended] * 5
+    assert [vitals.driven for vitals in seen] == pytest.approx([0.0, 0.0, 0.02, 0.04, 0.06, 0.08, 0.0], abs=1e-6)
+    assert [vitals.lease_age is None for vitals in seen] == [unattended] * 7
     if not unattended:
-        assert seen[-1].lease_age == pytest.approx(0.1, abs=0.025)
+        assert seen[-1].lease_age == pytest.approx(0.14, abs=0.025)
+
+
+def test_a_row_of_the_very_instant_at_which_a_recording_begins_is_in_it(tmp_path):
+    with driven(tmp_path) as (world, _, __):
+        loop, t0_ns = world.session.loop, world.clock.now_ns()
+        world.session.recorder.streams = ("load_cell", "motor", "command")
+        loop.begin_recording(t0_ns)
+        loop._record([Sample("load_cell", t0_ns - 1, (1.0,)), Sample("load_cell", t0_ns, (2.0,))], None, t0_ns)
+        world.recorder.step(0.0)
+        assert [row.values.tolist() for row in world.recorder.of(Rows) if row.stream == 0] == [[[2.0]]]
 
 
 def test_paces_are_told_whether_the_tick_before_commanded_anything(tmp_path):
