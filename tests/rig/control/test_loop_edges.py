@@ -276,6 +276,21 @@ def test_the_guard_is_told_how_long_the_motor_is_driven_and_who_was_seen(tmp_pat
         assert seen[-1].lease_age == pytest.approx(0.14, abs=0.025)
 
 
+def test_a_watcher_gets_the_rows_of_a_recording_and_when_the_command_left_in_s(tmp_path):
+    with driven(tmp_path) as (world, _, __):
+        loop, told = world.session.loop, []
+        world.session.recorder.streams = ("load_cell", "motor", "command")
+        loop.watcher = SimpleNamespace(rows=lambda rows, sent: told.append((rows, sent)))
+        loop.tick(world.motor, lambda _: Decision(6.0))
+        assert told == [], "nothing is recorded"
+        loop.begin_recording(world.clock.now_ns())
+        began = loop.now
+        loop.tick(world.motor, lambda _: Decision(5.0))
+    ((rows, sent),) = told
+    assert [row.values for row in rows if row.stream == "command"] == [(5.0,)]
+    assert began <= sent <= began + 0.02
+
+
 def test_a_row_of_the_very_instant_at_which_a_recording_begins_is_in_it(tmp_path):
     with driven(tmp_path) as (world, _, __):
         loop, t0_ns = world.session.loop, world.clock.now_ns()
