@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from importlib import import_module
 from itertools import chain
@@ -216,6 +216,12 @@ def _plan(found: Diagnosis, campaign: CampaignConfig, plan: Path, *, err: bool) 
         click.echo(f"next experiment written to {file}; next: rig check {file}", err=err)
 
 
+def _refuse_of_one(options: Sequence[tuple[str, object]], of_vehicle: bool, outputs: Mapping[str, object]) -> None:
+    """Raises ConfigError for what is asked of one diagnosis, where every file has its own."""
+    refuse_beside(*options, ("what is known of a vehicle", of_vehicle))
+    refuse_beside(*((f"--{name.replace('_path', '').replace('_', '-')}", path) for name, path in outputs.items()))
+
+
 def _rows(names: Sequence[str], seed: int, twin: Path | None, fleet: Fleet, *, any_thruster: bool) -> int:
     from rig.diagnose.fleet.row import COLUMNS, question_of
     from rig.fleet.asking import ask_all
@@ -280,12 +286,8 @@ def diagnose_command(
     try:
         fleet = fleet_of(jobs, scheduler, store, limit)
         if fleet is not None:
-            of_vehicle = any((thrusters, installation, mass, axis))
-            refuse_beside(("--holdout", holdout), ("--before", before), ("--explain", wants_stages))
-            refuse_beside(("what is known of a vehicle", of_vehicle))
-            refuse_beside(
-                *((f"--{name.replace('_path', '').replace('_', '-')}", path) for name, path in outputs.items())
-            )
+            of_one = (("--holdout", holdout), ("--before", before), ("--explain", wants_stages))
+            _refuse_of_one(of_one, any((thrusters, installation, mass, axis)), outputs)
             raise SystemExit(_rows(names, seed, twin, fleet, any_thruster=any_thruster))
         files = tuple(map(Path, names))
         wanted = wanted_of(**outputs)
