@@ -145,12 +145,11 @@ def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence
         new = _in_its_place(other, values, term, less, estimate, data, now.chi2 + max(hopeless, FORMS_SHARE * gain))
         if new.chi2 - now.chi2 + extra < suited:
             new = best_forms(new, [t for t in terms if t.id != other.id], data, estimate.weights, estimate.noise)
+        if new.chi2 - now.chi2 + constant_moved(new, data) - moved + extra < policy.select.RIVAL_STATED_BIC:
+            new = fit(new.model, new.theta, data, estimate.weights, near=new)  # it counts by how well it can do
         if at_bound(other, new, data, estimate.weights) or contradiction(new, other, estimate.noise, data):
             continue
         loss = new.chi2 - now.chi2 + constant_moved(new, data) - moved
-        if loss + extra < policy.select.RIVAL_STATED_BIC:  # it counts by how well it can do, not by how far it came
-            new = fit(new.model, new.theta, data, estimate.weights, near=new)
-            loss = new.chi2 - now.chi2 + constant_moved(new, data) - moved
         out.append(RivalTerm(other, new, float(loss + extra), float(loss + 2 * more)))
     return sorted(out, key=lambda rival: rival.bic_loss)
 
