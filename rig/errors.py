@@ -25,5 +25,9 @@ class RecordingError(RigError):
     """A file that is not a recording, is of a later version, or lacks what is asked of it."""
 
 
+class UnreadError(RecordingError):
+    """A file whose reading was ended by something else than what is in it, of which nothing is known: to ask again."""
+
+
 class TwinError(RigError):
     """A file that is not a twin, or a twin that does not suit what is asked of it."""

@@ -20,6 +20,8 @@ WHAT: Final = tuple(ONE)
 """What `--what` takes."""
 UNREADABLE: Final = "unreadable"
 """Outcome of a file that tells nothing; `reason` says why."""
+UNREAD: Final = "unread"
+"""Fact of an unreadable one: what ended its reading is not in the file, which is read again the next time."""
 UNCLOSED: Final = "unclosed"
 """Outcome of a recording or campaign that says `running` although nothing was written to it for a while."""
 

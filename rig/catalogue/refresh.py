@@ -9,10 +9,11 @@ from pathlib import Path
 from typing import Final, NamedTuple, TypeVar
 
 from rig.catalogue import index
-from rig.catalogue.entry import Entry
+from rig.catalogue.entry import UNREAD, Entry
 from rig.catalogue.reading import files
 from rig.catalogue.reading.campaigns import read_campaign
 from rig.catalogue.reading.documents import read_document
+from rig.catalogue.reading.files import Stamp
 from rig.catalogue.reading.recordings import read_recordings
 from rig.sqlite_transaction import transaction
 
@@ -61,7 +62,7 @@ def refresh(connection: sqlite3.Connection, folder: Path, tell: Callable[[int, i
     for said in _read(folder, new):
         with transaction(connection):
             for path, entries in said:
-                index.keep(connection, path, there[path], entries)
+                index.keep(connection, path, _as_read(there[path], entries), entries)
         done += len(said)
         tell(done, len(new))
     if gone or new:
@@ -69,6 +70,11 @@ def refresh(connection: sqlite3.Connection, folder: Path, tell: Callable[[int, i
             for statement in RELATE:
                 connection.execute(statement)
     return Refreshed(len(there), len(new), len(gone))
+
+
+def _as_read(stamp: Stamp, entries: Iterable[Entry]) -> Stamp:
+    """One that the file will not have, where it was not read."""
+    return stamp._replace(size=-1) if any(entry.facts.get(UNREAD) for entry in entries) else stamp
 
 
 def empty(connection: sqlite3.Connection) -> None:

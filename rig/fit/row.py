@@ -12,7 +12,7 @@ from identification.thruster.settling import settling_time
 from identification.thruster.thrust import Parameter
 from identification.thruster.thrust_data import calibration_of, gain_std
 from identification.thruster.thrust_report import verdicts
-from rig.errors import RecordingError
+from rig.errors import RecordingError, UnreadError
 from rig.fit.answer import Answer, fit_recordings
 from rig.fit.as_json import number
 from rig.fit.one_pass import LONG, OnePass, fit_one_pass, thrust_rows
@@ -90,11 +90,13 @@ def question_of(model: str, against: str, method: str) -> Question:
 def answer(path: Path, options: Mapping[str, Any]) -> Row:
     """The row of the recording in `path`, fitted alone; with an `error` where it can't be fitted.
 
-    Raises RecordingError for what is no recording.
+    Raises RecordingError for what is no recording, UnreadError.
     """
     recording = load(path, rows=0) if _is_long(path) else load(path)
     try:
         found = _fitted(path, recording, options)
+    except UnreadError:
+        raise
     except RecordingError as error:
         found = {"error": str(error)}
     return _identity(recording) | found

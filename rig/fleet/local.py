@@ -1,7 +1,7 @@
 """The engine of one machine: as many processes as wanted, each with its imports made once, each killed at no loss.
 
 A process that dies or takes too long is known with the file that it was at. That file is asked once more, in a new
-process; dies that one too, the file is told by name and the others go on.
+process, as is one that was not to be had or not read; fails that too, the file is told by name and the others go on.
 """
 
 from __future__ import annotations
@@ -51,5 +51,7 @@ class Local:
             except Ended as end:
                 why = f"{order.url}: the process that was at it ended, twice ({end})"
                 continue
-            return Failed(order, found["failed"]) if "failed" in found else (order, found)
+            if "failed" not in found:
+                return order, found
+            why = found["failed"]
         return Failed(order, why)

@@ -27,7 +27,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Final, NamedTuple, NoReturn, TypeVar
 
-from rig.errors import RecordingError, RigError
+from rig.errors import RecordingError, RigError, UnreadError
 
 T = TypeVar("T")
 
@@ -41,6 +41,10 @@ BYTES_PER_SECOND: Final = 5 * 2**20
 """and as many again for so many of its bytes: packed ones, on a slow machine."""
 PATIENCE: Final = 12
 """By the clock as many times longer: a disk, a network or a busy machine."""
+OF_THE_FILE: Final = frozenset(
+    {signal.SIGABRT, signal.SIGBUS, signal.SIGFPE, signal.SIGILL, signal.SIGSEGV, signal.SIGXCPU, signal.SIGXFSZ}
+)
+"""Signals that what is in a file brings upon its reader; of any other somebody else is the cause."""
 SIZES: Final = struct.Struct("<Q")
 ALIGNED: Final = 64
 """Bytes to whose multiples the arrays begin."""
@@ -49,7 +53,8 @@ ALIGNED: Final = 64
 def apart(work: Callable[[], T], path: Path) -> T:
     """What `work` returns, done in a child that may not use more than the file at `path` justifies.
 
-    Raises what `work` raises, and RecordingError where it needed too much or died. Elsewhere than on Linux, where a
+    Raises what `work` raises, RecordingError where it needed too much or died of what it read, and UnreadError where
+    somebody else ended it, the clock did, or there was no process for it. Elsewhere than on Linux, where a
     bench does not run but its recordings are read, it is done here; what is followed and believed is chosen as well.
     """
     found: T = _ended(_begin(work, path.stat().st_size, str(path)))
@@ -114,8 +119,10 @@ def _begin(work: Callable[[], Any], size: int, name: str) -> _Begun:
     answer = os.memfd_create("recording", os.MFD_CLOEXEC)
     try:
         pid = os.fork()
-    except BaseException:
+    except BaseException as error:
         os.close(answer)
+        if isinstance(error, OSError):
+            raise UnreadError(f"{name} was not read: no process is to be had for it ({error.strerror})") from None
         raise
     if pid == 0:
         _child(work, answer, seconds, memory)
@@ -129,8 +136,7 @@ def _ended(child: _Begun) -> Any:
     try:
         status = _awaited(child.pid, max(child.until - time.monotonic(), 0.0))
         if status != 0:
-            reason = _reason(status, child.seconds, child.memory)
-            raise RecordingError(f"{child.name} is damaged, or was made to harm: {reason}")
+            raise _error(child, status)
         with suppress(struct.error):  # nothing was written
             return _result(_unpacked(child.answer))
         raise RecordingError(f"{child.name} is damaged: reading it ended without an answer")
@@ -240,24 +246,36 @@ def _unpacked(answer: int) -> tuple[str, Any]:
     return found
 
 
-def _awaited(child: int, seconds: float) -> int:
-    """Exit status, negative for a signal. However this is left, the child has ended."""
+def _awaited(child: int, seconds: float) -> int | None:
+    """Exit status, negative for a signal; None where these seconds were over first. However this is left, the child has
+    ended."""
     descriptor = os.pidfd_open(child)
     try:
         poll = select.poll()
         poll.register(descriptor, select.POLLIN)
-        poll.poll(seconds * 1000)
+        ended = poll.poll(seconds * 1000)
     finally:
         os.close(descriptor)
         with suppress(ProcessLookupError):
             os.kill(child, signal.SIGKILL)  # one that has ended is not hurt: it waits to be asked how
         _, status = os.waitpid(child, 0)
-    return os.waitstatus_to_exitcode(status)
+    return os.waitstatus_to_exitcode(status) if ended else None
 
 
-def _reason(status: int, seconds: int, memory: int) -> str:
-    if status in (-signal.SIGXCPU, -signal.SIGKILL):
-        return f"reading it takes more than {seconds} s, or more memory than there is"
+def _error(child: _Begun, status: int | None) -> RecordingError:
+    if status is None:
+        within = child.seconds * PATIENCE
+        return UnreadError(f"{child.name} was not read within {within} s: its disk or this machine is slow; ask again")
+    if status < 0 and -status not in OF_THE_FILE:
+        by = signal.Signals(-status).name
+        why = "the system does so when memory runs out; " if by == "SIGKILL" else ""
+        return UnreadError(f"{child.name} was not read: its process was ended from outside ({by}; {why}ask again)")
+    return RecordingError(f"{child.name} is damaged, or was made to harm: {_reason(status, child)}")
+
+
+def _reason(status: int, child: _Begun) -> str:
+    if status == -signal.SIGXCPU:
+        return f"reading it takes more than {child.seconds} s of a processor"
     if status == -signal.SIGXFSZ:
-        return f"what it says it holds takes more than {memory // 2**20} MiB, which its size does not justify"
+        return f"what it says it holds takes more than {child.memory // 2**20} MiB, which its size does not justify"
     return f"HDF5 ended with {signal.Signals(-status).name if status < 0 else f'status {status}'}"

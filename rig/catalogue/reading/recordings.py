@@ -11,8 +11,8 @@ from itertools import tee
 from pathlib import Path
 from typing import Any, Final
 
-from rig.catalogue.entry import UNREADABLE, Entry, finite, seconds_of
-from rig.errors import RecordingError
+from rig.catalogue.entry import UNREAD, UNREADABLE, Entry, finite, seconds_of
+from rig.errors import RecordingError, UnreadError
 
 BENCH: Final = re.compile(
     r"^\[bench\]\s*$(?:(?!^\s*\[).*\n?)*?^\s*name\s*=\s*(?:\"([^\"\n]*)\"|'([^'\n]*)')", re.MULTILINE
@@ -36,7 +36,8 @@ def _said(folder: Path, path: str, header: Any) -> list[Entry]:
     if not isinstance(header, RecordingError):
         return list(_entries(path, header))
     reason = str(header).removeprefix(str(folder / path)).lstrip(": ")
-    return [Entry("recordings", path, outcome=UNREADABLE, reason=reason)]
+    facts = {UNREAD: isinstance(header, UnreadError)}
+    return [Entry("recordings", path, outcome=UNREADABLE, reason=reason, facts=facts)]
 
 
 def _entries(path: str, header: Any) -> Iterator[Entry]:

@@ -10,7 +10,7 @@ from typing import Any, Final
 from identification.mismatch.answer.as_json import diagnosis_json
 from identification.mismatch.diagnosis import Diagnosis
 from rig.diagnose.command import diagnose_files
-from rig.errors import RecordingError, RigError
+from rig.errors import RecordingError, RigError, UnreadError
 from rig.fleet.columns import COMMON, Column
 from rig.fleet.files import sha256_of
 from rig.fleet.question import Question, Row
@@ -85,7 +85,7 @@ def question_of(seed: int, twin: Path | None = None, *, any_thruster: bool = Fal
 def answer(path: Path, options: Mapping[str, Any]) -> Row:
     """The row of the recording in `path`, diagnosed alone; with an `error` where it can't be.
 
-    Raises RecordingError for what is no recording.
+    Raises RecordingError for what is no recording, UnreadError.
     """
     (header,) = headers([path])
     if isinstance(header, RigError):
@@ -95,6 +95,8 @@ def answer(path: Path, options: Mapping[str, Any]) -> Row:
         twin = _twin(options)
         found = diagnose_files([path], (), options["seed"], twin, any_thruster=bool(options.get("any_thruster")))
         return whose | _said(found)
+    except UnreadError:
+        raise
     except RigError as error:
         return whose | {"error": str(error)}
 

@@ -17,6 +17,7 @@ from rig.catalogue.selection import Filter
 from rig.hdf5 import RecordingFile
 from rig.link.recorder_messages import ChannelSpec, Rows, StreamSpec
 from tests.rig.catalogue.small_files import asked, diagnosis, fit, ledger, recording, twin
+from tests.rig.killed_readers import killed_readers
 
 
 def everything(folder, cache=None):
@@ -225,6 +226,16 @@ def test_what_is_no_recording_has_the_reason_and_hinders_nothing(tmp_path):
         (one,) = asked(tmp_path, Filter(what))
         assert one.outcome == UNREADABLE
         assert one.reason
+
+
+def test_a_file_whose_reader_was_killed_is_read_again(tmp_path, monkeypatch):
+    recording(tmp_path / "good.h5")
+    with monkeypatch.context() as patched:
+        killed_readers(patched)
+        (one,) = asked(tmp_path)
+        assert one.outcome == UNREADABLE
+        assert "ended from outside" in one.reason
+    assert [each.outcome for each in asked(tmp_path)] == ["completed"]
 
 
 def test_names_that_are_no_unicode_and_texts_that_are_no_text(tmp_path):

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from rig.errors import RecordingError
+from rig.hdf5.apart import apart
 
 COLUMNS_OF = {"created": "2026-11-26T10:00:00+00:00"}
 
@@ -34,6 +35,12 @@ def dies(path: Path, options: Mapping[str, Any]) -> dict[str, Any]:
     if asked(path, options) <= options["times"] and path.name in options["at"]:
         os.kill(os.getpid(), signal.SIGKILL)
     return dict(COLUMNS_OF)
+
+
+def reader_dies(path: Path, options: Mapping[str, Any]) -> dict[str, Any]:
+    """The child that reads these files is killed, as often as `times`."""
+    killed = asked(path, options) <= options["times"] and path.name in options["at"]
+    return apart(lambda: os.kill(os.getpid(), signal.SIGKILL) if killed else dict(COLUMNS_OF), path)
 
 
 def waits(path: Path, options: Mapping[str, Any]) -> dict[str, Any]:

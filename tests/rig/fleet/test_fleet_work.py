@@ -91,6 +91,22 @@ def test_a_process_that_is_killed_costs_nothing(tmp_path):
     assert failed.why.startswith(f"{urls[2]}: the process that was at it ended, twice (exit status -9")
 
 
+def test_a_reader_that_is_killed_costs_nothing_and_says_nothing_of_its_file(tmp_path):
+    """Once: asked again at once. Twice: told by name, no row, and asked again by the next command."""
+    urls = files(tmp_path / "in", "abcd")
+    found, rows = answer(tmp_path, question(tmp_path, "reader_dies", at=["c.h5"], times=1), urls)
+    assert (found.made, len(rows), found.failed, found.errors) == (4, 4, (), {})
+    assert log_of(tmp_path) == {f"{name}.h5": 2 if name == "c" else 1 for name in "abcd"}
+    (tmp_path / "log").unlink()
+    asked = question(tmp_path, "reader_dies", at=["c.h5"], times=2)
+    found, rows = answer(tmp_path, asked, urls)
+    (failed,) = found.failed
+    assert (found.made, len(rows), found.errors) == (3, 4 + 3, {})
+    assert failed.why.startswith(f"{urls[2]} was not read: its process was ended from outside (SIGKILL")
+    again, rows = answer(tmp_path, asked, urls)
+    assert (again.made, again.known, again.failed, len(rows)) == (1, 3, (), 8)
+
+
 def test_a_file_that_takes_too_long_is_told_and_asked_again_the_next_time(tmp_path):
     urls = files(tmp_path / "in", "abc")
     asked = question(tmp_path, "waits", at=["b.h5"])

@@ -2,14 +2,16 @@
 justify.
 """
 
+import errno
 import os
 import signal
+from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
 
-from rig.errors import RecordingError
+from rig.errors import RecordingError, UnreadError
 from rig.hdf5 import is_hdf5, load, recording_id_of, recover
 from rig.hdf5.apart import apart, open_no_more
 
@@ -139,6 +141,32 @@ def test_whatever_reading_does_this_process_goes_on(tmp_path):
     with pytest.raises(RuntimeError, match="Too many open files"):
         apart(opening, path)
     assert apart(lambda: 5, path) == 5
+
+
+@pytest.mark.parametrize("by", [signal.SIGKILL, signal.SIGTERM, signal.SIGHUP])
+def test_a_reader_that_somebody_ends_says_nothing_of_the_file(tmp_path, by):
+    path = made(tmp_path / "r.h5")
+    with pytest.raises(UnreadError, match=rf"r\.h5 was not read: its process was ended from outside \({by.name}"):
+        apart(lambda: os.kill(os.getpid(), by), path)
+
+
+def test_a_reader_that_waits_says_nothing_of_the_file(tmp_path, monkeypatch):
+    monkeypatch.setattr("rig.hdf5.apart.PATIENCE", 0.02)
+    path = made(tmp_path / "r.h5")
+    with pytest.raises(UnreadError, match=r"was not read within 0\.12 s: its disk or this machine is slow"):
+        apart(signal.pause, path)
+
+
+def test_no_process_to_read_with_says_nothing_of_the_file(tmp_path, monkeypatch):
+    path, before = made(tmp_path / "r.h5"), len(list(Path("/proc/self/fd").iterdir()))
+
+    def refused():
+        raise BlockingIOError(errno.EAGAIN, "Resource temporarily unavailable")
+
+    monkeypatch.setattr(os, "fork", refused)
+    with pytest.raises(UnreadError, match=r"no process is to be had for it \(Resource temporarily unavailable"):
+        load(path)
+    assert len(list(Path("/proc/self/fd").iterdir())) == before
 
 
 def test_what_can_not_be_read_is_said(tmp_path):
