@@ -1,17 +1,21 @@
 """What a recorded row costs beside h5py itself: CPU time, appended and flushed, in turns.
 
-    python benchmarks/recording.py [--batches 100 250 1000] [--turns 20]
+    python benchmarks/recording.py [--batches 100 250 1000] [--turns 20] [--tree OTHER]
 
 A row is 17 numbers of 8 bytes, time and 16 channels; a batch is what one flush takes. Beside the recorder's file, which
 has a dataset for each channel: one table of 17 columns, `resize` and a slice, as h5py's pages do it, with no name, unit
 or order of its columns and no row looked at; and a dataset for each channel in the same way. All in SWMR mode, and each
-flush is followed by an fsync. The median of the turns, and of the ratios within a turn.
+flush is followed by an fsync. The median of the turns, and of the ratios within a turn. `--tree`: in every turn the
+recorder's file of another checkout as well, in a process of its own.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import os
+import subprocess
+import sys
 import tempfile
 from collections.abc import Callable
 from pathlib import Path
@@ -38,6 +42,7 @@ def durable(file: h5py.File) -> None:
     os.fsync(file.id.get_vfd_handle())
 
 
+Cost = tuple[float, float]
 Append = Callable[[NDArray[np.int64], NDArray[np.float64]], None]
 
 
@@ -85,7 +90,7 @@ def datasets(path: Path) -> tuple[Append, Callable[[], object]]:
 WRITERS = {"table": table, "datasets": datasets, "recorder": recorder}
 
 
-def cost(make: Callable[[Path], tuple[Append, Callable[[], object]]], path: Path, batch: int) -> tuple[float, float]:
+def cost(make: Callable[[Path], tuple[Append, Callable[[], object]]], path: Path, batch: int) -> Cost:
     """CPU us a row: appended; appended and flushed."""
     append, flush = make(path)
     values = np.random.default_rng(0).normal(size=(batch, CHANNELS))
@@ -103,17 +108,37 @@ def cost(make: Callable[[Path], tuple[Append, Callable[[], object]]], path: Path
     return 1e6 * appended / rows, 1e6 * flushed / rows
 
 
+def costs(folder: Path, batch: int, tree: Path | None) -> dict[str, Cost]:
+    """Of one turn."""
+    found = {name: cost(make, folder / name, batch) for name, make in WRITERS.items()}
+    return found if tree is None else found | {"recorder of --tree": cost_there(folder / "there", batch, tree)}
+
+
+def cost_there(path: Path, batch: int, tree: Path) -> Cost:
+    """The recorder's, by the sources of another checkout."""
+    asked = [sys.executable, __file__, "--batches", str(batch), "--only", str(path)]
+    environment = os.environ | {"PYTHONPATH": str(tree)}
+    told = subprocess.run(asked, env=environment, capture_output=True, text=True, check=True).stdout
+    appended, flushed = json.loads(told)
+    return appended, flushed
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--batches", type=int, nargs="+", default=[100, 250, 1000])
     parser.add_argument("--turns", type=int, default=20)
+    parser.add_argument("--tree", type=Path)
+    parser.add_argument("--only", type=Path, help=argparse.SUPPRESS)
     asked = parser.parse_args()
+    if asked.only is not None:
+        print(json.dumps(cost(recorder, asked.only, asked.batches[0])))
+        return
     print("| rows in a batch | | appended, us a row | of table's | and flushed, us a row | of table's |")
     print("|---|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as name:
         for batch in asked.batches:
-            turns = [{k: cost(make, Path(name) / k, batch) for k, make in WRITERS.items()} for _ in range(asked.turns)]
-            for which in WRITERS:
+            turns = [costs(Path(name), batch, asked.tree) for _ in range(asked.turns)]
+            for which in turns[0]:
                 own = np.array([turn[which] for turn in turns])
                 ratio = np.median(own / np.array([turn["table"] for turn in turns]), axis=0)
                 one, both = np.median(own, axis=0)
