@@ -18,6 +18,8 @@ from identification.mismatch.compare.earlier_recordings import Novelty
 from identification.mismatch.compare.saved_model_baseline import terms_of
 from identification.mismatch.diagnosis import Finding
 from identification.mismatch.estimate.estimate import Estimate
+from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.estimate.rate_levels import rate_by_levels
 from identification.mismatch.estimate.stairs import covariance
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
@@ -181,9 +183,16 @@ def twin_of(estimate: Estimate, data: Data, recordings: Sequence[Recording], bef
         ),
         interval=_interval(recordings),
         highest_driver=max(data.scale.driver, 0.0 if before is None else before.highest_driver),
-        rate_per_driver=fitted.theta.k if data.with_rate else None,
+        rate_per_driver=_rate_per_driver(fitted, data),
         slip_rate_per_driver=next((h.rate_per_driver for h in data.histories if h.rate is not None), None),
     )
+
+
+def _rate_per_driver(fitted: Fit, data: Data) -> float | None:
+    if not data.with_rate:
+        return None
+    by_levels = rate_by_levels(fitted, data)
+    return fitted.theta.k if by_levels is None else by_levels[0]
 
 
 def _alternatives(estimate: Estimate, data: Data, named: Sequence[Named]) -> tuple[Alternative, ...]:

@@ -14,6 +14,7 @@ from identification.mismatch.diagnosis import Curves, Finding, RivalFinding
 from identification.mismatch.estimate.confidence_intervals import Interval
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, raw
+from identification.mismatch.estimate.rate_levels import rate_by_levels
 from identification.mismatch.model.data import Data
 from identification.mismatch.name.named_term import NamedTerm
 from identification.mismatch.select.rounds import T
@@ -75,12 +76,16 @@ def _of_driver(fitted: Fit, data: Data) -> tuple[float, float]:
         return C, float(fitted.std[at.C])
     (term, *_) = followed
     place = at.parameter(term, term.traits.follows_rate, data.scale)
-    share, more = float(fitted.theta.vector[place]), fitted.theta.k / known[0] - 1
+    by_levels = rate_by_levels(fitted, data)
+    k = fitted.theta.k if by_levels is None else by_levels[0]
+    share, more = float(fitted.theta.vector[place]), k / known[0] - 1
     driven = 1 + share * more
     slopes = np.zeros(at.size)
     slopes[at.C], slopes[place] = driven**2, 2 * C * driven * more
-    slopes[at.k] = 2 * C * driven * share / known[0]
-    return C * driven**2, float(np.sqrt(slopes @ np.nan_to_num(fitted.cov) @ slopes))
+    by_k = 2 * C * driven * share / known[0]
+    slopes[at.k] = by_k if by_levels is None else 0.0
+    beside = 0.0 if by_levels is None else by_k * by_levels[1]
+    return C * driven**2, float(np.hypot(np.sqrt(slopes @ np.nan_to_num(fitted.cov) @ slopes), beside))
 
 
 def values_told(

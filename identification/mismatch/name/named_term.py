@@ -15,12 +15,23 @@ from identification.mismatch.select.stepwise import F, RivalTerm, Standing
 from identification.recording import Floats
 
 CheckKind = Literal[
-    "possible", "sampled", "clipping", "undone", "pays", "constant", "repair", "own_covariate", "any_curve", "predicts"
+    "possible",
+    "sampled",
+    "clipping",
+    "rate_levels",
+    "undone",
+    "pays",
+    "constant",
+    "repair",
+    "own_covariate",
+    "any_curve",
+    "predicts",
 ]
-"""What a check is about: `possible` values, what the samples can show (`sampled`), what else clips, another term that
-undoes it, BIC, a parameter that is the same everywhere, the shape (three kinds), and what was not fitted."""
+"""What a check is about: `possible` values, what the samples can show (`sampled`), what else clips, where the measured
+rate stands, another term that undoes it, BIC, a parameter that is the same everywhere, the shape (three kinds), and
+what was not fitted."""
 PAYS: CheckKind = "pays"
-GRAVE: frozenset[CheckKind] = frozenset({"possible", "sampled", "clipping", "undone", PAYS, "predicts"})
+GRAVE: frozenset[CheckKind] = frozenset({"possible", "sampled", "clipping", "rate_levels", "undone", PAYS, "predicts"})
 """Kinds that no share of what could be explained makes up for: a term that fails one is not that physics."""
 
 LEAST_P = 1e-300

@@ -13,6 +13,7 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.estimate import Estimate, fit_without
 from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.estimate.rate_levels import contradiction
 from identification.mismatch.locate.residual_structure_test import ResidualStructure
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
@@ -23,7 +24,7 @@ from identification.mismatch.select.exchange.static_pairs import STATIC, static_
 from identification.mismatch.select.family_wise import orthogonal_basis
 from identification.mismatch.select.forward_selection import SwapTest, Thruster
 from identification.mismatch.select.likeliest_trials import alternatives
-from identification.mismatch.select.limits.clipping import contradiction
+from identification.mismatch.select.limits import clipping
 from identification.mismatch.select.stepwise import stands
 from identification.physics.term import Term
 from identification.recording import Floats
@@ -31,6 +32,7 @@ from identification.run_history.history import TURNING
 
 Named = NamedTerm[Term, Fit]
 CLIPPING = "what else was recorded clips with it, or does not"
+RATE_LEVELS = "the measured rate stands where it puts it"
 REPAIR = "no repair of another shape"
 """What is asked of two shapes on one static curve."""
 TOO_FAST = "it is faster than the samples can show"
@@ -45,7 +47,8 @@ def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check
     """
     at = _told(term, estimate.fit.values[term], data)
     ended = at_bound(term, estimate.fit, data, estimate.weights)
-    elsewhere = contradiction(estimate.fit, term, estimate.noise, data)
+    elsewhere = clipping.contradiction(estimate.fit, term, estimate.noise, data)
+    before_rotor = static_curve(term, measured=data.with_rate) == "rate"
     change = _raw_effect(estimate.fit, (term,), data)
     cancelled = _cancelled(estimate.fit, term, change, data)
     return (
@@ -54,6 +57,7 @@ def checks(estimate: Estimate, term: Term, data: Data, many: int) -> tuple[Check
         ),
         Check("sampled", "the samples can show it", _why_unseen(estimate.fit, term, data)),
         *((Check("clipping", CLIPPING, elsewhere),) if term.traits.limits else ()),
+        *((Check("rate_levels", RATE_LEVELS, contradiction(term, estimate.fit, data)),) if before_rotor else ()),
         *(Check("undone", "no other term undoes it", f"it and {other.id} nearly cancel") for other in cancelled),
         *(() if cancelled else (Check("undone", "no other term undoes it"),)),
         *_constancy(estimate, change, data, many),

@@ -67,3 +67,16 @@ ROUNDED_LEVELS = Count(
     unit="waves",
     reason="Each has an error of its own, which costs time; those with most samples are the ones that bend a curve.",
 )
+RATE_LEVELS = Count(
+    4,
+    unit="levels",
+    reason="Fewer levels of a measured rate than this don't tell one static curve from another.",
+)
+RATE_LEVELS_RATIO = Threshold(
+    10.0,
+    unit="ratio of squares",
+    reason=(
+        "What leaves the levels of the measured rate three times as far off as something simpler is not the rotor's, "
+        "whatever it does between them. Noise in eight levels makes such a ratio once in 300."
+    ),
+)

@@ -11,8 +11,10 @@ import pytest
 from drivers.canopen.cia402 import Cia402
 from drivers.errors import DeviceError, LinkError
 from drivers.ports.can_bus import CanBus
+from identification.mismatch.answer.as_json import diagnosis_json
 from rig.campaign.loading import load_bench
 from rig.cli import record_in_virtual_time
+from rig.diagnose.command import diagnose_files
 from rig.fit.answer import fit_recordings
 from rig.hdf5.load import load
 from rig.operate.check import check_campaign
@@ -104,6 +106,17 @@ def test_a_campaign_finds_the_truth_and_proves_the_watchdog(tmp_path, keys, moto
     rotation = recording.first_of("rotation_rate")
     assert len(rotation.time) / rotation.time[-1] == pytest.approx(50.0, rel=0.05)
     assert not [event.text for event in recording.events if "could not be understood" in event.text]
+
+
+def test_a_loop_that_holds_the_speed_gets_no_curve_that_the_rate_excludes(tmp_path):
+    """A rotor that a loop drives overshoots, which no lag does: thrust follows the rate, and the volts are its own. A
+    loss in the winding was told beside it, with C 10 % too large."""
+    path, _ = record_in_virtual_time(files(tmp_path), tmp_path / "run", bench(), STAMP)
+    found = diagnosis_json(diagnose_files([path]))
+    assert {each["effect"] for each in found["findings"]} == {"rotation_coupling", "motor_lag"}
+    constant = found["model"]["parameters"]["C"]
+    assert abs(constant["value"] - TRUTH) < 0.003 * TRUTH
+    assert constant["std"] < 0.01 * TRUTH
 
 
 def test_rate_per_volt_is_what_a_volt_is(tmp_path):
