@@ -12,6 +12,7 @@ from identification.physics.equation import follows
 from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
+from identification.run_history.rotor_lag import Rotor
 
 QUICKEST = 0.004
 """s, half of the least that a small thruster has."""
@@ -58,7 +59,7 @@ class InflowDynamics:
         return ()
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        rotor = (0.5 / (theta[1] * now.scale.driver), 0.0) if self.form else (0.0, 1 / theta[1])
+        rotor = Rotor(0.5 / (theta[1] * now.scale.driver), 0.0) if self.form else Rotor(0.0, 1 / theta[1])
         u = now.run.follower(now.settled, rotor)
         out: Floats = value + now.C * np.abs(now.x) * theta[0] * (now.x - u)
         return out

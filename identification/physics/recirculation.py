@@ -15,6 +15,7 @@ from identification.physics.equation import follows
 from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
+from identification.run_history.rotor_lag import Rotor
 
 JET = "the rotor's rate as the model has it, low-passed"
 INSTEAD = {"rate": JET, "thrust": "the root of the thrust, low-passed", "circuit": f"{JET} twice"}
@@ -66,7 +67,7 @@ class Recirculation:
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         jet = np.sign(value) * np.sqrt(np.abs(value / now.C)) if self.form == "thrust" else now.settled
-        follows = (0.0, 1 / theta[1])
+        follows = Rotor(0.0, 1 / theta[1])
         u = now.run.follower(jet, follows)
         if self.form == "circuit":
             u = now.run.follower(u, follows)

@@ -8,6 +8,7 @@ from typing import Any, Literal, Protocol
 
 from identification.recording import Floats
 from identification.run_history.history import History
+from identification.run_history.rotor_lag import Rotor
 
 SignatureKind = Literal["force", "gain", "step", "turn"]
 """What is averaged where an effect is shown: the residual itself / N; its share of the thrust; its share of the last
@@ -18,8 +19,7 @@ change of thrust; the residual towards the last change of the driver / N (half t
 class Dynamics:
     """What a term does between the ticks of a command, which intervals are too long to show."""
 
-    rotor: tuple[float, float] | None = None
-    """Coefficients of n' = quadratic (w|w| - n|n|) + linear (w - n) in 1/(s unit of the driver) and 1/s."""
+    rotor: Rotor | None = None
     slowest: float = 0.0
     """1/s, the least rate at which such a rotor follows a small change."""
     ring: tuple[float, float, float] | None = None

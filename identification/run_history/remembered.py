@@ -20,7 +20,7 @@ from identification.run_history.held import Held, held_of
 from identification.run_history.history import History, Samples
 from identification.run_history.least_recently_used import LeastRecentlyUsed
 from identification.run_history.rate_gap import RateGap, asked_rows, rate_gap
-from identification.run_history.rotor_lag import lag_ends, lag_means
+from identification.run_history.rotor_lag import Rotor, lag_ends, lag_means
 from identification.run_history.ticks.step_response_rows import TickRows, tick_rows
 
 Channel = Literal["thrust", "rate"]
@@ -76,47 +76,44 @@ class RememberedRun:
     def _held(self) -> Held | None:
         return held_of(self.history.driver, self.history.dt)
 
-    def followed(self, value: Floats, rotor: tuple[float, float]) -> Floats:
+    def followed(self, value: Floats, rotor: Rotor) -> Floats:
         """(M,) means of the rate of a rotor that follows `value` (rotor_lag.lag_means)."""
         h = self.history
         near = self._reference("intervals", h.driver, h.dt, rotor)
-        return lag_means(value, h.dt, *rotor, float(value[0]), near, self._held)
+        return lag_means(value, h.dt, rotor, float(value[0]), near, self._held)
 
-    def driven(self, rotor: tuple[float, float] | None) -> Floats:
+    def driven(self, rotor: Rotor | None) -> Floats:
         """(M,) the same of the driver itself, worked out once: a delay behind it moves and the rotor does not."""
         driver = self.history.driver
         return driver if rotor is None else self._followers(("driver", rotor), lambda: self.followed(driver, rotor))
 
-    def follower(self, value: Floats, rotor: tuple[float, float]) -> Floats:
+    def follower(self, value: Floats, rotor: Rotor) -> Floats:
         """(M,) means of what follows a `value` (M,) as `rotor_lag.lag` says, from rest; worked out once of the same."""
 
         def made() -> Floats:
             h = self.history
             near = self._reference("from rest", h.driver, h.dt, rotor, from_rest=True)
-            return lag_means(value, h.dt, *rotor, 0.0, near, self._held)
+            return lag_means(value, h.dt, rotor, 0.0, near, self._held)
 
         return self._followers(rotor, made, value)
 
-    def rates_at_ticks(self, rotor: tuple[float, float] | None) -> Floats:
+    def rates_at_ticks(self, rotor: Rotor | None) -> Floats:
         """(T,) rate of the rotor at each tick of the command; it was settled before the first."""
         assert self.history.ticks is not None
         when, value = self.history.ticks
         if rotor is None:
             return value
         held, dt = value[:-1], np.diff(when)
-        end = lag_ends(held, dt, *rotor, float(value[0]), self._reference("ticks", held, dt, rotor))
+        end = lag_ends(held, dt, rotor, float(value[0]), self._reference("ticks", held, dt, rotor))
         return np.concatenate([value[:1], end])
 
-    def _reference(
-        self, of: str, value: Floats, dt: Floats, rotor: tuple[float, float], *, from_rest: bool = False
-    ) -> Floats | None:
+    def _reference(self, of: str, value: Floats, dt: Floats, rotor: Rotor, *, from_rest: bool = False) -> Floats | None:
         """Ends of a similar rotor, from which those of `rotor` are a few steps; None where it is linear."""
-        if rotor[0] == 0 or not value.size:
+        if rotor.quadratic == 0 or not value.size:
             return None
-        quadratic, linear = (exp(round(REFERENCES * log(c)) / REFERENCES) if c > 0 else 0.0 for c in rotor)
-        key = (of, quadratic, linear)
+        near = Rotor(*(exp(round(REFERENCES * log(c)) / REFERENCES) if c > 0 else 0.0 for c in rotor))
         begin = 0.0 if from_rest else float(value[0])
-        return self._references(key, lambda: lag_ends(value, dt, quadratic, linear, begin))
+        return self._references((of, near), lambda: lag_ends(value, dt, near, begin))
 
     def delayed(self, value: Floats, delay: float) -> Floats:
         """(M,) means over each interval of `value` (M,) `delay` s before."""

@@ -68,7 +68,7 @@ def _response(known: list[Dynamics], level: float, dt: Floats, after: Floats) ->
     s = np.ones(dt.size)
     for each in known:
         if each.rotor is not None:
-            quadratic, linear = each.rotor
+            quadratic, linear, _ = each.rotor
             s = lowpass(s, dt, 1 / max(2 * quadratic * abs(level) + linear, each.slowest))[1]
         elif each.ring is not None:
             compliance, frequency, damping = each.ring

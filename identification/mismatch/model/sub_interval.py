@@ -20,6 +20,7 @@ from identification.recording import Floats
 from identification.run_history.filters import reconstructed
 from identification.run_history.history import History
 from identification.run_history.remembered import Channel, RememberedRun
+from identification.run_history.rotor_lag import Rotor
 from identification.run_history.ticks.sub_interval_dynamics import Passed
 from identification.run_history.ticks.sub_interval_leads import curvature, each_lead, lead
 
@@ -182,16 +183,16 @@ def _size(history: History, passed: Passed) -> float:
     return history.size if passed.ring is None else 2 * history.size**2
 
 
-def _rotor(model: Model, theta: Theta, largest: float) -> tuple[float, float] | None:
+def _rotor(model: Model, theta: Theta, largest: float) -> Rotor | None:
     """Coefficients of a rotor that does not follow at once; two lags one behind the other as one of both times."""
     rotors = [each.rotor for each in _dynamics(model, theta, largest) if each.rotor is not None]
     if len(rotors) < 2:
         return rotors[0] if rotors else None
-    rates = [2 * quadratic * largest + linear for quadratic, linear in rotors]
+    rates = [2 * each.quadratic * largest + each.linear for each in rotors]
     slowest = int(np.argmin(rates))
     share = 1 / (rates[slowest] * sum(1 / rate for rate in rates))
-    quadratic, linear = rotors[slowest]
-    return share * quadratic, share * linear
+    quadratic, linear, released = rotors[slowest]
+    return Rotor(share * quadratic, share * linear, released)
 
 
 def _ring(model: Model, theta: Theta) -> tuple[float, float, float] | None:

@@ -131,7 +131,7 @@ def _usual_time(term: Term, theta: tuple[float, ...], data: Data) -> float | Non
     if rotor is None:
         return None
     size = np.abs(np.concatenate([h.driver for h in data.histories]))
-    quadratic, linear = rotor
+    quadratic, linear, _ = rotor
     return 1 / (2 * quadratic * float(np.median(size[size > TURNING * data.scale.driver])) + linear)
 
 

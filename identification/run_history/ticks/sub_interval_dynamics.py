@@ -16,7 +16,7 @@ from identification.recording import Floats
 from identification.run_history.converter import Mode
 from identification.run_history.filters import complex_recursion, recursion, resonant
 from identification.run_history.remembered import RememberedRun
-from identification.run_history.rotor_lag import follow_rate, lag_ends, lagged, to_rest
+from identification.run_history.rotor_lag import Rotor, follow_rate, lag_ends, lagged, to_rest
 
 SETTLED = 25.0
 """Time constants after which a rotor has followed and ringing has died away."""
@@ -28,8 +28,8 @@ SLOWEST = 1e-3
 class Passed:
     """Dynamics between the driver and a channel: first a rotor that follows, then a stand that rings, then a delay."""
 
-    rotor: tuple[float, float] | None = None
-    """Coefficients of n' = quadratic (w|w| - n|n|) + linear (w - n); None at once."""
+    rotor: Rotor | None = None
+    """None: at once."""
     ring: tuple[float, float, float] | None = None
     """Compliance c, frequency w / 2 pi in Hz, damping z: transfer function 1 - c + c w^2/(p^2 + 2 z w p + w^2)."""
     delay: float = 0.0
@@ -60,9 +60,9 @@ class Passed:
         `rates` (T,) of the rotor there."""
         out: Floats = value[last]
         if self.rotor is not None:
-            quadratic, linear = self.rotor
-            follows = np.flatnonzero(since * (quadratic * np.abs(value) + linear)[last] < SETTLED)
-            out[follows] = lagged(out[follows], rates[last[follows]], since[follows], quadratic, linear)
+            rate = self.rotor.quadratic * np.abs(value) + self.rotor.linear_at(value)
+            follows = np.flatnonzero(since * rate[last] < SETTLED)
+            out[follows] = lagged(out[follows], rates[last[follows]], since[follows], self.rotor)
         return out
 
     def ringing(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
@@ -87,8 +87,7 @@ class Passed:
         share: NDArray[np.complex128] = np.full(value.size, c * w**2 / (2j * pole.imag * pole))
         modes = []
         if self.rotor is not None:
-            quadratic, linear = self.rotor
-            follow = 2 * quadratic * np.abs(value) + linear
+            follow = 2 * self.rotor.quadratic * np.abs(value) + self.rotor.linear_at(value)
             follow = np.maximum(follow, SLOWEST * float(np.max(follow)))
             share *= follow / (pole + follow)
             lagging = recursion(np.exp(-follow * gap), change, 0.0)
@@ -104,10 +103,9 @@ class Passed:
         round between two ticks (`turning_points` are among them otherwise) its sign is that of its beginning.
         """
         assert self.rotor is not None
-        quadratic, linear = self.rotor
-        ends = lag_ends(value[:-1], np.diff(when), quadratic, linear, float(value[0]))
+        ends = lag_ends(value[:-1], np.diff(when), self.rotor, float(value[0]))
         begin = np.concatenate([value[:1], ends])
-        rate = follow_rate(value, 0.5 * (begin + np.append(ends, value[-1])), quadratic, linear)
+        rate = follow_rate(value, 0.5 * (begin + np.append(ends, value[-1])), self.rotor)
         rate = np.maximum(rate, SLOWEST * float(np.max(rate)))
         sign = np.where(begin != 0, np.sign(begin), np.sign(value))
         gap = begin - value
@@ -116,10 +114,10 @@ class Passed:
     def turning_points(self, when: Floats, value: Floats) -> Floats:
         """s: where the rotor passes through rest between two of the ticks."""
         assert self.rotor is not None
-        ends = lag_ends(value[:-1], np.diff(when), *self.rotor, float(value[0]))
+        ends = lag_ends(value[:-1], np.diff(when), self.rotor, float(value[0]))
         begin = np.concatenate([value[:1], ends[:-1]])
         at = np.flatnonzero(begin * value[:-1] < 0)
         w, n = value[at], begin[at]
-        found = when[at] + to_rest(w, n, *self.rotor)
+        found = when[at] + to_rest(w, n, self.rotor)
         out: Floats = found[found < when[at + 1]]
         return out

@@ -38,6 +38,7 @@ PLAIN = {
     ("motor_lag", "first_order"): (0.12,),
     ("motor_lag", "quadratic"): (0.12,),
     ("motor_lag", "mixed"): (0.12, 0.37),
+    ("motor_lag", "coasting"): (0.12, 0.37, 0.71),
     ("rotation_coupling", ""): (0.83,),
     ("exponent", ""): (1.83,),
     ("asymmetry", ""): (0.81,),

@@ -165,6 +165,20 @@ def test_the_rotor_follows_its_equation():
     assert term("motor_lag", "quadratic").apply(u, m, (0.2,)) == pytest.approx(second, abs=0.02)
 
 
+def test_a_rotor_that_a_drive_lets_go_at_rest_is_braked_by_the_water_alone():
+    u, dt = steps(60, seed=8, high=0.05)
+    u[::3] = 0.0
+    m = moment(with_driver(u, dt), S)
+
+    def slope(y, v):
+        hold = 0.25 if v == 0 else 1.0
+        water = (v * abs(v) - y[0] * abs(y[0])) / (2 * 0.2 * S.driver)
+        return [0.4 * water + 0.6 * hold * (v - y[0]) / 0.2]
+
+    _, expected = integrated(slope, [u[0]], u, dt)
+    assert term("motor_lag", "coasting").apply(u, m, (0.2, 0.6, 0.75)) == pytest.approx(expected, abs=0.02)
+
+
 def test_the_wake_is_met_after_a_change_of_direction_only():
     x = np.repeat([0.0, 12.0, 0.0, 12.0, -12.0], 40)
     h = with_driver(x, np.full(200, 0.05))

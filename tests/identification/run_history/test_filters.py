@@ -16,7 +16,7 @@ from identification.run_history.filters import (
     reconstructed,
     recursion,
 )
-from identification.run_history.rotor_lag import lag
+from identification.run_history.rotor_lag import Rotor, lag
 
 
 def _play(value, width):
@@ -72,7 +72,7 @@ def test_lag_follows_its_differential_equation(quadratic, linear):
             m = n + h * slope
             n += 0.5 * h * (slope + quadratic * (v * abs(v) - m * abs(m)) + linear * (v - m))
         expected.append(total / fine)
-    found = lag(w, np.full(900, 0.01), quadratic, linear)[1]
+    found = lag(w, np.full(900, 0.01), Rotor(quadratic, linear))[1]
     np.testing.assert_allclose(found, expected, atol=0.03)
 
 

@@ -9,8 +9,10 @@ import pytest
 from drivers.dronecan.esc import DronecanEsc
 from drivers.errors import DeviceError, LinkError
 from drivers.ports.can_bus import CanBus
+from identification.mismatch.answer.as_json import diagnosis_json
 from rig.campaign.loading import load_bench
 from rig.cli import record_in_virtual_time
+from rig.diagnose.command import diagnose_files
 from rig.errors import PlanError
 from rig.fit.answer import fit_recordings
 from rig.hdf5.load import load
@@ -80,6 +82,16 @@ def test_a_campaign_finds_the_truth_and_proves_the_watchdog(tmp_path):
     pass_time(world, 0.1)
     assert world.drive.volts is None, "let go at the end"
     assert not [event.text for event in recording.events if "could not be understood" in event.text]
+    assert_it_coasts(diagnosis_json(diagnose_files([path])))
+
+
+def assert_it_coasts(found):
+    """Let go, the rotor keeps 1.5 of the 3.0 1/s by which the ESC holds it; that is all that C V|V| leaves out."""
+    assert (found["verdict"], [each["effect"] for each in found["findings"]]) == ("explained", ["motor_lag"])
+    told = found["findings"][0]["parameters"]["released"]
+    assert abs(told["value"] - 0.5) < 3 * told["std"] < 0.03
+    C = found["model"]["parameters"]["C"]
+    assert abs(C["value"] - TRUTH) < 3 * C["std"] < 0.003 * TRUTH
 
 
 def test_an_esc_that_wants_arming_status_and_is_second_of_its_bus(tmp_path):

@@ -48,9 +48,9 @@ def test_a_run_whose_samples_were_replaced_has_nothing_of_the_one_before():
     assert np.max(np.abs(after - before)) > 0.1, "or there was nothing to see"
 
 
-@pytest.mark.parametrize("form", ["first_order", "quadratic", "mixed"])
+@pytest.mark.parametrize("form", ["first_order", "quadratic", "mixed", "coasting"])
 def test_predictions_do_not_depend_on_what_was_predicted_before(form):
-    history, rest = sampled(1.0), (0.3,) if form == "mixed" else ()
+    history, rest = sampled(1.0), {"mixed": (0.3,), "coasting": (0.3, 0.8)}.get(form, ())
     lag, constants = MotorLag(form), (0.02, 0.9, 0.1, 0.35)
     one, other = Predictor(), Predictor()
     forwards = {tau: predicted(one, history, lag, tau, *rest) for tau in constants}

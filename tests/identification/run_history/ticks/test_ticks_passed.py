@@ -13,7 +13,7 @@ from identification.mismatch.select.baseline import start
 from identification.physics.motor_lag import MotorLag
 from identification.physics.stand_resonance import StandResonance
 from identification.recording import Channel, Recording
-from identification.run_history.rotor_lag import lag_ends
+from identification.run_history.rotor_lag import Rotor, lag_ends
 from identification.run_history.ticks.sub_interval_dynamics import Passed
 
 TICK = 0.05
@@ -60,15 +60,15 @@ def rates(passed, when, value):
     """Of the rotor at each tick; it was settled before the first."""
     if passed.rotor is None:
         return value
-    return np.concatenate([value[:1], lag_ends(value[:-1], np.diff(when), *passed.rotor, value[0])])
+    return np.concatenate([value[:1], lag_ends(value[:-1], np.diff(when), passed.rotor, value[0])])
 
 
 @pytest.mark.parametrize(
     ("response", "passed", "delay"),
     [
-        (lagging, Passed((0.0, 1 / TAU)), 0.0),
+        (lagging, Passed(Rotor(0.0, 1 / TAU)), 0.0),
         (ringing, Passed(ring=(0.6, 30.0, 0.1)), 0.0013),
-        (both, Passed((0.0, 1 / TAU), (0.6, 30.0, 0.1)), 0.0),
+        (both, Passed(Rotor(0.0, 1 / TAU), (0.6, 30.0, 0.1)), 0.0),
     ],
     ids=["lag", "ringing, late", "lag and ringing"],
 )
@@ -90,7 +90,7 @@ def test_a_rotor_that_turns_round_follows_the_torque_balance():
     stands = -np.arctan(n0 / w) / (q * w)
     t = np.linspace(0.0, 0.4, 81)
     when = np.concatenate([[-1.0], np.linspace(0.0, 0.4, 41)])
-    passed, value = Passed((q, 0.0)), np.concatenate([[n0], np.full(41, w)])
+    passed, value = Passed(Rotor(q, 0.0)), np.concatenate([[n0], np.full(41, w)])
     found = passed.followed(*ticks_before(t, when), value, rates(passed, when, value))
     turned = w * np.where(t < stands, np.tan(q * w * t + np.arctan(n0 / w)), np.tanh(q * w * (t - stands)))
     assert found == pytest.approx(turned, abs=2e-3)

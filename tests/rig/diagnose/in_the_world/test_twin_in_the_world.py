@@ -74,6 +74,7 @@ def test_every_term_of_the_catalogue_that_the_world_knows_builds_its_effect():
         ("supply_sag", "discharge"),
         ("supply_sag", "loaded"),
         ("motor_lag", "mixed"),
+        ("motor_lag", "coasting"),
         ("load_cell_saturation", "averaged"),
         ("rotation_coupling", ""),
         ("thruster_interaction", ""),
