@@ -35,6 +35,7 @@ name = "sound"
 bench = "bench.toml"
 output = "out"
 thrusters = ["{thruster}"]
+expected_C = 0.4
 [watch]
 off = true
 [tare]

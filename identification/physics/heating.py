@@ -65,7 +65,7 @@ TRAITS = Traits(
     told_by=((THERMOMETER, "the motor temperature"),),
     revealed_by=REVEALED,
 )
-CLOSER = replace(TRAITS, closer=True)
+CLOSER = replace(TRAITS, closer=True, own_winding=True)
 CLOSER_OF_POWER = replace(CLOSER, proxy=POWER)
 OF_POWER = replace(TRAITS, proxy=POWER)
 

@@ -3,7 +3,7 @@ drive that opens its windings at 0, where the water alone brakes."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import ClassVar, Final, Literal
 
 from identification.physics.digits import percent
@@ -39,6 +39,20 @@ def _dynamics(term: MotorLag, theta: tuple[float, ...], largest: float) -> Dynam
     return Dynamics(rotor=torques(term.form, theta, largest), slowest=SLOWEST / theta[0])
 
 
+TRAITS: Final = Traits(
+    moving=True,
+    delays=True,
+    dynamics=_dynamics,
+    quick="time_constant",
+    shown_over="time_since_step",
+    shown_as="step",
+    told_by=(("rotation_rate", "the measured rotation rate"),),
+    revealed_by="small and large steps, sampled fast; the measured rotation rate",
+)
+COASTING: Final = replace(TRAITS, closer=True, rare=True)
+"""Where a drive coasts its tail is plain: a little that the form repairs of something else is no sign of it."""
+
+
 @dataclass(frozen=True, slots=True)
 class MotorLag:
     """Rotor inertia: x' = a (V|V| - x|x|) + b (V - x); first order without a, the torque balance without b.
@@ -52,17 +66,11 @@ class MotorLag:
     physics: ClassVar[str] = "the rotor needs time to follow"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("time_since_step",)
-    traits: ClassVar[Traits] = Traits(
-        moving=True,
-        delays=True,
-        dynamics=_dynamics,
-        quick="time_constant",
-        shown_over="time_since_step",
-        shown_as="step",
-        told_by=(("rotation_rate", "the measured rotation rate"),),
-        revealed_by="small and large steps, sampled fast; the measured rotation rate",
-    )
     form: Literal["first_order", "quadratic", "mixed", "coasting"] = "first_order"
+
+    @property
+    def traits(self) -> Traits:
+        return COASTING if self.form == "coasting" else TRAITS
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         tau = Parameter("time_constant", "s", 0.0, 10.0, 0.0)

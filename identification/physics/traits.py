@@ -118,8 +118,9 @@ class Traits:
     winding: str = ""
     """The parameter by which voltage is lost in the winding, in proportion to the square of the rate."""
     closer: bool = False
-    """With a winding of its own and one parameter more than another form of the effect: it is asked only in the place
-    of that, where no other term of the model says what the winding takes."""
+    """With one parameter more than another form of the effect: it is asked only in the place of that."""
+    own_winding: bool = False
+    """It is so where no other term of the model says what the winding takes."""
     limits: Literal["", "command", "reading"] = ""
     """It clips: LimitsCommand or LimitsReading."""
     dynamics: Callable[[Any, tuple[float, ...], float], Dynamics] | None = None

@@ -85,9 +85,11 @@ def _k(histories: Sequence[History]) -> float:
 
 
 def every_shape(fit_now: Fit, data: Data, terms: Sequence[Term]) -> Floats:
-    """(n, k) raw columns: all trials of the catalogue's terms, and any shape over each covariate."""
+    """(n, k) raw columns: all trials of the catalogue's terms, and any shape over each covariate. Of a rare form that
+    refines another one none: it nearly has the other's shape."""
     shapes = [np.concatenate(c.columns) for c in covariates(fit_now, data)]
-    columns = np.column_stack([raw_directions(fit_now, data, terms), *shapes])
+    asked = [t for t in terms if not (t.traits.closer and t.traits.rare)]
+    columns = np.column_stack([raw_directions(fit_now, data, asked), *shapes])
     some = lengths(columns) > 0
     return columns if some.all() else columns[:, some]
 

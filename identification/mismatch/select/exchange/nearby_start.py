@@ -63,7 +63,8 @@ def may_replace(term: Term, other: Term, model: Model) -> bool:
     """Whether `other` is one that may stand where `term` does: a closer form does for forms of its effect only."""
     if not other.traits.closer:
         return True
-    return other.id == term.id and not any(t.traits.winding for t in model.terms)
+    told = other.traits.own_winding and any(t.traits.winding for t in model.terms)
+    return other.id == term.id and not told
 
 
 def beginnings(term: Term, values: tuple[float, ...], other: Term, scale: Scale) -> tuple[tuple[float, ...], ...]:
@@ -76,11 +77,12 @@ def beginnings(term: Term, values: tuple[float, ...], other: Term, scale: Scale)
 
 
 def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights, noise: Noise) -> Fit:
-    """The other of two forms where its BIC is less, and nothing contradicts it."""
+    """The other of two forms where its BIC is less, of a rare one by far, and nothing contradicts it."""
     if term not in now.model.terms:
         return now
     logn = float(np.log(max(now.residual.size, 2)))
     wanted = now.chi2 - policy.select.RIVAL_BETTER_BIC - (price(other, data) - price(term, data)) * logn
+    wanted -= policy.select.RARE_TERM_BIC * int(other.traits.rare and not term.traits.rare)
     own = now.layout.of(term)
     kept = np.array([j < own.start or j >= own.stop for j in range(now.free.size)])
     slopes = now.jacobian[:, kept[now.free]], now.free[kept]
