@@ -31,7 +31,7 @@ MOST = {"cia401": 8.0}
 GAIN = {"cia401": 2.4}
 """V of the motor for one of the command, where an amplifier stands between."""
 UNPROVED = ("cia401",)
-"""At its largest voltages for a proof nothing pushes enough to be seen, and no rate is measured."""
+"""Neither rate nor current is measured: the watchdog can't be proved."""
 FORWARDS = ("scpi_supply",)
 """A supply gives no negative voltage."""
 CAMPAIGN = """

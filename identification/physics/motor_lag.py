@@ -18,6 +18,7 @@ AT_ONCE = 1e-6
 SLOWEST = 1e-3
 """Of the time constant's inverse: the least rate of following, of a rotor that hardly turns."""
 PARAMETERS: Final = {"first_order": 1, "quadratic": 1, "mixed": 2, "coasting": 3}
+"""How many each form has."""
 NEARLY_LINEAR = 0.9
 """Linear share from which a lag is told as one that is the same at all levels."""
 
