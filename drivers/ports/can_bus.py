@@ -1,8 +1,8 @@
 """One CAN bus shared by several devices, through python-can. With serial_port.py the only place that opens wires.
 
 Traps of python-can 4 that this file knows (seen in can/interfaces/slcan.py and tried): it reads an slcan adapter too
-slowly for a full bus, so that slcan_lines.py does; opening one sleeps 2 s unless told not to; shutdown of a lost port
-raises before closing it.
+slowly for a full bus, so that slcan_lines.py does; it waits after each frame until the adapter has taken it, for ever
+if the adapter is stuck; opening one sleeps 2 s unless told not to; shutdown of a lost port raises before closing it.
 """
 
 from __future__ import annotations
@@ -27,16 +27,12 @@ from drivers.ports.inbox import BadRecords, Inbox
 from drivers.ports.own_reader import OwnReader
 from drivers.ports.reader import READ_TIMEOUT
 from drivers.ports.refusals import why_not_open
-from drivers.ports.serial_port import read, set_low_latency
+from drivers.ports.serial_port import WRITE_TIMEOUT, descriptor_of, read, set_low_latency, write
 from drivers.ports.slcan_lines import SlcanLines
 from drivers.ports.transcript import Transcript
 from drivers.ports.wire import SerialOverWire, Wire
 from drivers.protocols import LinkHealth
 
-SEND_TIMEOUT = 0.2
-"""s; an adapter that takes no bytes for this long has lost its bus or its cable. Time spent preempted counts for
-pyserial too, even when every byte went out at once: hence well above a scheduling hiccup, and below the lateness that
-the loop allows."""
 CAPACITY = 100_000
 """Frames kept per device between two drains; 25 s of a full 500 kbit/s bus."""
 
@@ -118,9 +114,10 @@ class CanBus:
         message = can.Message(arbitration_id=frame.id, is_extended_id=frame.extended, data=frame.data)
         sent_ns = self.now_ns()
         try:
-            self._bus.send(message, timeout=SEND_TIMEOUT)
+            self._bus.send(message, timeout=WRITE_TIMEOUT)
         except (can.CanError, OSError) as error:
-            self.error = self.error or f"{self._channel} refused {frame} ({error}): check adapter, cable and power"
+            why = error.__cause__ or error  # python-can's own words say that it could not write
+            self.error = self.error or f"{self._channel} refused {frame} ({why}): check adapter, cable and power"
             raise LinkError(f"CAN bus {self.error}") from error
         if self._transcript is not None:
             self._transcript.write(sent_ns, ">", str(frame).encode())
@@ -180,8 +177,12 @@ class CanBus:
     def _read(self, bus: can.BusABC) -> Callable[[], None]:
         """From now on; returns what ends that."""
         if isinstance(bus, slcanBus):
-            set_low_latency(bus.serialPortOrig)
-            return read(bus.serialPortOrig, self._channel, self._arrived, self._lost)
+            port = bus.serialPortOrig
+            set_low_latency(port)
+            if descriptor_of(port) is not None:
+                port.write = lambda data: write(port, bytes(data))  # type: ignore[method-assign]
+                port.flush = lambda: None  # type: ignore[method-assign]
+            return read(port, self._channel, self._arrived, self._lost)
         return OwnReader(self._channel, lambda: self._take_frame(bus), self._lost, (can.CanError, OSError)).end
 
     def _take_frame(self, bus: can.BusABC) -> None:

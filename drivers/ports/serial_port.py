@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import contextlib
+import os
+import select
 import termios
 import time
 from collections.abc import Callable, Sequence
@@ -25,7 +27,8 @@ from drivers.ports.wire import Arrived, Wire
 Record = TypeVar("Record")
 
 WRITE_TIMEOUT = 0.2
-"""s; a port that takes no bytes for this long has lost its device."""
+"""s; a port that takes no bytes for this long has lost its device, or a CAN adapter its bus or its cable: well below
+the lateness that the loop allows."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,12 +133,14 @@ class SerialPort(Generic[Record]):
 
     def write(self, data: bytes) -> None:
         """Send bytes. Raises LinkError when the port is closed, lost, or takes nothing for 0.2 s."""
-        port = self._wire or self._serial
-        if port is None or not self.alive:
+        if (self._wire is None and self._serial is None) or not self.alive:
             raise LinkError(f"{self._name}: {self.error or f'{self.settings.port} is not open'}")
         sent_ns = self.now_ns()  # before: the answer may be in the transcript first, and must not have the older stamp
         try:
-            port.write(data)
+            if self._wire is not None:
+                self._wire.write(data)
+            elif self._serial is not None:
+                write(self._serial, data)
         except OSError as error:
             self.error = f"{self.settings.port} refused {len(data)} bytes ({error}): check adapter, cable and power"
             raise LinkError(f"{self._name}: {self.error}") from error
@@ -209,12 +214,37 @@ def read(port: serial.Serial, label: str, arrived: Arrived, lost: Lost) -> Calla
 
     pyserial's own read takes four system calls and half as much again in Python: the descriptor is read, if it has one.
     """
-    try:
-        descriptor = port.fileno()
-    except (OSError, NotImplementedError, AttributeError):  # loop:// and rfc2217:// have none
+    descriptor = descriptor_of(port)
+    if descriptor is None:
         return OwnReader(label, lambda: _look(port, arrived), lost, (OSError,)).end
     READER.watch(descriptor, Port(label, arrived, lost))
     return lambda: READER.forget(descriptor)
+
+
+def descriptor_of(port: serial.Serial) -> int | None:
+    """loop:// and rfc2217:// have none."""
+    try:
+        return port.fileno()
+    except (OSError, NotImplementedError, AttributeError):
+        return None
+
+
+def write(port: serial.Serial, data: bytes) -> None:
+    """All of `data`. Raises OSError where the port takes nothing more for WRITE_TIMEOUT.
+
+    pyserial's own raises too where every byte went out at once, if this process was kept waiting meanwhile by others.
+    """
+    descriptor = descriptor_of(port)
+    if descriptor is None:
+        port.write(data)
+        return
+    deadline = time.monotonic() + WRITE_TIMEOUT
+    while data:
+        _, ready, _ = select.select([], [descriptor], [], max(deadline - time.monotonic(), 0.0))
+        if not ready:
+            raise TimeoutError(f"it took nothing more for {WRITE_TIMEOUT:g} s, {len(data)} bytes are left")
+        with contextlib.suppress(BlockingIOError):
+            data = data[os.write(descriptor, data) :]
 
 
 def _look(port: serial.Serial, arrived: Arrived) -> None:

@@ -231,9 +231,8 @@ class Loop:
 
     def _judge(self, now: float, samples: list[Sample]) -> Trip | None:
         if self._command_error:
-            return Trip(
-                f"the motor did not take a command: {self._command_error}", "link", now, self.bench.config.motor
-            )
+            cause = f"the motor did not take a command: {self._command_error}"
+            return self._told(Trip(cause, "link", now, self.bench.config.motor))
         if self._lapse:
             return self._told(Trip(self._lapse, "late", now))
         if not self.unattended and self.clients.last_lease is not None and not self.clients.attending:
@@ -251,7 +250,8 @@ class Loop:
 
     def _told(self, trip: Trip | None) -> Trip | None:
         """With what the machine may have done to it, which changes nothing else."""
-        busy = self.busy() if trip is not None and trip.source in ("stale", "late", "rate") else ""
+        about_time = trip is not None and (trip.source in ("stale", "late", "rate") or bool(self._command_error))
+        busy = self.busy() if about_time else ""
         return replace(trip, cause=f"{trip.cause}; {busy}") if trip is not None and busy else trip
 
     def _vitals(self, now: float) -> Vitals:

@@ -1,4 +1,4 @@
-"""Whether this machine does other things, which makes samples late on a line that is sound."""
+"""Whether this machine does other things, which makes samples and commands late on a line that is sound."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ def busy(load: Callable[[], tuple[float, float, float]] = os.getloadavg, process
     """A clause for the cause of a trip; empty where the machine is idle enough.
 
     >>> busy(lambda: (8.2, 5.0, 3.0), 2)
-    'this machine is busy (load 8.2 on 2 processors): that alone makes samples late'
+    'this machine is busy (load 8.2 on 2 processors): that alone makes samples and commands late'
     >>> busy(lambda: (1.9, 5.0, 3.0), 2)
     ''
     """
@@ -23,4 +23,4 @@ def busy(load: Callable[[], tuple[float, float, float]] = os.getloadavg, process
     if now <= BUSY * processors:
         return ""
     each = f"{processors} processor{'s' if processors > 1 else ''}"
-    return f"this machine is busy (load {now:.1f} on {each}): that alone makes samples late"
+    return f"this machine is busy (load {now:.1f} on {each}): that alone makes samples and commands late"

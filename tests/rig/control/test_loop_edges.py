@@ -197,9 +197,11 @@ def test_what_a_wire_refused_is_told_until_it_is_opened_anew(tmp_path):
             raise LinkError("its wire takes nothing")
 
         world.motor.command = refuses
+        world.session.loop.busy = lambda: "this machine is busy"
         turn(0.1)
         world.motor.command = takes
-        assert trips[0][1:] == ("link", "the motor did not take a command: its wire takes nothing")
+        refused = "the motor did not take a command: its wire takes nothing; this machine is busy"
+        assert trips[0][1:] == ("link", refused)
         trips.clear()
         world.session.loop.begin_link()
         turn(0.5)
