@@ -26,6 +26,8 @@ BENCHES = Path(__file__).resolve().parents[2] / "benches"
 THRUSTER = "T2"
 SERIAL = ("maestro", "roboteq", "scpi_supply", "smc_g2", "vesc_uart")
 """Benches without a CAN bus."""
+STEP = 0.001
+"""s of the world: as fine as the quickest of the cells looks (575 a second)."""
 MOST = {"cia401": 8.0}
 """V of the largest level, where it is not 20."""
 GAIN = {"cia401": 2.4}
@@ -79,7 +81,7 @@ def recorded(name: str, seed: int, folder: Path) -> tuple[Path, float]:
         thruster=THRUSTER, volts=levels(name), C=round(truth, 1), proof=proof, overrides=overrides
     )
     (folder / "campaign.toml").write_text(campaign, encoding="utf-8")
-    made = replace(settings, world=replace(settings.world, mounted=THRUSTER), seed=seed, step=0.005)
+    made = replace(settings, world=replace(settings.world, mounted=THRUSTER), seed=seed, step=STEP)
     host = Host(adapter=3e-4, work=5e-4, reader_late=2e-4, loop_late=3e-4)
     world = VirtualBench(made, host, "none" if name in SERIAL else "bus0")
     with suppress(RuntimeError):  # where too little is measured to say that it is at rest a run ends as tripped
