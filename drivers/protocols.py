@@ -153,6 +153,15 @@ class Coarse(Protocol):
 
 
 @runtime_checkable
+class Paced(Protocol):
+    """A motor controller that takes fewer set-points a second than it may be given: between two it keeps the first."""
+
+    @property
+    def holds(self) -> float:
+        """V of the last set-point that went to it."""
+
+
+@runtime_checkable
 class ForceSensor(Instrument, Protocol):
     """An instrument whose first stream has a `thrust` channel."""
 

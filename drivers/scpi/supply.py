@@ -29,6 +29,9 @@ READ_BACK = 0.01
 """Relative: a setting that is read back further off was not taken."""
 ZERO_BEFORE_ON, ON = "VOLT 0", "OUTP ON"
 OFF = "OUTP OFF"
+EARLY = 0.25
+"""Of the time between two set-points: so much before its time one may go out, the next waits for longer. A loop of the
+same rate is never quite punctual."""
 
 
 class ScpiSupply:
@@ -46,7 +49,7 @@ class ScpiSupply:
         self._fault: str | None = None
         self._told = math.nan
         """V that were sent last."""
-        self._fed_ns = self._sent_ns = self._asked_ns = self._next_ns = 0
+        self._fed_ns = self._due_ns = self._asked_ns = self._next_ns = 0
         self._asked = ""
         self._quiet_ns = self._unanswered = self._dead = 0
         self._row: float | None = None
@@ -104,6 +107,11 @@ class ScpiSupply:
     def told(self, volts: float) -> float:
         return round(volts / self._options.resolution) * self._options.resolution
 
+    @property
+    def holds(self) -> float:
+        """V of the last `VOLT`; of what `command` was given since, nothing went out."""
+        return self._told
+
     def command(self, volts: float) -> None:
         """`VOLT`, at most `command_rate` times a second, 0 at once; the first that is not 0 switches the output on.
 
@@ -144,17 +152,20 @@ class ScpiSupply:
         self._fed_ns = self._port.now_ns()
 
     def _set(self, volts: float, now_ns: int) -> None:
-        level = self.told(volts)
+        level, period_ns = self.told(volts), round(1e9 / self._options.command_rate)
         if level == 0.0 and self._lapsed:
             clear = (self._options.protection_clear,) if self._options.protection_clear else ()
             self._say(ZERO_BEFORE_ON, OFF, *clear)
-            self._lapsed, self._on, self._told, self._sent_ns = False, False, 0.0, now_ns
+            self._lapsed, self._on, self._told = False, False, 0.0
         elif level and not self._on:
             self._say(ZERO_BEFORE_ON, ON, f"VOLT {level:.6g}")
-            self._on, self._told, self._sent_ns = True, level, now_ns
-        elif (level == 0.0 and self._told != 0.0) or now_ns - self._sent_ns >= 1e9 / self._options.command_rate:
+            self._on, self._told = True, level
+        elif (level == 0.0 and self._told != 0.0) or now_ns >= self._due_ns - EARLY * period_ns:
             self._say(f"VOLT {level:.6g}")
-            self._told, self._sent_ns = level, now_ns
+            self._told = level
+        else:
+            return
+        self._due_ns = max(self._due_ns, now_ns) + period_ns
 
     def _question(self, now_ns: int) -> None:
         """The next one, when the last was answered or given up."""

@@ -12,7 +12,7 @@ from drivers.errors import LinkError as DriverLinkError
 from drivers.extras import MissingExtra
 from drivers.ports.can_bus import CanBus
 from drivers.ports.wire import Wire
-from drivers.protocols import Coarse, Instrument, MotorController, Sample, Stream
+from drivers.protocols import Coarse, Instrument, MotorController, Paced, Sample, Stream
 from rig.campaign.calibrated import Calibrated
 from rig.campaign.config import BenchConfig, CanBusConfig
 from rig.errors import ConfigError, DeviceError, LinkError
@@ -44,6 +44,11 @@ class Bench:
         """V of the set-point that the motor controller gets for a command of `volts`."""
         motor = self.instruments[self.config.motor]
         return motor.told(volts) if isinstance(motor, Coarse) else volts
+
+    def holds(self, volts: float) -> float:
+        """V of the set-point that the motor controller has, now that it was given a command of `volts`."""
+        motor = self.instruments[self.config.motor]
+        return motor.holds if isinstance(motor, Paced) else self.told(volts)
 
     def streams(self) -> Iterator[tuple[str, Stream]]:
         """(device name, stream) of every device, in the order of the bench file."""

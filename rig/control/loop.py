@@ -308,10 +308,10 @@ class Loop:
         if since is None:
             return
         rows = [sample for sample in samples if sample.t_ns >= since]
-        if self._recorded_command != (volts,):
-            self._recorded_command = (volts,)
-            told = nan if volts is None else self.bench.told(volts)
-            rows.append(Sample(COMMAND_STREAM, sent_ns, (told,)))
+        holds = None if volts is None else self.bench.holds(volts)
+        if self._recorded_command != (holds,):
+            self._recorded_command = (holds,)
+            rows.append(Sample(COMMAND_STREAM, sent_ns, (nan if holds is None else holds,)))
         self.recorder.rows(rows)
         if self.watcher is not None:
             self.watcher.rows(rows, sent_ns * 1e-9)

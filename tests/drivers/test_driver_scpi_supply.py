@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import random
 import threading
 import tomllib
 
@@ -165,6 +166,60 @@ def test_a_same_set_point_is_sent_no_faster_than_its_rate():
         device.command(0.0)
         wait_until(lambda: b"VOLT 0" in peer.heard[-2:], 0.1)
         device.close()
+
+
+class InTime:
+    """A wire on which nothing is heard, with a clock that is set by hand."""
+
+    def __init__(self):
+        self.t_ns, self.said = 10**9, []
+
+    def now(self):
+        return self.t_ns * 1e-9
+
+    def wait(self, seconds):
+        self.t_ns += round(seconds * 1e9)
+
+    def connect(self, arrived):
+        self.arrived = arrived
+
+    def disconnect(self):
+        self.arrived = None
+
+    def write(self, data):
+        self.said += [(self.t_ns, line) for line in data.split(b"\n") if line.startswith(b"VOLT ")]
+
+
+def ramp(command_rate, loop_rate, late):
+    """Ticks of a ramp, each `late()` s late: the level of each, what is held after it, and what went out."""
+    wire = InTime()
+    device = ScpiSupply("motor", options(command_rate=command_rate, timeout=60.0), wire)
+    device._port.open()
+    device.command(0.0)
+    began, ticks = wire.t_ns, []
+    for k in range(1, 401):
+        wire.t_ns = began + round((k / loop_rate + late()) * 1e9)
+        device.command(0.05 * k)
+        ticks.append((0.05 * k, device.holds))
+    return ticks, [(t, float(line[5:])) for t, line in wire.said]
+
+
+def test_a_loop_of_the_same_rate_that_is_never_quite_punctual_has_each_set_point_sent():
+    scatter = random.Random(3)
+    ticks, _ = ramp(50.0, 50.0, lambda: scatter.uniform(0.0, 0.004))
+    assert [held for _, held in ticks] == pytest.approx([volts for volts, _ in ticks])
+
+
+@pytest.mark.parametrize(("command_rate", "loop_rate"), [(20.0, 50.0), (50.0, 100.0), (30.0, 50.0)])
+def test_what_is_held_is_what_went_out_and_no_more_goes_out_than_its_rate(command_rate, loop_rate):
+    scatter = random.Random(4)
+    ticks, said = ramp(command_rate, loop_rate, lambda: scatter.uniform(0.0, 0.001))
+    assert said[-1][1] == pytest.approx(ticks[-1][1])
+    assert {round(held, 6) for _, held in ticks} <= {volts for _, volts in said}
+    assert any(held != pytest.approx(volts) for volts, held in ticks)
+    span = (said[-1][0] - said[2][0]) * 1e-9
+    assert len(said) - 3 <= command_rate * span + 1
+    assert len(said) - 3 >= 0.8 * command_rate * span
 
 
 def test_nothing_is_asked_while_nothing_is_commanded():

@@ -3,10 +3,12 @@
 from dataclasses import replace
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from drivers.errors import LinkError
 from drivers.protocols import Sample
+from rig.campaign.bench import COMMAND_STREAM
 from rig.campaign.config import LimitConfig
 from rig.control.loop import IDLE, Decision, Inputs
 from rig.control.motor_watch import RestByThrust
@@ -206,6 +208,20 @@ def test_what_a_wire_refused_is_told_until_it_is_opened_anew(tmp_path):
         world.session.loop.begin_link()
         turn(0.5)
         assert not trips
+
+
+def test_what_a_controller_holds_is_recorded_and_not_what_it_was_given_before_its_time(tmp_path):
+    with virtual(tmp_path) as world:
+        loop, motor, rows = world.session.loop, world.session.bench.motor, []
+        motor.holds = 0.0
+        loop.begin_recording(loop.clock.now_ns())
+        loop.recorder.rows = rows.extend
+        for volts, held in [(0.0, 0.0), (1.0, 0.0), (2.0, 2.0), (3.0, 2.0), (3.0, 3.0), (3.0, 3.0), (None, 3.0)]:
+            motor.holds = held
+            loop.tick(motor, lambda inputs, volts=volts: Decision(volts))
+        commanded = [row.values[0] for row in rows if row.stream == COMMAND_STREAM]
+        assert commanded[:-1] == [0.0, 2.0, 3.0]
+        assert np.isnan(commanded[-1])
 
 
 def test_a_recording_begins_anew_and_ends(tmp_path):
