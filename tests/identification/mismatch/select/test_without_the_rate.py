@@ -1,0 +1,58 @@
+"""What the measured rate tells at once is asked of effects too; the better model is kept."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from identification.mismatch.select.without_the_rate import told_without_the_rate
+from identification.physics.dead_band import DeadBand
+from identification.physics.linear_term import LinearTerm
+from identification.physics.rotation_coupling import RotationCoupling
+from identification.recording import Channel
+from tests.identification.diagnosed_runs import dead_band, levels
+from tests.identification.mismatch.small import estimated, rng, selected, short
+
+FOLLOWS, BAND, STRAIGHT = RotationCoupling(), DeadBand(), LinearTerm()
+FEW = (FOLLOWS, BAND, STRAIGHT)
+
+
+def with_rate(slower=None, **how):
+    """`slower(t)`: share of the rate that V asks for which is there."""
+    start, level = levels(0, 80.0)
+    t = np.arange(0.0, 80.0, 1 / 20.0)
+    V = level[np.maximum(np.searchsorted(start, t, side="right") - 1, 0)]
+    acting = how["volts"](V) if "volts" in how else V * slower(t)
+    n = 1.3 * acting + 0.01 * rng(5).standard_normal(t.size)
+    return short(extra=(Channel("n", "n", "rotation_rate", "rev/s", t, n),), **how)
+
+
+def followed(recording):
+    """A search that ended with thrust that follows the rate."""
+    found = selected({FOLLOWS: (1.0,)}, [recording], FEW)
+    data, after = estimated({FOLLOWS: (1.0,)}, [recording])
+    _, before = estimated({}, [recording])
+    return replace(found, data=data, before=before, after=after)
+
+
+def ids(found):
+    return [term.id for term in found.after.fit.model.terms]
+
+
+def test_an_effect_that_the_rate_shows_is_told_and_the_rate_is_not():
+    found = followed(with_rate(volts=dead_band(1.2)))
+    told = told_without_the_rate(found, rng(0))
+    assert ids(told) == ["dead_band"]
+    assert told.terms == FEW, "what may be asked of the rest is what could be before"
+
+
+def test_a_rate_of_which_no_effect_tells_is_followed():
+    late = lambda t: 1.0 - 0.1 * (np.sin(t / 5) > 0)  # noqa: E731
+    found = followed(with_rate(slower=late, change=lambda t, _V, F: F * late(t) ** 2))
+    assert told_without_the_rate(found, rng(0)) is found
+
+
+def test_a_model_that_follows_no_rate_is_as_it_was():
+    found = selected({BAND: (1.0,)}, [short(volts=dead_band(1.2))], FEW)
+    assert told_without_the_rate(found, rng(0)) is found
