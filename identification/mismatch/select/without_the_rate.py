@@ -16,6 +16,8 @@ from identification.mismatch.observer import UNWATCHED, Observer
 from identification.mismatch.select.forward_selection import Selected, onwards
 from identification.mismatch.select.stage import exchange_rivals
 
+NO_EFFECTS = "whether effects tell what the measured rate shows"
+
 
 def told_without_the_rate(found: Selected, rng: np.random.Generator, watch: Observer = UNWATCHED) -> Selected:
     """The model without a term that follows the rate, where one was found and that model is better; else as found."""
@@ -26,7 +28,9 @@ def told_without_the_rate(found: Selected, rng: np.random.Generator, watch: Obse
     others = tuple(term for term in found.terms if not term.traits.follows_rate)
     other = onwards(found.data, others, found.before, found.before, rng, watch)
     other = exchange_rivals(other, rng, watch)
-    if other.undone or not _better(other, found):
+    if other.undone:
+        return replace(found, undone=(*found.undone, NO_EFFECTS))
+    if not _better(other, found):
         return found
     return replace(other, terms=found.terms, rounds=(*found.rounds, *other.rounds))
 
@@ -36,5 +40,4 @@ def _better(other: Selected, found: Selected) -> bool:
     if not other.after.fit.model.terms:
         return False
     fitted = fit(other.after.fit.model, other.after.fit.theta, found.data, found.after.weights)
-    price = float(np.log(max(fitted.residual.size, 2)))
-    return bool(fitted.deviance + int(fitted.free.sum()) * price < found.after.bic)
+    return replace(found.after, fit=fitted).bic < found.after.bic

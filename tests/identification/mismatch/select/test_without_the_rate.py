@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.mismatch.select.without_the_rate import told_without_the_rate
+from identification.mismatch.observer import Interrupted
+from identification.mismatch.select.without_the_rate import NO_EFFECTS, told_without_the_rate
 from identification.physics.dead_band import DeadBand
 from identification.physics.linear_term import LinearTerm
 from identification.physics.rotation_coupling import RotationCoupling
@@ -51,6 +52,22 @@ def test_a_rate_of_which_no_effect_tells_is_followed():
     late = lambda t: 1.0 - 0.1 * (np.sin(t / 5) > 0)  # noqa: E731
     found = followed(with_rate(slower=late, change=lambda t, _V, F: F * late(t) ** 2))
     assert told_without_the_rate(found, rng(0)) is found
+
+
+class Ended:
+    """Somebody has had enough."""
+
+    def stage(self, name): ...
+
+    def trying(self, what):
+        raise Interrupted
+
+
+def test_who_ends_it_keeps_the_model_and_is_told_what_was_not_asked():
+    found = followed(with_rate(volts=dead_band(1.2)))
+    told = told_without_the_rate(found, rng(0), Ended())
+    assert told.after is found.after
+    assert told.undone == (NO_EFFECTS,)
 
 
 def test_a_model_that_follows_no_rate_is_as_it_was():
