@@ -19,10 +19,12 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from identification.recording import Floats
 from identification.run_history.history import History
 from identification.run_history.least_recently_used import LeastRecentlyUsed
+from identification.run_history.ticks.beside_means import Samples
 
 DENSE = 0.03
 """s between samples: where they are farther apart, hardly any share an interval."""
@@ -156,7 +158,7 @@ def _normal(
 ) -> Iterator[tuple[Floats, Floats, float, int]]:
     """(gram, moment, square of the thrust, samples) of each stretch of CHUNK intervals."""
     index = np.clip(np.searchsorted(history.edges, history.sample_time, side="right") - 1, 0, used.size - 1)
-    total = np.cumsum(change)
+    total = np.concatenate([[0.0], np.cumsum(change)])
     for first in range(0, used.size, CHUNK):
         if not used[first : first + CHUNK].any():
             continue
@@ -166,42 +168,33 @@ def _normal(
         if t.size < 3:
             continue
         last = np.searchsorted(at, t, side="right") - 1
-        columns = np.zeros((t.size, NODES + 3))
-        columns[:, 0] = history.sample_thrust[begin:end]
-        columns[:, 1] = np.where(last >= 0, total[np.maximum(last, 0)], 0.0)
-        rows = np.arange(t.size)
-        for back in range(NODES):
-            tick = last - back
-            since = t - at[np.maximum(tick, 0)]
-            near = (tick >= 0) & (since < nodes[-1])
-            if not near.any():
-                break
-            i, r = np.searchsorted(nodes, since[near], side="right") - 1, rows[near]
-            share = (since[near] - nodes[i]) / (nodes[i + 1] - nodes[i])
-            columns[r, 2 + i] += (1 - share) * change[tick[near]]
-            columns[r, 3 + i] += share * change[tick[near]]
-        kept = used[j] & (j >= first) & (j < first + CHUNK)
-        news = _beside_means(columns[:, :-1], t, j)[kept]
-        if news.shape[0] > NODES:
-            X, y = news[:, 1:], news[:, 0]
-            yield X.T @ X, X.T @ y, float(y @ y), int(y.size)
+        levels = np.column_stack([history.sample_thrust[begin:end], total[last + 1]])
+        here = np.arange(j[0], j[-1] + 1)
+        kept = used[here] & (here >= first) & (here < first + CHUNK)
+        samples = int(np.count_nonzero(kept[j - j[0]]))
+        if samples > NODES:
+            gram = Samples(t, j - j[0]).gram(levels, _held_back(t, last, at, change, nodes), kept)
+            yield gram[1:, 1:], gram[1:, 0], float(gram[0, 0]), samples
 
 
-def _beside_means(columns: Floats, t: Floats, j: NDArray[np.intp]) -> Floats:
-    """Columns less the means over their intervals and the lines through the neighbours' means."""
-    here = j - j[0]
-    count = np.maximum(np.bincount(here), 1)
-    size = count.size
-    ends = np.concatenate([[0], np.cumsum(np.bincount(here))])
-    running = np.concatenate([np.zeros((1, columns.shape[1])), np.cumsum(columns, axis=0)])
-    mean = (running[ends[1:]] - running[ends[:-1]]) / count[:, None]
-    when = np.bincount(here, weights=t) / count
-    slope = np.zeros_like(mean)
-    filled = np.diff(ends) > 0
-    inner = np.flatnonzero(filled[2:] & filled[:-2]) + 1 if size > 2 else np.empty(0, dtype=np.intp)
-    slope[inner] = (mean[inner + 1] - mean[inner - 1]) / (when[inner + 1] - when[inner - 1])[:, None]
-    out: Floats = columns - mean[here] - slope[here] * (t - when[here])[:, None]
-    return out
+def _held_back(t: Floats, last: NDArray[np.intp], at: Floats, change: Floats, nodes: Floats) -> csr_array:
+    """(n, B) what each node holds back, at samples `t` (n,), of the ticks `change` (T,) at `at`; `last` (n,) is the
+    tick before each."""
+    shares, columns = [], []
+    for back in range(NODES):
+        tick = np.maximum(last - back, 0)
+        since = t - at[tick]
+        near = (last >= back) & (since < nodes[-1])
+        if back and not near.any():
+            break
+        i = np.clip(np.searchsorted(nodes, since, side="right") - 1, 0, NODES - 1)
+        share = (since - nodes[i]) / (nodes[i + 1] - nodes[i])
+        held = np.where(near, change[tick], 0.0)
+        shares += [(1 - share) * held, share * held]
+        columns += [i, i + 1]
+    rows = np.arange(t.size + 1) * len(shares)
+    every = csr_array((np.array(shares).T.ravel(), np.array(columns).T.ravel(), rows), shape=(t.size, NODES + 1))
+    return every[:, :-1]  # at the last node nothing is held back
 
 
 def _axes(parts: list[tuple[Floats, Floats, float, int]], nodes: Floats, levels: Floats) -> TickRows | None:
