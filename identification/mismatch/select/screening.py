@@ -192,11 +192,13 @@ def _unit(found: Directions, before: Floats) -> Directions:
 def _trials(term: Term, fit: Fit, data: Data, weights: Weights, basis: Floats) -> list[tuple[float, ...]]:
     """The term's own; for a jump of the zero, for a delay and for ringing also those that the data point to.
 
-    Of one that the baseline has: each of its values moved a little.
+    Of one that the baseline has: each of its values moved a little, and a jump to elsewhere, as no slope leads there.
     """
     was = fit.model.given_for(term)
     if was is not None:
-        return _moved(was.values, term.parameters(data.scale))
+        known = term.parameters(data.scale)
+        elsewhere = term.finer(was.values, data.scale) if any(p.jumps for p in known) else ()
+        return [*_moved(was.values, known), *elsewhere]
     found = list(term.trials(data.scale))
     if term.traits.delay:  # ticks of a ramp meet the samples as before only when whole ones have passed
         found += [(k * tick,) for tick in {h.tick for h in data.histories if h.tick < SLOW_TICK} for k in TICKS]

@@ -15,6 +15,7 @@ from identification.mismatch.estimate.fitting import raw
 from identification.mismatch.estimate.stairs import covariance
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
+from identification.mismatch.pipeline import diagnose
 from identification.mismatch.value import QUANTILE
 from identification.physics.dead_band import DeadBand
 from identification.physics.motor_lag import MotorLag
@@ -26,12 +27,12 @@ JUMP, LAG = DeadBand("jump"), MotorLag("first_order")
 LEVELS = np.array([0.0, 9.0, -0.45, 3.0, 0.8, -9.0, 0.45, -3.0, -0.8, 6.0])
 
 
-def run(levels, seed):
+def run(levels, seed, half_width=HALF_WIDTH):
     """S of every level, the rotor at once, 50 samples a second."""
     start = HOLD * np.arange(levels.size)
     t = np.arange(0.01, HOLD * levels.size, 0.02)
     V = levels[np.searchsorted(start, t, side="right") - 1]
-    n = V * (np.abs(V) > HALF_WIDTH)
+    n = V * (np.abs(V) > half_width)
     rng = np.random.default_rng(seed)
     return Recording(
         f"r{seed}",
@@ -94,6 +95,19 @@ def test_a_level_just_beyond_a_given_threshold_turns_the_rotor_whole(fitted):
     assert told[0][np.isclose(driver, -0.597)] == pytest.approx(0.0, abs=1e-12)
     spread, _ = raw(Model((JUMP,)), Theta(C, ((0.6,),), (0.0,)), later, with_rate=False)
     assert np.all(spread[0][np.isclose(driver, 0.603)] < 0.8 * C * 0.603**2)
+
+
+def test_a_threshold_that_moved_across_levels_is_found_where_it_is_now():
+    """A little more than 0.6 V changes nothing between two levels, and no slope leads to 0.73 V."""
+    levels = np.concatenate([LEVELS, np.outer([0.57, 0.63, 0.67, 0.71, 0.75], [1, -1]).ravel()])
+    first, second = run(np.tile(levels, 3), 4), run(np.tile(levels, 3), 5, half_width=0.73)
+    yesterday = diagnose([first])
+    assert [f.effect for f in yesterday.findings] == ["dead_band"]
+    today = diagnose([second], baseline=yesterday.twin, before=[first])
+    assert today.verdict == "explained"
+    (moved,) = today.findings
+    assert moved.effect == "dead_band"
+    assert 0.71 < moved.parameters["half_width"].value < 0.75
 
 
 def test_what_has_no_stairs_keeps_its_covariance(fitted):
