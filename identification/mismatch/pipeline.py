@@ -21,10 +21,10 @@ from identification.mismatch.periodic import stage as periodic
 from identification.mismatch.periodic.stage import untouched
 from identification.mismatch.prepare import stage as prepare
 from identification.mismatch.prepare.preparing import Refusal
+from identification.mismatch.select.begun_otherwise import begun_otherwise
 from identification.mismatch.select.forward_selection import search
 from identification.mismatch.select.search_again import search_again
 from identification.mismatch.select.stage import exchange_rivals
-from identification.mismatch.select.without_the_rate import told_without_the_rate
 from identification.mismatch.unnamed import stage as unnamed
 from identification.mismatch.validate.judged import HeldBack, judged
 from identification.mismatch.validate.second_search import without_what_is_refused
@@ -115,7 +115,7 @@ def traced(
         found = search_again(first, cleaned.histories, draws.select_again, given, cleaned.bands, without, watch)
     watch.stage("asking for rivals")
     selected = exchange_rivals(found, draws.exchange, watch)  # goes back where the exchange made another model
-    selected = told_without_the_rate(selected, draws.apart, watch)
+    selected = begun_otherwise(selected, draws.apart, watch)
     selected = locate.calmed(selected, draws.calm)  # back to the baseline: noise after steps looks like many effects
     watch.stage("judging by what was not fitted")
     held_back = HeldBack(prepared.held_out, sound.unseen)

@@ -181,11 +181,18 @@ def _as_twin(earlier: Earlier, fitted: Fit) -> Twin:
 
 
 def _chi2_of(later: Later, twin: Twin, without: Term | None = None) -> float:
-    """Of the later recordings, against that twin; `without`: what it has of the model found."""
+    """Of the later recordings, against that twin; `without`: what it has of the model found, as it was fitted there: a
+    jump is spread over some levels, and one that stands for certain at its middle is none of the model found."""
     now, data = later.found, later.data
     model, theta = reduced(now.fit.model, now.fit.theta, () if without is None else (without,))
     plain = replace(data, prior_factor=level_error_factor(data, theta.C))
     data, _, bare = starting(lasting(twin, later.recordings))(plain, replace(theta, terms=()))
     size = forces(now.fit.model, now.fit.theta, later.data)
     judged = weights(data, now.noise, size, now.rate_noise, now.rows)
-    return fit(replace(model, given=bare.given), theta, data, judged).chi2
+    return fit(replace(model, given=_as_fitted(bare.given, without)), theta, data, judged).chi2
+
+
+def _as_fitted(given: tuple[Given, ...], term: Term | None) -> tuple[Given, ...]:
+    if term is None:
+        return given
+    return tuple(replace(g, term=term) if (g.term.id, g.term.form) == (term.id, term.form) else g for g in given)

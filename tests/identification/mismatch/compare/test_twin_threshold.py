@@ -8,19 +8,20 @@ import numpy as np
 import pytest
 
 from identification.mismatch.answer.against_twin import twin_of
-from identification.mismatch.compare.saved_model_baseline import given, prior_factor
+from identification.mismatch.compare.earlier_recordings import Later, put_to_earlier
+from identification.mismatch.compare.saved_model_baseline import given, prior_factor, starting
 from identification.mismatch.estimate.confidence_intervals import intervals
 from identification.mismatch.estimate.estimate import refresh
 from identification.mismatch.estimate.fitting import raw
 from identification.mismatch.estimate.stairs import covariance
-from identification.mismatch.model.model import Model
+from identification.mismatch.model.model import Model, extended
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.value import QUANTILE
 from identification.physics.dead_band import DeadBand
 from identification.physics.motor_lag import MotorLag
 from identification.recording import Channel, Recording
-from tests.identification.mismatch.small import data_of
+from tests.identification.mismatch.small import data_of, known_noise
 
 C, HALF_WIDTH, HOLD = 0.5, 0.6, 1.0
 JUMP, LAG = DeadBand("jump"), MotorLag("first_order")
@@ -108,6 +109,20 @@ def test_a_threshold_that_moved_across_levels_is_found_where_it_is_now():
     (moved,) = today.findings
     assert moved.effect == "dead_band"
     assert 0.71 < moved.parameters["half_width"].value < 0.75
+
+
+def test_a_threshold_that_earlier_levels_passed_over_is_not_called_new():
+    """Its jump is spread over 0.018 V for the fit, which ends beside the true place: for certain there it is wrong."""
+    far = np.array([0.0, 9.0, 3.0, -9.0, -3.0, 6.0])
+    near = np.concatenate([far, np.repeat([0.599, -0.599], 24), [0.602, -0.602]])
+    first, second = run(np.tile(far, 6), 8), run(np.tile(near, 2), 9)
+    data, estimate = known_noise({}, [first])
+    twin = twin_of(estimate, data, [first], None)
+    data, theta, model = starting(twin)(*data_of([second]))
+    found = refresh(*extended(model, theta, JUMP, (0.6,)), data, None, None)
+    assert not 0.599 < found.fit.values[JUMP][0] < 0.602
+    told, _ = put_to_earlier(twin, [first], Later([second], data, found), [JUMP])
+    assert told[JUMP].since == "not shown before"
 
 
 def test_what_has_no_stairs_keeps_its_covariance(fitted):

@@ -1,4 +1,5 @@
-"""What the measured rate tells at once is asked of effects too; the better model is kept."""
+"""What the measured rate tells at once is asked of effects too, and what was overtaken is done without; the better
+model is kept."""
 
 from __future__ import annotations
 
@@ -7,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from identification.mismatch.observer import Interrupted
-from identification.mismatch.select.without_the_rate import NO_EFFECTS, told_without_the_rate
+from identification.mismatch.select.begun_otherwise import NO_EFFECTS, NO_OTHER_BEGINNING, begun_otherwise, overtaken
+from identification.mismatch.select.rounds import Candidate, Round
 from identification.physics.dead_band import DeadBand
 from identification.physics.linear_term import LinearTerm
 from identification.physics.rotation_coupling import RotationCoupling
@@ -43,7 +45,7 @@ def ids(found):
 
 def test_an_effect_that_the_rate_shows_is_told_and_the_rate_is_not():
     found = followed(with_rate(volts=dead_band(1.2)))
-    told = told_without_the_rate(found, rng(0))
+    told = begun_otherwise(found, rng(0))
     assert ids(told) == ["dead_band"]
     assert told.terms == FEW, "what may be asked of the rest is what could be before"
 
@@ -51,7 +53,7 @@ def test_an_effect_that_the_rate_shows_is_told_and_the_rate_is_not():
 def test_a_rate_of_which_no_effect_tells_is_followed():
     late = lambda t: 1.0 - 0.1 * (np.sin(t / 5) > 0)  # noqa: E731
     found = followed(with_rate(slower=late, change=lambda t, _V, F: F * late(t) ** 2))
-    assert told_without_the_rate(found, rng(0)) is found
+    assert begun_otherwise(found, rng(0)) is found
 
 
 class Ended:
@@ -65,11 +67,50 @@ class Ended:
 
 def test_who_ends_it_keeps_the_model_and_is_told_what_was_not_asked():
     found = followed(with_rate(volts=dead_band(1.2)))
-    told = told_without_the_rate(found, rng(0), Ended())
+    told = begun_otherwise(found, rng(0), Ended())
     assert told.after is found.after
     assert told.undone == (NO_EFFECTS,)
 
 
 def test_a_model_that_follows_no_rate_is_as_it_was():
     found = selected({BAND: (1.0,)}, [short(volts=dead_band(1.2))], FEW)
-    assert told_without_the_rate(found, rng(0)) is found
+    assert begun_otherwise(found, rng(0)) is found
+
+
+def bent(_time, volts, force):
+    return force + 2.0 * np.sign(force) * np.maximum(np.abs(volts) - 1.2, 0.0)
+
+
+def taken_first(term, gained, recording):
+    """A search that took `term` at once, for so much, and then found the dead band."""
+    found = selected({term: (0.3,), BAND: (1.0,)}, [recording], FEW)
+    first = Round((), None, (Candidate(term, gained, 9.0, False),), None, (term,))
+    return replace(found, rounds=(first,))
+
+
+def test_what_was_overtaken_is_done_without():
+    found = taken_first(STRAIGHT, 4000.0, short(volts=dead_band(1.2)))
+    assert overtaken(found) == [STRAIGHT]
+    told = begun_otherwise(found, rng(0))
+    assert ids(told) == ["dead_band"]
+    assert told.terms == FEW
+    assert told.rounds[0] is found.rounds[0]
+
+
+def test_what_is_worth_what_it_gained_is_not_asked_again():
+    found = taken_first(STRAIGHT, 4000.0, short(volts=dead_band(1.2), change=bent))
+    assert overtaken(found) == []
+    assert begun_otherwise(found, rng(0)) is found
+
+
+def test_what_was_overtaken_and_is_needed_stays():
+    found = taken_first(STRAIGHT, 1e9, short(volts=dead_band(1.2), change=bent))
+    assert overtaken(found) == [STRAIGHT]
+    assert begun_otherwise(found, rng(0)) is found
+
+
+def test_who_ends_that_search_is_told_so():
+    found = taken_first(STRAIGHT, 4000.0, short(volts=dead_band(1.2)))
+    told = begun_otherwise(found, rng(0), Ended())
+    assert told.after is found.after
+    assert told.undone == (NO_OTHER_BEGINNING,)

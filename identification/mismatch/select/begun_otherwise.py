@@ -1,0 +1,83 @@
+"""A second search, without a term that may have led the first astray; the better of the two models is kept.
+
+A greedy search goes on from what it took first. One term that follows the measured rate takes at once all that a drive
+does before the rotor, and no round asks any more which effects that is: a winding loss beside a dead band was told as
+a drive that saturates, a coupling for the rest, and C far off. A stand that rings slowly, taken early for a winding
+loss, a lag and the water together, made the others take a wrong size and form, and stayed for the little that was left.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+import numpy as np
+
+from identification.mismatch import policy
+from identification.mismatch.estimate.estimate import fit_without
+from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.observer import UNWATCHED, Observer
+from identification.mismatch.select.forward_selection import Selected, onwards
+from identification.mismatch.select.stage import exchange_rivals
+from identification.physics.term import Term
+
+NO_EFFECTS = "whether effects tell what the measured rate shows"
+NO_OTHER_BEGINNING = "whether effects tell it all without what was taken first and is hardly needed now"
+
+
+def begun_otherwise(found: Selected, rng: np.random.Generator, watch: Observer = UNWATCHED) -> Selected:
+    """The model of a search without a term that follows the rate, then of one without what was overtaken, where there
+    are such and that model is better; else as found."""
+    watch.stage("asking whether another beginning leads farther")
+    told = _searched_without(_followers(found), NO_EFFECTS, found, rng, watch)
+    return _searched_without(overtaken(told), NO_OTHER_BEGINNING, told, rng, watch)
+
+
+def _followers(found: Selected) -> list[Term]:
+    return [term for term in found.after.fit.model.terms if term.traits.follows_rate]
+
+
+def overtaken(found: Selected) -> list[Term]:
+    """Terms without which the model would lose but a small part of what they gained when they were taken: since then
+    others tell it."""
+    now, gained = found.after, gains(found)
+    return [
+        term
+        for term in now.fit.model.terms
+        if term in gained
+        and fit_without(now, term, found.data).chi2 - now.fit.chi2 < policy.select.OVERTAKEN * gained[term]
+    ]
+
+
+def gains(found: Selected) -> dict[Term, float]:
+    """Fall of chi-square by each term when a round took it."""
+    return {
+        each.term: each.chi2_gain
+        for round_ in found.rounds
+        for each in round_.fitted
+        if round_.after is not None and each.term in round_.after and each.term not in round_.model
+    }
+
+
+def _searched_without(
+    terms: Collection[Term], unasked: str, found: Selected, rng: np.random.Generator, watch: Observer
+) -> Selected:
+    if not terms or found.undone:
+        return found
+    effects = {term.id for term in terms}
+    others = tuple(term for term in found.terms if term.id not in effects)
+    other = onwards(found.data, others, found.before, found.before, rng, watch)
+    other = exchange_rivals(other, rng, watch)
+    if other.undone:
+        return replace(found, undone=(*found.undone, unasked))
+    if not _better(other, found):
+        return found
+    return replace(other, terms=found.terms, rounds=(*found.rounds, *other.rounds))
+
+
+def _better(other: Selected, found: Selected) -> bool:
+    """Whether its model has the smaller BIC, by the noise that suits the model that was found."""
+    if not other.after.fit.model.terms:
+        return False
+    fitted = fit(other.after.fit.model, other.after.fit.theta, found.data, found.after.weights)
+    return replace(found.after, fit=fitted).bic < found.after.bic
