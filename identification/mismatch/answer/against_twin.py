@@ -11,13 +11,14 @@ from math import isfinite
 import numpy as np
 
 from identification.estimation.tails import normal_sf
+from identification.flexible_terms.flexible import Flexible
 from identification.mismatch import policy
 from identification.mismatch.answer.draft import Draft
 from identification.mismatch.answer.report_assembly import constant_of
 from identification.mismatch.compare.earlier_recordings import Novelty
 from identification.mismatch.compare.saved_model_baseline import terms_of
 from identification.mismatch.diagnosis import Finding
-from identification.mismatch.estimate.estimate import Estimate
+from identification.mismatch.estimate.estimate import Estimate, fit_without
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.estimate.rate_levels import rate_by_levels
 from identification.mismatch.estimate.stairs import covariance
@@ -142,9 +143,28 @@ def _own_constant(twin: Twin, estimate: Estimate, data: Data) -> tuple[float, fl
     return (estimate.fit.theta.C, float(estimate.fit.std[0])) if coupled else constant_of(estimate.fit, data)
 
 
+def _constant_now(twin: Twin, estimate: Estimate, data: Data) -> tuple[float, float]:
+    """As `_own_constant`. A free shape may be most of C V|V|: beside one it is the C nearer to the twin's, of the model
+    with it and of the model without it, and the twin's own where they move to either side."""
+    value, std = _own_constant(twin, estimate, data)
+    plain = _without_free_shapes(estimate, data)
+    if plain is estimate:
+        return value, std
+    other, _ = _own_constant(twin, plain, data)
+    if (value - twin.C) * (other - twin.C) <= 0:
+        return twin.C, std
+    return min(value, other, key=lambda each: abs(each - twin.C)), std
+
+
+def _without_free_shapes(estimate: Estimate, data: Data) -> Estimate:
+    for term in [t for t in estimate.fit.model.terms if isinstance(t, Flexible)]:
+        estimate = replace(estimate, fit=fit_without(estimate, term, data))
+    return estimate
+
+
 def changed_constant(twin: Twin, estimate: Estimate, data: Data, known: str, unit: str) -> Finding | None:
     """The thrust constant is no longer the twin's, at CHANGED_CONSTANT_FALSE_ALARM, and the change pays for itself."""
-    value, std = _own_constant(twin, estimate, data)
+    value, std = _constant_now(twin, estimate, data)
     was, was_std = twin.C, float(np.sqrt(twin.covariance[0][0]))
     both = float(np.hypot(std, was_std))
     if not isfinite(both) or both <= 0:

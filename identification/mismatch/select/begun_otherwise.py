@@ -4,6 +4,7 @@ A greedy search goes on from what it took first. One term that follows the measu
 does before the rotor, and no round asks any more which effects that is: a winding loss beside a dead band was told as
 a drive that saturates, a coupling for the rest, and C far off. A stand that rings slowly, taken early for a winding
 loss, a lag and the water together, made the others take a wrong size and form, and stayed for the little that was left.
+A drive that saturates from a fifth of the command on, where it can begin at the earliest, stood for a winding loss.
 """
 
 from __future__ import annotations
@@ -17,24 +18,29 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import fit_without
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.observer import UNWATCHED, Observer
-from identification.mismatch.select.forward_selection import Selected, onwards
+from identification.mismatch.select.forward_selection import Selected, Thruster, onwards
 from identification.mismatch.select.stage import exchange_rivals
 from identification.physics.term import Term
 
 NO_EFFECTS = "whether effects tell what the measured rate shows"
-NO_OTHER_BEGINNING = "whether effects tell it all without what was taken first and is hardly needed now"
+NO_OTHER_BEGINNING = "whether effects tell it all without what was taken first and is doubtful now"
 
 
 def begun_otherwise(found: Selected, rng: np.random.Generator, watch: Observer = UNWATCHED) -> Selected:
-    """The model of a search without a term that follows the rate, then of one without what was overtaken, where there
-    are such and that model is better; else as found."""
+    """The model of a search without what was overtaken or has values that are not possible, then of one without a term
+    that follows the rate, where there are such and that model is better; else as found."""
     watch.stage("asking whether another beginning leads farther")
-    told = _searched_without(_followers(found), NO_EFFECTS, found, rng, watch)
-    return _searched_without(overtaken(told), NO_OTHER_BEGINNING, told, rng, watch)
+    told = _searched_without({*overtaken(found), *_impossible(found)}, NO_OTHER_BEGINNING, found, rng, watch)
+    return _searched_without(_followers(told), NO_EFFECTS, told, rng, watch)
 
 
 def _followers(found: Selected) -> list[Term]:
     return [term for term in found.after.fit.model.terms if term.traits.follows_rate]
+
+
+def _impossible(found: Selected) -> list[Term]:
+    system = Thruster(found.data, found.terms)
+    return [term for term in found.after.fit.model.terms if system.impossible(found.after, term)]
 
 
 def overtaken(found: Selected) -> list[Term]:

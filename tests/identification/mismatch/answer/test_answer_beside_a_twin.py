@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.flexible_terms.flexible import Flexible
 from identification.mismatch.answer.against_twin import changed_constant, given_values, twin_of, with_twin
 from identification.mismatch.answer.periodic_findings import (
     line_finding,
@@ -18,6 +19,8 @@ from identification.mismatch.answer.periodic_findings import (
 )
 from identification.mismatch.answer.report_assembly import values_of
 from identification.mismatch.compare.saved_model_baseline import given
+from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.model.model import extended
 from identification.mismatch.periodic.periodic_disturbances import Line
 from identification.mismatch.periodic.rotor_angle import Part
 from identification.mismatch.value import Value, Where
@@ -162,6 +165,20 @@ def test_a_constant_that_moved_is_a_finding_with_its_sigmas(fitted):
     now = estimate.fit
     unknown = replace(now, free=np.zeros_like(now.free), jacobian=np.empty((now.residual.size, 0)))
     assert changed_constant(moved, replace(estimate, fit=unknown), data, "", "") is None, "an error that nobody knows"
+
+
+CURVE = Flexible("command_voltage", "V", (-9.0, -6.0, -3.0, 0.0, 3.0, 6.0, 9.0), (3,), ("force",), 1)
+
+
+def test_a_constant_of_which_a_free_shape_is_a_part_has_not_moved(fitted):
+    runs, data, estimate = fitted
+    before = replace(twin_of(estimate, data, runs, None), origin="the twin T")
+    bent = tuple(-0.2 * before.C * v * abs(v) for v in CURVE.knots if v != 0.0)
+    model, theta = extended(estimate.fit.model, replace(estimate.fit.theta, C=1.2 * before.C), CURVE, bent)
+    beside = replace(estimate, fit=fit(model, theta, data, estimate.weights, most_steps=0))
+    assert changed_constant(before, beside, data, "the twin T", "N/V^2") is None
+    moved = replace(before, C=0.9 * before.C)
+    assert "+11 %" in changed_constant(moved, beside, data, "the twin T", "N/V^2").statement
 
 
 def test_against_a_twin_its_terms_are_in_the_model_and_the_same_effect_comes_on_top(fitted):

@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.mismatch.observer import Interrupted
 from identification.mismatch.select.begun_otherwise import NO_EFFECTS, NO_OTHER_BEGINNING, begun_otherwise, overtaken
+from identification.mismatch.select.forward_selection import Thruster
 from identification.mismatch.select.rounds import Candidate, Round
 from identification.physics.dead_band import DeadBand
 from identification.physics.linear_term import LinearTerm
@@ -107,6 +108,13 @@ def test_what_was_overtaken_and_is_needed_stays():
     found = taken_first(STRAIGHT, 1e9, short(volts=dead_band(1.2), change=bent))
     assert overtaken(found) == [STRAIGHT]
     assert begun_otherwise(found, rng(0)) is found
+
+
+def test_what_has_values_that_are_not_possible_is_done_without(monkeypatch):
+    monkeypatch.setattr(Thruster, "impossible", lambda _self, _estimate, term: term == STRAIGHT)
+    found = taken_first(STRAIGHT, 0.0, short(volts=dead_band(1.2)))
+    assert overtaken(found) == []
+    assert ids(begun_otherwise(found, rng(0))) == ["dead_band"]
 
 
 def test_who_ends_that_search_is_told_so():
