@@ -28,8 +28,8 @@ ORDERS = 12
 """Whole ratios that are a family of their own: blades, bolts and bearings come in such numbers."""
 AROUND = 5
 """Ratios round the best one over which it may have its best without one group of speed."""
-
-
+LARGEST_SHAPE = 1e6
+"""Of the gamma variate that a sum of powers is: more of it has no spread that could be told."""
 ALIAS_REACH = 4.0
 """Widths of a peak of the longest stretch round an alias: the speeds at which it is loudest are several."""
 
@@ -110,9 +110,9 @@ def _of_powers(parts: Sequence[SteadySegment], top: float) -> OrderCandidate:
     if kept.shape[0] < 2:
         return OrderCandidate(1.0, 1.0, 1.0)
     total = kept.sum(axis=0)
-    strong, shape = _standing(total)
+    strong, shape = standing(total)
     at, p_value = _highest(strong, shape, grid, 0.0)
-    without, rest_shape = _standing(total - kept[int(np.argmax(kept[:, at]))])
+    without, rest_shape = standing(total - kept[int(np.argmax(kept[:, at]))])
     around = slice(max(at - AROUND // 2, 0), at + AROUND // 2 + 1)
     p_rest = float(gamma_sf(np.max(without[around]), rest_shape)) * AROUND
     return OrderCandidate(float(grid.ratios[at]), 0.5 / grid.longest, max(p_value, p_rest))
@@ -129,7 +129,7 @@ def _of_waves(parts: Sequence[SteadySegment], top: float, seconds: float) -> Ord
         turns = np.concatenate([p.turns for p, _ in piece])
         white = np.concatenate([abs(p.weight) * p.white for p, _ in piece])
         total += grid.power(turns, white) / sum(p.information for p, _ in piece)
-    strong, shape = _standing(total)
+    strong, shape = standing(total)
     at, p_value = _highest(strong, shape, grid, 1.0 / grid.longest)
     ratio = float(grid.ratios[at])
     return OrderCandidate(ratio, 1.0 / grid.longest, max(p_value, _even(list(pieces.values()), ratio)))
@@ -188,7 +188,7 @@ def _nearest(z: Floats, order: int, near: float) -> range:
     return range(max(middle - around, 0), min(middle + around + 1, z.size))
 
 
-def _standing(total: Floats) -> tuple[Floats, float]:
+def standing(total: Floats) -> tuple[Floats, float]:
     """The sum of powers as a gamma variate of scale 1 and the shape returned: mean and spread as the bulk has them."""
     block = max(total.size // 16, 8)
     count = max(total.size // block, 1)
@@ -196,8 +196,8 @@ def _standing(total: Floats) -> tuple[Floats, float]:
     blocks = total[: count * size].reshape(count, size)
     middle = (np.arange(count) + 0.5) * size
     low, centre, high = np.quantile(blocks, (0.1587, 0.5, 0.8413), axis=1)
-    shape = float(np.median((centre / np.maximum(0.5 * (high - low), 1e-300)) ** 2))
-    shape = float(np.clip(shape, 1.0, 1e6))
+    spread = np.maximum(np.maximum(0.5 * (high - low), centre / LARGEST_SHAPE**0.5), 1e-300)
+    shape = float(np.clip(np.median((centre / spread) ** 2), 1.0, LARGEST_SHAPE))
     level_now = np.interp(np.arange(total.size), middle, np.maximum(centre, 1e-300))
     expected = gamma_median(shape)
     out: Floats = total / level_now * expected

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from identification.estimation.tails import gamma_median
 from identification.mismatch import policy
 from identification.mismatch.periodic.line_or_order import as_turning
-from identification.mismatch.periodic.order_search import candidates
+from identification.mismatch.periodic.order_search import LARGEST_SHAPE, candidates, standing
 from identification.mismatch.periodic.order_tracking import find_locked
 from identification.mismatch.periodic.rotor_angle import Part, turned, wave_of
 from identification.mismatch.periodic.spectrum import Series
@@ -189,3 +190,10 @@ def test_at_one_speed_a_fixed_line_may_be_one_that_goes_with_the_rotor():
 def test_what_stands_still_turns_no_line():
     still = turning(speeds=np.zeros(60))
     assert as_turning([(0, still)], 10.0, 0.1, 1e-9) is None
+
+
+def test_powers_without_spread_are_a_variate_of_the_largest_shape():
+    """Alike in whole blocks, as of a residual that is quiet but for one stretch: no overflow."""
+    out, shape = standing(np.full(200, 3.0))
+    assert shape == pytest.approx(LARGEST_SHAPE)
+    np.testing.assert_allclose(out, gamma_median(shape))
