@@ -29,7 +29,6 @@ NO_OTHER_BEGINNING = "whether effects tell it all without what was taken first a
 def begun_otherwise(found: Selected, rng: np.random.Generator, watch: Observer = UNWATCHED) -> Selected:
     """The model of a search without what was overtaken or has values that are not possible, then of one without a term
     that follows the rate, where there are such and that model is better; else as found."""
-    watch.stage("asking whether another beginning leads farther")
     told = _searched_without({*overtaken(found), *_impossible(found)}, NO_OTHER_BEGINNING, found, rng, watch)
     return _searched_without(_followers(told), NO_EFFECTS, told, rng, watch)
 
@@ -70,6 +69,7 @@ def _searched_without(
 ) -> Selected:
     if not terms or found.undone:
         return found
+    watch.stage("asking whether another beginning leads farther")
     effects = {term.id for term in terms}
     others = tuple(term for term in found.terms if term.id not in effects)
     other = onwards(found.data, others, found.before, found.before, rng, watch)
