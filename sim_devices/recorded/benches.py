@@ -24,8 +24,8 @@ Rng = np.random.Generator
 BUS, CELL, MOTOR, FLOW = "bus0", "load_cell", "motor", "flow"
 ADAPTER_STD = 0.0005
 """s: what the drivers state of the least delay of an adapter and the computer (drivers' HOST_DELAY_STD)."""
-PIECES = 16
-"""Conversions that stand for a mean over a time: with 8 what they leave between them is a fifth of the noise."""
+APART = 8e-4
+"""s between the conversions that stand for a mean over a time, about: what 3 ms leave between them shows in a run."""
 CLOCK_STD = 3e-5
 """relative: quartz at room temperature, 30 ppm; the drivers state 100."""
 
@@ -122,7 +122,7 @@ def _tunnel(thrust: float, rng: Rng) -> Cell:
 def _amplifier(thrust: float, rng: Rng) -> Cell:
     """Counts of a 24-bit converter at 80-odd lines a second, the mean of what it converted since the last line."""
     rate, count = float(rng.uniform(76.0, 92.0)), thrust * _log(rng, 1e-5, 1e-3)
-    average = int(rng.choice((1, PIECES)))
+    average = int(rng.choice((1, _pieces(rate))))
     low_pass = 0.0 if rng.random() < 0.5 else _log(rng, 0.001, 0.01)
     options = LineOptions("line", CELL, 115200, rate, count, average, _clock(rng))
     told = {"kind": "line_stream", "port": CELL, "baud": 115200, "rate": rate, "line_characters": WIDTH + 2}
@@ -133,7 +133,7 @@ def _amplifier(thrust: float, rng: Rng) -> Cell:
 def _balance(thrust: float, rng: Rng) -> Cell:
     """A weigh module that means over the whole time between two readings, 20 a second, behind a slow line."""
     digit = 0.01 if thrust > 30.0 else 0.001
-    average, low_pass = PIECES, 0.0 if rng.random() < 0.5 else _log(rng, 0.003, 0.03)
+    average, low_pass = _pieces(20.0), 0.0 if rng.random() < 0.5 else _log(rng, 0.003, 0.03)
     options = MtSicsOptions(
         "mt_sics", CELL, 9600, capacity=20.0 * thrust, digit=digit, rate=20.0, max_rate=20.0, average=average,
         clock_error=_clock(rng),
@@ -144,6 +144,11 @@ def _balance(thrust: float, rng: Rng) -> Cell:
 
 BENCHES: dict[str, Callable[[float, Rng], Cell]] = {"tunnel": _tunnel, "amplifier": _amplifier, "balance": _balance}
 """tunnel: that of the demo."""
+
+
+def _pieces(rate: float) -> int:
+    """Conversions of one reading."""
+    return round(1.0 / (rate * APART))
 
 
 def _acquired(rate: float, average: int, low_pass: float) -> dict[str, float | str]:
