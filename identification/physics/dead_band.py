@@ -11,7 +11,7 @@ from identification.physics.term import EquationContext, Parameter, Scale, Stage
 from identification.physics.traits import Traits
 from identification.recording import Floats
 
-EDGE = 2e-3
+EDGE = 2e-4
 """Of the largest command: a ramp this narrow keeps the prediction of a jump continuous in the parameter."""
 LEAST_MOVE = 1e-6
 """Of the largest command: what moves less within an interval stands still."""

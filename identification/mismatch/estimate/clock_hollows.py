@@ -12,10 +12,9 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal
 
-import numpy as np
-
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, bounds_of, change_of_rates, fit, residual_of
+from identification.mismatch.estimate.others_follow import OthersFollow
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
@@ -49,11 +48,7 @@ def _clocks(found: Fit, data: Data, weights: Weights) -> Sequence[Clock]:
 
 def _least(found: Fit, data: Data, weights: Weights, clock: Clock) -> Theta | None:
     """Where chi-square is least over one clock, all other values following it to first order; None: where it is."""
-    still = found.layout.shift if clock == "shift" else found.layout.rate_shift
-    free = np.flatnonzero(found.free)
-    others = free != still
-    columns = found.jacobian[:, others]
-    basis = np.linalg.qr(columns)[0]
+    others = OthersFollow(found, found.layout.shift if clock == "shift" else found.layout.rate_shift)
 
     def left(shift: float) -> Floats:
         moved = _moved(found.theta, clock, shift)
@@ -62,9 +57,7 @@ def _least(found: Fit, data: Data, weights: Weights, clock: Clock) -> Theta | No
         return residual_of(found.model, moved, data, weights)
 
     def chi2(shift: float) -> float:
-        r = left(shift)
-        along = basis.T @ r
-        return float(r @ r - along @ along)
+        return others.chi2(left(shift))
 
     many = math.ceil(data.most_shift / STEP)
     step = data.most_shift / many
@@ -73,9 +66,7 @@ def _least(found: Fit, data: Data, weights: Weights, clock: Clock) -> Theta | No
     best = min((shift for shift in fine if abs(shift) <= data.most_shift), key=chi2)
     if not chi2(best) < found.chi2 - policy.estimate.CLOCK_HOLLOW_CHI2:
         return None
-    vector = _moved(found.theta, clock, best).vector
-    vector[free[others]] += np.linalg.lstsq(columns, left(best), rcond=None)[0]
-    return found.theta.with_vector(vector)
+    return found.theta.with_vector(others.taken_along(_moved(found.theta, clock, best).vector, left(best)))
 
 
 def _moved(theta: Theta, clock: Clock, shift: float) -> Theta:

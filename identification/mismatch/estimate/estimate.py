@@ -10,6 +10,7 @@ import numpy as np
 from identification.estimation.singular_values import thin_svd
 from identification.mismatch.estimate.clock_hollows import in_best_hollow
 from identification.mismatch.estimate.fitting import Fit, bounds_of, columns_of, fit, raw
+from identification.mismatch.estimate.thresholds import between_levels
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
@@ -24,7 +25,8 @@ MOST_NODES = 17
 """Nodes of the smooth curve beside which the noise of a table is judged: as many as covariates have hats."""
 
 HOLLOWS = 3
-"""Times that a fit may be begun again in another hollow of the clocks; noise and clocks agree after one."""
+"""Times that a fit may be begun again in another hollow of the clocks, or with a threshold between other levels; noise
+and clocks agree after one."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +76,11 @@ def refresh(
     """Noise by REML on what the model leaves, the columns of the model (and of what was pursued) taken as fitted.
 
     `like`: a noise whose time scales are kept, so that likelihoods can be compared. Where the clocks stood in a wrong
-    hollow, what was left was not noise, and it is estimated anew.
+    hollow, or a threshold between wrong levels, what was left was not noise, and it is estimated anew.
     """
     for _ in range(HOLLOWS):
         estimate = _refreshed(model, theta, data, extra, estimate, like)
-        deeper = in_best_hollow(estimate.fit, data, estimate.weights)
+        deeper = between_levels(in_best_hollow(estimate.fit, data, estimate.weights), data, estimate.weights)
         if deeper is estimate.fit:
             return estimate
         theta = deeper.theta

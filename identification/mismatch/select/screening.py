@@ -14,6 +14,8 @@ import numpy as np
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, raw, residual_of, ticks_told
+from identification.mismatch.estimate.others_follow import OthersFollow
+from identification.mismatch.estimate.thresholds import sought
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.family_wise import (
@@ -95,6 +97,8 @@ class Screening:
 def refined(fit: Fit, data: Data, weights: Weights, term: Term, values: tuple[float, ...]) -> tuple[float, ...]:
     """The best trial closely round `values`, for terms that have such."""
     trials = () if fit.model.given_for(term) else term.finer(values, data.scale)
+    if any(p.blur > 0 for p in term.parameters(data.scale)):
+        return _likeliest_threshold(fit, data, weights, term, [values, *trials])
     if not trials:
         return values
     if term.traits.delay:
@@ -102,6 +106,18 @@ def refined(fit: Fit, data: Data, weights: Weights, term: Term, values: tuple[fl
     found = directions(fit, data, weights, [term], trials)
     score = np.abs(found.columns.T @ fit.residual)
     return found.values[int(np.argmax(score))] if score.size else values
+
+
+def _likeliest_threshold(
+    fit: Fit, data: Data, weights: Weights, term: Term, trials: Sequence[tuple[float, ...]]
+) -> tuple[float, ...]:
+    others = OthersFollow(fit)
+
+    def chi2(threshold: float) -> float:
+        return others.chi2(residual_of(*fit.more(term, (threshold,)), data, weights))
+
+    near = min((threshold for (threshold,) in trials), key=chi2)
+    return (sought(near, term.parameters(data.scale)[0].high, chi2),)
 
 
 def _likeliest_delay(

@@ -84,18 +84,18 @@ def test_a_level_between_those_of_the_twin_is_no_surprise(fitted):
 
 
 def test_a_level_just_beyond_a_given_threshold_turns_the_rotor_whole(fitted):
-    """For a fit the jump is spread over 0.018 V of 9: half of 0.6 V would turn it, of a threshold that is known."""
+    """For a fit the jump is spread over 0.0018 V of 9: half of 0.6 V would turn it, of a threshold that is known."""
     recording, data, estimate = fitted
     twin = twin_of(estimate, data, [recording], None)
     (term,) = twin.terms
     at = replace(twin, terms=(replace(term, parameters={"half_width": 0.6}),))
-    later, _ = data_of([run(np.tile([9.0, 0.603, -9.0, -0.597], 4), 3)])
+    later, _ = data_of([run(np.tile([9.0, 0.6003, -9.0, -0.5997], 4), 3)])
     told, _ = raw(Model((), given(at)), Theta(C, (), (0.0,)), later, with_rate=False)
     driver = later.histories[0].driver[later.rows[0]]
-    assert told[0][np.isclose(driver, 0.603)] == pytest.approx(C * 0.603**2)
-    assert told[0][np.isclose(driver, -0.597)] == pytest.approx(0.0, abs=1e-12)
+    assert told[0][np.isclose(driver, 0.6003, rtol=1e-6)] == pytest.approx(C * 0.6003**2)
+    assert told[0][np.isclose(driver, -0.5997, rtol=1e-6)] == pytest.approx(0.0, abs=1e-12)
     spread, _ = raw(Model((JUMP,)), Theta(C, ((0.6,),), (0.0,)), later, with_rate=False)
-    assert np.all(spread[0][np.isclose(driver, 0.603)] < 0.8 * C * 0.603**2)
+    assert np.all(spread[0][np.isclose(driver, 0.6003, rtol=1e-6)] < 0.8 * C * 0.6003**2)
 
 
 def test_a_threshold_that_moved_across_levels_is_found_where_it_is_now():
@@ -112,15 +112,15 @@ def test_a_threshold_that_moved_across_levels_is_found_where_it_is_now():
 
 
 def test_a_threshold_that_earlier_levels_passed_over_is_not_called_new():
-    """Its jump is spread over 0.018 V for the fit, which ends beside the true place: for certain there it is wrong."""
+    """Its jump is spread over 0.0018 V for the fit, which ends beside the true place: for certain there it is wrong."""
     far = np.array([0.0, 9.0, 3.0, -9.0, -3.0, 6.0])
-    near = np.concatenate([far, np.repeat([0.599, -0.599], 24), [0.602, -0.602]])
+    near = np.concatenate([far, np.repeat([0.5999, -0.5999], 24), [0.6002, -0.6002]])
     first, second = run(np.tile(far, 6), 8), run(np.tile(near, 2), 9)
     data, estimate = known_noise({}, [first])
     twin = twin_of(estimate, data, [first], None)
     data, theta, model = starting(twin)(*data_of([second]))
     found = refresh(*extended(model, theta, JUMP, (0.6,)), data, None, None)
-    assert not 0.599 < found.fit.values[JUMP][0] < 0.602
+    assert not 0.5999 < found.fit.values[JUMP][0] < 0.6002
     told, _ = put_to_earlier(twin, [first], Later([second], data, found), [JUMP])
     assert told[JUMP].since == "not shown before"
 
