@@ -8,7 +8,7 @@ from identification.mismatch.pipeline import diagnose
 from identification.mismatch.select.screening import refined
 from identification.physics.dead_band import DeadBand
 from identification.recording import Channel, Recording
-from tests.identification.mismatch.small import data_of, estimated, known_noise
+from tests.identification.mismatch.small import estimated, known_noise
 
 C, TOP, HOLD, NOISE = 0.5, 9.0, 0.5, 0.01
 JUMP = DeadBand("jump")
