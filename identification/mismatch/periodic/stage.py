@@ -74,7 +74,8 @@ def _lines(fitted: Fit, data: Data, series: Sequence[Series]) -> tuple[Line, ...
         skipped += plan
     if skipped:
         found = find_lines(series, turns_unit=unit, ring=_ring(fitted, data), skipped=skipped)
-    lines = tuple(line for line in found if line.shown_amplitude > least)
+    shown = [line for line in found if line.shown_amplitude > least]
+    lines = tuple(line for line in shown if _stands_at_rest(line, found, series, data))
     if not lines or not data.with_rate:
         return lines
     scale_std = scale_std_of(fitted, data)
@@ -90,6 +91,22 @@ def _peaks(lines: Sequence[Line]) -> list[Band]:
         for low, high in pairwise(fixed)
         if high.frequency - low.frequency < reach * _resolution(low)
     ]
+
+
+def _stands_at_rest(line: Line, found: Sequence[Line], series: Sequence[Series], data: Data) -> bool:
+    """Whether it takes from what is left about as much where the rotor has settled as everywhere; also where nothing
+    settles. What a model lacks of dynamics comes again after each step, and looks like a wave that does."""
+    gain, wave = np.zeros((2, 2))  # everywhere and where it has settled, N^2
+    for i, (s, h) in enumerate(zip(series, data.histories, strict=True)):
+        waves = [each.at(s.time, s.turns, i) for each in found]
+        own, left = line.at(s.time, s.turns, i), s.residual - np.sum(waves, axis=0)
+        less = np.nan_to_num((left + own) ** 2 - left**2)
+        for k, counts in enumerate((np.ones(own.size), _settled(h, s.time).astype(np.float64))):
+            gain[k] += float(less @ counts)
+            wave[k] += float(own**2 @ counts)
+    share = wave[1] / wave[0]
+    asked = share >= policy.periodic.SETTLED_LEAST
+    return not asked or bool(gain[1] >= policy.periodic.SETTLED_GAIN * share * gain[0])
 
 
 def _resolution(line: Line) -> float:
@@ -119,9 +136,14 @@ def _still(series: Sequence[Series], lines: Sequence[Line], data: Data) -> list[
         left = s.residual.copy()
         for line in lines:
             left -= line.at(s.time, s.turns, i)
-        left[h.since_step[_interval(h, s.time)] < policy.periodic.UNSETTLED] = np.nan
+        left[~_settled(h, s.time)] = np.nan
         out.append(replace(s, residual=left))
     return out
+
+
+def _settled(history: History, time: Floats) -> NDArray[np.bool_]:
+    """(n,) whether a step is long past."""
+    return np.asarray(history.since_step[_interval(history, time)] >= policy.periodic.UNSETTLED)
 
 
 def _interval(history: History, time: Floats) -> NDArray[np.intp]:

@@ -66,6 +66,23 @@ UNSETTLED = Threshold(
         "is looked for in it."
     ),
 )
+SETTLED_GAIN = Threshold(
+    0.5,
+    unit="times what a wave takes everywhere, by its own power",
+    reason=(
+        "What a line takes from the residual it takes wherever it is; what a model lacks of dynamics is left after "
+        "steps, and a wave that is fitted to it makes the rest of the run worse."
+    ),
+    evidence=(
+        "difference/changed/3 of draw 2031-08-01: four lines locked to the rotor, fitted to 3 % of the samples; of "
+        "the others each makes them worse."
+    ),
+)
+SETTLED_LEAST = Threshold(
+    0.25,
+    unit="share of the power of a wave",
+    reason="Where less of a run is long past a step, what it shows there says nothing about the rest.",
+)
 NOISE_BANDS = Count(
     1,
     unit="bands",

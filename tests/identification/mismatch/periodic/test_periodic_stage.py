@@ -9,10 +9,10 @@ import pytest
 
 from identification.mismatch.periodic import stage
 from identification.mismatch.periodic.full_rate import scale_std_of, series_of, with_scale
-from identification.mismatch.periodic.periodic_disturbances import Line
+from identification.mismatch.periodic.periodic_disturbances import Line, find_lines
 from identification.physics.time_skew import TimeSkew
 from identification.recording import Channel
-from tests.identification.diagnosed_runs import NOISE
+from tests.identification.diagnosed_runs import NOISE, levels, run
 from tests.identification.mismatch.small import estimated, known_noise, rng, short
 
 
@@ -82,6 +82,32 @@ def test_two_waves_within_a_few_turns_of_the_run_are_a_peak_of_the_noise(apart, 
     duration = float(np.ptp(noisy().first_of("thrust").time))
     data, estimate = estimated({}, [noisy(change=lambda t, V, F: hum(4.0 + apart / duration)(t, V, hum(4.0)(t, V, F)))])
     assert len(stage.run(estimate.fit, data, data.histories).lines) == found
+
+
+@pytest.mark.parametrize("lasts", [0.1, 0.05])
+def test_what_comes_again_after_each_step_is_no_wave(lasts):
+    """Thrust that overshoots for a tenth of a second, which no term has: the rest of the run has no wave of 1.6 Hz."""
+    start, _ = levels(0, 150.0)
+
+    def overshoots(t, V, F):
+        since = t - np.concatenate([[-9.0], start])[np.searchsorted(start, t)]
+        return F + F * np.exp(-since / lasts) * np.sin(2 * np.pi * 0.4 * np.abs(V) * since)
+
+    data, estimate = known_noise({}, [run(overshoots, rate=50.0)])
+    assert find_lines(series_of(estimate.fit, data), turns_unit="V s"), "the spectrum has some"
+    assert not stage.run(estimate.fit, data, data.histories).lines
+
+
+def test_a_wave_that_is_there_stays_beside_what_comes_after_each_step():
+    start, _ = levels(0, 150.0)
+
+    def both(t, V, F):
+        since = t - np.concatenate([[-9.0], start])[np.searchsorted(start, t)]
+        return hum()(t, V, F + F * np.exp(-since / 0.1) * np.sin(2 * np.pi * 0.4 * np.abs(V) * since))
+
+    data, estimate = known_noise({}, [run(both, rate=50.0)])
+    (line,) = stage.run(estimate.fit, data, data.histories).lines
+    assert line.frequency == pytest.approx(4.0, abs=0.002)
 
 
 def test_runs_without_lines_are_handed_on_as_they_are():
