@@ -52,9 +52,9 @@ def _kept(system: Thruster, before: Estimate, model: Fit, rng: np.random.Generat
     if len(model.values) < 2:
         return before
     begun = system.enlarged(before, fit(model.model, model.theta, system.data, before.weights))
-    return asked_again(system, begun, partial(_missed, system.data), rng)
+    return asked_again(system, begun, partial(missed, system.data), rng)
 
 
-def _missed(data: Data, whole: Estimate, less: Estimate, judged: Screening) -> bool:
+def missed(data: Data, whole: Estimate, less: Estimate, judged: Screening) -> bool:
     """Whether a screening without a term finds something, or the noise had to take what the term did."""
     return judged.largest > judged.threshold or taken_by_noise(whole, less, judged, data)

@@ -4,13 +4,18 @@ model is kept."""
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
+import pytest
 
+from identification.mismatch.estimate.estimate import fit_without
 from identification.mismatch.observer import Interrupted
+from identification.mismatch.select import begun_otherwise as module
 from identification.mismatch.select.begun_otherwise import NO_EFFECTS, NO_OTHER_BEGINNING, begun_otherwise, overtaken
 from identification.mismatch.select.forward_selection import Thruster
 from identification.mismatch.select.rounds import Candidate, Round
+from identification.mismatch.select.stepwise import accept_threshold
 from identification.physics.dead_band import DeadBand
 from identification.physics.linear_term import LinearTerm
 from identification.physics.rotation_coupling import RotationCoupling
@@ -78,8 +83,9 @@ def test_a_model_that_follows_no_rate_is_as_it_was():
     assert begun_otherwise(found, rng(0)) is found
 
 
-def bent(_time, volts, force):
-    return force + 2.0 * np.sign(force) * np.maximum(np.abs(volts) - 1.2, 0.0)
+def bent(_time, volts, force, slope=2.0):
+    """`slope`: N/V."""
+    return force + slope * np.sign(force) * np.maximum(np.abs(volts) - 1.2, 0.0)
 
 
 def taken_first(term, gained, recording):
@@ -102,6 +108,20 @@ def test_what_is_worth_what_it_gained_is_not_asked_again():
     found = taken_first(STRAIGHT, 4000.0, short(volts=dead_band(1.2), change=bent))
     assert overtaken(found) == []
     assert begun_otherwise(found, rng(0)) is found
+
+
+@pytest.mark.parametrize(
+    ("slope", "is_missed", "stays"),
+    [(0.6, False, False), (0.6, True, True), (0.9, False, True)],
+    ids=["4.6 sigma that no search would find", "4.6 sigma that one finds", "8 sigma"],
+)
+def test_what_came_first_stays_only_for_what_a_search_would_find(slope, is_missed, stays, monkeypatch):
+    monkeypatch.setattr(module, "missed", lambda *_: is_missed)
+    found = taken_first(STRAIGHT, 1e9, short(volts=dead_band(1.2), change=partial(bent, slope=slope)))
+    assert overtaken(found) == [STRAIGHT]
+    worth = fit_without(found.after, STRAIGHT, found.data).chi2 - found.after.fit.chi2
+    assert worth > accept_threshold(1), "the model keeps it"
+    assert (STRAIGHT.id in ids(begun_otherwise(found, rng(0)))) == stays
 
 
 def test_what_was_overtaken_and_is_needed_stays():
