@@ -40,6 +40,19 @@ def in_best_hollow(found: Fit, data: Data, weights: Weights) -> Fit:
     return found
 
 
+def by_its_clocks(found: Fit, other: Fit, data: Data, weights: Weights) -> Fit:
+    """The fit, or the better one with the clocks of `other`: two terms are to be compared with the same samples on the
+    same side of a tick, and a few microseconds may put one on the other."""
+    low, high, _ = bounds_of(found.model, data, found.theta)
+    free = high[found.layout.shift] > low[found.layout.shift]
+    shift = other.theta.shift if free else found.theta.shift
+    begin = replace(found.theta, shift=shift, rate_shift=other.theta.rate_shift)
+    left = residual_of(found.model, begin, data, weights)
+    if not left @ left < found.chi2 - policy.estimate.CLOCK_HOLLOW_CHI2:
+        return found
+    return min(found, fit(found.model, begin, data, weights, near=found), key=lambda each: each.chi2)
+
+
 def _clocks(found: Fit, data: Data, weights: Weights) -> Sequence[Clock]:
     low, high, _ = bounds_of(found.model, data, found.theta)
     thrust: Sequence[Clock] = ("shift",) if high[found.layout.shift] > low[found.layout.shift] else ()

@@ -10,7 +10,7 @@ import numpy as np
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.at_bounds import at_bound
-from identification.mismatch.estimate.clock_hollows import STEP
+from identification.mismatch.estimate.clock_hollows import STEP, by_its_clocks
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data, price
@@ -204,7 +204,16 @@ class Thruster:
                 pressed = at_bound(term, new, data, weights)
                 found.append((Candidate(term, gain, cost, pressed), new))
                 most = most if pressed else max(most, gain - cost)
-        return found
+        return [self._by_the_best_clocks(estimate, each, found) for each in found]
+
+    def _by_the_best_clocks(
+        self, estimate: Estimate, each: tuple[Candidate[Term], Fit], found: list[tuple[Candidate[Term], Fit]]
+    ) -> tuple[Candidate[Term], Fit]:
+        candidate, fitted = each
+        best = max(found, key=lambda other: other[0].chi2_gain)[1]
+        new = by_its_clocks(fitted, best, self.data, estimate.weights)
+        pressed = candidate.at_bound if new is fitted else at_bound(candidate.term, new, self.data, estimate.weights)
+        return replace(candidate, chi2_gain=estimate.fit.chi2 - new.chi2, at_bound=pressed), new
 
     def enlarged(self, estimate: Estimate, best: Fit) -> Estimate:
         """The model with one more term, as fitted, its noise estimated anew."""

@@ -10,7 +10,7 @@ from typing import cast
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.noise.covariance import Noise
@@ -26,20 +26,23 @@ def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
     cell = cast(LimitsReading, term)
     values = fitted.values[term]
     left = scatter = told = samples = 0.0
+    told_thrust, _ = raw(fitted.model, fitted.theta, data, with_rate=False)
     for i, (h, rows) in enumerate(zip(data.histories, data.rows, strict=True)):
         whole = _force(fitted, term, data, i)
-        shown = predict(fitted.model, fitted.theta, data.runs[i], data.scale, fitted.theta.tares[i])[0][rows]
         edges = np.concatenate([whole[:1], 0.5 * (whole[1:] + whole[:-1]), whole[-1:]])
         force, first, last = whole[rows], edges[:-1][rows], edges[1:][rows]
+        moved = np.abs(np.diff(edges))
+        moved[1:] = np.maximum(moved[1:], moved[:-1])  # a mean over time is also of the interval before
         variance = noise.white + noise.proportional * force**2 + sum(noise.slow) + sum(noise.band)
+        still = moved[rows] < np.sqrt(variance)  # on its way a force is not foretold to a part of a tick
         for side in (1.0, -1.0):
             reached = np.minimum(side * first, side * last) + side * fitted.theta.tares[i]  # not on the way there
             slope = cell.slope(reached, values)
-            deep = (reached > cell.start(values)) & (slope < policy.select.KNEE_SLOPE)
+            deep = still & (reached > cell.start(values)) & (slope < policy.select.KNEE_SLOPE)
             behind = 0.0 if cell.silent else variance - noise.proportional * force**2
             if cell.sharp:
                 deep &= reached > values[0] + policy.select.CLIPPED_DEPTH * np.sqrt(variance)
-            count, beside = h.count[rows][deep].astype(np.float64), h.thrust[rows][deep] - shown[deep]
+            count, beside = h.count[rows][deep].astype(np.float64), h.thrust[rows][deep] - told_thrust[i][deep]
             if count.sum() > 1:
                 left += float(count @ (beside - np.average(beside, weights=count)) ** 2 + h.within[rows][deep].sum())
                 scatter += float(count @ variance[deep])

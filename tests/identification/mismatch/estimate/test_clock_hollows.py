@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.estimate.clock_hollows import in_best_hollow
+from identification.mismatch.estimate.clock_hollows import by_its_clocks, in_best_hollow
 from identification.mismatch.estimate.fitting import change_of_rates, fit, residual_of
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.whitening import weights
@@ -100,3 +100,14 @@ def test_clocks_that_a_tick_stops_stop_nothing_else(off):
     held, _ = data_of([recording], clocks=False)
     alone = fit(Model(), found.theta, replace(held, with_rate=False), replace(w, rate=()))
     assert pytest.approx(alone.theta.C, abs=0.2 * found.std[0]) == found.theta.C
+
+
+def test_two_fits_are_compared_by_the_same_clocks():
+    """One that ended with its samples on the wrong side of ticks takes the clocks of the other, which did not."""
+    data, theta = data_of([in_step(every=0.0497)], clocks=True)
+    w = stood(data)
+    right = settled(data, theta)
+    wrong = fit(Model(), replace(theta, shift=-0.005, rate_shift=0.005), data, w)
+    assert wrong.chi2 > 1.1 * right.chi2
+    assert by_its_clocks(wrong, right, data, w).chi2 == pytest.approx(right.chi2, rel=1e-3)
+    assert by_its_clocks(right, wrong, data, w) is right

@@ -10,6 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from identification.mismatch.estimate.estimate import Estimate, forces
+from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.select.baseline import baseline, level_error_factor, raw_directions
 from identification.mismatch.select.covariates import covariates, hats
 from identification.mismatch.select.exchange.static_pairs import static_curve
@@ -20,7 +22,7 @@ from identification.physics.dead_band import DeadBand
 from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.motor_lag import MotorLag
 from identification.physics.winding_resistance import WindingResistance
-from identification.recording import Channel, Recording
+from identification.recording import Acquisition, Channel, Recording
 from tests.identification.diagnosed_runs import NOISE, C, table
 from tests.identification.mismatch.small import data_of, estimated, known_noise, placed, rng, short, white
 
@@ -44,6 +46,32 @@ def test_noise_that_goes_on_tells_that_no_cell_clips(cell):
     told = replace(estimate.fit, theta=replace(estimate.fit.theta, terms=((60.0,),)))
     assert noise_goes_on(told, CLIPS, estimate.noise, data) is not cell
     assert noise_goes_on(told, DeadBand(), estimate.noise, data) is False
+
+
+def ramped(limit, conversions=200, every=0.05):
+    """Ramps in ticks of 0.1 V to 12 V and back; each sample the mean of conversions since the last, which clip."""
+    up = np.arange(-12.0, 12.01, 0.1)
+    volts = np.concatenate([up, np.full(50, 12.0), up[::-1], np.full(50, -12.0)] * 6)
+    when = 0.02 * np.arange(volts.size) + 0.013
+    t = np.arange(1.0, when[-1], every)
+    then = t[:, None] - every * (1.0 - (np.arange(conversions) + 0.5) / conversions)
+    V = volts[np.searchsorted(when, then, side="right") - 1]
+    each = NOISE * conversions**0.5 * rng(2).standard_normal(V.shape)
+    F = np.clip(C * V * np.abs(V) + each, -limit, limit).mean(axis=1)
+    command = Channel("command_voltage", "command", "command_voltage", "V", when, volts)
+    means = Channel("thrust", "cell", "thrust", "N", t, F, acquisition=Acquisition(window=every))
+    return Recording("ramped", "T1", (command, means))
+
+
+@pytest.mark.parametrize("limit", [70.0, 72.0])
+def test_a_ramp_on_its_way_is_no_noise(limit):
+    """On a ramp a mean of conversions is not foretold to a part of a tick: by the ramps the noise would go on."""
+    cell = LoadCellSaturation("averaged")
+    values = (limit, NOISE * 200**0.5)
+    data, theta = data_of([ramped(limit)])
+    model, begin = placed({cell: values}, replace(theta, C=C))
+    found = fit(model, begin, data, white(data, model, begin))
+    assert not noise_goes_on(found, cell, Noise(NOISE**2, 0.0), data)
 
 
 def test_a_limit_that_no_reading_reaches_is_not_doubted():
