@@ -24,8 +24,8 @@ Rng = np.random.Generator
 BUS, CELL, MOTOR, FLOW = "bus0", "load_cell", "motor", "flow"
 ADAPTER_STD = 0.0005
 """s: what the drivers state of the least delay of an adapter and the computer (drivers' HOST_DELAY_STD)."""
-APART = 8e-4
-"""s between the conversions that stand for a mean over a time, about: what 3 ms leave between them shows in a run."""
+APART = 2e-4
+"""s between the conversions that stand for a mean over a time, about: what 0.8 ms leave between them shows in a run."""
 CLOCK_STD = 3e-5
 """relative: quartz at room temperature, 30 ppm; the drivers state 100."""
 
