@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.estimation.singular_values import thin_svd
+from identification.mismatch.estimate.between_levels import between_levels
 from identification.mismatch.estimate.clock_hollows import in_best_hollow
 from identification.mismatch.estimate.fitting import Fit, bounds_of, columns_of, fit, raw
-from identification.mismatch.estimate.thresholds import between_levels
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta

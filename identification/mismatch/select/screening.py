@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from identification.mismatch import policy
+from identification.mismatch.estimate.between_levels import sought
 from identification.mismatch.estimate.fitting import Fit, raw, residual_of, ticks_told
 from identification.mismatch.estimate.others_follow import OthersFollow
-from identification.mismatch.estimate.thresholds import sought
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.family_wise import (

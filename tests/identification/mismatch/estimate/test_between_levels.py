@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.mismatch.estimate.thresholds import sought
+from identification.mismatch.estimate.between_levels import sought
 from identification.mismatch.pipeline import diagnose
 from identification.mismatch.select.screening import refined
 from identification.physics.dead_band import DeadBand
