@@ -40,7 +40,7 @@ def test_the_same_seed_is_the_same_case_and_a_mean_is_as_noisy_as_asked():
     assert one.bench == same.bench != other.bench
     assert one.campaign == same.campaign
     assert one.case.thruster == same.case.thruster
-    assert noises(one)["thrust"].white == pytest.approx(one.case.noise.white * 16**0.5)
+    assert noises(one)["thrust"].white == pytest.approx(one.case.noise.white * 250**0.5), "of 0.2 ms each"
 
 
 def test_strengths_are_of_what_the_amplifier_lets_through():
