@@ -16,7 +16,7 @@ from identification.mismatch.estimate.others_follow import OthersFollow
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
-from identification.physics.term import Parameter, Term
+from identification.physics.term import Term
 from identification.recording import Floats
 
 FAR, PARTS, CLOSER = 1.3, 8, 3
@@ -60,7 +60,7 @@ def _middle(places: Floats, told: Floats) -> float:
 def _least(found: Fit, data: Data, weights: Weights, term: Term, j: int) -> Theta | None:
     """Where chi-square is least over one threshold, all other values following it; None: where it is."""
     at = found.layout.of(term).start + j
-    known: Parameter = term.parameters(data.scale)[j]
+    known = term.parameters(data.scale)[j]
     others = OthersFollow(found, at)
 
     def moved(value: float) -> Theta:

@@ -75,7 +75,7 @@ def _lines(fitted: Fit, data: Data, series: Sequence[Series]) -> tuple[Line, ...
     if skipped:
         found = find_lines(series, turns_unit=unit, ring=_ring(fitted, data), skipped=skipped)
     shown = [line for line in found if line.shown_amplitude > least]
-    lines = tuple(line for line in shown if _stands_at_rest(line, found, series, data))
+    lines = tuple(line for line in shown if _stands_where_settled(line, found, series, data))
     if not lines or not data.with_rate:
         return lines
     scale_std = scale_std_of(fitted, data)
@@ -93,7 +93,7 @@ def _peaks(lines: Sequence[Line]) -> list[Band]:
     ]
 
 
-def _stands_at_rest(line: Line, found: Sequence[Line], series: Sequence[Series], data: Data) -> bool:
+def _stands_where_settled(line: Line, found: Sequence[Line], series: Sequence[Series], data: Data) -> bool:
     """Whether it takes from what is left about as much where the rotor has settled as everywhere; also where nothing
     settles. What a model lacks of dynamics comes again after each step, and looks like a wave that does."""
     gain, wave = np.zeros((2, 2))  # everywhere and where it has settled, N^2

@@ -55,7 +55,10 @@ DOUBTFUL_CLOCK_SHIFT = Threshold(
 CLOCK_HOLLOW_CHI2 = Threshold(
     1.0,
     unit="chi-square",
-    reason="A fit is begun again at another place of the clocks only where that is plainly better to first order.",
+    reason=(
+        "A fit is begun again at another place of the clocks, or of a threshold between levels, only where that is "
+        "plainly better to first order."
+    ),
 )
 ROUNDING_UNSEEN = Threshold(
     0.02,

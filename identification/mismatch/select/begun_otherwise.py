@@ -31,7 +31,8 @@ NO_OTHER_BEGINNING = "whether effects tell it all without what was taken first a
 
 def begun_otherwise(found: Selected, rng: np.random.Generator, watch: Observer = UNWATCHED) -> Selected:
     """The model of a search without what was overtaken or has values that are not possible, then of one without a term
-    that follows the rate, where there are such and that model is better; else as found."""
+    that follows the rate, where there are such and that model is better, or the same less what none would find; else as
+    found."""
     told = _searched_without({*overtaken(found), *_impossible(found)}, NO_OTHER_BEGINNING, found, rng, watch)
     return _searched_without(_followers(told), NO_EFFECTS, told, rng, watch)
 
