@@ -66,15 +66,16 @@ class Converter:
     def instant(self) -> bool:
         return self.window <= 0 and self.low_pass <= 0
 
-    def response(self, frequency: float) -> complex:
-        """What a sample holds of a wave of `frequency` Hz.
+    def response(self, frequency: Floats) -> NDArray[np.complex128]:
+        """(n,) what a sample holds of waves of these frequencies in Hz.
 
-        >>> round(abs(Converter(window=0.05).response(10.0)), 3), round(abs(Converter(low_pass=0.01).response(10.0)), 3)
-        (0.637, 0.847)
+        >>> at = np.array([10.0])
+        >>> [abs(Converter(0.05).response(at)).round(3), abs(Converter(low_pass=0.01).response(at)).round(3)]
+        [array([0.637]), array([0.847])]
         """
-        return complex(np.sinc(frequency * max(self.window, 0.0))) / complex(
-            1.0, 2 * np.pi * frequency * max(self.low_pass, 0.0)
-        )
+        meaned = np.sinc(frequency * max(self.window, 0.0))
+        out: NDArray[np.complex128] = meaned / (1.0 + 2j * np.pi * frequency * max(self.low_pass, 0.0))
+        return out
 
     def places(self, edges: Floats, at: Floats) -> tuple[Places, ...]:
         """Where the samples at `at` (k,) look at a course on intervals between `edges`."""

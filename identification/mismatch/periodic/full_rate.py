@@ -10,14 +10,12 @@ from numpy.typing import NDArray
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, raw
-from identification.mismatch.model.converted import converted_samples
 from identification.mismatch.model.data import Data
+from identification.mismatch.model.each_sample import foretold
 from identification.mismatch.model.predictor import predict
-from identification.mismatch.model.sub_interval import sample_lead
 from identification.mismatch.periodic.periodic_disturbances import Line
 from identification.mismatch.periodic.rotor_angle import turned
 from identification.mismatch.periodic.spectrum import Series
-from identification.run_history.filters import delayed, within_intervals
 from identification.run_history.history import History
 
 STEADY = 10.0
@@ -30,15 +28,8 @@ def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
     follows = _rate_follows(fitted, data)
     for run, tare in zip(data.runs, fitted.theta.tares, strict=True):
         h = run.history
-        F, x = predict(fitted.model, fitted.theta, run, data.scale, tare)
-        if fitted.theta.shift:
-            F = delayed(F, h.edges, fitted.theta.shift)
-        if h.converter.instant:
-            at = within_intervals(F, h.edges, h.sample_time)
-            rate = within_intervals(x, h.edges, h.sample_time)
-            at += fitted.theta.C * sample_lead(fitted.model, fitted.theta, run, rate, data.scale.driver)
-        else:
-            at = converted_samples(fitted.model, fitted.theta, run, F, data.scale.driver)
+        _, x = predict(fitted.model, fitted.theta, run, data.scale, tare)
+        at = foretold(fitted.model, fitted.theta, run, data.scale, tare)
         residual = h.sample_thrust - at - tare
         speed = fitted.theta.k * x if follows else h.others.get("rotation_rate", x)
         out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time), h.converter))

@@ -10,7 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+from numpy.typing import NDArray
+
 from identification.mismatch.periodic.steady_segments import SteadySegment
+from identification.recording import Floats
 
 Ring = tuple[float, float, float]
 """Compliance, frequency in Hz and damping of a stand that rings."""
@@ -24,14 +28,19 @@ class OrderLaw:
     """Power of the speed that its force goes with: 2, or 0 of a pick-up."""
     ring: Ring | None = None
 
-    def weight(self, order: float, speed: float, top: float) -> complex:
-        """Of its force at the highest speed `top`, what the cell shows of it at `speed`, both in turns per s."""
-        return (speed / top) ** self.growth * (1.0 if self.ring is None else response(self.ring, order * speed))
+    def weight(self, order: float, speed: Floats, top: float) -> NDArray[np.complex128]:
+        """(n,) of its force at the highest speed `top`, what the cell shows of it at `speed` (n,), in turns per s."""
+        weight = ((speed / top) ** self.growth).astype(np.complex128)
+        if self.ring is not None:
+            weight *= response(self.ring, order * speed)
+        return weight
 
     def on(self, parts: Sequence[SteadySegment], order: float, top: float) -> list[SteadySegment]:
-        """The stretches, each weighed by what its samples hold of such a wave."""
+        """The stretches, each sample weighed by what it holds of such a wave: a mean over time turns its sign where
+        the wave becomes shorter than its window."""
         return [
-            replace(p, weight=self.weight(order, p.speed, top) * p.converter.response(order * p.speed)) for p in parts
+            replace(p, weight=self.weight(order, p.turning, top) * p.converter.response(order * p.turning))
+            for p in parts
         ]
 
 
@@ -46,12 +55,12 @@ def laws(ring: Ring | None) -> tuple[OrderLaw, ...]:
     return (FORCE, PICK_UP) if ring is None else (FORCE, OrderLaw(2, ring), PICK_UP)
 
 
-def response(ring: Ring, frequency: float) -> complex:
-    """Of a mass on a spring that takes a share `compliance` of the force.
+def response(ring: Ring, frequency: Floats) -> NDArray[np.complex128]:
+    """(n,) at these frequencies, of a mass on a spring that takes a share `compliance` of the force.
 
-    >>> round(abs(response((1.0, 10.0, 0.05), 10.0)), 3), round(abs(response((1.0, 10.0, 0.05), 0.1)), 3)
-    (10.0, 1.0)
+    >>> np.abs(response((1.0, 10.0, 0.05), np.array([10.0, 0.1]))).round(3).tolist()
+    [10.0, 1.0]
     """
     compliance, natural, damping = ring
     r = frequency / natural
-    return 1 + compliance * (1 / complex(1 - r * r, 2 * damping * r) - 1)
+    return np.asarray(1 + compliance * (1 / (1 - r * r + 2j * damping * r) - 1), dtype=np.complex128)

@@ -105,7 +105,7 @@ def _of_powers(parts: Sequence[SteadySegment], top: float) -> OrderCandidate:
     for p, g in zip(parts, _groups(parts, top), strict=True):
         window = np.hanning(p.time.size + 2)[1:-1]
         power = p.colour.out_of(grid.power(p.turns, p.value * window), grid.ratios, p.speeds)
-        by_group[g] += abs(p.weight) ** 2 * power
+        by_group[g] += p.information / p.time.size * power
     kept = by_group[by_group.any(axis=1)]
     if kept.shape[0] < 2:
         return OrderCandidate(1.0, 1.0, 1.0)
@@ -127,7 +127,7 @@ def _of_waves(parts: Sequence[SteadySegment], top: float, seconds: float) -> Ord
     total = np.zeros(grid.ratios.size)
     for piece in pieces.values():
         turns = np.concatenate([p.turns for p, _ in piece])
-        white = np.concatenate([abs(p.weight) * p.white for p, _ in piece])
+        white = np.concatenate([np.abs(p.weight) * p.white for p, _ in piece])
         total += grid.power(turns, white) / sum(p.information for p, _ in piece)
     strong, shape = standing(total)
     at, p_value = _highest(strong, shape, grid, 1.0 / grid.longest)

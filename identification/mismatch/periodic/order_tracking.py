@@ -281,8 +281,11 @@ def _told(parts: Sequence[SteadySegment], waves: _Waves, p_value: float) -> Roto
         gain=waves.gain if coherent else waves.gain - 2.0 * each.size,
         speed=float(np.average([p.speed for p in parts], weights=n)),
         parts=tuple(
-            Part(p.run, float(p.time[0]), float(np.nextafter(p.time[-1], np.inf)), float(c.real), float(-c.imag))
-            for p, c in zip(parts, each[waves.piece] * np.array([p.weight for p in parts]), strict=True)
+            Part(
+                *(p.run, float(p.time[0]), float(np.nextafter(p.time[-1], np.inf)), float(c.real), float(-c.imag)),
+                weight=(p.time, p.weight),
+            )
+            for p, c in zip(parts, each[waves.piece], strict=True)
         ),
         law_gain=waves.of_one_size - 2.0 * (waves.weights.size - 1),
     )

@@ -248,7 +248,7 @@ def _fitted(
 
 def _passed(run: Series, f: float) -> complex:
     """What its samples hold of a wave of `f` Hz; all of it where they could hold nothing, so that it came later."""
-    response = run.converter.response(f)
+    response = complex(run.converter.response(np.array([f]))[0])
     return response if abs(response) > policy.periodic.LEAST_PASSED else 1.0
 
 

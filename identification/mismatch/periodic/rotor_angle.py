@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.recording import Floats
 from identification.run_history.filters import integral
@@ -29,15 +30,24 @@ def turned_by_rate(time: Floats, rate: Floats, at: Floats) -> Floats:
     return out
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False, slots=True)
 class Part:
-    """a cos(phi) + b sin(phi) from `start` to `end` (s) of one run."""
+    """a cos(phi) + b sin(phi), as far as it is shown, from `start` to `end` (s) of one run."""
 
     run: int
     start: float
     end: float
     a: float
     b: float
+    weight: tuple[Floats, NDArray[np.complex128]] | None = None
+    """Times in s, and what is shown then of its size and phase; None: all."""
+
+    def at(self, time: Floats, angle: Floats) -> Floats:
+        """(n,) N."""
+        wave = complex(self.a, -self.b) * np.exp(1j * angle)
+        if self.weight is not None:
+            wave *= np.interp(time, *self.weight)
+        return np.asarray(wave.real, dtype=np.float64)
 
 
 def wave_of(parts: Sequence[Part], run: int, time: Floats, angle: Floats) -> Floats:
@@ -46,5 +56,5 @@ def wave_of(parts: Sequence[Part], run: int, time: Floats, angle: Floats) -> Flo
     for part in parts:
         if part.run == run:
             inside = (time >= part.start) & (time < part.end)
-            out[inside] += part.a * np.cos(angle[inside]) + part.b * np.sin(angle[inside])
+            out[inside] += part.at(time[inside], angle[inside])
     return out

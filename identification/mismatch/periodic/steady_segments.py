@@ -88,13 +88,15 @@ class SteadySegment:
     """Turns per s, QUANTILES of it."""
     colour: Colour
     converter: Converter
-    weight: complex = 1.0
-    """What a wave has here of its size and phase at the highest speed."""
+    turning: Floats
+    """(n,) turns per s."""
+    weight: NDArray[np.complex128]
+    """(n,) what each sample has of a wave of one size and phase at the highest speed."""
 
     @property
     def information(self) -> float:
         """Samples, each by what it holds of a wave."""
-        return abs(self.weight) ** 2 * self.time.size
+        return float(np.sum(np.abs(self.weight) ** 2))
 
     @property
     def speed(self) -> float:
@@ -111,11 +113,11 @@ class SteadySegment:
         return 0 if abs(change) < least else 1 if change > 0 else 2
 
     def wave(self, z: float) -> complex:
-        """Sum of white exp(-2 pi i z turns), by the weight of the stretch.
+        """Sum of white exp(-2 pi i z turns), each by its weight.
 
         Whitened, for a loud resonance leaks into all frequencies of a stretch.
         """
-        return complex(np.conj(self.weight) * (self.white @ np.exp(-2j * np.pi * z * self.turns)))
+        return complex((np.conj(self.weight) * self.white) @ np.exp(-2j * np.pi * z * self.turns))
 
 
 def quick(series: Series, residual: Floats) -> Floats:
@@ -149,8 +151,10 @@ def stretches(runs: Sequence[tuple[int, Series]], top: float, lines: Sequence[Fl
                 and speed[s].mean() > policy.periodic.STRETCH_TURNING * top
                 and np.any(value[s])
             ):
-                speeds = np.quantile(speed[s], QUANTILES)
-                yield SteadySegment(i, r.time[s], r.turns[s], value[s], white[s], speeds, colour, r.converter)
+                speeds, even = np.quantile(speed[s], QUANTILES), np.ones(high - low, dtype=np.complex128)
+                yield SteadySegment(
+                    i, r.time[s], r.turns[s], value[s], white[s], speeds, colour, r.converter, speed[s], even
+                )
 
 
 def _edges(time: Floats, speed: Floats, top: float) -> list[int]:

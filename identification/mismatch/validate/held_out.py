@@ -14,13 +14,15 @@ from identification.mismatch.diagnosis import HeldOutRmse
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit, raw
 from identification.mismatch.model.data import Data
+from identification.mismatch.model.each_sample import foretold
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
-from identification.physics.term import Term
+from identification.physics.term import Scale, Term
 from identification.recording import Floats
 from identification.run_history.history import History
+from identification.run_history.remembered import RememberedRun
 
 KEPT_BACK = 4
 """One block of so many is not fitted: a quarter judges, and three quarters still determine the model."""
@@ -72,17 +74,29 @@ def together(parts: Sequence[Squares]) -> Squares:
 
 
 def squares(model: Model, theta: Theta, data: Data, which: Sequence[NDArray[np.bool_]]) -> Squares:
-    """Over the rows in `which`, by blocks of time (of a table an eighth of its levels): scatter within a row is in
-    it."""
+    """Over the rows in `which`, by blocks of time (of a table an eighth of its levels): scatter within a row is in it,
+    about what the model says of each sample."""
     thrust, _ = raw(model, theta, data, with_rate=False)
     found = []
-    for h, rows, f, w in zip(data.histories, data.rows, thrust, which, strict=True):
-        r = rows[w]
-        each = h.count[r] * (h.thrust[r] - f[w]) ** 2 + h.within[r]
+    for run, rows, f, w, tare in zip(data.runs, data.rows, thrust, which, theta.tares, strict=True):
+        h, r = run.history, rows[w]
+        each = h.count[r] * (h.thrust[r] - f[w]) ** 2 + scatter(model, theta, run, data.scale, tare)[r]
         piece = _pieces(h)[w]
         error, count = (np.asarray(np.bincount(piece, weights=x), dtype=np.float64) for x in (each, h.count[r]))
         found.append(Squares(error[count > 0], count[count > 0]))
     return together(found)
+
+
+def scatter(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: float) -> Floats:
+    """(M,) N^2, sum of squares within each interval about its mean, of what the model leaves: on a ramp an interval of
+    several samples moves."""
+    h = run.history
+    samples = h.thrust_samples
+    if h.sample_thrust.size != samples.time.size or h.static:
+        return h.within
+    left = h.sample_thrust - foretold(model, theta, run, scale, tare)
+    left -= samples.means(left)[samples.interval]
+    return np.asarray(np.bincount(samples.interval, weights=left**2, minlength=samples.count.size), dtype=np.float64)
 
 
 def _pieces(history: History) -> NDArray[np.intp]:
