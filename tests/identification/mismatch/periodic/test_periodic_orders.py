@@ -10,9 +10,11 @@ from identification.mismatch import policy
 from identification.mismatch.periodic.line_or_order import as_turning
 from identification.mismatch.periodic.order_search import LARGEST_SHAPE, candidates, standing
 from identification.mismatch.periodic.order_tracking import find_locked
+from identification.mismatch.periodic.periodic_disturbances import find_lines
 from identification.mismatch.periodic.rotor_angle import Part, turned, wave_of
 from identification.mismatch.periodic.spectrum import Series
 from identification.mismatch.periodic.steady_segments import Colour, quick, speed_of, stretches
+from identification.run_history.converter import Converter
 from tests.identification.mismatch.small import rng
 
 RATE, LENGTH = 60.0, 100.0
@@ -149,6 +151,24 @@ def test_what_was_found_is_the_wave_that_was_there():
     assert np.std((made - true)[moving & (made != 0)]) < 0.1
     assert np.all(made[speed_of(series) < 0.1][1:-1] == 0.0)
     assert found.speed == pytest.approx(np.mean(speed_of(series)[moving]), rel=0.15)
+
+
+def test_a_mean_over_time_turns_the_sign_of_a_wave_that_becomes_shorter_than_it():
+    """A sine of up to 12 turns/s read by means over 50 ms: three a turn are beyond one period of the window above 6.7
+    turns/s, within one stretch of steady turning and the next."""
+    fine = np.arange(0.0, 200.0, 0.0005)
+    speed = 12.0 * np.abs(np.sin(2 * np.pi * fine / 60.0))
+    turns = np.cumsum(speed) * 0.0005
+    whole = np.cumsum(2.5 * (speed / 12.0) ** 2 * np.sin(2 * np.pi * 3 * turns + 0.7)) * 0.0005
+    t = np.arange(1.0, 199.0, 0.05)
+    meaned = (np.interp(t + 0.025, fine, whole) - np.interp(t - 0.025, fine, whole)) / 0.05
+    residual = meaned + 0.17 * rng(2).standard_normal(t.size)
+    lines = find_lines([Series(t, residual, np.interp(t, fine, turns), Converter(window=0.05))])
+    assert [line.kind for line in lines] == ["rotation"]
+    assert lines[0].ratio == pytest.approx(3.0, abs=4 * lines[0].ratio_std)
+    assert lines[0].amplitude == pytest.approx(2.5, abs=4 * lines[0].amplitude_std)
+    left = residual - lines[0].at(t, np.interp(t, fine, turns))
+    assert np.std(left) == pytest.approx(0.17, rel=0.03)
 
 
 def test_a_phase_that_slips_is_not_told_and_its_size_is():
