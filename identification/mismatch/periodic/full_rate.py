@@ -13,6 +13,7 @@ from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.each_sample import foretold
 from identification.mismatch.model.predictor import predict
+from identification.mismatch.model.sub_interval import delay_of
 from identification.mismatch.periodic.periodic_disturbances import Line
 from identification.mismatch.periodic.rotor_angle import turned
 from identification.mismatch.periodic.spectrum import Series
@@ -23,16 +24,18 @@ STEADY = 10.0
 
 
 def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
-    """Measured minus predicted at every sample that the intervals hold; turns from the rate, or from the model."""
+    """Measured minus predicted at every sample that the intervals hold; turns from the rate, or from the model, of when
+    the force was: a wave of five a turn is a fifth of its period off after some milliseconds."""
     out = []
     follows = _rate_follows(fitted, data)
+    late = delay_of(fitted.model, fitted.theta) + fitted.theta.shift - (0.0 if follows else fitted.theta.rate_shift)
     for run, tare in zip(data.runs, fitted.theta.tares, strict=True):
         h = run.history
         _, x = predict(fitted.model, fitted.theta, run, data.scale, tare)
         at = foretold(fitted.model, fitted.theta, run, data.scale, tare)
         residual = h.sample_thrust - at - tare
         speed = fitted.theta.k * x if follows else h.others.get("rotation_rate", x)
-        out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time), h.converter))
+        out.append(Series(h.sample_time, residual, turned(h.edges, speed, h.sample_time - late), h.converter))
     return tuple(out)
 
 

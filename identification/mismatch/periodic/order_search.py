@@ -46,6 +46,10 @@ class OrderCandidate:
     """Family-wise."""
 
 
+Piece = list[tuple[SteadySegment, int]]
+"""Stretches over which a wave may keep its phase, each with its group of speed."""
+
+
 @dataclass(frozen=True, eq=False)
 class _Grid:
     """Ratios that are looked at, and the transform that gives them."""
@@ -120,22 +124,33 @@ def _of_powers(parts: Sequence[SteadySegment], top: float) -> OrderCandidate:
 
 def _of_waves(parts: Sequence[SteadySegment], top: float, seconds: float) -> OrderCandidate:
     """Whitened waves summed with their phase over pieces of so many seconds, their powers over the pieces."""
-    pieces: dict[tuple[int, int], list[tuple[SteadySegment, int]]] = defaultdict(list)
-    for p, g in zip(parts, _groups(parts, top), strict=True):
-        pieces[p.run, int(p.time[0] // seconds)].append((p, g))
-    grid = _grid(max(float(s[-1][0].turns[-1] - s[0][0].turns[0]) for s in pieces.values()), top)
+    pieces = pieces_of(parts, top, seconds)
+    grid = _grid(longest_of(pieces), top)
     total = np.zeros(grid.ratios.size)
-    for piece in pieces.values():
+    for piece in pieces:
         turns = np.concatenate([p.turns for p, _ in piece])
         white = np.concatenate([np.abs(p.weight) * p.white for p, _ in piece])
         total += grid.power(turns, white) / sum(p.information for p, _ in piece)
     strong, shape = standing(total)
     at, p_value = _highest(strong, shape, grid, 1.0 / grid.longest)
     ratio = float(grid.ratios[at])
-    return OrderCandidate(ratio, 1.0 / grid.longest, max(p_value, _even(list(pieces.values()), ratio)))
+    return OrderCandidate(ratio, 1.0 / grid.longest, max(p_value, even(pieces, ratio)))
 
 
-def _even(pieces: Sequence[Sequence[tuple[SteadySegment, int]]], ratio: float) -> float:
+def pieces_of(parts: Sequence[SteadySegment], top: float, seconds: float) -> list[Piece]:
+    """The stretches of every so many seconds of a run, each with its group of speed."""
+    found: dict[tuple[int, int], Piece] = defaultdict(list)
+    for p, g in zip(parts, _groups(parts, top), strict=True):
+        found[p.run, int(p.time[0] // seconds)].append((p, g))
+    return list(found.values())
+
+
+def longest_of(pieces: Sequence[Piece]) -> float:
+    """Turns of the longest piece."""
+    return max(float(piece[-1][0].turns[-1] - piece[0][0].turns[0]) for piece in pieces)
+
+
+def even(pieces: Sequence[Piece], ratio: float) -> float:
     """p-value of the waves without the group of speed that gives most of them; 1 when they differ between groups.
 
     A plan that comes again turns the rotor as often, and what the model lacks comes again with it: but not as one wave,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from identification.mismatch.periodic.recurrence import Recurrence, of_stretches
 from identification.mismatch.periodic.rotor_angle import Part, wave_of
 from identification.mismatch.periodic.spectrum import Series, spacing_of
 from identification.mismatch.periodic.steady_segments import SteadySegment, speed_of, stretches
+from identification.mismatch.periodic.whole_orders import whole_orders
 from identification.recording import Floats
 
 TRIED = np.linspace(-1.0, 1.0, 41)
@@ -109,6 +111,8 @@ def find_locked(
     if len(parts) < 2:
         return None
     every = [each for law in (FORCE, PICK_UP) for each in candidates(law.on(parts, 0.0, top), top)]
+    if in_turns and not all(r.converter.instant for _, r in runs):
+        every += [each for law in (FORCE, PICK_UP) for each in whole_orders(partial(law.on, parts, top=top), top)]
     every = [replace(each, p_value=min(2 * each.p_value, 1.0)) for each in every]  # of two laws
     likely = [each for each in every if _passes(each, alarm, in_turns)]
     if not likely:

@@ -27,6 +27,9 @@ DENSE_ZONE = 10.0
 """...for so many samples."""
 WINDOW_SHARE = 0.3
 """Of the spacing, at most, before and after a sample."""
+WINDOWED = 0.4
+"""Of the intervals: samples on ramps that have windows, at most; each takes two, and those beside a small tick are told
+by the tick itself."""
 GROWTH = 0.06
 """Length of an interval per time since the last change."""
 MOVES = 0.01
@@ -219,21 +222,36 @@ def _with_steps(edges: Floats, held: Held, spacing: float, most: int) -> Floats:
     return result
 
 
+def _changes(held: Held, edges: Floats, least: float) -> Floats:
+    """Times within the run at which a command changes by more than this share of its size."""
+    found = held.time[1:][np.abs(np.diff(held.value)) > least * float(np.max(np.abs(held.value)))]
+    out: Floats = found[(found > edges[0]) & (found < edges[-1])]
+    return out
+
+
+def _shortly_after(changes: Floats, time: Floats, zone: float) -> Floats:
+    """Those of the samples that come within `zone` s after one of the changes."""
+    if not changes.size:
+        return changes
+    last = np.searchsorted(changes, time, side="right") - 1
+    out: Floats = time[(last >= 0) & (time - changes[np.maximum(last, 0)] < zone)]
+    return out
+
+
 def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most: int) -> Floats:
-    """Shortly after every change of a command, each sample gets a short interval of its own."""
+    """Shortly after every change of a command, each sample gets a short interval of its own: after steps alone where
+    samples are dense, or many are on ramps."""
     if not held.stepwise:
         return edges
     dense = spacing < LEAST_WINDOWED
-    least = policy.prepare.COMMAND_STEP * float(np.max(np.abs(held.value))) if dense else 0.0
-    changes = held.time[1:][np.abs(np.diff(held.value)) > least]
-    changes = changes[(changes > edges[0]) & (changes < edges[-1])]
-    if not changes.size or changes.size > most:
-        return edges
     zone = DENSE_ZONE * spacing if dense else max(WINDOW_ZONE, 5 * spacing)
+    small = 0.0
+    if dense or _shortly_after(_changes(held, edges, small), time, zone).size > WINDOWED * most:
+        small = policy.prepare.COMMAND_STEP
+    changes = _changes(held, edges, small)
+    own = _shortly_after(changes, time, zone)
     half = min(WINDOW, WINDOW_SHARE * spacing)
-    last = np.searchsorted(changes, time, side="right") - 1
-    own = time[(last >= 0) & (time - changes[np.maximum(last, 0)] < zone)]
-    if own.size > most:
+    if not changes.size or max(changes.size, own.size) > most:
         return edges
     if not own.size:
         return np.asarray(np.union1d(edges, changes), dtype=np.float64)

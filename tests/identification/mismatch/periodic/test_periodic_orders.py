@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 
 from identification.estimation.tails import gamma_median
 from identification.mismatch import policy
 from identification.mismatch.periodic.line_or_order import as_turning
-from identification.mismatch.periodic.order_search import LARGEST_SHAPE, candidates, standing
+from identification.mismatch.periodic.order_law import FORCE
+from identification.mismatch.periodic.order_search import LARGEST_SHAPE, OrderCandidate, candidates, standing
 from identification.mismatch.periodic.order_tracking import find_locked
 from identification.mismatch.periodic.periodic_disturbances import find_lines
 from identification.mismatch.periodic.rotor_angle import Part, turned, wave_of
 from identification.mismatch.periodic.spectrum import Series
 from identification.mismatch.periodic.steady_segments import Colour, quick, speed_of, stretches
+from identification.mismatch.periodic.whole_orders import whole_orders
 from identification.run_history.converter import Converter
 from tests.identification.mismatch.small import rng
 
 RATE, LENGTH = 60.0, 100.0
 ALARM = policy.periodic.LINE_FALSE_ALARM
+NONE = OrderCandidate(1.0, 1.0, 1.0)
 
 
 def clearest(parts, top):
@@ -153,22 +159,49 @@ def test_what_was_found_is_the_wave_that_was_there():
     assert found.speed == pytest.approx(np.mean(speed_of(series)[moving]), rel=0.15)
 
 
+def meaned(speed, blades, size, window, noise, seed):
+    """A force of the rotor of so many a turn, by means over a window as long as the time between two readings; `speed`
+    (n,) turns per s, every half millisecond."""
+    fine = 0.0005 * np.arange(speed.size)
+    turns = np.cumsum(speed) * 0.0005
+    wave = size * (speed / speed.max()) ** 2 * np.sin(2 * np.pi * blades * turns + 0.7)
+    whole = np.cumsum(wave) * 0.0005
+    t = np.arange(1.0, fine[-1] - 1.0, window)
+    mean = (np.interp(t + 0.5 * window, fine, whole) - np.interp(t - 0.5 * window, fine, whole)) / window
+    residual = mean + noise * rng(seed).standard_normal(t.size)
+    return Series(t, residual, np.interp(t, fine, turns), Converter(window=window))
+
+
 def test_a_mean_over_time_turns_the_sign_of_a_wave_that_becomes_shorter_than_it():
     """A sine of up to 12 turns/s read by means over 50 ms: three a turn are beyond one period of the window above 6.7
     turns/s, within one stretch of steady turning and the next."""
-    fine = np.arange(0.0, 200.0, 0.0005)
-    speed = 12.0 * np.abs(np.sin(2 * np.pi * fine / 60.0))
-    turns = np.cumsum(speed) * 0.0005
-    whole = np.cumsum(2.5 * (speed / 12.0) ** 2 * np.sin(2 * np.pi * 3 * turns + 0.7)) * 0.0005
-    t = np.arange(1.0, 199.0, 0.05)
-    meaned = (np.interp(t + 0.025, fine, whole) - np.interp(t - 0.025, fine, whole)) / 0.05
-    residual = meaned + 0.17 * rng(2).standard_normal(t.size)
-    lines = find_lines([Series(t, residual, np.interp(t, fine, turns), Converter(window=0.05))])
+    speed = 12.0 * np.abs(np.sin(2 * np.pi * np.arange(0.0, 200.0, 0.0005) / 60.0))
+    series = meaned(speed, 3, 2.5, 0.05, 0.17, seed=2)
+    lines = find_lines([series])
     assert [line.kind for line in lines] == ["rotation"]
     assert lines[0].ratio == pytest.approx(3.0, abs=4 * lines[0].ratio_std)
     assert lines[0].amplitude == pytest.approx(2.5, abs=4 * lines[0].amplitude_std)
-    left = residual - lines[0].at(t, np.interp(t, fine, turns))
+    left = series.residual - lines[0].at(series.time, series.turns)
     assert np.std(left) == pytest.approx(0.17, rel=0.03)
+
+
+def test_a_whole_order_is_looked_for_as_its_own_samples_show_it():
+    """Five a turn at levels of up to 34 turns/s, by means over 13 ms: of one sign and the other, about in turns."""
+    speed = np.repeat(np.abs(rng(3).uniform(-34.0, 34.0, 40)), 2000)
+    found = find_locked([(0, meaned(speed, 5, 0.9, 0.013, 0.12, seed=4))], ALARM)
+    assert found is not None
+    assert found.ratio == pytest.approx(5.0, abs=4 * found.ratio_std)
+    assert found.amplitude == pytest.approx(0.9, abs=4 * found.amplitude_std)
+
+
+def test_means_of_noise_have_no_whole_order():
+    smallest = []
+    for seed in range(40):
+        series = replace(turning(seed=seed), converter=Converter(window=1 / RATE))
+        parts, top = parts_of(series)
+        smallest.append(min(each.p_value for each in [*whole_orders(partial(FORCE.on, parts, top=top), top), NONE]))
+    assert np.mean(np.array(smallest) < 0.1) < 0.25
+    assert min(smallest) > ALARM / 10
 
 
 def test_a_phase_that_slips_is_not_told_and_its_size_is():

@@ -47,6 +47,16 @@ def test_a_delay_is_in_the_residual_at_every_sample():
     assert np.std(series.residual) < 0.5 * np.std(bare.residual)
 
 
+def test_the_angle_is_that_of_when_the_force_was():
+    data, estimate = known_noise({TimeSkew(): (0.0,)}, [noisy()])
+    now = estimate.fit
+    (plain,) = series_of(replace(now, theta=replace(now.theta, terms=((0.0,),))), data)
+    (late,) = series_of(replace(now, theta=replace(now.theta, terms=((0.09,),), shift=0.01)), data)
+    before = np.interp(plain.time - 0.1, plain.time, plain.turns)
+    assert late.turns[5:] == pytest.approx(before[5:], abs=0.25)
+    assert np.max(plain.turns - late.turns) > 0.5, "at 9 V"
+
+
 def test_a_shift_of_the_clocks_is_in_it_too():
     """Forty milliseconds between command and force, as a nuisance and as a delay: the same residual."""
     data, estimate = known_noise({TimeSkew(): (0.0,)}, [noisy()])
