@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from identification.estimation.tails import chi2_isf
 from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate, refresh
-from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data, price
+from identification.mismatch.model.parameters import Theta
 from identification.mismatch.select.overdispersion import dispersion_of
 from identification.mismatch.select.rounds import Unhidden
 from identification.mismatch.select.screening import Screening, refined
@@ -44,7 +47,7 @@ def hidden(estimate: Estimate, judged: Screening, data: Data) -> tuple[Unhidden,
         begin = refined(estimate.fit, data, estimate.weights, term, values)
         bigger, theta = estimate.fit.more(term, begin)
         first = fit(bigger, theta, data, estimate.weights)
-        new = refresh(bigger, first.theta, data, None, now, now.noise)
+        new = refresh(bigger, _by_the_clocks_of(now, first), data, None, now, now.noise)
         gain = (now.fit.deviance - new.fit.deviance) / dispersion_of(term, new.fit, data.size)
         if gain > (asked := asked_of(term, judged, data)):
             found.append((Unhidden(gain, asked), new))
@@ -54,11 +57,19 @@ def hidden(estimate: Estimate, judged: Screening, data: Data) -> tuple[Unhidden,
     return told, refresh(best.fit.model, best.fit.theta, data, None, None)
 
 
+def _by_the_clocks_of(now: Estimate, first: Fit) -> Theta:
+    """The values of a fit with clocks that are to be compared: one reading of the rate on the other side of a tick is
+    worth more than what is asked of a term. A delay has none beside it."""
+    if any(term.traits.delay for term in first.model.terms):
+        return first.theta
+    return replace(first.theta, shift=now.fit.theta.shift, rate_shift=now.fit.theta.rate_shift)
+
+
 def taken_by_noise(whole: Estimate, less: Estimate, judged: Screening, data: Data) -> bool:
     """Whether the terms that `less` lacks of the `whole` gain, estimated together with the noise, what is asked of one
     that is hidden; `judged`: of `less`."""
     noise = refresh(less.fit.model, less.fit.theta, data, None, None)
-    told = refresh(whole.fit.model, whole.fit.theta, data, None, noise, noise.noise)
+    told = refresh(whole.fit.model, _by_the_clocks_of(noise, whole.fit), data, None, noise, noise.noise)
     lacking = set(whole.fit.model.terms) - set(less.fit.model.terms)
     return noise.fit.deviance - told.fit.deviance > sum(asked_of(term, judged, data) for term in lacking)
 

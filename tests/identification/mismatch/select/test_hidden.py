@@ -9,12 +9,14 @@ import pytest
 from scipy import stats
 
 from identification.mismatch import policy
+from identification.mismatch.estimate.estimate import refresh
 from identification.mismatch.select.forward_selection import Thruster
 from identification.mismatch.select.hidden import asked_of, hidden
 from identification.physics.dead_band import DeadBand
 from identification.physics.stand_resonance import StandResonance
 from identification.physics.zero_drift import ZeroDrift
 from identification.physics.zero_offset import ZeroOffset
+from identification.recording import Acquisition, Channel, Recording
 from tests.identification.diagnosed_runs import dead_band
 from tests.identification.mismatch.small import estimated, rng, short
 
@@ -97,3 +99,43 @@ def test_what_is_asked_of_a_gain_goes_with_how_the_term_was_looked_for():
     ringing = StandResonance()
     full = threshold + len(ringing.parameters(data.scale)) * logn
     assert asked_of(ringing, judged, data) == pytest.approx(full)
+
+
+def ticking(seed: int) -> Recording:
+    """A slow sine in ticks, its rate read between them and 2 ms late; the zero jumps, slowly enough for noise."""
+    draw, when = rng(seed), np.arange(0.0, 240.0, 0.02)
+    level = 8.7 * np.sin(2 * np.pi * when / 35.0)
+
+    def at(t):
+        return level[np.clip(np.searchsorted(when, t, side="right") - 1, 0, None)]
+
+    t, r = np.arange(0.005, 240.0, 1 / 92), np.arange(0.0031, 240.0, 0.01003)
+    F = 0.673 * at(t) * np.abs(at(t)) + draw.normal(0.0, 0.4, t.size) - 0.09 * (t > 150.2)
+    n = 2.055 * at(r - 0.002) + draw.normal(0.0, 0.017, r.size)
+    channels = (
+        Channel(
+            "command_voltage", "command", "command_voltage", "V", when, level, acquisition=Acquisition(delay_std=0.002)
+        ),
+        Channel("thrust", "cell", "thrust", "N", t, F),
+        Channel("rotation_rate", "motor", "rotation_rate", "rev/s", r, n),
+    )
+    return Recording("ticking", "T1", channels)
+
+
+def test_terms_are_compared_with_what_is_without_them_by_the_same_clocks(monkeypatch):
+    """One reading of the rate on the other side of a tick is worth more than what is asked of a term."""
+    data, estimate = estimated({}, [ticking(2)], clocks=True)
+    judged = Thruster(data, (JUMP,)).judged(estimate, rng(0))
+    begun, ended = [], []
+
+    def watched(model, theta, *others):
+        begun.append((theta.shift, theta.rate_shift))
+        ended.append(refresh(model, theta, *others))
+        return ended[-1]
+
+    monkeypatch.setattr("identification.mismatch.select.hidden.refresh", watched)
+    told, _ = hidden(estimate, judged, data)
+    now = ended[0].fit.theta
+    assert now.rate_shift == pytest.approx(0.002, abs=2e-4)
+    assert begun[1:-1] == [(now.shift, now.rate_shift)] * (len(begun) - 2)
+    assert told.gain > told.asked

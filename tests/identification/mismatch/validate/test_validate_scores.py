@@ -94,7 +94,7 @@ def test_an_error_is_that_of_every_sample_whatever_the_rows(fitted):
 
 
 def ramps(noise: float) -> Recording:
-    """Up and down in ticks of 40 ms, the force read 82 times a second: more ticks than samples get rows of their own."""
+    """Up and down in ticks of 40 ms, the force read 82 times a second: too many for rows of their own."""
     when = np.arange(0.0, RAMPS, 0.04)
     level = 9.0 * np.sin(2 * np.pi * when / 20.0)
     t = np.arange(0.005, RAMPS, 1 / 82.15)
