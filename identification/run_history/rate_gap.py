@@ -26,9 +26,9 @@ NODES, ROWS_A_NODE = 17, 50
 LEAST_ROWS = 8
 SLOW = 4
 """Rows on either side that foretell a row best, where what is seen wanders."""
-CALMER = 0.2
+CALMER = 0.5
 """Of the error with which neighbours foretell a row of the gap: held rows that err less are the ones to be asked."""
-HELD_SHARE = 0.5
+HELD_SHARE = 0.25
 """Of the rows, at rest between two commands: fewer are not all that is known of the gap."""
 REACHES = (1, 2, 4, 8, 16, 32, 64, 128)
 """Rows on either side."""

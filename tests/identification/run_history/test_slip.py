@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from identification.recording import Channel, Recording
-from identification.run_history.rate_gap import held_rows
+from identification.run_history.rate_gap import driver_at_rate, gap_of_driver, held_rows
 from identification.run_history.remembered import RememberedRun
 from identification.run_history.slip import slip
 from tests.identification.mismatch.small import history
@@ -14,8 +14,8 @@ from tests.identification.mismatch.small import history
 TICK, K, SECONDS = 0.02, 0.73, 160.0
 
 
-def ramped(share=0.012, period=20.0):
-    """Levels of 4 s, half a second of ramp in ticks between them; the rate is off by a share that comes and goes, and
+def ramped(share=0.012, period=20.0, step=0.8):
+    """Levels of 4 s, half a second of ramp in ticks of `step` V between them; the rate is off by a share that comes and goes, and
     read at instants that are not quite the ticks'."""
     rng = np.random.default_rng(3)
     time = TICK * np.arange(int(SECONDS / TICK))
@@ -23,7 +23,7 @@ def ramped(share=0.012, period=20.0):
     volts, now = [], 0.0
     for t in time.tolist():
         aim = aims[int(t / 4.0)]
-        now += float(np.clip(aim - now, -0.8, 0.8))
+        now += float(np.clip(aim - now, -step, step))
         volts.append(now)
     level = np.array(volts)
     read = time + rng.uniform(0.0, TICK, time.size)
@@ -62,3 +62,11 @@ def test_a_ramp_says_when_the_rate_was_read_and_not_how_far_off_it_is():
     found = slip(run, h.driver, K)
     true = 0.012 * h.driver * np.sin(2 * np.pi * h.middle / 20.0)
     assert np.std(found - true) < 0.6 * np.std(true), "2.3 times it where every row is asked"
+
+
+def test_holds_are_asked_also_where_most_of_a_run_is_ramps():
+    run = RememberedRun(h := replace(history(ramped(step=0.2)), rate_per_driver=K))
+    held = held_rows(driver_at_rate(h), gap_of_driver(h))
+    assert 0.3 < np.mean(held) < 0.5
+    true = 0.012 * h.driver * np.sin(2 * np.pi * h.middle / 20.0)
+    assert np.std(slip(run, h.driver, K) - true) < 0.3 * np.std(true), "as large as it where every row is asked"
