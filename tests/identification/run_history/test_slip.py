@@ -15,8 +15,8 @@ TICK, K, SECONDS = 0.02, 0.73, 160.0
 
 
 def ramped(share=0.012, period=20.0, step=0.8):
-    """Levels of 4 s, half a second of ramp in ticks of `step` V between them; the rate is off by a share that comes and goes, and
-    read at instants that are not quite the ticks'."""
+    """Levels of 4 s, half a second of ramp in ticks of `step` V between them; the rate is off by a share that comes and
+    goes, and read at instants that are not quite the ticks'."""
     rng = np.random.default_rng(3)
     time = TICK * np.arange(int(SECONDS / TICK))
     aims = rng.choice([-20.0, -12.0, -5.0, 5.0, 12.0, 20.0], int(SECONDS / 4.0) + 1)
