@@ -28,8 +28,8 @@ DENSE_ZONE = 10.0
 WINDOW_SHARE = 0.3
 """Of the spacing, at most, before and after a sample."""
 WINDOWED = 0.4
-"""Of the intervals: samples on ramps that have windows, at most; each takes two, and those beside a small tick are told
-by the tick itself."""
+"""Of the intervals: samples on ramps that have windows, at most; each takes two. Where there are more the ticks are
+edges, and cut the intervals of the samples beside them."""
 GROWTH = 0.06
 """Length of an interval per time since the last change."""
 MOVES = 0.01
@@ -239,19 +239,22 @@ def _shortly_after(changes: Floats, time: Floats, zone: float) -> Floats:
 
 
 def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most: int) -> Floats:
-    """Shortly after every change of a command, each sample gets a short interval of its own: after steps alone where
-    samples are dense, or many are on ramps."""
+    """Every change of a command is an edge, and shortly after it each sample gets a short interval of its own: after
+    steps alone where samples are dense, or many are on ramps."""
     if not held.stepwise:
         return edges
     dense = spacing < LEAST_WINDOWED
     zone = DENSE_ZONE * spacing if dense else max(WINDOW_ZONE, 5 * spacing)
-    small = 0.0
-    if dense or _shortly_after(_changes(held, edges, small), time, zone).size > WINDOWED * most:
-        small = policy.prepare.COMMAND_STEP
-    changes = _changes(held, edges, small)
+    changes = _changes(held, edges, policy.prepare.COMMAND_STEP if dense else 0.0)
+    if not changes.size or changes.size > most:
+        return edges
     own = _shortly_after(changes, time, zone)
+    if own.size > WINDOWED * most and not dense:
+        edges = np.union1d(edges, changes)
+        changes = _changes(held, edges, LARGEST_TICK)
+        own = _shortly_after(changes, time, zone)
     half = min(WINDOW, WINDOW_SHARE * spacing)
-    if not changes.size or max(changes.size, own.size) > most:
+    if own.size > most:
         return edges
     if not own.size:
         return np.asarray(np.union1d(edges, changes), dtype=np.float64)
