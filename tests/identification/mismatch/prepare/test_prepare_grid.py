@@ -108,6 +108,17 @@ def test_a_slow_sine_without_steps_has_even_intervals():
     assert np.max(np.diff(edges)) < 0.3
 
 
+def test_where_most_samples_are_on_ramps_the_ticks_cut_their_intervals_and_no_sample_has_a_window():
+    """Ticks of 40 ms and 3 % of the largest command, 80 samples/s: an interval for each sample, and one for each tick
+    beside; two windows for each and seven intervals for each tick were three times as many."""
+    start = np.arange(0.0, 120.0, 0.04)
+    value = 30.0 * np.sin(start / 1.5)
+    time = np.arange(0.011, 120.0, 1 / 80)
+    edges = edges_of(time, Held(command(start, value), 120.0), 10_000)
+    assert set(start[(start > edges[0]) & (start < edges[-1])].tolist()) <= set(edges.tolist())
+    assert edges.size < time.size + start.size + 100
+
+
 def test_a_gap_in_the_samples_is_an_interval_of_its_own():
     time = np.concatenate([np.arange(0.0, 20.0, 0.05), np.arange(30.0, 50.0, 0.05)])
     edges = edges_of(time, Held(command([0.0, 25.0, 40.0], [4.0, 8.0, 2.0]), 50.0), 6000)
