@@ -111,9 +111,11 @@ def find_locked(
     if len(parts) < 2:
         return None
     every = [each for law in (FORCE, PICK_UP) for each in candidates(law.on(parts, 0.0, top), top)]
+    ways = 2  # of two laws
     if in_turns and not all(r.converter.instant for _, r in runs):
         every += [each for law in (FORCE, PICK_UP) for each in whole_orders(partial(law.on, parts, top=top), top)]
-    every = [replace(each, p_value=min(2 * each.p_value, 1.0)) for each in every]  # of two laws
+        ways *= 2
+    every = [replace(each, p_value=min(ways * each.p_value, 1.0)) for each in every]
     likely = [each for each in every if _passes(each, alarm, in_turns)]
     if not likely:
         return None
