@@ -24,7 +24,8 @@ EFFECTS = tuple(e for e in SHAPES if e not in NEEDS_FLOW | NEEDS_DRIFT | {"thrus
 LEAST_LATE = 0.012
 """s; a recording of the rig states its commands and its stamps to 2 ms (1 sigma)."""
 MOST_CREEP = 0.05
-"""Of the load, that comes late: more is no cell, however cheap (class C3 of OIML R 60 has 0.0003)."""
+"""Of the load, that comes late with the first time constant (a second has up to 1.5 times as much): more is no cell,
+however cheap (class C3 of OIML R 60 has 0.0003)."""
 TRIES = 30
 FINEST = 0.002
 """s: the world's longest step, and about that of the grid on which strengths are found."""
@@ -54,7 +55,7 @@ def drawn(
         case = found.case
         try:
             for effect in effects:
-                added = Concealed(_told_apart(effect, shape(effect, case.scale, rng)), 0.0)
+                added = Concealed(_of_a_bench(effect, shape(effect, case.scale, rng)), 0.0)
                 case = scaled_to(replace(case, effects=(*case.effects, added)), effect, strength)
             case = levelled(case, strength) if len(effects) > 1 else case
         except OutOfReach:
@@ -63,8 +64,8 @@ def drawn(
     raise OutOfReach(f"no case of {TRIES} shows {', '.join(effects)} at {strength} sigma; expected a lower strength")
 
 
-def _told_apart(effect: str, made: Shape) -> Shape:
-    """Of a size that a bench has: what comes late does so by more than the recording says that it does not know (within
+def _of_a_bench(effect: str, made: Shape) -> Shape:
+    """In sizes that a bench has: what comes late does so by more than the recording says that it does not know (within
     that it is no finding), and no cell creeps without end. Where an amount ends there, the noise meets the strength."""
     if effect in ("time_skew", "motor_lag"):
         return replace(made, lowest=LEAST_LATE)

@@ -25,7 +25,7 @@ STEADY = 10.0
 
 def series_of(fitted: Fit, data: Data) -> tuple[Series, ...]:
     """Measured minus predicted at every sample that the intervals hold; turns from the rate, or from the model, of when
-    the force was: a wave of five a turn is a fifth of its period off after some milliseconds."""
+    the force was: 3 ms are half a period of five waves a turn at 34 turns/s."""
     out = []
     follows = _rate_follows(fitted, data)
     late = delay_of(fitted.model, fitted.theta) + fitted.theta.shift - (0.0 if follows else fitted.theta.rate_shift)

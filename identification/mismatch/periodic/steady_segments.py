@@ -151,9 +151,9 @@ def stretches(runs: Sequence[tuple[int, Series]], top: float, lines: Sequence[Fl
                 and speed[s].mean() > policy.periodic.STRETCH_TURNING * top
                 and np.any(value[s])
             ):
-                speeds, even = np.quantile(speed[s], QUANTILES), np.ones(high - low, dtype=np.complex128)
+                speeds, alike = np.quantile(speed[s], QUANTILES), np.ones(high - low, dtype=np.complex128)
                 yield SteadySegment(
-                    i, r.time[s], r.turns[s], value[s], white[s], speeds, colour, r.converter, speed[s], even
+                    i, r.time[s], r.turns[s], value[s], white[s], speeds, colour, r.converter, speed[s], alike
                 )
 
 

@@ -80,14 +80,14 @@ def squares(model: Model, theta: Theta, data: Data, which: Sequence[NDArray[np.b
     found = []
     for run, rows, f, w, tare in zip(data.runs, data.rows, thrust, which, theta.tares, strict=True):
         h, r = run.history, rows[w]
-        each = h.count[r] * (h.thrust[r] - f[w]) ** 2 + scatter(model, theta, run, data.scale, tare)[r]
+        each = h.count[r] * (h.thrust[r] - f[w]) ** 2 + _scatter(model, theta, run, data.scale, tare)[r]
         piece = _pieces(h)[w]
         error, count = (np.asarray(np.bincount(piece, weights=x), dtype=np.float64) for x in (each, h.count[r]))
         found.append(Squares(error[count > 0], count[count > 0]))
     return together(found)
 
 
-def scatter(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: float) -> Floats:
+def _scatter(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: float) -> Floats:
     """(M,) N^2, sum of squares within each interval about its mean, of what the model leaves: on a ramp an interval of
     several samples moves."""
     h = run.history
