@@ -4,7 +4,7 @@ The noise would hide a coupling of the thrust to the rate. What is left of the g
 beside it what wanders: a share of the driver, or an amount, whichever foretells the rate better. A gap that changes
 from row to row, as that of a rotor that lags, is no wandering: it is taken as it was measured, or over few rows. While
 the command moves, a reading says when it was taken rather than how far off the rate is: where holds are long enough
-only they are asked.
+only they are asked, unless the gap goes on from row to row there too, as that of a rotor that overshoots.
 """
 
 from __future__ import annotations
@@ -28,6 +28,9 @@ SLOW = 4
 """Rows on either side that foretell a row best, where what is seen wanders."""
 CALMER = 0.5
 """Of the error with which neighbours foretell a row of the gap: held rows that err less are the ones to be asked."""
+OWN = 0.1
+"""Of the square of the gap where the driver moves: what neighbours there err less than is the rotor's own way, and no
+scatter of when it was read."""
 HELD_SHARE = 0.25
 """Of the rows, at rest between two commands: fewer are not all that is known of the gap."""
 REACHES = (1, 2, 4, 8, 16, 32, 64, 128)
@@ -82,12 +85,14 @@ def gap_of_driver(history: History) -> Floats:
 
 def asked_rows(history: History) -> NDArray[np.bool_]:
     """(m,) rows of the rate that the gap is found on: those between which the driver is held, where they foretell each
-    other far better than all do; the same whatever a fit makes of the driver."""
+    other far better than all do, and the others do not; the same whatever a fit makes of the driver."""
     driver, gap = driver_at_rate(history), gap_of_driver(history)
     held = held_rows(driver, gap)
     if held.all() or _missed(gap[held], driver[held]) >= CALMER * _missed(gap, driver):
         return np.ones_like(held)
-    return held
+    moving = gap[~held]
+    own = _missed(moving, driver[~held]) < OWN * float(np.mean(moving**2))
+    return np.ones_like(held) if own else held
 
 
 def _missed(gap: Floats, driver: Floats) -> float:

@@ -4,9 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from identification.recording import Channel, Recording
-from identification.run_history.rate_gap import driver_at_rate, gap_of_driver, held_rows
+from identification.run_history.rate_gap import asked_rows, driver_at_rate, gap_of_driver, held_rows
 from identification.run_history.remembered import RememberedRun
 from identification.run_history.slip import slip
 from tests.identification.mismatch.small import history
@@ -14,9 +15,10 @@ from tests.identification.mismatch.small import history
 TICK, K, SECONDS = 0.02, 0.73, 160.0
 
 
-def ramped(share=0.012, period=20.0, step=0.8):
+def ramped(share=0.012, period=20.0, step=0.8, lag=0.0, jitter=1.0):
     """Levels of 4 s, half a second of ramp in ticks of `step` V between them; the rate is off by a share that comes and
-    goes, and read at instants that are not quite the ticks'."""
+    goes, and read at instants that are not quite the ticks', with a jitter of as many ticks; it may follow `lag` s
+    behind."""
     rng = np.random.default_rng(3)
     time = TICK * np.arange(int(SECONDS / TICK))
     aims = rng.choice([-20.0, -12.0, -5.0, 5.0, 12.0, 20.0], int(SECONDS / 4.0) + 1)
@@ -26,9 +28,11 @@ def ramped(share=0.012, period=20.0, step=0.8):
         now += float(np.clip(aim - now, -step, step))
         volts.append(now)
     level = np.array(volts)
-    read = time + rng.uniform(0.0, TICK, time.size)
+    read = time + TICK * (0.5 + jitter * rng.uniform(-0.5, 0.5, time.size))
     own = 1.0 + share * np.sin(2 * np.pi * read / period)
-    rate = K * own * level + 0.002 * rng.standard_normal(time.size)
+    kept = np.exp(-TICK / lag) if lag else 0.0
+    turned = np.interp(read, time, lfilter([1.0 - kept], [1.0, -kept], level)) if lag else level
+    rate = K * own * turned + 0.002 * rng.standard_normal(time.size)
     cell = np.arange(0.0, SECONDS, 1 / 90)
     channels = (
         Channel("command_voltage", "command", "command_voltage", "V", time, level),
@@ -70,3 +74,13 @@ def test_holds_are_asked_also_where_most_of_a_run_is_ramps():
     assert 0.3 < np.mean(held) < 0.5
     true = 0.012 * h.driver * np.sin(2 * np.pi * h.middle / 20.0)
     assert np.std(slip(run, h.driver, K) - true) < 0.3 * np.std(true), "as large as it where every row is asked"
+
+
+def test_a_rotor_that_has_its_own_way_is_asked_while_it_moves():
+    """Where the loop of a drive holds the speed, what the rotor is off by on a ramp goes on from row to row."""
+    run = RememberedRun(h := replace(history(ramped(share=0.0, step=0.4, lag=0.02, jitter=0.2)), rate_per_driver=K))
+    gap = gap_of_driver(h)
+    assert 0.5 < np.mean(held_rows(driver_at_rate(h), gap)) < 0.7
+    assert asked_rows(h).all()
+    found = np.interp(h.rate_sampled[h.rate_rows], h.middle, slip(run, h.driver, K))
+    assert np.std(found - gap) < 0.1 * np.std(gap), "as large as it where only held rows are asked"
