@@ -25,7 +25,7 @@ BACK = 0.005
 """Share of the largest driver by which it must come back to have turned round."""
 NOISES = 5.0
 """Standard deviations of a measured driver: a smaller difference may be its noise."""
-LARGEST_LEAD = 0.08
+LARGEST_LEAD = 0.2
 """Of the largest driver: what changes by more is a step even in a fast ramp, and no tick."""
 LOUD_READINGS = 0.4, 0.9
 """Of the largest reading: above, the cell may clip; below, noise that is proportional is small."""

@@ -40,6 +40,19 @@ def in_best_hollow(found: Fit, data: Data, weights: Weights) -> Fit:
     return found
 
 
+def with_clocks_of(whole: Theta, found: Fit, data: Data, weights: Weights) -> Fit:
+    """The fit of a part of the rows with the clocks that all rows had, where this part tells them no better: a few
+    microseconds that it does not mind may put a sample that it has not on the other side of a tick."""
+    low, high, _ = bounds_of(found.model, data, found.theta)
+    free = high[found.layout.shift] > low[found.layout.shift]
+    shift = whole.shift if free else found.theta.shift
+    kept = replace(found.theta, shift=shift, rate_shift=whole.rate_shift if weights.rate else found.theta.rate_shift)
+    left = residual_of(found.model, kept, data, weights)
+    if float(left @ left) > found.chi2 + policy.estimate.CLOCK_HOLLOW_CHI2:
+        return found
+    return replace(found, theta=kept, residual=left)
+
+
 def by_its_clocks(found: Fit, other: Fit, data: Data, weights: Weights) -> Fit:
     """The fit, or the better one with the clocks of `other`: two terms are to be compared with the same samples on the
     same side of a tick, and a few microseconds may put one on the other."""

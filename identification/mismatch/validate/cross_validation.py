@@ -9,6 +9,7 @@ import numpy as np
 
 from identification.mismatch import policy
 from identification.mismatch.diagnosis import HeldOutRmse
+from identification.mismatch.estimate.clock_hollows import with_clocks_of
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data
@@ -89,4 +90,4 @@ def _of(data: Data, runs: Sequence[int]) -> Data:
 def _fitted(estimate: Estimate, part: Data, runs: Sequence[int]) -> Fit:
     theta = replace(estimate.fit.theta, tares=tuple(estimate.fit.theta.tares[i] for i in runs))
     w = weights(part, estimate.noise, forces(estimate.fit.model, theta, part), estimate.rate_noise)
-    return fit(estimate.fit.model, theta, part, w)
+    return with_clocks_of(theta, fit(estimate.fit.model, theta, part, w), part, w)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from identification.estimation.tails import student_sf
 from identification.mismatch import policy
 from identification.mismatch.diagnosis import HeldOutRmse
+from identification.mismatch.estimate.clock_hollows import with_clocks_of
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit, raw
 from identification.mismatch.model.data import Data
@@ -150,7 +151,7 @@ def refitted(estimate: Estimate, data: Data, keep: Sequence[NDArray[np.bool_]]) 
     """Parameters of the same model from a part of the rows, with the same noise."""
     part = replace(data, keep=tuple(keep))
     w = weights(part, estimate.noise, forces(estimate.fit.model, estimate.fit.theta, part), estimate.rate_noise)
-    return fit(estimate.fit.model, estimate.fit.theta, part, w)
+    return with_clocks_of(estimate.fit.theta, fit(estimate.fit.model, estimate.fit.theta, part, w), part, w)
 
 
 def by_blocks(before: Estimate, after: Estimate, data: Data, measured: Data, quiet: Noise) -> HeldOutRmse:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from identification.mismatch import policy
+from identification.mismatch.estimate.clock_hollows import with_clocks_of
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.data import Data
@@ -76,5 +77,6 @@ def predicting(
 def predicts(estimate: Estimate, before: Estimate, data: Data, others: Sequence[History]) -> bool:
     """Whether the model predicts what was not fitted better than the baseline, `before`."""
     split = train_test_split(estimate, data, others)
-    plain = fit(before.fit.model, before.fit.theta, split.data, split.estimate.weights)
+    found = fit(before.fit.model, before.fit.theta, split.data, split.estimate.weights)
+    plain = with_clocks_of(split.estimate.fit.theta, found, split.data, split.estimate.weights)
     return split.judge(split.estimate.fit).rmse < split.judge(plain).rmse

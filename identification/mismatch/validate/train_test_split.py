@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from identification.mismatch import policy
+from identification.mismatch.estimate.clock_hollows import with_clocks_of
 from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data
@@ -45,7 +46,8 @@ def refitted_without(split: TrainTestSplit, term: Term) -> Fit:
     now, data = split.estimate.fit, split.data
 
     def made() -> Fit:
-        return fit(*now.less(term), data, split.estimate.weights)
+        smaller = fit(*now.less(term), data, split.estimate.weights)
+        return with_clocks_of(now.theta, smaller, data, split.estimate.weights)
 
     found: Fit = data.predictor.once(("refitted without", term), made, split.estimate, data)
     return found

@@ -140,6 +140,28 @@ def test_ticks_of_a_fast_ramp_are_no_steps():
     assert thrust == pytest.approx(data.thrust[0], abs=1e-9)
 
 
+def test_large_ticks_of_a_slow_loop_are_no_steps_either():
+    """25 Hz, ramps of 12 % of full scale a tick: rates that come 4 ms late are foretold wherever they were read. Those
+    2 ms after a tick, of what was before it, were missed by a third of the tick."""
+    at, late = 0.04 * np.arange(1500.0), 0.004
+    volts = 8.0 * np.clip(2.5 * np.sin(2 * np.pi * at / 5), -1, 1)
+    assert 0.11 < np.max(np.abs(np.diff(volts))) / 8 < 0.13
+
+    def held(t):
+        return volts[np.maximum(np.searchsorted(at, t, side="right") - 1, 0)]
+
+    t, turning = np.arange(0.003, 59.0, 0.05), np.arange(0.002, 59.0, 0.0497)
+    channels = (
+        Channel("command_voltage", "command", "command_voltage", "V", at, volts),
+        Channel("thrust", "cell", "thrust", "N", t, 0.5 * held(t) * np.abs(held(t))),
+        Channel("rotation_rate", "esc", "rotation_rate", "rev/s", turning, 0.8 * held(turning - late)),
+    )
+    data, theta = start([history_of(Recording("ramps", "T1", channels, source="ramps.h5"))])
+    (_,), (rate,) = raw(Model(), replace(theta, C=0.5, tares=(0.0,), k=0.8, rate_shift=late), data, with_rate=True)
+    (history,) = data.histories
+    assert rate == pytest.approx(history.rates, abs=1e-3)
+
+
 def test_ringing_that_outlasts_a_ramp_is_as_loud_as_the_force_that_began_it():
     """Two samples of 39 Hz to an interval; 7 Hz rings on from full speed through zero. A wrong damping is far off."""
     f, z, tick, C = 7.26, 0.0238, 0.011, 0.017
