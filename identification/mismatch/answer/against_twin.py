@@ -32,8 +32,9 @@ from identification.recording import Recording
 from identification.twin import Alternative, Source, Twin, TwinNoise, names_of
 
 SAYS = {
-    "changed": "That is new: the recordings behind {} speak against it.",
-    "not shown before": "Whether that is new cannot be told: the recordings behind {} could not have shown it.",
+    "changed": "That{amount} is new: the recordings behind {origin} speak against it.",
+    "not shown before": "Whether that{amount} is new cannot be told: the recordings behind {origin} could not have "
+    "shown it.",
 }
 PART_OF_IT = "Part of what was found, or is left, may be in it."
 NOT_NEW = "Not new, for it suits the recordings behind {} as well (chi-square of both {:+.3g} if it was there then): {}"
@@ -290,7 +291,8 @@ def told_new(
             not_new.append(finding.statement)
             notes.append(NOT_NEW.format(origin, novelty.loss, finding.statement))
         else:
-            statement = f"{finding.statement} {SAYS[novelty.since].format(origin)}"
+            amount = " amount" if twin is not None and finding.effect in {t.effect for t in twin.terms} else ""
+            statement = f"{finding.statement} {SAYS[novelty.since].format(amount=amount, origin=origin)}"
             new.append(replace(finding, statement=statement, since=novelty.since))
     whole = _together([novelties[term] for term in nameless if term in novelties], len(nameless))
     if left is not None and whole is not None:
@@ -299,7 +301,7 @@ def told_new(
             notes.append(NOT_NEW.format(origin, whole.loss, left.statement))
             left = None
         else:
-            left = replace(left, statement=f"{left.statement} {SAYS[whole.since].format(origin)}")
+            left = replace(left, statement=f"{left.statement} {SAYS[whole.since].format(amount='', origin=origin)}")
     return ToldNew(tuple(new), tuple(not_new), tuple(notes), left)
 
 

@@ -33,6 +33,13 @@ def test_what_is_new_says_so_and_what_nobody_asked_stays_as_it_is():
     assert (told.not_new, told.notes) == ((), ())
 
 
+def test_of_what_the_twin_has_the_amount_is_new(fitted):
+    runs, data, estimate = fitted
+    twin = twin_of(estimate, data, runs, None)
+    (told,) = told_new({BAND: finding()}, {BAND: Novelty("changed", 80.0)}, twin).findings
+    assert told.statement.endswith(f" That amount is new: the recordings behind {twin.origin} speak against it.")
+
+
 def test_what_has_no_name_and_was_there_before_is_not_left():
     told = told_new({}, {SHAPE: Novelty("there before", -20.0)}, None, LEFT, [SHAPE])
     assert told.left is None
