@@ -99,8 +99,9 @@ class History:
     others: Mapping[str, Floats] = None  # type: ignore[assignment]  # replaced in __post_init__
     """quantity -> (M,) interpolated: bus_voltage, flow_speed, current, torque, motor_temperature, water_temperature,
     rotation_rate, neighbour_thrust."""
-    coarse: frozenset[str] = frozenset()
-    """Of these what was read in so few steps that the steps hide how it moves."""
+    coarse: Mapping[str, float] = field(default_factory=dict)
+    """Of these what was read in so few steps that the steps hide how it moved: by what share of that, one standard
+    deviation."""
     begun_error: float = 0.0
     """K, standard error of the motor temperature that the run began with."""
     rate_per_driver: float = 1.0

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from identification.mismatch.estimate.bounded_least_squares import LEAST_REACH
 from identification.mismatch.estimate.fitting import Fit, bounds_of, columns_of, residual_of
-from identification.mismatch.model.data import Data
+from identification.mismatch.model.data import Data, hidden_by_steps
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.value import QUANTILE
 from identification.physics.term import Parameter, Term
@@ -55,14 +55,25 @@ class Interval:
 
 
 def intervals(fitted: Fit, data: Data, weights: Weights, terms: Collection[Term]) -> dict[Term, tuple[Interval, ...]]:
-    """Of all parameters of those of its `terms`. Of a delay no closer than what the recordings say of their own."""
+    """Of all parameters of those of its `terms`. Of a delay no closer than what the recordings say of their own, of an
+    amount no closer than the steps of the channel that it goes with let it be."""
     out = {}
-    for term in fitted.model.terms:
+    for term, values in fitted.values.items():
         if term in terms:
-            known = enumerate(term.parameters(data.scale), fitted.layout.of(term).start)
-            unsure = QUANTILE * max(h.delay_std for h in data.histories) if term.traits.delay else 0.0
-            out[term] = tuple(_interval(fitted, data, weights, j, p, unsure) for j, p in known)
+            at = fitted.layout.of(term).start
+            known = enumerate(zip(term.parameters(data.scale), values, strict=True), at)
+            late = max(h.delay_std for h in data.histories) if term.traits.delay else 0.0
+            hidden = hidden_by_steps(term, data)
+            out[term] = tuple(
+                _interval(fitted, data, weights, j, p, QUANTILE * hypot(late, hidden * _amount(p, value)))
+                for j, (p, value) in known
+            )
     return out
+
+
+def _amount(known: Parameter, value: float) -> float:
+    """By how much the parameter is away from where its term is absent; 0 of an inner one."""
+    return 0.0 if known.neutral is None else abs(value - known.neutral)
 
 
 def _interval(fitted: Fit, data: Data, weights: Weights, j: int, known: Parameter, unsure: float = 0.0) -> Interval:

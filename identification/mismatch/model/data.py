@@ -92,6 +92,12 @@ class Data:
         return sum(r.size for r in self.rows)
 
 
+def hidden_by_steps(term: Term, data: Data) -> float:
+    """Share of its amount, one standard deviation, that the steps of what was recorded hide of a term that needs it."""
+    shares = (h.coarse.get(q, 0.0) for h in data.histories for q in term.needs)
+    return max(shares, default=0.0)
+
+
 def price(term: Term, data: Data) -> int:
     """Parameters that a term adds: a delay takes the place of the small one that the clocks are allowed."""
     return len(term.parameters(data.scale)) - int(bool(term.traits.delay) and data.most_shift > 0)

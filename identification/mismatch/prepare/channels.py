@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import combinations
+from math import sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -110,10 +111,14 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     return by_load + np.interp(at, time, smooth)
 
 
-def is_coarse(channel: Channel | None, moved: Floats) -> bool:
-    """Whether it `moved` (M,) over so few steps of its readings that these hide how."""
+def coarseness(channel: Channel | None, moved: Floats) -> float:
+    """What a step of its readings hides of how it `moved` (M,): standard deviation, as a share of all of that; 0 of one
+    that moved over many steps."""
     step = 0.0 if channel is None else channel.acquisition.quantum or 0.0
-    return step > 0 and float(np.ptp(moved)) < policy.prepare.COARSE_STEPS * step
+    far = float(np.ptp(moved))
+    if far >= policy.prepare.COARSE_STEPS * step:
+        return 0.0
+    return step / sqrt(12) / max(far, step / policy.prepare.COARSE_STEPS)
 
 
 def torque(channel: Channel, held: Held, edges: Floats, driven: Floats) -> Floats | None:

@@ -13,7 +13,7 @@ from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.clock_hollows import STEP, by_its_clocks
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
 from identification.mismatch.estimate.fitting import Fit, fit
-from identification.mismatch.model.data import Data, price
+from identification.mismatch.model.data import Data, hidden_by_steps, price
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.observer import UNWATCHED, Observer
@@ -250,7 +250,10 @@ class Thruster:
         )
 
     def rarer(self, term: Term, other: Term) -> bool:
-        """Never against a twin: what most thrusters have all the time is no likelier to have come since."""
+        """Never against a twin: what most thrusters have all the time is no likelier to have come since. As a rare one
+        counts what a few steps of a channel say of an effect, before what stands for that channel."""
+        if term.id == other.id and hidden_by_steps(term, self.data) > hidden_by_steps(other, self.data):
+            return True
         return self.data.constant_before is None and term.traits.rare and not other.traits.rare
 
     def begun_better(self, estimate: Estimate, other: Estimate) -> bool:

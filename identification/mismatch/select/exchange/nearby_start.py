@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from identification.mismatch import policy
 from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.fitting import Fit, bounds_of, change_of, fit, residual_of
-from identification.mismatch.model.data import Data, price
+from identification.mismatch.model.data import Data, hidden_by_steps, price
 from identification.mismatch.model.model import Model, extended
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
@@ -77,12 +77,14 @@ def beginnings(term: Term, values: tuple[float, ...], other: Term, scale: Scale)
 
 
 def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights, noise: Noise) -> Fit:
-    """The other of two forms where its BIC is less, of a rare one by far, and nothing contradicts it."""
+    """The other of two forms where its BIC is less, of a rare one by far, and nothing contradicts it. What stands for a
+    channel of a few steps need not be better than what those say."""
     if term not in now.model.terms:
         return now
     logn = float(np.log(max(now.residual.size, 2)))
     wanted = now.chi2 - policy.select.RIVAL_BETTER_BIC - (price(other, data) - price(term, data)) * logn
-    wanted -= policy.select.RARE_TERM_BIC * int(other.traits.rare and not term.traits.rare)
+    coarser = np.sign(hidden_by_steps(other, data) - hidden_by_steps(term, data))
+    wanted -= policy.select.RARE_TERM_BIC * (coarser or int(other.traits.rare and not term.traits.rare))
     own = now.layout.of(term)
     kept = np.array([j < own.start or j >= own.stop for j in range(now.free.size)])
     slopes = now.jacobian[:, kept[now.free]], now.free[kept]
