@@ -4,7 +4,7 @@ The noise would hide a coupling of the thrust to the rate. What is left of the g
 beside it what wanders: a share of the driver, or an amount, whichever foretells the rate better. A gap that changes
 from row to row, as that of a rotor that lags, is no wandering: it is taken as it was measured, or over few rows. While
 the command moves, a reading says when it was taken rather than how far off the rate is: where holds are long enough
-only they are asked, unless the gap goes on from row to row there too, as that of a rotor that overshoots.
+only they are asked, unless the gap goes on from row to row and into the holds, as that of a rotor that overshoots.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ SLOW = 4
 """Rows on either side that foretell a row best, where what is seen wanders."""
 CALMER = 0.5
 """Of the error with which neighbours foretell a row of the gap: held rows that err less are the ones to be asked."""
-OWN = 0.1
-"""Of the square of the gap where the driver moves: what neighbours there err less than is the rotor's own way, and no
-scatter of when it was read."""
+OWN, OWN_HELD = 0.1, 0.3
+"""Of the square of the gap where the driver moves: what neighbours there err less than goes on from row to row, and
+where that of held rows is more the rotor's own way goes on into holds."""
 HELD_SHARE = 0.25
 """Of the rows, at rest between two commands: fewer are not all that is known of the gap."""
 REACHES = (1, 2, 4, 8, 16, 32, 64, 128)
@@ -90,9 +90,14 @@ def asked_rows(history: History) -> NDArray[np.bool_]:
     held = held_rows(driver, gap)
     if held.all() or _missed(gap[held], driver[held]) >= CALMER * _missed(gap, driver):
         return np.ones_like(held)
-    moving = gap[~held]
-    own = _missed(moving, driver[~held]) < OWN * float(np.mean(moving**2))
-    return np.ones_like(held) if own else held
+    return np.ones_like(held) if has_own_way(driver, gap, held) else held
+
+
+def has_own_way(driver: Floats, gap: Floats, held: NDArray[np.bool_]) -> bool:
+    """Whether the gap (m,) where the driver (m,) moves is the rotor's own, and no matter of when it was read."""
+    moving = float(np.mean(gap[~held] ** 2))
+    goes_on = _missed(gap[~held], driver[~held]) < OWN * moving
+    return goes_on and float(np.mean(gap[held] ** 2)) > OWN_HELD * moving
 
 
 def _missed(gap: Floats, driver: Floats) -> float:

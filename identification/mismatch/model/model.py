@@ -15,6 +15,12 @@ Acting = tuple[Term, tuple[float, ...], Scale]
 """A term with its values, and the sizes that they refer to."""
 
 
+def usual_form(term: Term, other: Term, scale: Scale) -> bool:
+    """Whether the two are forms of one effect with as many parameters, and `term` is the first that textbooks have."""
+    alike = term.id == other.id and len(term.parameters(scale)) == len(other.parameters(scale))
+    return alike and ORDER[term] < ORDER[other]
+
+
 @dataclass(frozen=True, eq=False, slots=True)
 class Given:
     """A term of the baseline (a twin's) with its values: not fitted, and none of what may be dropped or swapped."""

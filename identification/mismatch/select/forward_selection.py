@@ -14,7 +14,7 @@ from identification.mismatch.estimate.clock_hollows import STEP, by_its_clocks
 from identification.mismatch.estimate.estimate import Estimate, fit_without, refresh
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data, hidden_by_steps, price
-from identification.mismatch.model.model import Model
+from identification.mismatch.model.model import Model, usual_form
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.observer import UNWATCHED, Observer
 from identification.mismatch.select.baseline import baseline, every_shape, plain_shapes, start
@@ -255,6 +255,9 @@ class Thruster:
         if term.id == other.id and hidden_by_steps(term, self.data) > hidden_by_steps(other, self.data):
             return True
         return self.data.constant_before is None and term.traits.rare and not other.traits.rare
+
+    def usual_form(self, term: Term, other: Term) -> bool:
+        return usual_form(term, other, self.data.scale)
 
     def begun_better(self, estimate: Estimate, other: Estimate) -> bool:
         """The clocks stood in a wrong hollow, and a delay that was tried led to the right one."""

@@ -104,6 +104,9 @@ class System(Protocol[T, F, S, Judged]):
     def rarer(self, term: T, other: T, /) -> bool:
         """Whether `other` is the ordinary one of two, and is named where both do as well."""
 
+    def usual_form(self, term: T, other: T, /) -> bool:
+        """Whether they are forms of one effect, and `term` is the first of them that textbooks have."""
+
     def begun_better(self, state: S, other: S, /) -> bool:
         """Whether the same terms are fitted better in `other`, where a search for one more had led and it fell away."""
 
@@ -197,6 +200,8 @@ def _best(system: System[T, F, S, Judged], found: Sequence[tuple[Candidate[T], F
     most = max(map(_worth, possible))
     near = [each for each in possible if _worth(each) >= policy.select.SIMPLER_TERM_GAIN * most]
     best = min(near, key=lambda each: (len(each[1].values[each[0].term]), -_worth(each)))
+    alike = [each for each in near if _worth(each) > _worth(best) - policy.select.RIVAL_BETTER_BIC]
+    best = next((each for each in alike if system.usual_form(each[0].term, best[0].term)), best)
     least = _worth(best) - policy.select.RARE_TERM_BIC
     ordinary = [each for each in possible if system.rarer(best[0].term, each[0].term) and _worth(each) > least]
     return max(ordinary, key=_worth, default=best)[1]

@@ -131,6 +131,10 @@ class Vehicle:
         """No effect of a vehicle is rarer than its rivals."""
         return False
 
+    def usual_form(self, _term: VehicleTerm, _other: VehicleTerm) -> bool:
+        """An effect of a vehicle has one form."""
+        return False
+
     def begun_better(self, _state: State, _other: State) -> bool:
         """A vehicle has no clocks that a term leads elsewhere."""
         return False

@@ -4,10 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.signal import lfilter
 
 from identification.recording import Channel, Recording
-from identification.run_history.rate_gap import asked_rows, driver_at_rate, gap_of_driver, held_rows
+from identification.run_history.rate_gap import driver_at_rate, gap_of_driver, has_own_way, held_rows
 from identification.run_history.remembered import RememberedRun
 from identification.run_history.slip import slip
 from tests.identification.mismatch.small import history
@@ -15,10 +14,9 @@ from tests.identification.mismatch.small import history
 TICK, K, SECONDS = 0.02, 0.73, 160.0
 
 
-def ramped(share=0.012, period=20.0, step=0.8, lag=0.0, jitter=1.0):
+def ramped(share=0.012, period=20.0, step=0.8):
     """Levels of 4 s, half a second of ramp in ticks of `step` V between them; the rate is off by a share that comes and
-    goes, and read at instants that are not quite the ticks', with a jitter of as many ticks; it may follow `lag` s
-    behind."""
+    goes, and read at instants that are not quite the ticks'."""
     rng = np.random.default_rng(3)
     time = TICK * np.arange(int(SECONDS / TICK))
     aims = rng.choice([-20.0, -12.0, -5.0, 5.0, 12.0, 20.0], int(SECONDS / 4.0) + 1)
@@ -28,11 +26,9 @@ def ramped(share=0.012, period=20.0, step=0.8, lag=0.0, jitter=1.0):
         now += float(np.clip(aim - now, -step, step))
         volts.append(now)
     level = np.array(volts)
-    read = time + TICK * (0.5 + jitter * rng.uniform(-0.5, 0.5, time.size))
+    read = time + rng.uniform(0.0, TICK, time.size)
     own = 1.0 + share * np.sin(2 * np.pi * read / period)
-    kept = np.exp(-TICK / lag) if lag else 0.0
-    turned = np.interp(read, time, lfilter([1.0 - kept], [1.0, -kept], level)) if lag else level
-    rate = K * own * turned + 0.002 * rng.standard_normal(time.size)
+    rate = K * own * level + 0.002 * rng.standard_normal(time.size)
     cell = np.arange(0.0, SECONDS, 1 / 90)
     channels = (
         Channel("command_voltage", "command", "command_voltage", "V", time, level),
@@ -76,11 +72,14 @@ def test_holds_are_asked_also_where_most_of_a_run_is_ramps():
     assert np.std(slip(run, h.driver, K) - true) < 0.3 * np.std(true), "as large as it where every row is asked"
 
 
-def test_a_rotor_that_has_its_own_way_is_asked_while_it_moves():
-    """Where the loop of a drive holds the speed, what the rotor is off by on a ramp goes on from row to row."""
-    run = RememberedRun(h := replace(history(ramped(share=0.0, step=0.4, lag=0.02, jitter=0.2)), rate_per_driver=K))
-    gap = gap_of_driver(h)
-    assert 0.5 < np.mean(held_rows(driver_at_rate(h), gap)) < 0.7
-    assert asked_rows(h).all()
-    found = np.interp(h.rate_sampled[h.rate_rows], h.middle, slip(run, h.driver, K))
-    assert np.std(found - gap) < 0.1 * np.std(gap), "as large as it where only held rows are asked"
+def test_what_goes_on_from_a_ramp_into_the_hold_is_the_rotors_own_way():
+    """The loop of a drive holds the speed, and overshoots. A clock that is off, and jitter, end with the ramp."""
+    rng = np.random.default_rng(5)
+    time = 0.02 * np.arange(4000)
+    held = np.mod(time, 2.0) > 0.8
+    driver = np.interp(np.mod(time, 8.0), [0.0, 0.8, 2.0, 2.8, 4.0, 4.8, 6.0, 6.8], [-9.0, 3, 3, 9, 9, -3, -3, -9])
+    noise = 0.02 * rng.standard_normal(time.size)
+    swing = np.sin(2 * np.pi * np.mod(time, 2.0) / 1.1) * np.exp(-np.mod(time, 2.0) / 4.0)
+    assert has_own_way(driver, swing + noise, held)
+    assert not has_own_way(driver, np.where(held, 0.0, swing) + noise, held)
+    assert not has_own_way(driver, swing * rng.uniform(-1.0, 1.0, time.size), held)

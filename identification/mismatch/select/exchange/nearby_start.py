@@ -11,7 +11,7 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.fitting import Fit, bounds_of, change_of, fit, residual_of
 from identification.mismatch.model.data import Data, hidden_by_steps, price
-from identification.mismatch.model.model import Model, extended
+from identification.mismatch.model.model import Model, extended, usual_form
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.noise.covariance import Noise
@@ -78,11 +78,12 @@ def beginnings(term: Term, values: tuple[float, ...], other: Term, scale: Scale)
 
 def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights, noise: Noise) -> Fit:
     """The other of two forms where its BIC is less, of a rare one by far, and nothing contradicts it. What stands for a
-    channel of a few steps need not be better than what those say."""
+    channel of a few steps need not be better than what those say, nor the usual one of two that do as well."""
     if term not in now.model.terms:
         return now
     logn = float(np.log(max(now.residual.size, 2)))
     wanted = now.chi2 - policy.select.RIVAL_BETTER_BIC - (price(other, data) - price(term, data)) * logn
+    wanted += 2 * policy.select.RIVAL_BETTER_BIC * int(usual_form(other, term, data.scale))
     coarser = np.sign(hidden_by_steps(other, data) - hidden_by_steps(term, data))
     wanted -= policy.select.RARE_TERM_BIC * (coarser or int(other.traits.rare and not term.traits.rare))
     own = now.layout.of(term)

@@ -71,6 +71,8 @@ class Columns:
     pressed: frozenset[Column] = frozenset()
     hidden: Column | None = None
     rare: frozenset[Column] = frozenset()
+    usual: tuple[Column, Column] | None = None
+    """Two forms of one effect, the usual one first."""
     led: Column | None = None
     """One that leads to a better fit of what it was added to, and falls away."""
 
@@ -99,6 +101,9 @@ class Columns:
 
     def rarer(self, term, other):
         return term in self.rare and other not in self.rare
+
+    def usual_form(self, term, other):
+        return (term, other) == self.usual
 
     def begun_better(self, state, other):
         return self.led is not None and other.fit.chi2 < state.fit.chi2
@@ -243,6 +248,14 @@ def test_of_two_that_gain_the_same_the_ordinary_one_is_added():
     for gain, first in ((6.0, A), (policy.select.RARE_TERM_BIC + 2.0, B)):
         y = 9 * wave(0) + np.sqrt(gain) * wave(1)
         system = Columns(y, {A: wave(0), B: y / np.linalg.norm(y)}, rare=frozenset({B}))
+        assert list(forward(system, system.state(), 1, RNG)[0].fit.values) == [first]
+
+
+def test_of_two_forms_that_gain_the_same_the_usual_one_is_added():
+    """Rounding decided it: a step in thrust after a reversal, and what the next run needed was a wake that dies."""
+    for more, first in ((0.2, A), (1.0, B)):
+        y = 9 * wave(0) + np.sqrt(more) * wave(1)
+        system = Columns(y, {A: wave(0), B: y / np.linalg.norm(y)}, usual=(A, B))
         assert list(forward(system, system.state(), 1, RNG)[0].fit.values) == [first]
 
 
