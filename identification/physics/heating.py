@@ -27,6 +27,8 @@ MOST_FLUX = 0.3
 """Magnets that have lost more do not come back (Pyrhonen et al. 2008: 0.001 to 0.0012 1/K of NdFeB)."""
 MOST_FLUX_PER_KELVIN = 0.1
 """1/K, a hundred times that of the magnet itself: a thermometer outside sees only a part of its rise."""
+SLOWER_THAN_SEEN = 2.0
+"""Magnets that follow a thermometer may be so much slower than what only time itself tells: how it moved is known."""
 
 
 def _slowest(scale: Scale) -> float:
@@ -187,7 +189,8 @@ class MeasuredHeating:
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         loss = Parameter("loss_per_kelvin", "1/K", 0.0, MOST_PER_KELVIN, 0.0)
-        later = Parameter("magnet_time_constant", "s", 5.0, _slowest(scale), told="time constant of the magnets")
+        slowest = SLOWER_THAN_SEEN * _slowest(scale)
+        later = Parameter("magnet_time_constant", "s", 5.0, slowest, told="time constant of the magnets")
         match self.form:
             case "measured_winding":
                 return (loss,)

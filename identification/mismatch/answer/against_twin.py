@@ -18,7 +18,7 @@ from identification.mismatch.answer.report_assembly import constant_of
 from identification.mismatch.compare.earlier_recordings import Novelty
 from identification.mismatch.compare.saved_model_baseline import terms_of
 from identification.mismatch.diagnosis import Finding
-from identification.mismatch.estimate.estimate import Estimate, fit_without
+from identification.mismatch.estimate.estimate import Estimate, fit_without, forces
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.estimate.rate_levels import rate_by_levels
 from identification.mismatch.estimate.stairs import covariance
@@ -36,6 +36,8 @@ SAYS = {
     "not shown before": "Whether that{amount} is new cannot be told: the recordings behind {origin} could not have "
     "shown it.",
 }
+NEAR_REST = 0.05
+"""Of the largest thrust: below, a factor of the thrust says little."""
 PART_OF_IT = "Part of what was found, or is left, may be in it."
 NOT_NEW = "Not new, for it suits the recordings behind {} as well (chi-square of both {:+.3g} if it was there then): {}"
 
@@ -65,7 +67,7 @@ def with_twin(
     effects = {effect for effect, _ in anew}
     findings = tuple(_relative(f, before, (f.effect, f.form) in anew, was) for f in draft.findings)
     changed = changed_constant(before, estimate, data, known, draft.model["C"].unit)
-    if changed is not None and (findings or beside) and _little(changed):
+    if changed is not None and (findings or beside) and _referred(changed, before, estimate, data):
         draft = replace(draft, notes=(*draft.notes, f"{changed.statement} {PART_OF_IT}"))
     elif changed is not None:
         findings = (*findings, changed)
@@ -132,9 +134,24 @@ def given_values(twin: Twin) -> dict[str, Value]:
     }
 
 
-def _little(changed: Finding) -> bool:
+def _referred(changed: Finding, before: Twin, estimate: Estimate, data: Data) -> bool:
+    """Whether C moved by little more than by what it refers to: of thrust that grows as |V|^2.03 it is another at every
+    level, and the twin's is that of one of them."""
     now, was = changed.parameters["C"].value, changed.parameters["before"].value
-    return abs(now / was - 1) < policy.answer.CONSTANT_MOVED
+    known = {term.effect for term in before.terms}
+    new = [t for t in estimate.fit.model.terms if t.traits.refers and t.id not in known]
+    least, most = _gains(estimate.fit, new, data) if new else (1.0, 1.0)
+    little = policy.answer.CONSTANT_MOVED
+    return least - little < was / now < most + little
+
+
+def _gains(fitted: Fit, terms: Sequence[Term], data: Data) -> tuple[float, float]:
+    """Least and most factor of the thrust that these terms of the model make, where it is not near rest."""
+    whole = np.concatenate(forces(fitted.model, fitted.theta, data))
+    less = np.concatenate(forces(*fitted.less(*terms), data))
+    turning = np.abs(less) > NEAR_REST * float(np.max(np.abs(less)))
+    gain = whole[turning] / less[turning]
+    return float(np.min(gain, initial=1.0)), float(np.max(gain, initial=1.0))
 
 
 def _own_constant(twin: Twin, estimate: Estimate, data: Data) -> tuple[float, float]:

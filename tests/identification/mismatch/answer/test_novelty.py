@@ -4,12 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from identification.flexible_terms.flexible import Flexible
 from identification.mismatch.answer.against_twin import changed_constant, told_new, twin_of, with_twin
 from identification.mismatch.compare.earlier_recordings import Novelty
+from identification.mismatch.estimate.fitting import fit
+from identification.physics.exponent import Exponent
+from tests.identification.diagnosed_runs import C
 from tests.identification.mismatch.answer.answered import BAND, LEFT, UNEVEN, draft, finding
+from tests.identification.mismatch.small import known_noise, short
 
 SHAPE = Flexible("command_voltage", "V", (-5.0, 0.0, 5.0), (1,), ("force",))
 
@@ -79,3 +84,17 @@ def test_a_little_of_the_constant_beside_what_is_left_is_a_note(fitted):
     beside = with_twin(draft(), sure, data, runs, before, beside=True)
     assert beside.findings == ()
     assert "is left, may be in it" in beside.notes[0]
+
+
+def test_c_beside_a_term_that_refers_it_to_a_voltage_is_no_change():
+    """Of thrust that grows as |V|^2.05 C is that of the highest level, and the twin's that of the middle: 2.4 % and 11
+    sigma were told as a changed thrust constant beside the exponent."""
+    runs = [short(lambda _, V, F: F * np.abs(V / 4.0) ** 0.05, seconds=60.0)]
+    data, estimate = known_noise({Exponent(): (2.05,)}, runs)
+    bare = twin_of(replace(estimate, fit=fit(*estimate.fit.less(Exponent()), data, estimate.weights)), data, runs, None)
+    sure = replace(bare, covariance=((1e-12,),))
+    told = with_twin(draft(findings=(finding("exponent"),)), estimate, data, runs, replace(sure, C=C))
+    assert [f.effect for f in told.findings] == ["exponent"]
+    assert "may be in it" in told.notes[0]
+    far = with_twin(draft(findings=(finding("exponent"),)), estimate, data, runs, replace(sure, C=0.7 * C))
+    assert [f.effect for f in far.findings] == ["exponent", "thrust_constant"]
