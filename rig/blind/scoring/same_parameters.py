@@ -150,14 +150,14 @@ def _copper(p: Table, truth: Table, *, measured: bool) -> Table:
     s, winding = truth["scale"], _of("winding_resistance", truth)
     upstream = _per_volt(winding["resistance"], truth) if winding else 0.0
     cold = 2.0 * s["voltage"] / (1.0 + sqrt(1.0 + 4.0 * upstream * s["voltage"]))
-    w, copper = _per_volt(p["resistance"], truth), p.get("copper", COPPER)
+    w, copper, series = _per_volt(p["resistance"], truth), p.get("copper", COPPER), upstream or None
     if measured:
-        return {"loss_per_kelvin": loss_per_kelvin(w, cold, copper)}
+        return {"loss_per_kelvin": loss_per_kelvin(w, cold, copper, series)}
     time = {"time_constant": truth["thruster"]["heating_time"]}
     if "current" in truth["channels"]:
         return time
     rise = truth["thruster"]["heating"] * (s["current"] * (cold / s["voltage"]) ** 2) ** 2
-    return time | {"loss": loss_at_full(w, cold, rise, copper)}
+    return time | {"loss": loss_at_full(w, cold, rise, copper, series)}
 
 
 SAME: Final[Mapping[str, Same]] = {
