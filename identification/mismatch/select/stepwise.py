@@ -245,7 +245,9 @@ def accept_threshold(extra: int) -> float:
 
 
 def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Standing[F, T]] | None]:
-    """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end."""
+    """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end. A model
+    that was left for values that are not possible is not come back to."""
+    left = set[frozenset[T]]()
     for _ in range(ROUNDS):
         best: tuple[float, F] | None = None
         standing = {term: stands(system, state, term) for term in state.fit.values}
@@ -255,6 +257,8 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
             if system.impossible(state, term):
                 price = policy.select.PRESSED_TERM_HANDICAP * (less.chi2 - state.fit.chi2)
             for rival in rivals:
+                if frozenset(rival.fit.values) in left:
+                    continue
                 # a rarer one stays only where it is better by more than this: it must be so to come at all
                 rarer = int(system.rarer(term, rival.term)) - int(system.rarer(rival.term, term))
                 ordinary = rarer * policy.select.RARE_TERM_BIC
@@ -265,6 +269,8 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
         best = system.merged(state, standing, best)
         if best is None:
             return state, standing
+        if any(system.impossible(state, term) for term in state.fit.values):
+            left.add(frozenset(state.fit.values))
         state = system.replaced(state, best[1])
     return state, None
 
