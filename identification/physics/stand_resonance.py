@@ -12,6 +12,10 @@ from identification.physics.traits import Dynamics, Traits
 from identification.recording import Floats
 from identification.run_history.filters import resonant
 
+LOWEST = 0.5
+"""Hz: slower than any stand that thrusters are tried on; a fit goes on from there."""
+LONG = 0.03
+"""Damping of what rings on for five periods: trials between which such ringing stays in phase are as close as that."""
 TRIED = 18
 """Frequencies to look for it with."""
 HIGHEST = 300.0
@@ -52,13 +56,15 @@ class StandResonance:
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
         highest = min(0.4 / scale.interval, HIGHEST)
-        return tuple((1.0, float(f), 0.1) for f in np.geomspace(0.5, max(highest, 0.6), TRIED))
+        return tuple((1.0, float(f), 0.1) for f in np.geomspace(LOWEST, max(highest, 0.6), TRIED))
 
     def finer(self, values: tuple[float, ...], scale: Scale) -> tuple[tuple[float, ...], ...]:
-        # ringing that is out of phase after a cycle or two looks like nothing: no slope leads there
+        # ringing that is out of phase after a cycle or two looks like nothing: no slope leads there, and no blunt trial
         most = self.parameters(scale)[1].high
         near = values[1] * np.geomspace(0.6, 1.6, 31)
-        return tuple((values[0], float(min(f, most)), damping) for f in near for damping in (0.03, 0.1))
+        found = [(values[0], float(min(f, most)), damping) for f in near for damping in (LONG, 0.1)]
+        anywhere = np.geomspace(LOWEST, most, max(round(float(np.log(most / LOWEST)) / (1.3 * LONG)), 2))
+        return *found, *((values[0], float(f), LONG) for f in anywhere)
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
         rung = resonant(value, now.history.dt, theta[1], theta[2])
