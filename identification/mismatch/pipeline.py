@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from identification.mismatch.select.begun_otherwise import begun_otherwise
 from identification.mismatch.select.forward_selection import search
 from identification.mismatch.select.search_again import search_again
 from identification.mismatch.select.stage import exchange_rivals
+from identification.mismatch.select.wrong_side import on_their_side
 from identification.mismatch.unnamed import stage as unnamed
 from identification.mismatch.validate.judged import HeldBack, judged
 from identification.mismatch.validate.second_search import without_what_is_refused
@@ -106,6 +108,7 @@ def traced(
     sound = faults.run(prepared, wired.faults, None if baseline is None else baseline.slip_rate)
     if isinstance(sound, Refusal):
         return sound
+    sound = replace(sound, histories=on_their_side(sound.histories, given))
     watch.stage("looking for effects")
     first = found = search(sound.histories, draws.select, given=given, without=without, watch=watch)
     original = sound.histories

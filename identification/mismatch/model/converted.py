@@ -50,11 +50,12 @@ def _beside_means(run: RememberedRun, passed: Passed) -> Floats:
 
 
 def _means(run: RememberedRun, passed: Passed) -> Floats:
-    """(M,) rate |rate| of a driver that stands still in each interval."""
+    """(M,) rate |rate| of a driver that stands still in each interval: the force comes late, as in the model."""
     if passed.ring is not None:
         return passed.rung_means(run)
-    rate = passed.means(run)
-    return rate * np.abs(rate)
+    rate = run.driven(passed.rotor)
+    force = rate * np.abs(rate)
+    return run.delayed(force, passed.delay) if passed.delay else force
 
 
 def _each(run: RememberedRun, passed: Passed) -> Floats:

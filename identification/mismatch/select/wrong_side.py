@@ -1,0 +1,74 @@
+"""Single samples on the other side of a tick than the clocks say: the command was quick or slow to the wire then.
+
+A ramp is written in ticks, and each is a jump of thrust and rate. A sample within a millisecond of one is foretold by
+what was held before it or after it, and which it was is a matter of what a bus and a drive did that once: of 24 sigma
+one such sample was "something left after steps" where nothing was left out. It is no data.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from identification.mismatch.estimate.estimate import unweighted
+from identification.mismatch.estimate.fitting import fit, raw
+from identification.mismatch.model.model import Model
+from identification.mismatch.select.baseline import start
+from identification.mismatch.select.forward_selection import Given
+from identification.recording import Floats
+from identification.run_history.history import History, Samples
+
+NEAR = 0.0015
+"""s from a tick: farther off no bus or drive makes the difference."""
+FAR_OFF = 4.5
+"""Standard deviations, by the median: what is nearer may be noise."""
+TOLD = 0.5
+"""Of the error, at most, is left where the other side of the tick is what is foretold."""
+FEW = 0.01
+"""Of the rows: where more are so, the model is wrong and not the side."""
+
+
+def on_their_side(histories: Sequence[History], given: Given | None = None) -> tuple[History, ...]:
+    """The runs without such samples, thrust and rate each by the clock of a first fit of the baseline."""
+    if any(h.ticks is None or h.static for h in histories):
+        return tuple(histories)
+    data, theta = start(histories)
+    data, theta, model = given(data, theta) if given is not None else (data, theta, Model())
+    found = fit(model, theta, data, unweighted(data)).theta
+    thrust, rate = raw(model, found, data, with_rate=data.with_rate)
+    out = []
+    for i, h in enumerate(histories):
+        samples, rows = h.thrust_samples, h.rows
+        off = _wrong(h, samples, rows, data.thrust[i] - thrust[i], found.shift, lambda v: found.C * v * np.abs(v))
+        gone = np.isin(np.arange(h.count.size), rows[off])
+        new = replace(h, count=np.where(gone, 0, h.count), thrust=np.where(gone, np.nan, h.thrust))
+        if data.with_rate and h.rate is not None and h.rate_count is not None:
+            rows = h.rate_rows
+            off = _wrong(h, h.rate_samples, rows, h.rates - rate[i], found.rate_shift, lambda v: found.k * v)
+            gone = np.isin(np.arange(h.count.size), rows[off])
+            counted = np.where(gone, 0, h.rate_count)
+            new = replace(new, rate=np.where(gone, np.nan, h.rate), rate_count=counted)
+        out.append(new)
+    return tuple(out)
+
+
+def _wrong(
+    h: History, samples: Samples, rows: NDArray[np.intp], error: Floats, shift: float, made: Callable[[Floats], Floats]
+) -> NDArray[np.bool_]:
+    """(m,) of rows with one sample those whose error the other side of a tick tells; `made`: what a driver makes."""
+    assert h.ticks is not None
+    when, value = h.ticks
+    at, many = samples.middle[rows] - shift, samples.count[rows]
+    last = np.clip(np.searchsorted(when, at, side="right") - 1, 0, when.size - 1)
+    after = np.minimum(last + 1, when.size - 1)
+    seen = made(value)
+    std = float(np.median(np.abs(error) * np.sqrt(many))) / 0.6745
+    far = (many == 1) & (np.abs(error) > FAR_OFF * std)
+    off = np.zeros(rows.size, dtype=np.bool_)
+    for other, apart in ((np.maximum(last - 1, 0), at - when[last]), (after, when[after] - at)):
+        near = far & (np.abs(apart) < NEAR)
+        off |= near & (np.abs(error - (seen[other] - seen[last])) < TOLD * np.abs(error))
+    return off if np.count_nonzero(off) <= FEW * rows.size else np.zeros_like(off)
