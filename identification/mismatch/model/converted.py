@@ -39,23 +39,14 @@ def converted_samples(model: Model, theta: Theta, run: RememberedRun, F: Floats,
     if history.ticks is None:
         return at
     passed = dynamics_between(model, theta, history, largest, delay_of(model, theta) + theta.shift)
-    line = within_intervals(run.converted_amid(_means(run, passed)), history.edges, history.sample_time)
+    line = within_intervals(run.converted_amid(passed.force_means(run)), history.edges, history.sample_time)
     return at + theta.C * (_each(run, passed) - line)
 
 
 def _beside_means(run: RememberedRun, passed: Passed) -> Floats:
     samples = run.samples("thrust")
-    beside = samples.means(_each(run, passed)) - run.converted(_means(run, passed))
+    beside = samples.means(_each(run, passed)) - run.converted(passed.force_means(run))
     return np.where(samples.count > 0, beside, 0.0)
-
-
-def _means(run: RememberedRun, passed: Passed) -> Floats:
-    """(M,) rate |rate| of a driver that stands still in each interval: the force comes late, as in the model."""
-    if passed.ring is not None:
-        return passed.rung_means(run)
-    rate = run.driven(passed.rotor)
-    force = rate * np.abs(rate)
-    return run.delayed(force, passed.delay) if passed.delay else force
 
 
 def _each(run: RememberedRun, passed: Passed) -> Floats:

@@ -56,7 +56,8 @@ def _ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: f
     known = _remembered(run, "thrust", passed)
     if passed.ring is not None:
         return np.asarray(share * known[0], dtype=np.float64)
-    return run.lately("ahead", lambda: share * (2 * np.abs(x) * known[0] + known[1]), x, known, share)
+    then = run.delayed(x, passed.delay) if passed.delay else x
+    return run.lately("ahead", lambda: share * (2 * np.abs(then) * known[0] + known[1]), then, known, share)
 
 
 def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, late: float) -> Floats:
@@ -147,7 +148,7 @@ def _leads(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:
     seen, force = _followed(run, channel, replace(passed, ring=None))
     if passed.ring is None:
         beside = lead(history, seen, means, samples, size)
-        return np.array([beside, curvature(history, force, means, beside, samples)])
+        return np.array([beside, curvature(history, force, means, passed.force_means(run), beside, samples)])
     assert history.ticks is not None
     when, value = history.ticks
     rung = force + samples.means(passed.ringing(*run.after_ticks(channel, passed.delay), when, value))

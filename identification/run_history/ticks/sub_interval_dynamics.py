@@ -40,6 +40,15 @@ class Passed:
         out = run.driven(self.rotor)
         return run.delayed(out, self.delay) if self.delay else out
 
+    def force_means(self, run: RememberedRun) -> Floats:
+        """(M,) of rate |rate|, means over intervals, of a driver that stands still in each: what comes late is the
+        force, as in the model, and no mean of it is the square of a mean."""
+        if self.ring is not None:
+            return self.rung_means(run)
+        rate = run.driven(self.rotor)
+        force = rate * np.abs(rate)
+        return run.delayed(force, self.delay) if self.delay else force
+
     def rung_means(self, run: RememberedRun) -> Floats:
         """(M,) of rate |rate| as the stand shows it, means over intervals, of a driver that stands still in each."""
         assert self.ring is not None

@@ -20,9 +20,10 @@ def lead(history: History, seen: Floats, means: Floats, samples: Samples, size: 
     return _ticks(np.where(samples.count > 0, beside, 0.0), size)
 
 
-def curvature(history: History, seen: Floats, means: Floats, beside: Floats, samples: Samples) -> Floats:
-    """(M,) rate |rate| `seen` at the samples less what the line through means of the rate and its lead make of it."""
-    line = reconstructed(means * np.abs(means), history.middle, samples.middle)
+def curvature(history: History, seen: Floats, means: Floats, force: Floats, beside: Floats, samples: Samples) -> Floats:
+    """(M,) rate |rate| `seen` at the samples less the line through its means `force` (M,), and what the lead `beside`
+    the `means` of the rate makes of it."""
+    line = reconstructed(force, history.middle, samples.middle)
     return np.where(beside != 0, seen - line - 2 * np.abs(means) * beside, 0.0)
 
 
@@ -41,7 +42,8 @@ def with_leads(history: History, measured: Floats | None = None) -> History:
     driver, size, samples = history.driver, history.size, history.thrust_samples
     value = _held(history, samples)
     beside = lead(history, samples.means(value), driver, samples, size)
-    curved = curvature(history, samples.means(value * np.abs(value)), driver, beside, samples)
+    force = driver * np.abs(driver)
+    curved = curvature(history, samples.means(value * np.abs(value)), driver, force, beside, samples)
     out = replace(history, lead=beside, curved=curved, sample_lead=each_lead(history, value, driver, size))
     if history.rate is None:
         return out

@@ -163,6 +163,21 @@ def test_large_ticks_of_a_slow_loop_are_no_steps_either():
     assert rate == pytest.approx(history.rates, abs=1e-3)
 
 
+def test_large_ticks_that_come_late_are_foretold_in_every_sample():
+    """Force that comes 2 ms late: it is late itself, where a late rate was squared samples were 3 % of a tick off."""
+    at, late, C = 0.04 * np.arange(1500.0), 0.002, 0.017
+    volts = 25.7 * np.clip(2.5 * np.sin(2 * np.pi * at / 9), -1, 1)
+    t = np.arange(0.1, 59.0, 0.0131)
+    x = volts[np.searchsorted(at, t - late, side="right") - 1]
+    channels = (
+        Channel("command_voltage", "command", "command_voltage", "V", at, volts),
+        Channel("thrust", "cell", "thrust", "N", t, C * x * np.abs(x)),
+    )
+    data, theta = start([history_of(Recording("ramps", "T1", channels, source="ramps.h5"))])
+    (told,), _ = raw(Model(), replace(theta, C=C, tares=(0.0,), shift=late), data, with_rate=False)
+    assert told == pytest.approx(data.thrust[0], abs=1e-9)
+
+
 def test_means_of_large_ticks_that_come_late_are_foretold():
     """Force that comes 2 ms late, means over 13 ms, ticks of 7 % of full scale: the rate was late in the means between
     which it was told, and then squared; 1 % of a tick was missed beside each, and a stand of 32 Hz named for it."""
