@@ -41,16 +41,17 @@ def on_their_side(histories: Sequence[History], given: Given | None = None) -> t
     thrust, rate = raw(model, found, data, with_rate=data.with_rate)
     out = []
     for i, h in enumerate(histories):
-        samples, rows = h.thrust_samples, h.rows
-        off = _wrong(h, samples, rows, data.thrust[i] - thrust[i], found.shift, lambda v: found.C * v * np.abs(v))
-        gone = np.isin(np.arange(h.count.size), rows[off])
-        new = replace(h, count=np.where(gone, 0, h.count), thrust=np.where(gone, np.nan, h.thrust))
+        error = data.thrust[i] - thrust[i]
+        gone = _wrong(h, h.thrust_samples, h.rows, error, found.shift, lambda v: found.C * v * np.abs(v))
+        new = h
+        if gone.any():
+            new = replace(new, count=np.where(gone, 0, h.count), thrust=np.where(gone, np.nan, h.thrust))
         if data.with_rate and h.rate is not None and h.rate_count is not None:
-            rows = h.rate_rows
-            off = _wrong(h, h.rate_samples, rows, h.rates - rate[i], found.rate_shift, lambda v: found.k * v)
-            gone = np.isin(np.arange(h.count.size), rows[off])
-            counted = np.where(gone, 0, h.rate_count)
-            new = replace(new, rate=np.where(gone, np.nan, h.rate), rate_count=counted)
+            error = h.rates - rate[i]
+            gone = _wrong(h, h.rate_samples, h.rate_rows, error, found.rate_shift, lambda v: found.k * v)
+            if gone.any():
+                counted = np.where(gone, 0, h.rate_count)
+                new = replace(new, rate=np.where(gone, np.nan, h.rate), rate_count=counted)
         out.append(new)
     return tuple(out)
 
@@ -58,7 +59,8 @@ def on_their_side(histories: Sequence[History], given: Given | None = None) -> t
 def _wrong(
     h: History, samples: Samples, rows: NDArray[np.intp], error: Floats, shift: float, made: Callable[[Floats], Floats]
 ) -> NDArray[np.bool_]:
-    """(m,) of rows with one sample those whose error the other side of a tick tells; `made`: what a driver makes."""
+    """(M,) intervals of one sample whose error, (m,) at `rows`, the other side of a tick tells; `made`: what a driver
+    makes."""
     assert h.ticks is not None
     when, value = h.ticks
     at, many = samples.middle[rows] - shift, samples.count[rows]
@@ -71,4 +73,5 @@ def _wrong(
     for other, apart in ((np.maximum(last - 1, 0), at - when[last]), (after, when[after] - at)):
         near = far & (np.abs(apart) < NEAR)
         off |= near & (np.abs(error - (seen[other] - seen[last])) < TOLD * np.abs(error))
-    return off if np.count_nonzero(off) <= FEW * rows.size else np.zeros_like(off)
+    told = rows[off] if np.count_nonzero(off) <= FEW * rows.size else rows[:0]
+    return np.isin(np.arange(samples.count.size), told)
