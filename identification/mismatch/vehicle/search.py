@@ -132,7 +132,7 @@ class Vehicle:
         return False
 
     def usual_form(self, _term: VehicleTerm, _other: VehicleTerm) -> bool:
-        """An effect of a vehicle has one form."""
+        """No form of an effect of a vehicle goes before another."""
         return False
 
     def begun_better(self, _state: State, _other: State) -> bool:
