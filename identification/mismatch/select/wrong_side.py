@@ -2,7 +2,8 @@
 
 A ramp is written in ticks, and each is a jump of thrust and rate. A sample within a millisecond of one is foretold by
 what was held before it or after it, and which it was is a matter of what a bus and a drive did that once: of 24 sigma
-one such sample was "something left after steps" where nothing was left out. It is no data.
+one such sample was "something left after steps" where nothing was left out. It is no data; nor is one so close to a
+tick that the clocks, which are fitted, put it on this side as well as on that.
 """
 
 from __future__ import annotations
@@ -23,12 +24,16 @@ from identification.run_history.history import History, Samples
 
 NEAR = 0.0015
 """s from a tick: farther off no bus or drive makes the difference."""
+TOO_CLOSE = 0.00015
+"""s from a tick: clocks and stamps are not surer than that."""
 FAR_OFF = 4.5
 """Standard deviations, by the median: what is nearer may be noise."""
 TOLD = 0.5
 """Of the error, at most, is left where the other side of the tick is what is foretold."""
 FEW = 0.01
 """Of the rows: where more are so, the model is wrong and not the side."""
+NOT_ALL = 0.03
+"""Of the rows, at most, go because they are too close: samples in step with the ticks stay."""
 
 
 def on_their_side(histories: Sequence[History], given: Given | None = None) -> tuple[History, ...]:
@@ -59,8 +64,8 @@ def on_their_side(histories: Sequence[History], given: Given | None = None) -> t
 def _wrong(
     h: History, samples: Samples, rows: NDArray[np.intp], error: Floats, shift: float, made: Callable[[Floats], Floats]
 ) -> NDArray[np.bool_]:
-    """(M,) intervals of one sample whose error, (m,) at `rows`, the other side of a tick tells; `made`: what a driver
-    makes."""
+    """(M,) intervals of one sample whose error, (m,) at `rows`, the other side of a tick tells, or that may be on
+    either; `made`: what a driver makes."""
     assert h.ticks is not None
     when, value = h.ticks
     at, many = samples.middle[rows] - shift, samples.count[rows]
@@ -68,10 +73,14 @@ def _wrong(
     after = np.minimum(last + 1, when.size - 1)
     seen = made(value)
     std = float(np.median(np.abs(error) * np.sqrt(many))) / 0.6745
-    far = (many == 1) & (np.abs(error) > FAR_OFF * std)
-    off = np.zeros(rows.size, dtype=np.bool_)
+    far = np.abs(error) > FAR_OFF * std
+    told, either = np.zeros((2, rows.size), dtype=np.bool_)
     for other, apart in ((np.maximum(last - 1, 0), at - when[last]), (after, when[after] - at)):
-        near = far & (np.abs(apart) < NEAR)
-        off |= near & (np.abs(error - (seen[other] - seen[last])) < TOLD * np.abs(error))
-    told = rows[off] if np.count_nonzero(off) <= FEW * rows.size else rows[:0]
-    return np.isin(np.arange(samples.count.size), told)
+        jump = seen[other] - seen[last]
+        told |= far & (np.abs(apart) < NEAR) & (np.abs(error - jump) < TOLD * np.abs(error))
+        either |= (np.abs(jump) > std) & (np.abs(apart) < TOO_CLOSE)
+    gone = rows[:0]
+    for each, most in ((told, FEW), (either, NOT_ALL)):
+        off = rows[each & (many == 1)]
+        gone = np.concatenate([gone, off]) if off.size <= most * rows.size else gone
+    return np.isin(np.arange(samples.count.size), gone)

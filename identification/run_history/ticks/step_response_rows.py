@@ -156,7 +156,7 @@ def _ticking(history: History, at: Floats, steps: Floats, longest: float) -> NDA
 def _normal(
     history: History, at: Floats, change: Floats, nodes: Floats, used: NDArray[np.bool_]
 ) -> Iterator[tuple[Floats, Floats, float, int]]:
-    """(gram, moment, square of the thrust, samples) of each stretch of CHUNK intervals."""
+    """(gram, moment, square of the thrust, samples beyond the means taken out) of each stretch of CHUNK intervals."""
     index = np.clip(np.searchsorted(history.edges, history.sample_time, side="right") - 1, 0, used.size - 1)
     total = np.concatenate([[0.0], np.cumsum(change)])
     for first in range(0, used.size, CHUNK):
@@ -174,7 +174,7 @@ def _normal(
         samples = int(np.count_nonzero(kept[j - j[0]]))
         if samples > NODES:
             gram = Samples(t, j - j[0]).gram(levels, _held_back(t, last, at, change, nodes), kept)
-            yield gram[1:, 1:], gram[1:, 0], float(gram[0, 0]), samples
+            yield gram[1:, 1:], gram[1:, 0], float(gram[0, 0]), samples - int(np.count_nonzero(kept))
 
 
 def _held_back(t: Floats, last: NDArray[np.intp], at: Floats, change: Floats, nodes: Floats) -> csr_array:
@@ -207,11 +207,11 @@ def _axes(parts: list[tuple[Floats, Floats, float, int]], nodes: Floats, levels:
         return None
     power, axis = power[kept], axis[:, kept]
     response = axis @ ((axis.T @ moment) / power)
-    samples = sum(p[3] for p in parts)
+    freedom = sum(p[3] for p in parts) - power.size
     left = sum(p[2] for p in parts) - float(moment @ response)
-    variance = left / max(samples - power.size, 1)
-    if variance <= 0:
+    if freedom <= 0 or left <= 0:
         return None
+    variance = left / freedom
     scores = np.array([(axis.T @ (p[1] - p[0] @ response)) / np.sqrt(power) for p in parts])
     colour = np.maximum(np.sum(scores**2, axis=0) / variance * len(parts) / (len(parts) - 1), 1.0)
     seen = (axis.T @ moment) / np.sqrt(power * variance * colour)

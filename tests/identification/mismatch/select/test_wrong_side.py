@@ -10,20 +10,20 @@ from tests.identification.mismatch.small import history
 TICK, LATE, C = 0.02, 0.002, 0.5
 
 
-def ramps(lag=0.0, quick=()):
+def ramps(lag=0.0, quick=(), every=0.0117):
     """Ramps in ticks of 2 % for 40 s, thrust 85 times a second and 2 ms late; of `quick` samples the command was 0.8 ms
     sooner. The recording's history, and the thrust of each sample."""
     rng = np.random.default_rng(1)
     when = TICK * np.arange(2000)
     volts = np.interp(when, np.arange(0.0, 41.0, 2.0), rng.choice([-10.0, -5.0, 5.0, 10.0], 21))
     volts = np.round(volts / 0.2) * 0.2
-    t = np.arange(0.1, 39.5, 0.0117)
+    t = np.arange(0.1 + LATE, 39.5, every)
     early = np.zeros(t.size)
     early[list(quick)] = 0.0008
     x = volts[np.searchsorted(when, t - LATE + early, side="right") - 1]
     F = C * x * np.abs(x)
     if lag:
-        F = lfilter([0.0117 / lag], [1.0, 0.0117 / lag - 1.0], F)
+        F = lfilter([every / lag], [1.0, every / lag - 1.0], F)
     F += 0.02 * rng.standard_normal(t.size)
     unsure = Acquisition(delay_std=0.002)
     channels = (
@@ -38,13 +38,32 @@ def dropped(h):
     return h.sampled[h.rows][~np.isin(h.rows, clear.rows)]
 
 
-def test_a_sample_that_saw_a_tick_early_is_no_data_and_all_others_are():
+def from_a_tick(t):
+    """s between what a sample at `t` saw and the tick nearest to it."""
+    return np.abs((t - LATE + TICK / 2) % TICK - TICK / 2)
+
+
+def test_a_sample_that_saw_a_tick_early_is_no_data():
     """Of 24 sigma one was something left after steps in a run in which nothing was left out."""
-    h, t, F = ramps()
+    _, t, F = ramps()
     _, _, sooner = ramps(quick=range(t.size))
-    first, second, *_ = np.flatnonzero(np.abs(sooner - F) > 0.5)[4:]
+    first, second, *_ = np.flatnonzero((np.abs(sooner - F) > 0.5) & (from_a_tick(t) > 0.0004))[4:]
+    gone = dropped(ramps(quick=(first, second))[0])
+    assert {t[first], t[second]} <= set(gone.tolist())
+    assert np.max(from_a_tick(np.setdiff1d(gone, t[[first, second]]))) < 0.0004
+
+
+def test_a_sample_that_the_clocks_put_on_either_side_is_no_data():
+    """Of 25 sigma one was 0.01 ms from a tick, where the fitted clock had come to rest."""
+    h, t, _ = ramps()
+    gone = dropped(h)
+    assert 0 < gone.size < 0.03 * t.size
+    assert np.max(from_a_tick(gone)) < 0.0004
+
+
+def test_samples_in_step_with_the_ticks_stay():
+    h, *_ = ramps(every=TICK)
     assert dropped(h).size == 0
-    assert dropped(ramps(quick=(first, second))[0]).tolist() == [t[first], t[second]]
 
 
 def test_where_many_are_off_it_is_not_the_side():
