@@ -33,4 +33,4 @@ def chi_square_per_row(rows):
 def test_few_samples_to_an_interval_leave_rows_of_unit_noise():
     """A mean taken out of two samples leaves one: 63 rows had a chi-square of 143 where nothing was left out."""
     found = [tick_rows(sine(seed)) for seed in range(8)]
-    assert 0.5 < np.mean([chi_square_per_row(rows) for rows in found]) < 1.1
+    assert 0.7 < np.mean([chi_square_per_row(rows) for rows in found]) < 1.15
