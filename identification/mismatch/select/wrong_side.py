@@ -1,4 +1,4 @@
-"""Single samples on the other side of a tick than the clocks say: the command was quick or slow to the wire then.
+"""Single samples on the other side of a tick than the clocks say, as the command was quick or slow to the wire then.
 
 A ramp is written in ticks, and each is a jump of thrust and rate. A sample within a millisecond of one is foretold by
 what was held before it or after it, and which it was is a matter of what a bus and a drive did that once: of 24 sigma
@@ -25,7 +25,7 @@ from identification.run_history.history import History, Samples
 NEAR = 0.0015
 """s from a tick: farther off no bus or drive makes the difference."""
 TOO_CLOSE = 0.00015
-"""s from a tick: clocks and stamps are not surer than that."""
+"""s from a tick: some times the 0.02 ms by which stamps were off where it showed (docs/proof-diary.md, 2026-11-29)."""
 FAR_OFF = 4.5
 """Standard deviations, by the median: what is nearer may be noise."""
 TOLD = 0.5
@@ -47,13 +47,13 @@ def on_their_side(histories: Sequence[History], given: Given | None = None) -> t
     out = []
     for i, h in enumerate(histories):
         error = data.thrust[i] - thrust[i]
-        gone = _wrong(h, h.thrust_samples, h.rows, error, found.shift, lambda v: found.C * v * np.abs(v))
+        gone = _doubtful(h, h.thrust_samples, h.rows, error, found.shift, lambda v: found.C * v * np.abs(v))
         new = h
         if gone.any():
             new = replace(new, count=np.where(gone, 0, h.count), thrust=np.where(gone, np.nan, h.thrust))
         if data.with_rate and h.rate is not None and h.rate_count is not None:
             error = h.rates - rate[i]
-            gone = _wrong(h, h.rate_samples, h.rate_rows, error, found.rate_shift, lambda v: found.k * v)
+            gone = _doubtful(h, h.rate_samples, h.rate_rows, error, found.rate_shift, lambda v: found.k * v)
             if gone.any():
                 counted = np.where(gone, 0, h.rate_count)
                 new = replace(new, rate=np.where(gone, np.nan, h.rate), rate_count=counted)
@@ -61,7 +61,7 @@ def on_their_side(histories: Sequence[History], given: Given | None = None) -> t
     return tuple(out)
 
 
-def _wrong(
+def _doubtful(
     h: History, samples: Samples, rows: NDArray[np.intp], error: Floats, shift: float, made: Callable[[Floats], Floats]
 ) -> NDArray[np.bool_]:
     """(M,) intervals of one sample whose error, (m,) at `rows`, the other side of a tick tells, or that may be on

@@ -54,7 +54,7 @@ SHAPE = 0.01
 """Of a step: how far a response is known between nodes, and a static curve from level to level."""
 GAIN_STD = 0.1
 """Relative: how far the slope of the static curve may be off C V|V| where the command ticks."""
-ALIKE = 20.0
+IN_COMMON = 20.0
 """Stretches for which what all axes have in common counts, beside those of an axis itself: few tell little of one."""
 MOST_KEPT = 1000
 JUMP_STD = 0.3
@@ -216,7 +216,7 @@ def _axes(parts: list[tuple[Floats, Floats, float, int]], nodes: Floats, levels:
     variance = left / freedom
     scores = np.array([(axis.T @ (p[1] - p[0] @ response)) / np.sqrt(power) for p in parts])
     each = np.sum(scores**2, axis=0) / variance * len(parts) / (len(parts) - 1)
-    colour = np.maximum((ALIKE * float(np.mean(each)) + len(parts) * each) / (ALIKE + len(parts)), 1.0)
+    colour = np.maximum((IN_COMMON * float(np.mean(each)) + len(parts) * each) / (IN_COMMON + len(parts)), 1.0)
     seen = (axis.T @ moment) / np.sqrt(power * variance * colour)
     design = np.sqrt(power / (variance * colour))[:, None] * axis.T
     gain = float(response[0])
