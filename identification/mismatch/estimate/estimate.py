@@ -113,11 +113,10 @@ def _refreshed(
     rate_noise = None
     if data.with_rate:
         left_rate = [h.rates - f for h, f in zip(data.histories, rate, strict=True)]
-        at = [f[:, None] for f in rate] if in_time else curves(data)
         rate_noise = fit_noise(
             data.rate_rows,
             left_rate,
-            at,
+            _beside_rate(rate, data) if in_time else curves(data),
             [np.zeros(r.size) for r in left_rate],
             start=estimate.rate_noise if estimate is not None else None,
             in_time=in_time,
@@ -137,6 +136,16 @@ def unweighted(data: Data) -> Weights:
         [replace(r, count=np.ones(r.time.size)) for r in data.thrust_rows],
         unit=True,
     )
+
+
+def _beside_rate(rate: Sequence[Floats], data: Data) -> list[Floats]:
+    """(m, k) run by run, beside which the noise of the rate is judged: a factor of the rate, and what a given baseline
+    is not sure of, which is no noise."""
+    factor = [f[:, None] for f in rate]
+    unsure = data.prior_factor.rate if data.prior_factor is not None else ()
+    if len(unsure) < len(factor):
+        return factor
+    return independent([np.column_stack(pair) for pair in zip(factor, unsure, strict=True)])
 
 
 def curves(data: Data) -> list[Floats]:
