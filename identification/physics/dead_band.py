@@ -10,6 +10,7 @@ import numpy as np
 from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Traits
 from identification.recording import Floats
+from identification.run_history.command_means import command_means
 
 EDGE = 2e-4
 """Of the largest command: a ramp this narrow keeps the prediction of a jump continuous in the parameter."""
@@ -51,15 +52,19 @@ class DeadBand:
         return tuple((min(float(share) * values[0], most),) for share in np.geomspace(0.3, 3.0, 48))
 
     def apply(self, value: Floats, now: TermContext, theta: tuple[float, ...]) -> Floats:
-        # a command that moves within an interval passes the threshold in a part of it; its variance tells how far
-        moved = np.sqrt(12 * np.abs(now.history.excess))
-        if self.form == "jump":
-            edge = np.maximum(self.edge * now.scale.driver, moved)
-            out: Floats = value * np.clip((np.abs(value) - theta[0]) / edge + 0.5, 0.0, 1.0) if theta[0] > 0 else value
-            return out
-        half = 0.5 * np.maximum(LEAST_MOVE * now.scale.driver, moved)
-        shrunk: Floats = (_integral(value + half, theta[0]) - _integral(value - half, theta[0])) / (2 * half)
-        return shrunk
+        if theta[0] <= 0:
+            return value
+        history, least = now.history, (self.edge if self.form == "jump" else LEAST_MOVE) * now.scale.driver
+        if value is history.driver and history.ticks is not None:
+            return command_means(history, lambda each: self._mean(each, 0.5 * least, theta[0]))
+        # what moves within an interval passes the threshold in a part of it; its variance tells how far
+        return self._mean(value, 0.5 * np.maximum(least, np.sqrt(12 * np.abs(history.excess))), theta[0])
+
+    def _mean(self, value: Floats, half: Floats | float, half_width: float) -> Floats:
+        """(M,) of what acts of voltages that lie evenly within `half` of `value` (M,)."""
+        total = _of_jump if self.form == "jump" else _of_shrink
+        out: Floats = (total(value + half, half_width) - total(value - half, half_width)) / (2 * half)
+        return out
 
     def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
         V, width = model.symbol, f"{theta[0]:.6g}"
@@ -72,8 +77,14 @@ class DeadBand:
         return f"Dead band: within +-{theta[0]:.3g} {scale.driver_unit} the rotor does not turn, and {what}."
 
 
-def _integral(value: Floats, half_width: float) -> Floats:
-    """Of the voltage that acts where only what is beyond the band does, from 0 to `value` (M,)."""
+def _of_jump(value: Floats, half_width: float) -> Floats:
+    """(M,) integral of the voltage that acts, from 0 to `value`, where all of it does beyond the band."""
+    out: Floats = 0.5 * np.maximum(value**2 - half_width**2, 0.0)
+    return out
+
+
+def _of_shrink(value: Floats, half_width: float) -> Floats:
+    """The same where only what is beyond the band acts."""
     out: Floats = 0.5 * np.maximum(np.abs(value) - half_width, 0.0) ** 2
     return out
 

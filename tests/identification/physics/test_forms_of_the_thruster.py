@@ -37,9 +37,22 @@ def test_a_moving_command_passes_the_edge_of_a_dead_band_within_an_interval():
     mean = fine.mean(axis=1)
     moving = replace(H, edges=np.arange(31.0), driver=mean, excess=np.mean(fine**2, axis=1) - mean**2)
     got = term("dead_band", "jump").apply(mean, moment(moving, S), (3.07,))
-    assert got == pytest.approx(np.where(fine > 3.07, fine, 0.0).mean(axis=1), abs=0.04)
+    assert got == pytest.approx(np.where(fine > 3.07, fine, 0.0).mean(axis=1), abs=0.004)
     shrunk = term("dead_band", "shrink").apply(mean, moment(moving, S), (3.07,))
     assert shrunk == pytest.approx(np.maximum(fine - 3.07, 0.0).mean(axis=1), abs=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("form", "acts"), [("jump", lambda v: np.where(v > 0.44, v, 0.0)), ("shrink", lambda v: np.maximum(v - 0.44, 0.0))]
+)
+def test_ticks_of_a_command_pass_a_dead_band_one_by_one(form, acts):
+    """A ramp in ticks of 0.1 V, three in an interval: one acts or it does not, whatever their mean is."""
+    fine = 0.1 * np.arange(30.0).reshape(10, 3) + 0.05
+    mean = fine.mean(axis=1)
+    ticks = np.arange(30.0) / 3, fine.ravel()
+    stairs = replace(H, edges=np.arange(11.0), driver=mean, excess=np.mean(fine**2, axis=1) - mean**2, ticks=ticks)
+    got = term("dead_band", form).apply(mean, moment(stairs, S), (0.44,))
+    assert got == pytest.approx(acts(fine).mean(axis=1), abs=1e-10)
 
 
 def test_static_forms_of_the_propeller():
