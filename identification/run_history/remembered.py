@@ -6,6 +6,7 @@ depend on the order in which they are made. None of it is a part of the history,
 
 from __future__ import annotations
 
+from collections.abc import Callable, Hashable
 from functools import cached_property
 from math import exp, log
 from typing import Any, Literal
@@ -38,6 +39,8 @@ MOST_REFERENCES = 64
 """Rotors from whose rates those of similar ones are sought."""
 MOST_DELAYS = 8
 """Delays of which is known what each interval looks at: that of a fit, and of its slope."""
+MOST_BEHIND = 4
+"""Of the same run behind a dead band: that of a fit, and of its slope."""
 REFERENCES = 8.0
 """Of them to a factor e in each coefficient."""
 
@@ -54,6 +57,7 @@ class RememberedRun:
         self._followers = LeastRecentlyUsed[Floats](MOST_FOLLOWERS)
         self._references = LeastRecentlyUsed[Floats](MOST_REFERENCES)
         self._delays = LeastRecentlyUsed[Delay](MOST_DELAYS)
+        self._behind = LeastRecentlyUsed[RememberedRun](MOST_BEHIND)
         self._since: dict[Channel, tuple[float, tuple[NDArray[np.intp], Floats]]] = {}
 
     @cached_property
@@ -75,6 +79,16 @@ class RememberedRun:
     @cached_property
     def _held(self) -> Held | None:
         return held_of(self.history.driver, self.history.dt)
+
+    def behind(self, what: Hashable, history: Callable[[], History]) -> RememberedRun:
+        """The run with another driver, which ticks when its own does."""
+
+        def made() -> RememberedRun:
+            out = RememberedRun(history())
+            out._since = self._since
+            return out
+
+        return self._behind(what, made)
 
     def followed(self, value: Floats, rotor: Rotor) -> Floats:
         """(M,) means of the rate of a rotor that follows `value` (rotor_lag.lag_means)."""

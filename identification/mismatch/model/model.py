@@ -11,6 +11,9 @@ from identification.physics.term import STAGES, Parameter, Scale, Term
 
 ORDER = {term: i for i, term in enumerate(sorted(CATALOGUE, key=lambda t: STAGES.index(t.stage)))}
 """Stage by stage, and in the order of the catalogue within one."""
+PLACES = {(term.id, term.form): place for term, place in ORDER.items()}
+"""The same of effects and forms: a threshold that is known is sharper than that of the catalogue, and acts where it
+does."""
 Acting = tuple[Term, tuple[float, ...], Scale]
 """A term with its values, and the sizes that they refer to."""
 
@@ -69,7 +72,7 @@ class Model:
 
 
 def _place(term: Term) -> tuple[int, int]:
-    return STAGES.index(term.stage), ORDER.get(term, len(ORDER))
+    return STAGES.index(term.stage), PLACES.get((term.id, term.form), len(PLACES))
 
 
 def acting(model: Model, theta: Theta, scale: Scale) -> list[Acting]:

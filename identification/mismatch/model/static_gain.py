@@ -29,9 +29,12 @@ MOST_GAIN = 5.0
 ROTOR = ("command", "rotor")
 
 
-def rotor_gain(model: Model, theta: Theta, run: RememberedRun, scale: Scale) -> Floats | float:
-    """(M,) or 1: change of the rate per change of the driver, both in units of the driver."""
-    terms = [each for each in _static(model, theta, scale) if each[0].stage in ROTOR]
+def rotor_gain(
+    model: Model, theta: Theta, run: RememberedRun, scale: Scale, passed: Acting | None = None
+) -> Floats | float:
+    """(M,) or 1: change of the rate per change of the driver, both in units of the driver, which has `passed` the first
+    of the terms where that is given."""
+    terms = [each for each in _static(model, theta, scale) if each[0].stage in ROTOR][passed is not None :]
     if not terms:
         return 1.0
     key = ("rotor gain", tuple(each[:2] for each in terms))

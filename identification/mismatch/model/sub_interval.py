@@ -11,6 +11,7 @@ from typing import cast
 import numpy as np
 
 from identification.mismatch import policy
+from identification.mismatch.model.behind_band import behind_band
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.static_gain import jumping, rotor_gain, thrust_gain
@@ -40,11 +41,11 @@ def delay_of(model: Model, theta: Theta) -> float:
 def ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, late: float, tare: float) -> Floats:
     """(M,) driver |driver|, at the thrust samples less the line through means: of a force at the rates x (M,) that a
     stand may pass on, and that comes `late` s after."""
-    history, largest = run.history, scale.driver
-    if history.ticks is None:
-        return _ahead(model, theta, run, x, largest, late)
-    gain = rotor_gain(model, theta, run, scale) * thrust_gain(model, theta, run, x, scale, tare)
-    return gain * _ahead(model, theta, run, x, largest, late)
+    if run.history.ticks is None:
+        return _ahead(model, theta, run, x, scale.driver, late)
+    behind, band = behind_band(model, theta, run, scale)
+    gain = rotor_gain(model, theta, behind, scale, band) * thrust_gain(model, theta, run, x, scale, tare)
+    return gain * _ahead(model, theta, behind, x, scale.driver, late)
 
 
 def _ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: float, late: float) -> Floats:
@@ -64,13 +65,14 @@ def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Sc
     """(M,) rate at its samples, in units of the driver, of a rotor whose mean rates are `x` (M,), read `late` s after;
     the rotor alone passes ticks on. A rate is read so well that a rotor on its way between two steps, however far they
     are apart, is bent within an interval."""
+    run, band = behind_band(model, theta, run, scale)
     history = run.history
     passed = Passed(_rotor(model, theta, scale.driver), delay=late if _is_late(late, history) else 0.0)
     bent = passed.rotor is not None and history.ticks is not None
     known = _remembered(run, "rate", passed) if bent or _changes(passed, history) else history.rate_lead
     share, shift = passed_on(model, theta, history), theta.rate_shift
-    gain = 1.0 if history.ticks is None else rotor_gain(model, theta, run, scale)
-    jumped = None if passed.rotor is not None else _jumped(model, theta, run, scale, passed.delay)
+    gain = 1.0 if history.ticks is None else rotor_gain(model, theta, run, scale, band)
+    jumped = None if passed.rotor or band else _jumped(model, theta, run, scale, passed.delay)
 
     def made() -> Floats:
         assert history.rate_sampled is not None

@@ -257,10 +257,7 @@ def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most:
         return edges
     dense = spacing < LEAST_WINDOWED
     zone = DENSE_ZONE * spacing if dense else max(WINDOW_ZONE, 5 * spacing)
-    ticks = _changes(held, edges, 0.0)
-    changes = _changes(held, edges, policy.prepare.COMMAND_STEP) if dense else ticks
-    if dense and 0 < ticks.size <= most:
-        edges = _from_tick_to_tick(edges, ticks, ON_RAMP * float(np.median(np.diff(edges))))
+    changes = _changes(held, edges, policy.prepare.COMMAND_STEP if dense else 0.0)
     if not changes.size or changes.size > most:
         return edges
     own = _shortly_after(changes, time, zone)
