@@ -11,7 +11,7 @@ from scipy.optimize import least_squares
 from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.estimate import curves, fit_without, reading_step, refresh, unweighted
 from identification.mismatch.estimate.fitting import bounds_of, columns_of, fit, residual_of
-from identification.mismatch.model.data import price
+from identification.mismatch.model.data import PriorPredictionFactor, price
 from identification.mismatch.model.model import Model
 from identification.physics.asymmetry import Asymmetry
 from identification.physics.dead_band import DeadBand
@@ -201,6 +201,25 @@ def test_columns_taken_as_fitted_take_their_share_of_the_residual():
     plain, beside = (refresh(Model(), theta, data, extra, None).noise for extra in (None, column))
     assert plain.white + sum(plain.slow) > 1.0
     assert beside.white + sum(beside.slow) == pytest.approx(NOISE**2, rel=0.25)
+
+
+def test_what_a_given_baseline_is_not_sure_of_is_no_noise_of_the_rate():
+    """Six rows beside a threshold made the noise of all of them sixteen times what it was."""
+    begun, level = levels(0, 80.0)
+    t = np.arange(0.0, 80.0, 1 / 8.0) + 0.03
+    rate = 3.0 * level[np.maximum(np.searchsorted(begun, t, side="right") - 1, 0)] + 0.02 * rng().standard_normal(
+        t.size
+    )
+    rate[50::100] += 1.5
+    data, theta = data_of([short(extra=(Channel("rotation_rate", "drive", "rotation_rate", "rev/s", t, rate),))])
+    (h,) = data.histories
+    beside = (np.abs(h.rates - 3.0 * h.driver[h.rate_rows]) > 1.0).astype(float)[:, None]
+    assert beside.sum() == 6
+    spread = PriorPredictionFactor((np.zeros((data.thrust[0].size, 1)),), (beside,))
+    begin = replace(theta, k=3.0)
+    blind, sure = (refresh(Model(), begin, d, None, None) for d in (data, replace(data, prior_factor=spread)))
+    assert blind.rate_noise.white > 20 * 0.02**2
+    assert sure.rate_noise.white == pytest.approx(0.02**2, rel=0.15)
 
 
 def test_rounding_of_a_table_is_noise_too():
