@@ -15,12 +15,12 @@ from identification.mismatch.estimate.at_bounds import impossible
 from identification.mismatch.name.named_term import Check
 from identification.mismatch.name.naming import Named
 from identification.mismatch.validate.held_out import Score
+from identification.mismatch.validate.prediction import WORSE
 from identification.physics.term import Scale, Term
 
 ASKED = "the same without the terms that have no name"
 BOUND = "without the other terms that were refused it would take values that are not possible"
 OTHER = "without the other terms that were refused its value is another"
-WORSE = "what was not fitted is predicted better without it"
 
 
 def not_standing(

@@ -12,11 +12,15 @@ from identification.mismatch.estimate.clock_hollows import with_clocks_of
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.model.data import Data
+from identification.mismatch.model.model import Model
 from identification.mismatch.select.baseline import baseline
 from identification.mismatch.validate.held_out import Score
 from identification.mismatch.validate.train_test_split import TrainTestSplit, better, refitted_without, train_test_split
 from identification.physics.term import Term
 from identification.run_history.history import History
+
+WORSE = "what was not fitted is predicted better without it"
+UNPROVEN = "what was not fitted is predicted as well with the baseline's amount"
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -51,6 +55,13 @@ def worse_predicted(scores: WithoutEach, *, same_run: bool) -> tuple[Term, ...]:
         for t, score in scores.less.items()
         if score.chi2 < now.chi2 - policy.validate.PREDICTED_WORSE_CHI2 and score.rmse < most
     )
+
+
+def unproven_changes(model: Model, scores: WithoutEach) -> tuple[Term, ...]:
+    """Of these terms of a model those that change what its baseline has, and are worth too little on what was not
+    fitted."""
+    least = scores.whole.chi2 + policy.validate.CHANGE_WORTH_CHI2
+    return tuple(t for t, score in scores.less.items() if model.given_for(t) is not None and score.chi2 < least)
 
 
 def predicting(

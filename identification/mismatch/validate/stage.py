@@ -13,7 +13,14 @@ from identification.mismatch.name.naming import Named
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.validate.cross_validation import by_folds
 from identification.mismatch.validate.held_out import by_blocks, by_runs
-from identification.mismatch.validate.prediction import WithoutEach, without_each, worse_predicted
+from identification.mismatch.validate.prediction import (
+    UNPROVEN,
+    WORSE,
+    WithoutEach,
+    unproven_changes,
+    without_each,
+    worse_predicted,
+)
 from identification.mismatch.validate.train_test_split import TrainTestSplit, train_test_split
 from identification.physics.term import Term
 from identification.run_history.history import History
@@ -38,8 +45,8 @@ def run(estimate: Estimate, named: Sequence[Named], data: Data, unseen: Sequence
     asked = [n.term for n in named if not n.failed_checks]
     scores = without_each(split, asked, same_run=not unseen)
     worse = worse_predicted(scores, same_run=not unseen)
-    failed = "what was not fitted is predicted better without it"
-    checked = [n.asked(_check(n, scores, failed if n.term in worse else "")) for n in named]
+    failed = dict.fromkeys(unproven_changes(estimate.fit.model, scores), UNPROVEN) | dict.fromkeys(worse, WORSE)
+    checked = [n.asked(_check(n, scores, failed.get(n.term, ""))) for n in named]
     earned = tuple(n for n in checked if not n.failed_checks)
     return Validated(split, scores, earned, tuple(n for n in checked if n.failed_checks))
 

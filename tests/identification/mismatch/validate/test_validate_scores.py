@@ -7,7 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.model.model import Given, Model
 from identification.mismatch.name.naming import Check, name
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.validate import stage
@@ -26,7 +28,13 @@ from identification.mismatch.validate.held_out import (
     rmse,
     with_tares,
 )
-from identification.mismatch.validate.prediction import predicting, predicts, without_each, worse_predicted
+from identification.mismatch.validate.prediction import (
+    predicting,
+    predicts,
+    unproven_changes,
+    without_each,
+    worse_predicted,
+)
 from identification.mismatch.validate.train_test_split import better, train_test_split
 from identification.physics.dead_band import DeadBand
 from identification.physics.speed_of_advance import SpeedOfAdvance
@@ -269,6 +277,19 @@ def test_names_without_which_the_rest_is_predicted_better_are_sent_away(fitted):
     assert worse_predicted(without_each(split, [BAND], same_run=False), same_run=False) == (BAND,)
     assert worse_predicted(without_each(split, [], same_run=False), same_run=False) == ()
     assert worse_predicted(without_each(train_test_split(after, data, ()), [BAND], same_run=True), same_run=True) == ()
+
+
+@pytest.mark.parametrize(("was", "proven"), [(1.0, True), (1.199, False)])
+def test_another_amount_of_what_was_there_must_predict(was, proven):
+    """A dead band of 1.2 V is a change of one of 1.0 V, and none of one of 1.199 V, whatever a fit makes of it."""
+    data, theta = data_of([banded(seed=3)])
+    model = Model((BAND,), (Given(BAND, (was,), data.scale),))
+    begin = replace(theta, terms=((1.2,),))
+    w = white(data, model, begin)
+    after = Estimate(fit(model, begin, data, w), Noise(NOISE**2, 0.0), None, w, data.thrust_rows)
+    scores = without_each(train_test_split(after, data, ()), [BAND], same_run=True)
+    assert unproven_changes(model, scores) == (() if proven else (BAND,))
+    assert unproven_changes(Model((BAND,)), scores) == (), "it is no change of anything"
 
 
 def test_a_clock_or_a_jump_of_one_run_is_not_asked_of_another():
