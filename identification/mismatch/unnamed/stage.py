@@ -25,6 +25,7 @@ from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
 from identification.mismatch.unnamed.shares import mended, mostly_right, nearly_right, scores_alone, with_shares
 from identification.mismatch.validate.prediction import WORSE, predicting, predicts
+from identification.mismatch.validate.refuted import refuted, without_refuted
 from identification.mismatch.validate.stage import Validated
 from identification.mismatch.validate.train_test_split import TrainTestSplit
 from identification.physics.term import Term
