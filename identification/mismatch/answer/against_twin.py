@@ -26,7 +26,7 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.name.naming import Named
 from identification.mismatch.unexplained import Remainder
-from identification.mismatch.value import Value
+from identification.mismatch.value import QUANTILE, Value
 from identification.physics.term import Term
 from identification.recording import Recording
 from identification.twin import Alternative, Source, Twin, TwinNoise, names_of
@@ -66,7 +66,7 @@ def with_twin(
     anew = {(t.id, t.form) for t in model.terms if model.given_for(t) is not None}
     effects = {effect for effect, _ in anew}
     findings = tuple(_relative(f, before, (f.effect, f.form) in anew, was) for f in draft.findings)
-    changed = changed_constant(before, estimate, data, known, draft.model["C"].unit)
+    changed = changed_constant(before, estimate, data, known, draft.model["C"])
     if changed is not None and (findings or beside) and _referred(changed, before, estimate, data):
         draft = replace(draft, notes=(*draft.notes, f"{changed.statement} {PART_OF_IT}"))
     elif changed is not None:
@@ -180,10 +180,21 @@ def _without_free_shapes(estimate: Estimate, data: Data) -> Estimate:
     return estimate
 
 
-def changed_constant(twin: Twin, estimate: Estimate, data: Data, known: str, unit: str) -> Finding | None:
-    """The thrust constant is no longer the twin's, at CHANGED_CONSTANT_FALSE_ALARM, and the change pays for itself."""
+def _towards(told: Value, was: float) -> float:
+    """The standard error of C as it is told, on the side of another: its interval holds what rivals, and what nothing
+    claims, would make of it."""
+    low, high = told.interval
+    return (told.value - low if was < told.value else high - told.value) / QUANTILE
+
+
+def changed_constant(twin: Twin, estimate: Estimate, data: Data, known: str, told: Value) -> Finding | None:
+    """The thrust constant is no longer the twin's, at CHANGED_CONSTANT_FALSE_ALARM, and the change pays for itself.
+
+    `told`: C as it is told of the model.
+    """
     value, std = _constant_now(twin, estimate, data)
-    was, was_std = twin.C, float(np.sqrt(twin.covariance[0][0]))
+    was, was_std, unit = twin.C, float(np.sqrt(twin.covariance[0][0])), told.unit
+    std = float(np.maximum(std, _towards(told, was)))
     both = float(np.hypot(std, was_std))
     if not isfinite(both) or both <= 0:
         return None

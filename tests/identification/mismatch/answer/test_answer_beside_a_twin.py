@@ -29,6 +29,9 @@ from tests.identification.diagnosed_runs import dead_band
 from tests.identification.mismatch.answer.answered import BAND, UNEVEN, draft, finding
 from tests.identification.mismatch.small import known_noise, short
 
+TOLD = Value(0.4, 0.0, "N/V^2")
+"""C of which no rival or other form says more than the fit."""
+
 
 def line(frequency=20.0, amplitude=1.0, *, ratio=None, gain=100.0, rival=None, unit="rev"):
     kind = "fixed" if ratio is None else "rotation"
@@ -154,9 +157,9 @@ def test_a_twin_holds_the_fit(fitted):
 def test_a_constant_that_moved_is_a_finding_with_its_sigmas(fitted):
     runs, data, estimate = fitted
     before = replace(twin_of(estimate, data, runs, None), origin="the twin T")
-    assert changed_constant(before, estimate, data, "the twin T", "N/V^2") is None
+    assert changed_constant(before, estimate, data, "the twin T", TOLD) is None
     moved = replace(before, C=0.9 * before.C)
-    found = changed_constant(moved, estimate, data, "the twin T", "N/V^2")
+    found = changed_constant(moved, estimate, data, "the twin T", TOLD)
     both = np.hypot(estimate.fit.std[0], np.sqrt(before.covariance[0][0]))
     z = 0.1 * before.C / both
     assert f"{z:.0f} sigma" in found.statement
@@ -164,7 +167,17 @@ def test_a_constant_that_moved_is_a_finding_with_its_sigmas(fitted):
     assert found.parameters["before"].value == pytest.approx(0.9 * before.C)
     now = estimate.fit
     unknown = replace(now, free=np.zeros_like(now.free), jacobian=np.empty((now.residual.size, 0)))
-    assert changed_constant(moved, replace(estimate, fit=unknown), data, "", "") is None, "an error that nobody knows"
+    assert changed_constant(moved, replace(estimate, fit=unknown), data, "", TOLD) is None, "an error that nobody knows"
+
+
+@pytest.mark.parametrize(("ends", "told_so"), [((0.9, 1.001), False), ((0.999, 1.1), True)])
+def test_a_constant_that_may_be_the_same_for_what_nothing_claims_has_not_changed(fitted, ends, told_so):
+    """Its interval held the twin's, and it was told as changed by five sigma of its own error."""
+    runs, data, estimate = fitted
+    before = replace(twin_of(estimate, data, runs, None), origin="the twin T")
+    was = replace(before, C=0.95 * before.C)
+    told = Value(before.C, 0.05 * before.C, "N/V^2", ends=tuple(end * before.C for end in ends))
+    assert (changed_constant(was, estimate, data, "the twin T", told) is not None) == told_so
 
 
 CURVE = Flexible("command_voltage", "V", (-9.0, -6.0, -3.0, 0.0, 3.0, 6.0, 9.0), (3,), ("force",), 1)
@@ -176,9 +189,9 @@ def test_a_constant_of_which_a_free_shape_is_a_part_has_not_moved(fitted):
     bent = tuple(-0.2 * before.C * v * abs(v) for v in CURVE.knots if v != 0.0)
     model, theta = extended(estimate.fit.model, replace(estimate.fit.theta, C=1.2 * before.C), CURVE, bent)
     beside = replace(estimate, fit=fit(model, theta, data, estimate.weights, most_steps=0))
-    assert changed_constant(before, beside, data, "the twin T", "N/V^2") is None
+    assert changed_constant(before, beside, data, "the twin T", TOLD) is None
     moved = replace(before, C=0.9 * before.C)
-    assert "+11 %" in changed_constant(moved, beside, data, "the twin T", "N/V^2").statement
+    assert "+11 %" in changed_constant(moved, beside, data, "the twin T", TOLD).statement
 
 
 def test_against_a_twin_its_terms_are_in_the_model_and_the_same_effect_comes_on_top(fitted):

@@ -12,6 +12,7 @@ from identification.mismatch.answer.against_twin import changed_constant, twin_o
 from identification.mismatch.name.naming import name
 from identification.mismatch.unnamed.shares import mostly_right
 from identification.mismatch.validate.train_test_split import train_test_split
+from identification.mismatch.value import Value
 from tests.identification.diagnosed_runs import NOISE
 from tests.identification.mismatch.answer.answered import BAND, UNEVEN, told
 from tests.identification.mismatch.small import known_noise, short
@@ -49,4 +50,4 @@ def test_a_thrust_constant_must_pay_as_well_as_be_rare(sigmas, told_so):
     twin = replace(twin_of(estimate, data, [short()], None), covariance=((0.0,),))
     moved = replace(twin, C=twin.C - sigmas * float(estimate.fit.std[0]))
     assert policy.answer.CHANGED_CONSTANT_FALSE_ALARM > 0.007
-    assert (changed_constant(moved, estimate, data, "the twin", "N/V^2") is not None) == told_so
+    assert (changed_constant(moved, estimate, data, "the twin", Value(0.4, 0.0, "N/V^2")) is not None) == told_so

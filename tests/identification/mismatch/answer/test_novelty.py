@@ -11,6 +11,7 @@ from identification.flexible_terms.flexible import Flexible
 from identification.mismatch.answer.against_twin import changed_constant, told_new, twin_of, with_twin
 from identification.mismatch.compare.earlier_recordings import Novelty
 from identification.mismatch.estimate.fitting import fit
+from identification.mismatch.value import Value
 from identification.physics.exponent import Exponent
 from tests.identification.diagnosed_runs import C
 from tests.identification.mismatch.answer.answered import BAND, LEFT, UNEVEN, draft, finding
@@ -78,10 +79,10 @@ def test_a_little_of_the_constant_beside_what_is_left_is_a_note(fitted):
     before = replace(now, C=0.99 * now.C, covariance=tuple(tuple(1e-6 * v for v in row) for row in now.covariance))
     before = replace(before, covariance=((1e-12, *before.covariance[0][1:]), *before.covariance[1:]))
     sure = replace(estimate, fit=replace(estimate.fit, jacobian=100 * estimate.fit.jacobian))
-    assert changed_constant(before, sure, data, "", "N/V^2") is not None
-    alone = with_twin(draft(), sure, data, runs, before)
+    assert changed_constant(before, sure, data, "", Value(now.C, 0.0, "N/V^2")) is not None
+    alone = with_twin(draft(model={"C": Value(now.C, 0.0, "N/V^2")}), sure, data, runs, before)
     assert [f.effect for f in alone.findings] == ["thrust_constant"]
-    beside = with_twin(draft(), sure, data, runs, before, beside=True)
+    beside = with_twin(draft(model={"C": Value(now.C, 0.0, "N/V^2")}), sure, data, runs, before, beside=True)
     assert beside.findings == ()
     assert "is left, may be in it" in beside.notes[0]
 
