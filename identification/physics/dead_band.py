@@ -61,10 +61,13 @@ class DeadBand:
         return self._mean(value, 0.5 * np.maximum(least, np.sqrt(12 * np.abs(history.excess))), theta[0])
 
     def _mean(self, value: Floats, half: Floats | float, half_width: float) -> Floats:
-        """(M,) of what acts of voltages that lie evenly within `half` of `value` (M,)."""
-        total = _of_jump if self.form == "jump" else _of_shrink
+        """(M,) of what acts of voltages that lie evenly within `half` of `value` (M,); to the last digit where all of
+        them lie on one side of the threshold."""
+        jumps, size = self.form == "jump", np.abs(value)
+        total = _of_jump if jumps else _of_shrink
         out: Floats = (total(value + half, half_width) - total(value - half, half_width)) / (2 * half)
-        return out
+        out = np.where(size - half >= half_width, value if jumps else value - np.sign(value) * half_width, out)
+        return np.where(size + half <= half_width, 0.0, out)
 
     def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
         V, width = model.symbol, f"{theta[0]:.6g}"
