@@ -180,7 +180,7 @@ def _without_free_shapes(estimate: Estimate, data: Data) -> Estimate:
     return estimate
 
 
-def _towards(told: Value, was: float) -> float:
+def _error_towards(told: Value, was: float) -> float:
     """The standard error of C as it is told, on the side of another: its interval holds what rivals, and what nothing
     claims, would make of it."""
     low, high = told.interval
@@ -194,7 +194,7 @@ def changed_constant(twin: Twin, estimate: Estimate, data: Data, known: str, tol
     """
     value, std = _constant_now(twin, estimate, data)
     was, was_std, unit = twin.C, float(np.sqrt(twin.covariance[0][0])), told.unit
-    std = float(np.maximum(std, _towards(told, was)))
+    std = float(np.maximum(std, _error_towards(told, was)))
     both = float(np.hypot(std, was_std))
     if not isfinite(both) or both <= 0:
         return None

@@ -72,7 +72,7 @@ def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Sc
     known = _remembered(run, "rate", passed) if bent or _changes(passed, history) else history.rate_lead
     share, shift = passed_on(model, theta, history), theta.rate_shift
     gain = 1.0 if history.ticks is None else rotor_gain(model, theta, run, scale, band)
-    jumped = None if passed.rotor or band else _jumped(model, theta, run, scale, passed.delay)
+    jumped = None if passed.rotor is not None or band is not None else _jumped(model, theta, run, scale, passed.delay)
 
     def made() -> Floats:
         assert history.rate_sampled is not None
