@@ -26,6 +26,8 @@ NODES, ROWS_A_NODE = 17, 50
 LEAST_ROWS = 8
 SLOW = 4
 """Rows on either side that foretell a row best, where what is seen wanders."""
+SLOWER = 0.25
+"""Of itself, over as many rows: what changes by less wanders, however plainly each row shows it."""
 CALMER = 0.5
 """Of the error with which neighbours foretell a row of the gap: held rows that err less are the ones to be asked."""
 OWN, OWN_HELD = 0.1, 0.3
@@ -69,11 +71,16 @@ def rate_gap(history: History) -> RateGap | None:
     left = gap - columns @ np.linalg.lstsq(columns, gap, rcond=1e-10)[0]
     one = np.ones_like(gap)
     by_share = running(left, driver).error < running(left, one).error
-    if running(left, driver if by_share else one).reach < SLOW:
-        return None
+    basis = driver if by_share else one
     count = one if history.rate_count is None else history.rate_count[rows].astype(np.float64)
-    smoother = Smoother(history.rate_sampled[rows], columns, driver if by_share else one, count, gap)
-    return None if smoother.law is None else RateGap(smoother, nodes, by_share, asked)
+    at = history.rate_sampled[rows]
+    smoother = Smoother(at, columns, basis, count, gap)
+    if smoother.law is None:
+        return None
+    wanders = smoother.law.frequency * SLOW * float(np.median(np.diff(at))) < SLOWER
+    if not wanders and running(gap - columns @ smoother.curve(gap), basis).reach < SLOW:
+        return None
+    return RateGap(smoother, nodes, by_share, asked)
 
 
 def gap_of_driver(history: History) -> Floats:

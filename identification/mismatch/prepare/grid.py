@@ -30,6 +30,9 @@ WINDOW_SHARE = 0.3
 WINDOWED = 0.4
 """Of the intervals: samples on ramps that have windows, at most; each takes two. Where there are more the ticks are
 edges, and cut the intervals of the samples beside them."""
+ON_RAMP = 2.0
+"""Spacings of the samples: ticks closer than this to each other are a ramp, on which an interval goes from one to the
+next. A command stands still in it."""
 GROWTH = 0.06
 """Length of an interval per time since the last change."""
 MOVES = 0.01
@@ -238,6 +241,15 @@ def _shortly_after(changes: Floats, time: Floats, zone: float) -> Floats:
     return out
 
 
+def _from_tick_to_tick(edges: Floats, ticks: Floats, apart: float) -> Floats:
+    """Ticks as edges; of the edges before, those that lie between ticks less than `apart` s from each other go."""
+    before = np.searchsorted(ticks, edges, side="right") - 1
+    close = np.append(np.diff(ticks) < apart, False)
+    free = (before < 0) | ~close[np.maximum(before, 0)]
+    free[[0, -1]] = True
+    return np.union1d(edges[free], ticks)
+
+
 def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most: int) -> Floats:
     """Every change of a command is an edge, and shortly after it each sample gets a short interval of its own: after
     steps alone where samples are dense, or many are on ramps."""
@@ -250,7 +262,7 @@ def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most:
         return edges
     own = _shortly_after(changes, time, zone)
     if own.size > WINDOWED * most and not dense:
-        edges = np.union1d(edges, changes)
+        edges = _from_tick_to_tick(edges, changes, ON_RAMP * spacing)
         changes = _changes(held, edges, LARGEST_TICK)
         own = _shortly_after(changes, time, zone)
     half = min(WINDOW, WINDOW_SHARE * spacing)
