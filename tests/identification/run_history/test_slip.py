@@ -69,7 +69,8 @@ def test_holds_are_asked_also_where_most_of_a_run_is_ramps():
     held = held_rows(driver_at_rate(h), gap_of_driver(h))
     assert 0.3 < np.mean(held) < 0.5
     true = 0.012 * h.driver * np.sin(2 * np.pi * h.middle / 20.0)
-    assert np.std(slip(run, h.driver, K) - true) < 0.3 * np.std(true), "as large as it where every row is asked"
+    left = np.std(slip(run, h.driver, K) - true)
+    assert left < 0.08 * np.std(true), "as large as it where every row is asked, or the curve found before what wanders"
 
 
 def test_what_goes_on_from_a_ramp_into_the_hold_is_the_rotors_own_way():
