@@ -37,7 +37,7 @@ def test_a_curve_is_not_made_of_what_came_by_while_a_level_was_held(seed):
 
 
 def test_rows_without_driver_tell_of_the_curve_alone():
-    time, level, curve, wander, measured = at_levels()
+    time, level, _, _, measured = at_levels()
     rest = time > 150.0
     level[rest], measured[rest] = 0.0, 0.3 + 0.002 * np.random.default_rng(0).standard_normal(np.count_nonzero(rest))
     nodes = np.sort([*NODES, 0.0])
