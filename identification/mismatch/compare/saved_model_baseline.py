@@ -61,9 +61,10 @@ def starting(twin: Twin) -> Callable[[Data, Theta], tuple[Data, Theta, Model]]:
     def begin(data: Data, theta: Theta) -> tuple[Data, Theta, Model]:
         model = Model((), given(twin))
         theta = replace(theta, C=twin.C)
-        unsure = _both(data.prior_factor, prior_factor(twin, data, theta))
+        own = prior_factor(twin, data, theta)
+        unsure = _both(data.prior_factor, own)
         before = (twin.C, sqrt(twin.covariance[0][0]))
-        return replace(data, prior_factor=unsure, constant_before=before), theta, model
+        return replace(data, prior_factor=unsure, twin_factor=own, constant_before=before), theta, model
 
     return begin
 

@@ -104,6 +104,8 @@ def _refreshed(
     parts = by_run(J, data)
     if extra is not None and extra.shape[1]:
         parts = [np.column_stack([p, e]) for p, e in zip(parts, by_run(extra, data), strict=True)]
+    if data.twin_factor is not None:  # what a given baseline is not sure of is no noise
+        parts = [np.column_stack(pair) for pair in zip(parts, data.of_rows(data.twin_factor.thrust), strict=True)]
     parts = independent(parts)
     rows = estimate.rows if estimate is not None else data.thrust_rows
     in_time = not any(h.static for h in data.histories)  # rows of a table may stand in the order of their levels
@@ -142,7 +144,7 @@ def _beside_rate(rate: Sequence[Floats], data: Data) -> list[Floats]:
     """(m, k) run by run, beside which the noise of the rate is judged: a factor of the rate, and what a given baseline
     is not sure of, which is no noise."""
     factor = [f[:, None] for f in rate]
-    unsure = data.prior_factor.rate if data.prior_factor is not None else ()
+    unsure = data.twin_factor.rate if data.twin_factor is not None else ()
     if len(unsure) < len(factor):
         return factor
     return independent([np.column_stack(pair) for pair in zip(factor, unsure, strict=True)])

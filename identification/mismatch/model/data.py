@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -42,7 +43,9 @@ class Data:
     most_shift: float = 0.0
     """s, bound of the nuisance shift; 0 where nothing moves."""
     prior_factor: PriorPredictionFactor | None = None
-    """How uncertain the baseline's own prediction is, where a twin gives it."""
+    """How uncertain the baseline's own prediction is, where a twin gives it, and levels that err as one."""
+    twin_factor: PriorPredictionFactor | None = None
+    """Of `prior_factor` what the twin gives: how large the noise is, is judged beside it."""
     constant_before: tuple[float, float] | None = None
     """C of a twin and its standard error; None without one."""
     predictor: Predictor = field(default_factory=Predictor, repr=False)
@@ -63,6 +66,12 @@ class Data:
     @cached_property
     def thrust(self) -> tuple[Floats, ...]:
         return tuple(h.thrust[r] for h, r in zip(self.histories, self.rows, strict=True))
+
+    def of_rows(self, thrust: Sequence[Floats]) -> list[Floats]:
+        """Run by run, of what is told at all intervals with thrust (n, ...), those that are fitted."""
+        if self.keep is None:
+            return list(thrust)
+        return [t[k] for t, k in zip(thrust, self.keep, strict=True)]
 
     @cached_property
     def thrust_rows(self) -> tuple[Rows, ...]:

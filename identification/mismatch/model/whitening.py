@@ -74,7 +74,6 @@ def weights(
 
 def _whitened_prior(known: Weights, data: Data, spread: PriorPredictionFactor) -> Floats | None:
     """Whitened, and turned into orthogonal columns."""
-    thrust = spread.thrust if data.keep is None else [c[k] for c, k in zip(spread.thrust, data.keep, strict=True)]
-    u, s, _ = thin_svd(known.whiten(thrust, spread.rate if known.rate else ()))
+    u, s, _ = thin_svd(known.whiten(data.of_rows(spread.thrust), spread.rate if known.rate else ()))
     kept = s > 1e-6
     return u[:, kept] * s[kept] if kept.any() else None

@@ -96,7 +96,9 @@ class Bench:
     def rehearsed(self, runs: Sequence[Sequence[PlanStep]]) -> Data:
         """Sweeps as data without measurements; each run has one flow speed."""
         histories = tuple(self._history(run, k) for k, run in enumerate(runs))
-        return replace(self.data, histories=histories, keep=None, prior_factor=None, predictor=Predictor())
+        return replace(
+            self.data, histories=histories, keep=None, prior_factor=None, twin_factor=None, predictor=Predictor()
+        )
 
     def _history(self, steps: Sequence[PlanStep], number: int) -> History:
         dt, driver, blind = intervals(steps, self.slew)

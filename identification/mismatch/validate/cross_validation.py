@@ -84,7 +84,8 @@ def fitted_to(estimate: Estimate, data: Data, runs: Sequence[int]) -> Fit:
 
 
 def _of(data: Data, runs: Sequence[int]) -> Data:
-    return replace(data, histories=tuple(data.histories[i] for i in runs), keep=None, prior_factor=None)
+    histories = tuple(data.histories[i] for i in runs)
+    return replace(data, histories=histories, keep=None, prior_factor=None, twin_factor=None)
 
 
 def _fitted(estimate: Estimate, part: Data, runs: Sequence[int]) -> Fit:
