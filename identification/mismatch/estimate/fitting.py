@@ -219,7 +219,8 @@ def fit(
 
     What comes late and clocks that differ look alike, and small steps of the command at few phases of the samples leave
     valleys between: where a shift of the clocks was found beside such a term, it is also looked for without one. So it
-    is where none at all is better: chi-square has an edge where a step passes from one sample into the next.
+    is where none at all is better, or none between force and rate: chi-square has an edge where a step passes from one
+    sample into the next.
     Ends early once chi-square is above `hopeless` and falls too slowly to get there; so does the second look. `near`: a
     fit with the same weights, with whose slopes it begins.
     """
@@ -233,12 +234,17 @@ def fit(
     doubtful = shift > policy.estimate.DOUBTFUL_CLOCK_SHIFT * data.most_shift > 0 and any(
         term.traits.delays for term in model.terms
     )
-    if not doubtful:
-        left = residual_of(model, alike, data, weights)
-        if not float(left @ left) < found.chi2:
-            return found
-    other = _descended(model, alike, data, weights, most_steps, min(hopeless, found.chi2), found)
-    return min(found, other, key=lambda each: each.chi2)
+    together = replace(found.theta, rate_shift=0.0)
+    begins = [alike] if doubtful else [t for t in (alike, together) if _chi2(model, t, data, weights) < found.chi2]
+    for begin in begins:
+        other = _descended(model, begin, data, weights, most_steps, min(hopeless, found.chi2), found)
+        found = min(found, other, key=lambda each: each.chi2)
+    return found
+
+
+def _chi2(model: Model, theta: Theta, data: Data, weights: Weights) -> float:
+    left = residual_of(model, theta, data, weights)
+    return float(left @ left)
 
 
 def _descended(

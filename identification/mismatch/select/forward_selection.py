@@ -239,9 +239,9 @@ class Thruster:
     def replaced(self, estimate: Estimate, other: Fit) -> Estimate:
         return refresh(other.model, other.theta, self.data, None, estimate)
 
-    def rivals(self, estimate: Estimate, term: Term, less: Fit) -> list[Rival]:
+    def rivals(self, estimate: Estimate, term: Term, less: Fit, stood: Mapping[Term, tuple[float, ...]]) -> list[Rival]:
         self.watch.trying(f"rivals of {term.id}")
-        return swaps(estimate, term, less, self.data, self.terms)
+        return swaps(estimate, term, less, self.data, self.terms, stood)
 
     def impossible(self, estimate: Estimate, term: Term) -> bool:
         """Its values end at what is possible, or what else was recorded contradicts that it clips."""

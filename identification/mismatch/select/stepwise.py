@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -95,8 +96,9 @@ class System(Protocol[T, F, S, Judged]):
     def replaced(self, state: S, other: F, /) -> S:
         """A smaller model, or one with a rival, in the place of the model."""
 
-    def rivals(self, state: S, term: T, less: F, /) -> list[RivalTerm[T, F]]:
-        """Terms that could do what this one does, each refitted in its place, best first; `less`: without it."""
+    def rivals(self, state: S, term: T, less: F, stood: Mapping[T, tuple[float, ...]], /) -> list[RivalTerm[T, F]]:
+        """Terms that could do what this one does, each refitted in its place, best first; `less`: without it. `stood`:
+        terms that stood in its place before, with their values."""
 
     def impossible(self, state: S, term: T, /) -> bool:
         """Whether the values of a term are none that it can have."""
@@ -248,9 +250,10 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
     """Exchange a term for a rival wherever that makes the BIC smaller; and how each term stands in the end. A model
     that was left for values that are not possible is not come back to."""
     left = set[frozenset[T]]()
+    stood: dict[T, tuple[float, ...]] = {}
     for _ in range(ROUNDS):
         best: tuple[float, F] | None = None
-        standing = {term: stands(system, state, term) for term in state.fit.values}
+        standing = {term: stands(system, state, term, stood) for term in state.fit.values}
         for term, (less, rivals) in standing.items():
             # a value that is not possible explains nothing: whatever does nearly as well goes before it
             price = 0.0
@@ -271,11 +274,14 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
             return state, standing
         if any(system.impossible(state, term) for term in state.fit.values):
             left.add(frozenset(state.fit.values))
+        stood |= state.fit.values
         state = system.replaced(state, best[1])
     return state, None
 
 
-def stands(system: System[T, F, S, Judged], state: S, term: T) -> Standing[F, T]:
-    """How a term stands: the model without it, and its rivals."""
+def stands(
+    system: System[T, F, S, Judged], state: S, term: T, stood: Mapping[T, tuple[float, ...]] = MappingProxyType({})
+) -> Standing[F, T]:
+    """How a term stands: the model without it, and its rivals, among them those that `stood` there before."""
     less = system.without(state, term)
-    return less, system.rivals(state, term, less)
+    return less, system.rivals(state, term, less, stood)

@@ -109,8 +109,10 @@ class Vehicle:
         """Under the same noise: chi-squares can be compared."""
         return State(other, state.noise, state.white)
 
-    def rivals(self, state: State, term: VehicleTerm, less: Fit) -> list[RivalTerm[VehicleTerm, Fit]]:
-        """Every other term that could take most of what this one explains."""
+    def rivals(
+        self, state: State, term: VehicleTerm, less: Fit, _stood: Mapping[VehicleTerm, tuple[float, ...]]
+    ) -> list[RivalTerm[VehicleTerm, Fit]]:
+        """Every other term that could take most of what this one explains, where it stood before or not."""
         others = [t for t in self.beside(less.values) if t != term]
         gain = less.chi2 - state.fit.chi2
         out = []

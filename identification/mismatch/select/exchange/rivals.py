@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
+from types import MappingProxyType
 
 import numpy as np
 
@@ -126,11 +127,21 @@ def one_less(
     return best
 
 
-def swaps(estimate: Estimate, term: Term, less: Fit, data: Data, terms: Sequence[Term]) -> list[RivalTerm[Term, Fit]]:
-    """Every other term (and form) that could do what this one does, refitted in its place; best first."""
+def swaps(
+    estimate: Estimate,
+    term: Term,
+    less: Fit,
+    data: Data,
+    terms: Sequence[Term],
+    stood: Mapping[Term, tuple[float, ...]] = MappingProxyType({}),
+) -> list[RivalTerm[Term, Fit]]:
+    """Every other term (and form) that could do what this one does, refitted in its place; best first. One that `stood`
+    there and was exchanged for it begins where it was: its trials need be like neither."""
     now = estimate.fit
     gain = less.chi2 - now.chi2
-    ranked = sorted(alike(estimate, term, less, data, terms).items(), key=lambda item: -item[1][0])
+    inside = {t.id for t in now.model.terms} - {term.id}
+    before = {t: (1.0, values) for t, values in stood.items() if t != term and t.id not in inside}
+    ranked = sorted((alike(estimate, term, less, data, terms) | before).items(), key=lambda item: -item[1][0])
     out = []
     extra_now = price(term, data)
     logn = float(np.log(max(now.residual.size, 2)))

@@ -74,6 +74,8 @@ class Columns:
     """Two forms of one effect, the usual one first."""
     led: Column | None = None
     """One that leads to a better fit of what it was added to, and falls away."""
+    unlike: Column | None = None
+    """One whose trials are like nothing: a rival where it stood before alone."""
 
     def fit(self, *terms):
         J = np.column_stack([self.columns[t] for t in terms]) if terms else np.empty((ROWS, 0))
@@ -122,8 +124,8 @@ class Columns:
     def replaced(self, state, other):
         return State(other)
 
-    def rivals(self, state, term, less):
-        others = [t for t in self.columns if t not in state.fit.values]
+    def rivals(self, state, term, less, stood):
+        others = [t for t in self.columns if t not in state.fit.values and (t != self.unlike or t in stood)]
         fits = [(t, self.fit(*less.values, t)) for t in others]
         found = [RivalTerm(t, f, f.chi2 - state.fit.chi2, f.chi2 - state.fit.chi2) for t, f in fits]
         return sorted(found, key=lambda r: r.bic_loss)
@@ -224,6 +226,17 @@ def test_a_better_rival_takes_the_place_and_how_each_stands_is_told():
     assert np.isclose(rival.bic_loss, 81 * (1 - 0.9**2))
 
 
+def test_what_was_exchanged_is_a_rival_of_what_took_its_place():
+    """A stand that rings, as slow as a lag: none of its trials is like the lag, and it was never told of again."""
+    system = Columns(9 * wave(0) + 5 * wave(1), {A: alike(0.95), B: wave(0), C: wave(1)}, unlike=A)
+    _, standing = exchanged(system, system.state(A, C))
+    assert standing is not None
+    assert [rival.term for rival in standing[B][1]] == [A]
+    _, standing = exchanged(system, system.state(B, C))
+    assert standing is not None
+    assert standing[B][1] == []
+
+
 def test_what_has_impossible_values_gives_way_to_what_does_nearly_as_well():
     columns = {A: wave(0), B: alike(0.95)}
     whole = Columns(9 * wave(0), columns)
@@ -274,7 +287,7 @@ def test_a_name_has_one_rival_of_each_effect_and_its_values_in_the_last_model():
     found = named_term(
         A,
         state.fit,
-        (system.fit(), system.rivals(state, A, system.fit())),
+        (system.fit(), system.rivals(state, A, system.fit(), {})),
         (Check("own_covariate", "asked", "failed"),),
     )
     assert [r.term for r in found.rivals] == [B], "neither another form of its own, nor one twice, nor what is far off"
