@@ -7,8 +7,9 @@ some thousand of them and a motor lag is still seen. Values are means over the i
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +17,7 @@ from numpy.typing import NDArray
 from identification.calibration.bend import CellBend
 from identification.recording import Floats
 from identification.run_history.converter import Converter
+from identification.run_history.least_recently_used import LeastRecentlyUsed
 
 TURNING = 0.02
 """Share of the largest driver above which it counts as driving."""
@@ -35,6 +37,10 @@ STILL = 1e-3
 """Share of the largest driver by which it may move within an interval that tells so."""
 TAIL = 3.0
 """Times the standard deviation of the others: that of the samples in the tails."""
+MOST_AFTER = 4
+"""Delays and ticks of which is remembered which tick is before each sample."""
+SAMPLES = ("thrust_samples", "rate_samples")
+"""What is worked out of samples and intervals alone."""
 GLITCH = 30.0
 """Times the median: what is off by more is no noise."""
 
@@ -52,10 +58,18 @@ class Samples:
     middle: Floats
     """(M,) s, their mean time; the middle of the interval where there are none."""
 
+    _after: LeastRecentlyUsed[tuple[NDArray[np.intp], Floats]] = field(
+        default_factory=lambda: LeastRecentlyUsed(MOST_AFTER), init=False, repr=False
+    )
+
     def after(self, when: Floats, delay: float) -> tuple[NDArray[np.intp], Floats]:
         """(N,) the last of the ticks `when` that is `delay` s ago or longer, else the first, and s since then."""
-        last = np.maximum(np.searchsorted(when, self.time - delay, side="right") - 1, 0)
-        return last, np.maximum(self.time - delay - when[last], 0.0)
+
+        def made() -> tuple[NDArray[np.intp], Floats]:
+            last = np.maximum(np.searchsorted(when, self.time - delay, side="right") - 1, 0)
+            return last, np.maximum(self.time - delay - when[last], 0.0)
+
+        return self._after(delay, made, when)
 
     def means(self, value: Floats) -> Floats:
         """(M,) means of values (N,) over each interval; 0 where there are none."""
@@ -147,6 +161,12 @@ class History:
     def __post_init__(self) -> None:
         if self.others is None:
             object.__setattr__(self, "others", {})
+
+    def with_driver(self, **changes: Any) -> History:
+        """With another driver, or with what that does at the samples; they are in the intervals in which they were."""
+        out = replace(self, **changes)
+        vars(out).update({name: vars(self)[name] for name in SAMPLES if name in vars(self)})
+        return out
 
     @cached_property
     def dt(self) -> Floats:

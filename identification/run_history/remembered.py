@@ -58,7 +58,6 @@ class RememberedRun:
         self._references = LeastRecentlyUsed[Floats](MOST_REFERENCES)
         self._delays = LeastRecentlyUsed[Delay](MOST_DELAYS)
         self._behind = LeastRecentlyUsed[RememberedRun](MOST_BEHIND)
-        self._since: dict[Channel, tuple[float, tuple[NDArray[np.intp], Floats]]] = {}
 
     @cached_property
     def step_responses(self) -> TickRows | None:
@@ -82,13 +81,7 @@ class RememberedRun:
 
     def behind(self, what: Hashable, history: Callable[[], History]) -> RememberedRun:
         """The run with another driver, which ticks when its own does."""
-
-        def made() -> RememberedRun:
-            out = RememberedRun(history())
-            out._since = self._since
-            return out
-
-        return self._behind(what, made)
+        return self._behind(what, lambda: RememberedRun(history()))
 
     def followed(self, value: Floats, rotor: Rotor) -> Floats:
         """(M,) means of the rate of a rotor that follows `value` (rotor_lag.lag_means)."""
@@ -156,8 +149,5 @@ class RememberedRun:
 
     def after_ticks(self, channel: Channel, delay: float) -> tuple[NDArray[np.intp], Floats]:
         """(N,) of each sample the last tick that is `delay` s ago or longer, else the first, and s since then."""
-        known = self._since.get(channel)
-        if known is None or known[0] != delay:
-            assert self.history.ticks is not None
-            known = self._since[channel] = delay, self.samples(channel).after(self.history.ticks[0], delay)
-        return known[1]
+        assert self.history.ticks is not None
+        return self.samples(channel).after(self.history.ticks[0], delay)

@@ -6,8 +6,6 @@ behind the band, within an interval too, follows the ticks that left it.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from identification.mismatch.model.model import Acting, Model, acting
@@ -39,9 +37,9 @@ def _behind(band: Acting, run: RememberedRun) -> History:
     history = run.history
     assert history.ticks is not None
     when, command = history.ticks
-    instant = RememberedRun(replace(history, excess=np.zeros(1)))
+    instant = RememberedRun(history.with_driver(excess=np.zeros(1)))
     left = term.apply(command, TermContext(instant, sizes, 1.0, 0.0, command), values)
     driver = term.apply(history.driver, TermContext(run, sizes, 1.0, 0.0, history.driver), values)
-    behind = replace(history, driver=driver, ticks=(when, left))
+    behind = history.with_driver(driver=driver, ticks=(when, left))
     excess = command_means(behind, lambda each: each * np.abs(each)) - driver * np.abs(driver)
-    return with_leads(replace(behind, excess=excess))
+    return with_leads(behind.with_driver(excess=excess))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from identification.mismatch.model.parameters import Layout, Theta
 from identification.physics.catalogue import CATALOGUE
@@ -41,14 +42,20 @@ class Model:
     terms: tuple[Term, ...] = ()
     given: tuple[Given, ...] = ()
 
-    @property
+    @cached_property
     def held(self) -> tuple[Given, ...]:
         """Of the baseline, what acts: a term that is fitted anew takes the place of the one given."""
         return tuple(g for g in self.given if not any(self.given_for(t) is g for t in self.terms))
 
+    @cached_property
+    def order(self) -> tuple[int, ...]:
+        """In which `held` and `terms`, one after the other, act."""
+        every = [*(g.term for g in self.held), *self.terms]
+        return tuple(sorted(range(len(every)), key=lambda i: _place(every[i])))
+
     def given_for(self, term: Term) -> Given | None:
         """What the baseline has of the same effect in the same textbook form, once: `term` is then a change of it."""
-        if term not in ORDER:
+        if not self.given or term not in ORDER:
             return None
         known = [g for g in self.given if (g.term.id, g.term.form) == (term.id, term.form)]
         return known[0] if len(known) == 1 else None
@@ -80,7 +87,8 @@ def acting(model: Model, theta: Theta, scale: Scale) -> list[Acting]:
     found = [(term, values, scale) for term, values in zip(model.terms, theta.terms, strict=True)]
     if not model.given:
         return found
-    return sorted([(g.term, g.values, g.scale) for g in model.held] + found, key=lambda each: _place(each[0]))
+    every = [*((g.term, g.values, g.scale) for g in model.held), *found]
+    return [every[i] for i in model.order]
 
 
 def reduced(model: Model, theta: Theta, without: Collection[Term]) -> tuple[Model, Theta]:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from identification.recording import Floats
@@ -44,11 +42,11 @@ def with_leads(history: History, measured: Floats | None = None) -> History:
     beside = lead(history, samples.means(value), driver, samples, size)
     force = driver * np.abs(driver)
     curved = curvature(history, samples.means(value * np.abs(value)), driver, force, beside, samples)
-    out = replace(history, lead=beside, curved=curved, sample_lead=each_lead(history, value, driver, size))
+    out = history.with_driver(lead=beside, curved=curved, sample_lead=each_lead(history, value, driver, size))
     if history.rate is None:
         return out
     turning = history.rate_samples
-    return replace(out, rate_lead=lead(history, turning.means(_held(history, turning)), driver, turning, size))
+    return out.with_driver(rate_lead=lead(history, turning.means(_held(history, turning)), driver, turning, size))
 
 
 def _paired(history: History, value: Floats) -> History:
@@ -56,8 +54,7 @@ def _paired(history: History, value: Floats) -> History:
     beside = lead(history, samples.means(value), driver, samples, np.inf)
     line = reconstructed(driver * np.abs(driver), history.middle, samples.middle)
     curved = samples.means(value * np.abs(value)) - line - 2 * np.abs(driver) * beside
-    return replace(
-        history,
+    return history.with_driver(
         lead=beside,
         curved=np.where(samples.count > 0, curved, 0.0),
         sample_lead=each_lead(history, value, driver, np.inf),
