@@ -27,7 +27,9 @@ class DeadBand:
     physics: ClassVar[str] = "below a voltage the rotor does not turn"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
-    traits: ClassVar[Traits] = Traits(spread=True, revealed_by="fine levels close to zero, of both signs")
+    traits: ClassVar[Traits] = Traits(
+        spread=True, tick_by_tick=True, revealed_by="fine levels close to zero, of both signs"
+    )
     form: Literal["shrink", "jump"] = "shrink"
     edge: float = EDGE
     """Of the largest command: over which a jump is spread."""

@@ -91,6 +91,8 @@ class Traits:
     """Some of its trials are where the data point to: it pays for all its parameters in full."""
     spread: bool = False
     """SpreadJump: a level within the blur of its threshold is taken half for one beyond it."""
+    tick_by_tick: bool = False
+    """It lets the ticks of a command pass one by one: no slope says what becomes of those that cross its threshold."""
     delay: str = ""
     """The parameter that is a delay of the reading: such a term takes the place of the nuisance shift of clocks."""
     instant: str = ""

@@ -1,4 +1,4 @@
-"""The run as it is behind a dead band with a jump, where that comes first: ticks pass it one by one or not at all.
+"""The run as it is behind a dead band, where that comes first: ticks pass it one by one or not at all.
 
 A slope says what a small change of a tick becomes, and nothing of a tick that begins to act. What follows the command
 behind the band, within an interval too, follows the ticks that left it.
@@ -20,15 +20,15 @@ from identification.run_history.ticks.sub_interval_leads import with_leads
 def behind_band(model: Model, theta: Theta, run: RememberedRun, scale: Scale) -> tuple[RememberedRun, Acting | None]:
     """That run and the band; the run itself and None where no such band comes first, or nothing is known of ticks."""
     first = next(iter(acting(model, theta, scale)), None) if run.history.ticks is not None else None
-    if first is None or not _jumps(first):
+    if first is None or not _lets_ticks_pass(first):
         return run, None
     term, values, sizes = first
     return run.behind((term, values, sizes), lambda: _behind(first, run)), first
 
 
-def _jumps(each: Acting) -> bool:
-    term, values, sizes = each
-    return term.stage == "command" and values[0] > 0 and any(p.jumps for p in term.parameters(sizes))
+def _lets_ticks_pass(each: Acting) -> bool:
+    term, values, _ = each
+    return term.traits.tick_by_tick and values[0] > 0
 
 
 def _behind(band: Acting, run: RememberedRun) -> History:

@@ -88,15 +88,20 @@ def test_what_the_band_swallows_bends_nothing():
     assert np.max(np.abs(told[0][low])) < 1e-4
 
 
-def ticking(half_width):
-    """A sine of 9 V, written twenty times a second, on a rotor that begins to turn with a jump. Intervals keep step
-    with samples of the thrust, so that a tick falls within one."""
+def beyond(command, half_width, band):
+    """What acts of it."""
+    acting = command if band.form == "jump" else command - np.sign(command) * half_width
+    return np.where(np.abs(command) > half_width, acting, 0.0)
+
+
+def ticking(half_width, band):
+    """A sine of 9 V, written twenty times a second, on a rotor that begins to turn behind a dead band. Intervals keep
+    step with samples of the thrust, so that a tick falls within one."""
     start = np.arange(0.0, 240.0, 0.049)
     command = LATTICE * np.round(9.0 / LATTICE * np.sin(2 * np.pi * start / 60.0))
 
     def turning(t):
-        at = command[np.searchsorted(start, t, side="right") - 1]
-        return np.where(np.abs(at) > half_width, at, 0.0)
+        return beyond(command[np.searchsorted(start, t, side="right") - 1], half_width, band)
 
     t, force = np.arange(0.094, 239.0, 0.098), np.arange(0.0113, 239.9, 0.0302)
     channels = (
@@ -107,20 +112,21 @@ def ticking(half_width):
     return data_of([Recording("ticking", "T1", channels)])[0]
 
 
-def test_a_rotor_that_jumps_at_a_tick_is_read_before_it_or_after():
+@pytest.mark.parametrize("band", [DeadBand("jump"), DeadBand("shrink")])
+def test_a_rotor_that_begins_to_turn_at_a_tick_is_read_before_it_or_after(band):
     """A slope said half of the jump, twenty sigma of a good tachometer, and a lag of 0.4 ms was told to repair that."""
-    data = ticking(15.5 * LATTICE)
-    model, theta = Model((DeadBand("jump"),)), Theta(0.2, ((15.5 * LATTICE,),), (0.0,), k=PER_DRIVER)
+    data = ticking(15.5 * LATTICE, band)
+    model, theta = Model((band,)), Theta(0.2, ((15.5 * LATTICE,),), (0.0,), k=PER_DRIVER)
     _, told = raw(model, theta, data, with_rate=True)
     assert np.max(np.abs(told[0] - data.histories[0].rates)) < 1e-3
 
 
-def ramping(half_width, taken):
+def ramping(half_width, taken, band):
     """Fast ramps up and down in ticks of 12 ms on a rotor that lags behind a dead band, whose intervals hold several
     samples and several ticks; `taken`: by the winding, 1/V."""
     start = np.arange(0.0, 400.0, 0.0119)
     command = LATTICE * np.round(9.0 / LATTICE * (2 * np.abs((start / 12.0 + 0.5) % 2 - 1) - 1))
-    acting = np.where(np.abs(command) > half_width, command, 0.0)
+    acting = beyond(command, half_width, band)
     driving = np.sign(acting) * (np.sqrt(1 + 4 * taken * np.abs(acting)) - 1) / (2 * taken) if taken else acting
     n = np.zeros(start.size)
     for i in range(1, start.size):
@@ -137,11 +143,12 @@ def ramping(half_width, taken):
 
 
 @pytest.mark.parametrize("taken", [0.0, 0.03])
-@pytest.mark.parametrize("band", [DeadBand("jump"), DeadBand("jump").sharp()])
+@pytest.mark.parametrize("band", [DeadBand("jump"), DeadBand("jump").sharp(), DeadBand("shrink")])
 def test_a_rotor_that_lags_behind_a_band_begins_to_turn_at_a_tick(band, taken):
     """A threshold was passed by a part of an interval: 0.05 rev/s off, here, and 0.18 in a case of the proof, fifteen
-    sigma; and one that is known acted on what the winding had left of the command."""
-    data = ramping(15.5 * LATTICE, taken)
+    sigma; and one that is known acted on what the winding had left of the command. A band that shrinks the command too
+    was passed by a slope: 0.9 rev/s off in another case, and a lag of 0.2 ms was told for it."""
+    data = ramping(15.5 * LATTICE, taken, band)
     known = [(band, (15.5 * LATTICE,)), (MotorLag("first_order"), (TAU,))]
     known += [(WindingResistance(), (taken,))] if taken else []
     model = Model((), tuple(Given(term, values, data.scale) for term, values in known))
