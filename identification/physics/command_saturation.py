@@ -28,6 +28,7 @@ class CommandSaturation:
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     traits: ClassVar[Traits] = Traits(
         limits="command",
+        tick_by_tick=True,
         told_by=(("rotation_rate", "the measured rotation rate"),),
         revealed_by="current or rotation rate at the highest levels: they stop rising too",
     )

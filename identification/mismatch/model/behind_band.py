@@ -1,45 +1,64 @@
-"""The run as it is behind a dead band, where that comes first: ticks pass it one by one or not at all.
+"""The run as it is behind a drive's limit and dead band, where these come first: ticks pass them one by one, or not.
 
-A slope says what a small change of a tick becomes, and nothing of a tick that begins to act. What follows the command
-behind the band, within an interval too, follows the ticks that left it.
+A slope says what a small change of a tick becomes, and nothing of a tick that begins to act, or that a drive clips.
+What follows the command behind them, within an interval too, follows the ticks that left them.
 """
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from identification.mismatch.model.model import Acting, Model, acting
 from identification.mismatch.model.parameters import Theta
-from identification.physics.term import Scale, TermContext
+from identification.physics.term import Scale, Term, TermContext
+from identification.recording import Floats
 from identification.run_history.command_means import command_means
-from identification.run_history.history import History
+from identification.run_history.history import TURNING, History
 from identification.run_history.remembered import RememberedRun
 from identification.run_history.ticks.sub_interval_leads import with_leads
 
 
-def behind_band(model: Model, theta: Theta, run: RememberedRun, scale: Scale) -> tuple[RememberedRun, Acting | None]:
-    """That run and the band; the run itself and None where no such band comes first, or nothing is known of ticks."""
-    first = next(iter(acting(model, theta, scale)), None) if run.history.ticks is not None else None
-    if first is None or not _lets_ticks_pass(first):
-        return run, None
-    term, values, sizes = first
-    return run.behind((term, values, sizes), lambda: _behind(first, run)), first
+def behind_band(model: Model, theta: Theta, run: RememberedRun, scale: Scale) -> tuple[RememberedRun, tuple[Term, ...]]:
+    """That run, and the terms that it is behind: the last that ticks pass one by one, and all before it. The run itself
+    and none where there is no such term, or nothing is known of ticks."""
+    if run.history.ticks is None:
+        return run, ()
+    every = acting(model, theta, scale)
+    last = max((i for i, each in enumerate(every) if _lets_ticks_pass(each)), default=-1)
+    if last < 0:
+        return run, ()
+    first = tuple(every[: last + 1])
+    return run.behind(first, lambda: _behind(first, run)), tuple(term for term, _, _ in first)
 
 
 def _lets_ticks_pass(each: Acting) -> bool:
-    term, values, _ = each
-    return term.traits.tick_by_tick and values[0] > 0
+    term, values, sizes = each
+    return term.traits.tick_by_tick and values[0] != term.parameters(sizes)[0].neutral
 
 
-def _behind(band: Acting, run: RememberedRun) -> History:
-    """Its driver, ticks and leads are those that leave the band."""
-    term, values, sizes = band
+def _behind(first: Sequence[Acting], run: RememberedRun) -> History:
+    """Its driver, ticks and leads are those that leave the terms that come first."""
     history = run.history
     assert history.ticks is not None
-    when, command = history.ticks
+    (when, command), driver = history.ticks, history.driver
     instant = RememberedRun(history.with_driver(excess=np.zeros(1)))
-    left = term.apply(command, TermContext(instant, sizes, 1.0, 0.0, command), values)
-    driver = term.apply(history.driver, TermContext(run, sizes, 1.0, 0.0, history.driver), values)
-    behind = history.with_driver(driver=driver, ticks=(when, left))
+    for term, values, sizes in first:
+        if term.traits.tick_by_tick:
+            command = term.apply(command, TermContext(instant, sizes, 1.0, 0.0, command), values)
+            driver = command_means(history.with_driver(ticks=(when, command)), lambda each: each)
+        else:
+            before, driver = driver, term.apply(driver, TermContext(run, sizes, 1.0, 0.0, driver), values)
+            command = command * _share(driver, before, history, when)
+    behind = history.with_driver(driver=driver, ticks=(when, command))
     excess = command_means(behind, lambda each: each * np.abs(each)) - driver * np.abs(driver)
     return with_leads(behind.with_driver(excess=excess))
+
+
+def _share(after: Floats, before: Floats, history: History, when: Floats) -> Floats:
+    """(T,) of what drives, that a term leaves which says it of means over intervals, at the ticks."""
+    drives = np.abs(before) > TURNING * history.size
+    if not drives.any():
+        return np.ones(when.size)
+    return np.asarray(np.interp(when, history.middle[drives], after[drives] / before[drives]))

@@ -28,10 +28,10 @@ def beside_means(
     that comes `late` s after."""
     history = run.history
     passed = dynamics_between(model, theta, history, scale.driver, late)
-    behind, band = behind_band(model, theta, run, scale)
+    behind, by_tick = behind_band(model, theta, run, scale)
     known = behind.leads(("converted", passed), lambda: _beside_means(behind, passed))
-    gain = rotor_gain(model, theta, behind, scale, band) * thrust_gain(model, theta, run, x, scale, tare)
-    return np.asarray(passed_on(model, theta, history) * gain * known, dtype=np.float64)
+    gain = rotor_gain(model, theta, behind, scale, by_tick) * thrust_gain(model, theta, run, x, scale, tare)
+    return np.asarray(passed_on(model, theta, history, by_tick) * gain * known, dtype=np.float64)
 
 
 def converted_samples(model: Model, theta: Theta, run: RememberedRun, F: Floats, largest: float) -> Floats:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from identification.mismatch.model.behind_band import behind_band
 from identification.mismatch.model.model import Acting, Model, acting
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.noise.covariance import Shapes
@@ -63,14 +64,15 @@ def predict(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: 
 
     x is what the model itself says of the rate: a term that reads the measured rate does not count there.
     """
-    value = run.history.driver
+    behind, by_tick = behind_band(model, theta, run, scale)
+    value = behind.history.driver
     modelled = None
     x = value
     stage = 0
-    key: object = scale
     terms = acting(model, theta, scale)
+    key: object = (scale, tuple(each[:2] for each in terms[: len(by_tick)]))
     winding = winding_of(terms)
-    for term, values, sizes in terms:
+    for term, values, sizes in terms[len(by_tick) :]:
         at = STAGES.index(term.stage)
         if stage < HYDRO <= at:
             x = value

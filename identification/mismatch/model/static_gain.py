@@ -6,6 +6,7 @@ Dynamics of a few ticks (a lag, a ring, a delay) and limits have answers of thei
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
 
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 
 from identification.mismatch.model.model import Acting, Model, acting
 from identification.mismatch.model.parameters import Theta
-from identification.physics.term import Scale, TermContext
+from identification.physics.term import Scale, Term, TermContext
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed
 from identification.run_history.history import Samples
@@ -30,11 +31,11 @@ ROTOR = ("command", "rotor")
 
 
 def rotor_gain(
-    model: Model, theta: Theta, run: RememberedRun, scale: Scale, passed: Acting | None = None
+    model: Model, theta: Theta, run: RememberedRun, scale: Scale, by_tick: Collection[Term] = ()
 ) -> Floats | float:
-    """(M,) or 1: change of the rate per change of the driver, both in units of the driver, which has `passed` the first
-    of the terms where that is given."""
-    terms = [each for each in _static(model, theta, scale) if each[0].stage in ROTOR][passed is not None :]
+    """(M,) or 1: change of the rate per change of the driver, both in units of the driver, which is behind the terms
+    `by_tick` already."""
+    terms = [each for each in _static(model, theta, scale) if each[0].stage in ROTOR and each[0] not in by_tick]
     if not terms:
         return 1.0
     key = ("rotor gain", tuple(each[:2] for each in terms))

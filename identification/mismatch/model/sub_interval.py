@@ -5,6 +5,7 @@ What a screening or a fit asks for again is remembered with the run.
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from typing import cast
 
@@ -41,17 +42,20 @@ def delay_of(model: Model, theta: Theta) -> float:
 def ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, late: float, tare: float) -> Floats:
     """(M,) driver |driver|, at the thrust samples less the line through means: of a force at the rates x (M,) that a
     stand may pass on, and that comes `late` s after."""
+    behind, by_tick = behind_band(model, theta, run, scale)
+    beside = _ahead(model, theta, behind, x, scale.driver, late, by_tick)
     if run.history.ticks is None:
-        return _ahead(model, theta, run, x, scale.driver, late)
-    behind, band = behind_band(model, theta, run, scale)
-    gain = rotor_gain(model, theta, behind, scale, band) * thrust_gain(model, theta, run, x, scale, tare)
-    return gain * _ahead(model, theta, behind, x, scale.driver, late)
+        return beside
+    gain = rotor_gain(model, theta, behind, scale, by_tick) * thrust_gain(model, theta, run, x, scale, tare)
+    return gain * beside
 
 
-def _ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: float, late: float) -> Floats:
+def _ahead(
+    model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: float, late: float, by_tick: Collection[Term]
+) -> Floats:
     history = run.history
     passed = Passed(_rotor(model, theta, largest), _ring(model, theta), late if _is_late(late, history) else 0.0)
-    share = passed_on(model, theta, history)
+    share = passed_on(model, theta, history, by_tick)
     if not _changes(passed, history):
         return run.lately("ahead", lambda: share * (2 * np.abs(x) * history.lead + history.curved), x, share)
     known = _remembered(run, "thrust", passed)
@@ -65,14 +69,14 @@ def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Sc
     """(M,) rate at its samples, in units of the driver, of a rotor whose mean rates are `x` (M,), read `late` s after;
     the rotor alone passes ticks on. A rate is read so well that a rotor on its way between two steps, however far they
     are apart, is bent within an interval."""
-    run, band = behind_band(model, theta, run, scale)
+    run, by_tick = behind_band(model, theta, run, scale)
     history = run.history
     passed = Passed(_rotor(model, theta, scale.driver), delay=late if _is_late(late, history) else 0.0)
     bent = passed.rotor is not None and history.ticks is not None
     known = _remembered(run, "rate", passed) if bent or _changes(passed, history) else history.rate_lead
-    share, shift = passed_on(model, theta, history), theta.rate_shift
-    gain = 1.0 if history.ticks is None else rotor_gain(model, theta, run, scale, band)
-    jumped = None if passed.rotor is not None or band is not None else _jumped(model, theta, run, scale, passed.delay)
+    share, shift = passed_on(model, theta, history, by_tick), theta.rate_shift
+    gain = 1.0 if history.ticks is None else rotor_gain(model, theta, run, scale, by_tick)
+    jumped = None if passed.rotor is not None or by_tick else _jumped(model, theta, run, scale, passed.delay)
 
     def made() -> Floats:
         assert history.rate_sampled is not None
@@ -112,11 +116,12 @@ def sample_lead(model: Model, theta: Theta, run: RememberedRun, rate: Floats, la
     return beside if passed.ring is not None else 2 * np.abs(rate) * beside
 
 
-def passed_on(model: Model, theta: Theta, history: History) -> Floats | float:
-    """(M,) or 1: the share of what the command does within an interval that the drive gives the rotor."""
+def passed_on(model: Model, theta: Theta, history: History, by_tick: Collection[Term] = ()) -> Floats | float:
+    """(M,) or 1: the share of what the command does within an interval that the drive gives the rotor, where it is not
+    behind its limit already."""
     share: Floats | float = 1.0
     for term, values, _ in _every(model, theta, 1.0):
-        if term.traits.limits == "command":
+        if term.traits.limits == "command" and term not in by_tick:
             share = share * cast(LimitsCommand, term).passed(history, values)
     return share
 

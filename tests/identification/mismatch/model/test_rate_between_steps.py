@@ -8,6 +8,7 @@ import pytest
 from identification.mismatch.estimate.fitting import raw
 from identification.mismatch.model.model import Given, Model
 from identification.mismatch.model.parameters import Theta
+from identification.physics.command_saturation import CommandSaturation
 from identification.physics.dead_band import DeadBand
 from identification.physics.motor_lag import MotorLag
 from identification.physics.winding_resistance import WindingResistance
@@ -121,12 +122,12 @@ def test_a_rotor_that_begins_to_turn_at_a_tick_is_read_before_it_or_after(band):
     assert np.max(np.abs(told[0] - data.histories[0].rates)) < 1e-3
 
 
-def ramping(half_width, taken, band):
-    """Fast ramps up and down in ticks of 12 ms on a rotor that lags behind a dead band, whose intervals hold several
-    samples and several ticks; `taken`: by the winding, 1/V."""
+def ramping(half_width, taken, band, limit=np.inf):
+    """Fast ramps up and down in ticks of 12 ms on a rotor that lags behind a dead band and a drive that clips at
+    `limit`, whose intervals hold several samples and several ticks; `taken`: by the winding, 1/V."""
     start = np.arange(0.0, 400.0, 0.0119)
     command = LATTICE * np.round(9.0 / LATTICE * (2 * np.abs((start / 12.0 + 0.5) % 2 - 1) - 1))
-    acting = beyond(command, half_width, band)
+    acting = beyond(np.clip(command, -limit, limit), half_width, band)
     driving = np.sign(acting) * (np.sqrt(1 + 4 * taken * np.abs(acting)) - 1) / (2 * taken) if taken else acting
     n = np.zeros(start.size)
     for i in range(1, start.size):
@@ -155,3 +156,16 @@ def test_a_rotor_that_lags_behind_a_band_begins_to_turn_at_a_tick(band, taken):
     thrust, rate = raw(model, Theta(0.2, (), (0.0,), k=PER_DRIVER), data, with_rate=True)
     assert np.max(np.abs(rate[0] - data.histories[0].rates)) < (4e-3 if taken else 1e-3)
     assert np.max(np.abs(thrust[0] - data.thrust[0])) < 2e-3
+
+
+@pytest.mark.parametrize("width", [0.0, 15.5 * LATTICE])
+def test_a_drive_clips_ticks_one_by_one_and_a_band_behind_it_lets_them_pass_so(width):
+    """A band was none of the first terms beside a drive that clips, and ticks crossed it by a slope again."""
+    band, limit = DeadBand("shrink"), 7.013
+    data = ramping(width, 0.03, band, limit)
+    known = [(CommandSaturation("hard"), (limit,)), (MotorLag("first_order"), (TAU,)), (WindingResistance(), (0.03,))]
+    known += [(band, (width,))] if width else []
+    model = Model((), tuple(Given(term, values, data.scale) for term, values in known))
+    thrust, rate = raw(model, Theta(0.2, (), (0.0,), k=PER_DRIVER), data, with_rate=True)
+    assert np.max(np.abs(rate[0] - data.histories[0].rates)) < 1e-3
+    assert np.max(np.abs(thrust[0] - data.thrust[0])) < 1e-3
