@@ -79,18 +79,18 @@ def refresh(
     hollow, or a threshold between wrong levels, what was left was not noise, and it is estimated anew.
     """
     for _ in range(HOLLOWS):
-        estimate = _refreshed(model, theta, data, extra, estimate, like)
+        estimate = refreshed_once(model, theta, data, extra, estimate, like)
         deeper = between_levels(in_best_hollow(estimate.fit, data, estimate.weights), data, estimate.weights)
         if deeper is estimate.fit:
             return estimate
         theta = deeper.theta
-    return _refreshed(model, theta, data, extra, estimate, like)
+    return refreshed_once(model, theta, data, extra, estimate, like)
 
 
-def _refreshed(
+def refreshed_once(
     model: Model, theta: Theta, data: Data, extra: Floats | None, estimate: Estimate | None, like: Noise | None
 ) -> Estimate:
-    """The noise of what this leaves, and the fit with it."""
+    """The noise of what this leaves, and the fit with it, which begins where the clocks and thresholds stand."""
     size = forces(model, theta, data)
     thrust, rate = raw(model, theta, data, with_rate=data.with_rate)
     left = [y - f for y, f in zip(data.thrust, thrust, strict=True)]

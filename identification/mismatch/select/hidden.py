@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.estimation.tails import chi2_isf
 from identification.mismatch import policy
-from identification.mismatch.estimate.estimate import Estimate, refresh
+from identification.mismatch.estimate.estimate import Estimate, refresh, refreshed_once
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.parameters import Theta
@@ -47,7 +47,7 @@ def hidden(estimate: Estimate, judged: Screening, data: Data) -> tuple[Unhidden,
         begin = refined(estimate.fit, data, estimate.weights, term, values)
         bigger, theta = estimate.fit.more(term, begin)
         first = fit(bigger, theta, data, estimate.weights)
-        new = refresh(bigger, _by_the_clocks_of(now, first), data, None, now, now.noise)
+        new = refreshed_once(bigger, _by_the_clocks_of(now, first), data, None, now, now.noise)
         gain = (now.fit.deviance - new.fit.deviance) / dispersion_of(term, new.fit, data.size)
         if gain > (asked := asked_of(term, judged, data)):
             found.append((Unhidden(gain, asked), new))
