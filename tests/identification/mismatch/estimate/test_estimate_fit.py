@@ -218,10 +218,23 @@ def test_what_a_given_baseline_is_not_sure_of_is_no_noise_of_the_rate():
     assert np.count_nonzero(beside) == 6
     spread = PriorPredictionFactor((np.zeros((data.thrust[0].size, 1)),), (beside,))
     begin = replace(theta, k=3.0)
-    blind, sure = (refresh(Model(), begin, d, None, None) for d in (data, replace(data, prior_factor=spread)))
+    blind, sure = (refresh(Model(), begin, d, None, None) for d in (data, replace(data, twin_factor=spread)))
     loud, quiet = (each.rate_noise.white + sum(each.rate_noise.slow) for each in (blind, sure))
     assert loud > 20 * 0.02**2
     assert quiet == pytest.approx(0.02**2, rel=0.15)
+
+
+def test_nor_of_the_thrust():
+    """A drift of 15 sigma was slow noise beside a recirculation that the twin knew to a twentieth."""
+    data, theta = data_of([short(lambda t, _V, F: F + 1.0 * np.sin(0.2 * t))])
+    rows = data.histories[0].sampled[data.rows[0]]
+    spread = PriorPredictionFactor((np.sin(0.2 * rows)[:, None],), (np.zeros((0, 1)),))
+    blind, sure = (refresh(Model(), theta, d, None, None) for d in (data, replace(data, twin_factor=spread)))
+    assert sum(blind.noise.slow) > 0.1
+    assert sure.noise.white + sum(sure.noise.slow) == pytest.approx(NOISE**2, rel=0.25)
+    half = [np.arange(rows.size) < rows.size // 2]
+    some = replace(data, twin_factor=spread, keep=tuple(half))
+    assert refresh(Model(), theta, some, None, None).noise.white == pytest.approx(NOISE**2, rel=0.3)
 
 
 def test_rounding_of_a_table_is_noise_too():
