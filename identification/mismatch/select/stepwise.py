@@ -274,7 +274,8 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
             return state, standing
         if any(system.impossible(state, term) for term in state.fit.values):
             left.add(frozenset(state.fit.values))
-        stood |= state.fit.values
+        else:
+            stood |= state.fit.values
         state = system.replaced(state, best[1])
     return state, None
 
