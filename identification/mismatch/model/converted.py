@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from identification.mismatch.model.behind_band import behind_band
+from identification.mismatch.model.behind_drive import behind_drive
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.static_gain import rotor_gain, thrust_gain
@@ -28,7 +28,7 @@ def beside_means(
     that comes `late` s after."""
     history = run.history
     passed = dynamics_between(model, theta, history, scale.driver, late)
-    behind, by_tick = behind_band(model, theta, run, scale)
+    behind, by_tick = behind_drive(model, theta, run, scale)
     known = behind.leads(("converted", passed), lambda: _beside_means(behind, passed))
     gain = rotor_gain(model, theta, behind, scale, by_tick) * thrust_gain(model, theta, run, x, scale, tare)
     return np.asarray(passed_on(model, theta, history, by_tick) * gain * known, dtype=np.float64)

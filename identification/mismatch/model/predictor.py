@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from identification.mismatch.model.behind_band import behind_band
+from identification.mismatch.model.behind_drive import behind_drive
 from identification.mismatch.model.model import Acting, Model, acting
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.noise.covariance import Shapes
@@ -64,7 +64,7 @@ def predict(model: Model, theta: Theta, run: RememberedRun, scale: Scale, tare: 
 
     x is what the model itself says of the rate: a term that reads the measured rate does not count there.
     """
-    behind, by_tick = behind_band(model, theta, run, scale)
+    behind, by_tick = behind_drive(model, theta, run, scale)
     value = behind.history.driver
     modelled = None
     x = value

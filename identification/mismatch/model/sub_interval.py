@@ -12,7 +12,7 @@ from typing import cast
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.model.behind_band import behind_band
+from identification.mismatch.model.behind_drive import behind_drive
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.static_gain import jumping, rotor_gain, thrust_gain
@@ -42,7 +42,7 @@ def delay_of(model: Model, theta: Theta) -> float:
 def ahead(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, late: float, tare: float) -> Floats:
     """(M,) driver |driver|, at the thrust samples less the line through means: of a force at the rates x (M,) that a
     stand may pass on, and that comes `late` s after."""
-    behind, by_tick = behind_band(model, theta, run, scale)
+    behind, by_tick = behind_drive(model, theta, run, scale)
     beside = _ahead(model, theta, behind, x, scale.driver, late, by_tick)
     if run.history.ticks is None:
         return beside
@@ -69,7 +69,7 @@ def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Sc
     """(M,) rate at its samples, in units of the driver, of a rotor whose mean rates are `x` (M,), read `late` s after;
     the rotor alone passes ticks on. A rate is read so well that a rotor on its way between two steps, however far they
     are apart, is bent within an interval."""
-    run, by_tick = behind_band(model, theta, run, scale)
+    run, by_tick = behind_drive(model, theta, run, scale)
     history = run.history
     passed = Passed(_rotor(model, theta, scale.driver), delay=late if _is_late(late, history) else 0.0)
     bent = passed.rotor is not None and history.ticks is not None

@@ -20,7 +20,9 @@ from identification.run_history.remembered import RememberedRun
 from identification.run_history.ticks.sub_interval_leads import with_leads
 
 
-def behind_band(model: Model, theta: Theta, run: RememberedRun, scale: Scale) -> tuple[RememberedRun, tuple[Term, ...]]:
+def behind_drive(
+    model: Model, theta: Theta, run: RememberedRun, scale: Scale
+) -> tuple[RememberedRun, tuple[Term, ...]]:
     """That run, and the terms that it is behind: the last that ticks pass one by one, and all before it. The run itself
     and none where there is no such term, or nothing is known of ticks."""
     if run.history.ticks is None:
