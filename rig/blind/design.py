@@ -181,7 +181,7 @@ def _alone(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tup
         for effect in known:
             spec: dict[str, Any] = {"effects": [effect], "strength": strength}
             if cell == "plain":
-                spec["rivals"] = [other for other in known if other != effect]
+                spec["rivals"] = _others_of(effect, known)
             for place, job in _many(cell, effect, seeds, spec):
                 orders = job.orders
                 if cell == "plain" and effect not in NOT_REMOVABLE:
@@ -189,6 +189,10 @@ def _alone(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tup
                 yield place, Job(job.id, spec, orders)
     for lie in world.lies:
         yield from _many("fault", lie, seeds, {"lie": lie})
+
+
+def _others_of(effect: str, known: Collection[str]) -> list[str]:
+    return [other for other in known if other != effect]
 
 
 def _open(world: Kinds, catalogue: Collection[str], seeds: int) -> Iterator[tuple[float, Job]]:
@@ -230,7 +234,11 @@ def _recorded(world: Kinds, catalogue: Collection[str], seeds: int, draw: str) -
     known = [effect for effect in world.recorded if effect in catalogue]
     cells: list[tuple[str, int, dict[str, Any]]] = [("nothing", BENCH_CLEAN_PER_SEED * seeds, {})]
     cells += [
-        (f"{name}:{effect}", seeds, {"effects": [effect], "strength": STRENGTHS[name]})
+        (
+            f"{name}:{effect}",
+            seeds,
+            {"effects": [effect], "strength": STRENGTHS[name], "rivals": _others_of(effect, known)},
+        )
         for name in BENCH_STRENGTHS
         for effect in known
     ]

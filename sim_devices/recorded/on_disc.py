@@ -1,7 +1,8 @@
 """Recorded cases on disc, laid as by `sim_devices.concealed.sealing.on_disc`: `open/<token>/0.h5` is the recording.
 
 A case is asked for by a table: `token`, `seed`, `bench` (of BENCHES), and what is not to be left to chance: `effects`,
-`strength`, `plan`, `duration`; `world`: the version that is to make it, where that matters.
+`strength`, `plan`, `duration`; `world`: the version that is to make it, where that matters; `rivals`: names whose
+likeness to the first effect goes into the seal (`concealed.twins`, beside the run as it was recorded).
 """
 
 from __future__ import annotations
@@ -18,16 +19,17 @@ import numpy as np
 
 from sim_devices.concealed.cases.definition import Case
 from sim_devices.concealed.sealing.another import another
-from sim_devices.concealed.sealing.on_disc import write_json, write_rows
+from sim_devices.concealed.sealing.on_disc import NEAREST, write_json, write_rows
 from sim_devices.concealed.sealing.records import truth
 from sim_devices.concealed.visibility.oracle import OutOfReach, measured
+from sim_devices.concealed.visibility.rivals import twins
 from sim_devices.recorded.benches import BENCHES
 from sim_devices.recorded.draw import EFFECTS, Drawn, drawn
 from sim_devices.recorded.run import Record, run
 from sim_devices.tables import WorldError
 
 CHOSEN = ("effects", "strength", "plan", "duration")
-KNOWN = frozenset({"token", "seed", "world", "bench", *CHOSEN})
+KNOWN = frozenset({"token", "seed", "world", "bench", "rivals", *CHOSEN})
 
 
 def version() -> str:
@@ -73,7 +75,11 @@ def conceal(asked: Mapping[str, Any], out: Path, record: Record) -> None:
     write_rows(out / "open" / token / "drive.npz", other.drive, at=other.at)
     exact, seen = other.thrust.astype(np.float32), other.measured.astype(np.float32)
     np.savez_compressed(seal.with_suffix(".npz"), thrust=exact, measured=seen)
-    write_json(seal, _truth(found, case) | {"asked": dict(asked), "error": None})
+    told = _truth(found, case) | {"asked": dict(asked), "error": None}
+    if asked.get("rivals") and case.effects:
+        near = twins(case, case.effects[0].effect, list(asked["rivals"]), np.random.default_rng([*seed, 1]))
+        told["twins"] = [asdict(twin) for twin in near[:NEAREST]]
+    write_json(seal, told)
 
 
 def _recorded(found: Drawn, folder: Path, record: Record) -> Case:

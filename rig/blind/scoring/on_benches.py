@@ -6,9 +6,9 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 
-from rig.blind.design import PAIR_STRENGTH
+from rig.blind.design import BENCH_STRENGTHS, PAIR_STRENGTH
 from rig.blind.scoring.rates import Goal, of_groups, of_rate, rate
-from rig.blind.scoring.score import Score
+from rig.blind.scoring.score import TELLABLE, Score
 
 
 def bench_goals(scores: Sequence[Score]) -> list[Goal]:
@@ -51,7 +51,15 @@ def bench_goals(scores: Sequence[Score]) -> list[Goal]:
 
 def bench_besides(scores: Sequence[Score]) -> list[Goal]:
     """C in all answers, also those that say too much or too little; names that are not there."""
+    tellable = [
+        of_rate(
+            f"bench, {name}: right alone, where the nearest neighbour leaves an oracle {TELLABLE:g} sigma",
+            rate(s.alone for s in _labelled(scores, f"{name}:") if s.counted),
+        )
+        for name in BENCH_STRENGTHS
+    ]
     return [
+        *tellable,
         of_rate("bench, coverage of the 95 % interval of C, whatever was said", rate(_covers(scores))),
         of_rate("bench, one effect: a name that is not there", rate(s.extra for s in scores if len(s.truth) == 1)),
         of_rate("bench: crashed, refused or overdue", rate(s.failed for s in scores)),

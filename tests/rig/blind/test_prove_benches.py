@@ -9,7 +9,7 @@ from rig.blind.command import designed
 from rig.blind.design import Order, design
 from rig.blind.score_file import read, write
 from rig.blind.scoring.on_benches import bench_besides, bench_goals
-from rig.blind.scoring.score import Interval, Score, scored, thrust_constant
+from rig.blind.scoring.score import Interval, Near, Score, scored, thrust_constant
 from rig.blind.store import Store
 from rig.blind.workers import Lane, carry_out
 from tests.rig.blind_scores import CATALOGUE, WORLD, answer, truth
@@ -28,8 +28,15 @@ def test_each_bench_gets_its_share_of_each_kind():
     assert len(pairs) == 8
     assert all(set(two) == {"dead_band", "heating"} for two in pairs)
     assert {job.world for job in jobs} == {"w2"}
+    asked = {job.orders[0].label: job.spec.get("rivals") for job in jobs}
+    assert asked == {label: _rivals(label) for label in labels}
     assert {job.orders[0].id for job in design(BENCHED, CATALOGUE, 4, ["bench/*"])} == {j.orders[0].id for j in jobs}
     assert not [job for job in design(WORLD, CATALOGUE, 4) if "bench" in job.spec]
+
+
+def _rivals(label: str) -> list[str] | None:
+    """Of a single effect the other one."""
+    return {"dead_band": ["heating"], "heating": ["dead_band"]}.get(label.partition(":")[2])
 
 
 def score(label: str, *effects: str, **facts) -> Score:
@@ -43,7 +50,7 @@ def test_figures():
         score("nothing", named=("dead_band",), constant=misses),
         score("clear:heating", "heating", constant=covers),
         score("plain:heating", "heating", said="unexplained", constant=misses),
-        score("plain:heating", "heating", named=("asymmetry",)),
+        score("plain:heating", "heating", named=("asymmetry",), near=Near("asymmetry", 0.4)),
         score("pair", "heating", "dead_band", named=("heating",), rivals=("dead_band",)),
     ]
     found = {g.what.removeprefix("bench, "): (g.value, g.n) for g in bench_goals(scores)}
@@ -56,6 +63,8 @@ def test_figures():
     assert found["coverage of the 95 % interval of C"] == (1.0, 2)
     besides = {g.what: (g.value, g.n) for g in bench_besides(scores)}
     assert besides["bench, coverage of the 95 % interval of C, whatever was said"] == (0.5, 4)
+    tellable = "right alone, where the nearest neighbour leaves an oracle 8 sigma"
+    assert (besides[f"bench, clear: {tellable}"], besides[f"bench, plain: {tellable}"]) == ((1.0, 1), (0.0, 1))
 
 
 def test_the_constant_of_an_answer(tmp_path):
@@ -86,3 +95,6 @@ def test_one_case_from_seal_to_score(tmp_path):
     assert one.right
     assert one.constant is not None
     assert "bench tunnel" in one.case
+    assert one.near is not None
+    assert one.near.rival != "dead_band"
+    assert 0.0 <= one.near.left <= 41.0
