@@ -268,7 +268,9 @@ def _composites(world: Kinds, catalogue: Collection[str], seeds: int, draw: str)
             first = _some(known, min(int(rng.choice(FIRST_EFFECTS)), len(known)), rng)
             spec: dict[str, Any] = {"field": first, "more": "", "strength": STRENGTHS["clear"]}
             if label == "one_more":
-                spec["more"] = str(rng.choice([effect for effect in more if effect not in first]))
+                beside = [effect for effect in more if effect not in first]
+                spec["more"] = str(rng.choice(beside))
+                spec["rivals"] = _others_of(spec["more"], beside)
             if label == "changed":
                 spec["changed"] = str(rng.choice(first))
             yield place, Job(job.id, spec, job.orders)

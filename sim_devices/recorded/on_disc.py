@@ -19,10 +19,9 @@ import numpy as np
 
 from sim_devices.concealed.cases.definition import Case
 from sim_devices.concealed.sealing.another import another
-from sim_devices.concealed.sealing.on_disc import NEAREST, write_json, write_rows
+from sim_devices.concealed.sealing.on_disc import nearest, write_json, write_rows
 from sim_devices.concealed.sealing.records import truth
 from sim_devices.concealed.visibility.oracle import OutOfReach, measured
-from sim_devices.concealed.visibility.rivals import twins
 from sim_devices.recorded.benches import BENCHES
 from sim_devices.recorded.draw import EFFECTS, Drawn, drawn
 from sim_devices.recorded.run import Record, run
@@ -77,8 +76,7 @@ def conceal(asked: Mapping[str, Any], out: Path, record: Record) -> None:
     np.savez_compressed(seal.with_suffix(".npz"), thrust=exact, measured=seen)
     told = _truth(found, case) | {"asked": dict(asked), "error": None}
     if asked.get("rivals") and case.effects:
-        near = twins(case, case.effects[0].effect, list(asked["rivals"]), np.random.default_rng([*seed, 1]))
-        told["twins"] = [asdict(twin) for twin in near[:NEAREST]]
+        told["twins"] = nearest(case, case.effects[0].effect, asked)
     write_json(seal, told)
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from rig.blind.design import STRENGTHS
 from rig.blind.scoring.rates import Goal, of_groups, of_rate, rate
-from rig.blind.scoring.score import Score
+from rig.blind.scoring.score import TELLABLE, Score
 
 CLEAR: Final = f"{STRENGTHS['clear']:g}"
 CHANGED_CONSTANT: Final = "thrust_constant"
@@ -53,6 +53,13 @@ def composite_besides(field: Sequence[Score], difference: Sequence[Score]) -> li
         of_rate(f"field: all effects at {CLEAR} or more named, and no other", rate(map(_whole, field))),
         of_rate("field, coverage of the 95 % interval of C", rate(_covers(field))),
         of_rate("field: crashed, refused or overdue", rate(s.failed for s in field)),
+        *(
+            of_rate(f"difference, one more: {what}, where all else leaves an oracle {TELLABLE:g} sigma", rate(said))
+            for what, said in (
+                ("right or among stated rivals", (s.right for s in more if s.counted)),
+                ("exactly it", (s.exact for s in more if s.counted)),
+            )
+        ),
         of_rate("difference, one more: exactly it, and no rival stated", rate(s.alone for s in more)),
         of_rate("difference, one more: a name that is not there", rate(s.extra for s in more)),
         of_rate(

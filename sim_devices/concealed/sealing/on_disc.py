@@ -9,7 +9,8 @@
 
 A case is asked for by a table: `token` (its name, which should tell nothing), `seed` (integers), and what is not to be
 left to chance: `effects`, `strength`, `forms`, `noise`, `plan`, `lie`, `runs`, `sampling`, `duration`, `wiring` as of
-`concealed.case`; `rivals`: names whose likeness to the first effect goes into the seal (`concealed.twins`);
+`concealed.case`; `rivals`: names whose likeness to the first effect goes into the seal (`concealed.twins`), of a second
+recording to what came on top, and the known amounts beside them (`concealed.visibility.learned`);
 `world`: the version that is to make it, where that matters.
 
 With `field`, a list of effects in the place of `effects`, their amounts are drawn as the field has them
@@ -43,8 +44,9 @@ from sim_devices.concealed.draw import case as drawn
 from sim_devices.concealed.sealing.another import another
 from sim_devices.concealed.sealing.records import Rows, rows, truth
 from sim_devices.concealed.version import version
+from sim_devices.concealed.visibility.learned import beside_first
 from sim_devices.concealed.visibility.oracle import OutOfReach
-from sim_devices.concealed.visibility.rivals import twins
+from sim_devices.concealed.visibility.rivals import Twin, twins
 from sim_devices.tables import WorldError
 
 Floats = NDArray[np.float64]
@@ -65,6 +67,8 @@ KINDS: Mapping[str, Any] = {
 CHOSEN = ("effects", "strength", "forms", "noise", "plan", "lie", "runs", "sampling", "duration", "wiring")
 CHOSEN_OF_COMPOSITES = ("noise", "plan", "sampling", "duration")
 KNOWN = frozenset({"token", "seed", "world", "rivals", "field", "more", "changed", *CHOSEN})
+KNOWN_AMOUNTS = "amounts of the known"
+"""Rival of what came on top in a second recording: other amounts of what the first one has."""
 NEAREST = 5
 """Twins that go into the seal."""
 AGAIN = "again"
@@ -88,16 +92,15 @@ def conceal(asked: Mapping[str, Any], out: Path) -> None:
         return
     except (TypeError, ValueError) as error:
         raise WorldError(f"case {token}: {error}") from error
-    folder = out / "open" / token
+    folder, first = out / "open" / token, None
     told = _recorded(case, folder)
     if second is not None:
         folder = folder / AGAIN
         known = [c.effect for c in case.effects if c.effect != asked.get("changed")]
-        told, case = _recorded(second, folder) | {"known": known, "first": told}, second
+        told, first, case = _recorded(second, folder) | {"known": known, "first": told}, case, second
     told |= {"asked": dict(asked), "thruster": asdict(case.thruster), "error": None}
     if asked.get("rivals") and case.effects:
-        near = twins(case, case.effects[0].effect, list(asked["rivals"]), np.random.default_rng([*seed, 1]))
-        told["twins"] = [asdict(twin) for twin in near[:NEAREST]]
+        told["twins"] = nearest(case, str(asked.get("more") or case.effects[0].effect), asked, first)
     if case.fault is None and "wiring" not in asked:
         other = another(case, np.random.default_rng([*seed, 2]))
         write_rows(folder / "drive.npz", other.drive, at=other.at)
@@ -106,13 +109,24 @@ def conceal(asked: Mapping[str, Any], out: Path) -> None:
     write_json(sealed / f"{token}.json", told)  # last: a seal stands for a case that is complete
 
 
+def nearest(case: Case, effect: str, asked: Mapping[str, Any], first: Case | None = None) -> list[dict[str, Any]]:
+    """For the seal, nearest first: what the asked rivals would leave of `effect`; where it came on top of what `first`
+    conceals, that is the nearest which the amounts of all before leave."""
+    rng = np.random.default_rng([*asked["seed"], 1])
+    found = twins(case, effect, list(asked["rivals"]), rng)
+    if first is not None:
+        found.append(Twin(KNOWN_AMOUNTS, "", beside_first(first, case, effect)))
+    return [asdict(twin) for twin in sorted(found, key=lambda twin: twin.left)[:NEAREST]]
+
+
 def _cases(asked: Mapping[str, Any], rng: np.random.Generator) -> tuple[Case, Case | None]:
     """What is recorded first, and a second time. Raises OutOfReach; TypeError and ValueError for what cannot be."""
     if "field" not in asked:
         if "more" in asked:
             raise ValueError("more: expected `field` with it, the effects of the first recording; give both")
         return drawn(rng, **{name: asked[name] for name in CHOSEN if name in asked}), None
-    if instead := sorted(set(asked) & (set(CHOSEN) | {"rivals"}) - {"strength", *CHOSEN_OF_COMPOSITES}):
+    not_taken = set(CHOSEN) if asked.get("more") else {"rivals", *CHOSEN}
+    if instead := sorted(set(asked) & not_taken - {"strength", *CHOSEN_OF_COMPOSITES}):
         raise ValueError(f"field: its effects are all there is, got {', '.join(instead)} with it; leave that out")
     chosen = {name: asked[name] for name in CHOSEN_OF_COMPOSITES if name in asked}
     if "more" not in asked:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -40,14 +41,18 @@ def amplified(force: Floats, dt: float, how: Amplifier) -> Floats:
 
 
 class Projection:
-    """Exact whitening and baseline columns of all runs; made once, asked for differences."""
+    """Exact whitening and baseline columns of all runs; made once, asked for differences.
 
-    def __init__(self, case: Case, values: list[Floats]) -> None:
-        self._runs = []
-        for run, value, columns in zip(case.runs, values, _baseline(case, values), strict=True):
+    `beside`: further columns that may take a difference, each run by run.
+    """
+
+    def __init__(self, case: Case, values: list[Floats], beside: Sequence[list[Floats]] = ()) -> None:
+        self._runs, grams = [], []
+        known = [np.column_stack(own) for own in zip(_baseline(case, values), *beside, strict=True)]
+        for run, value, columns in zip(case.runs, values, known, strict=True):
             whitening = Whitening(case.noise, value - run.tare, case.rate)
             self._runs.append((whitening, whitening.solve(columns)))
-        grams = [c.T @ solved for c, (_, solved) in zip(_baseline(case, values), self._runs, strict=True)]
+            grams.append(columns.T @ self._runs[-1][1])
         self._gram = np.sum(grams, axis=0)
 
     def strength(self, with_effect: list[Floats], without: list[Floats]) -> float:

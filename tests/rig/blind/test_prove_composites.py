@@ -10,7 +10,7 @@ from rig.blind.design import Order, design
 from rig.blind.report.page import proof_page
 from rig.blind.score_file import read, write
 from rig.blind.scoring.composites import composite_besides, composite_rows, difference_goals, field_goals
-from rig.blind.scoring.score import HeldOut, Score, scored
+from rig.blind.scoring.score import HeldOut, Near, Score, scored
 from rig.blind.scoring.tables import tables
 from rig.blind.store import Store
 from rig.blind.workers import Lane, carry_out, concealable
@@ -41,6 +41,7 @@ def test_the_lanes_have_their_labels_and_shares():
         else:
             assert job.spec["more"] in {"exponent", "time_skew", "dead_band"} - set(job.spec["field"])
             assert job.spec["strength"] == 15.0
+            assert not {job.spec["more"], *job.spec["field"]} & set(job.spec["rivals"])
     again = [job for job in design(COMPOSED, CATALOGUE, 20) if "field" in job.spec]
     assert again == jobs
     other = [job for job in design(COMPOSED, CATALOGUE, 20, draw="autumn") if "field" in job.spec]
@@ -87,9 +88,9 @@ def test_figures_of_composites():
     assert (rows["heating"]["clear"], rows["heating"]["faint_named"]) == (0, 1)
 
 
-def again(label, truth_, *named, said="explained", rivals=()):
+def again(label, truth_, *named, said="explained", rivals=(), near=None):
     seen = (15.0,) * len(truth_)
-    return Score(Order(f"difference/{label}/0"), truth_, said, named, rivals, strengths=seen)
+    return Score(Order(f"difference/{label}/0"), truth_, said, named, rivals, strengths=seen, near=near)
 
 
 def test_figures_of_differences():
@@ -99,7 +100,7 @@ def test_figures_of_differences():
         again("one_more", one, "heating", said="ambiguous", rivals=("supply_sag",)),
         again("one_more", one, "heating", "thrust_constant"),
         again("one_more", one, "heating", said="unexplained"),
-        again("one_more", one, "exponent"),
+        again("one_more", one, "exponent", near=Near("amounts of the known", 2.0)),
         again("nothing", (), said="adequate"),
         again("nothing", (), "thrust_constant"),
         again("changed", one, "heating"),
@@ -118,6 +119,7 @@ def test_figures_of_differences():
     }
     besides = {g.what: (g.value, g.n) for g in composite_besides((), scores)}
     assert besides["difference, one more: exactly it, and no rival stated"] == (0.2, 5)
+    assert besides["difference, one more: exactly it, where all else leaves an oracle 8 sigma"] == (0.5, 4)
     assert besides["difference: a thrust constant that is said to have changed"] == (pytest.approx(2 / 9), 9)
 
 

@@ -10,6 +10,7 @@ from sim_devices import concealed
 from sim_devices.concealed.cases.field_size import warm_change
 from sim_devices.concealed.cases.shapes import shape
 from sim_devices.concealed.sealing.on_disc import KINDS, conceal
+from sim_devices.concealed.visibility.learned import beside_first
 from sim_devices.concealed.visibility.oracle import added_at, measured, with_amount
 from sim_devices.concealed.visibility.projection import Projection, signals
 from sim_devices.tables import WorldError
@@ -74,6 +75,31 @@ def test_a_second_recording_is_of_the_same_thruster_with_one_effect_more():
     assert second.runs[0].tare != first.runs[0].tare
 
 
+def test_what_came_on_top_is_seen_as_far_as_no_other_amounts_make_it():
+    """Cross-talk is asymmetry where nothing tells how much of that there was; the first recording does, in part.
+    A creep no asymmetry makes."""
+    both = concealed.difference(rng(2), ["asymmetry"], "torque_crosstalk", 15.0, noise="white", **SHORT)
+    without, whole = signals(both.second, frozenset({"torque_crosstalk"})), signals(both.second)
+    alone = Projection(both.second, without, [_more_asymmetry(both.second, without)]).strength(whole, without)
+    left = beside_first(both.first, both.second, "torque_crosstalk")
+    assert alone < 0.1
+    assert 8.0 < left < 0.9 * concealed.strength(both.second, "torque_crosstalk")
+    both = concealed.difference(rng(2), ["asymmetry"], "load_cell_creep", 15.0, noise="white", **SHORT)
+    seen = concealed.strength(both.second, "load_cell_creep")
+    assert beside_first(both.first, both.second, "load_cell_creep") == pytest.approx(seen, rel=0.2)
+
+
+def _more_asymmetry(case, without):
+    more = with_amount(case, "asymmetry", 1.01 * case.effects[0].amount)
+    return [a - b for a, b in zip(signals(more, frozenset({"torque_crosstalk"})), without, strict=True)]
+
+
+def test_what_cannot_move_any_thrust_is_no_rival_of_what_came_on_top():
+    """A dead band between two levels may have any edge there."""
+    both = concealed.difference(rng(2), ["dead_band"], "linear_term", 15.0, noise="white", **SHORT)
+    assert beside_first(both.first, both.second, "linear_term") > 8.0
+
+
 def test_nothing_more_is_the_same_thruster_again():
     both = concealed.difference(rng(2), TWO, "", **SHORT)
     assert [e.parameters for e in both.second.effects] == [e.parameters for e in both.first.effects]
@@ -131,7 +157,7 @@ def test_what_is_not_known_is_refused():
 
 def test_two_recordings_on_disc_and_one_seal(tmp_path):
     asked = {"token": "abc", "seed": [1, 2], "field": TWO, "more": "linear_term", "strength": 15.0, **SHORT}
-    conceal(asked, tmp_path)
+    conceal(asked | {"rivals": ["zero_drift"]}, tmp_path)
     folder = tmp_path / "open" / "abc"
     assert sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.npz")) == [
         "0.npz",
@@ -143,6 +169,7 @@ def test_two_recordings_on_disc_and_one_seal(tmp_path):
     assert sealed["known"] == TWO
     assert [e["effect"] for e in sealed["first"]["effects"]] == TWO
     assert sealed["first"]["recordings"] != sealed["recordings"]
+    assert {twin["rival"] for twin in sealed["twins"]} == {"zero_drift", "amounts of the known"}
     with np.load(folder / "again" / "drive.npz") as drive, np.load(tmp_path / "sealed" / "abc.npz") as seal:
         assert drive["at"].shape == seal["thrust"].shape == seal["measured"].shape
 
@@ -161,6 +188,7 @@ def test_a_composite_on_disc_has_its_drive_beside_it(tmp_path):
         ({"more": "heating"}, "more: expected `field` with it"),
         ({"field": TWO, "effects": ["heating"]}, "got effects with it"),
         ({"field": ["strut_drag"]}, "field: expected some of"),
+        ({"field": TWO, "rivals": ["heating"]}, "got rivals with it"),
     ],
 )
 def test_an_order_that_cannot_be_read_is_refused(tmp_path, asked, says):
