@@ -162,21 +162,34 @@ def _in_proportion(twin: Twin, theta: Theta, data: Data, base: Predicted) -> lis
 
 
 def _form_errors(twin: Twin) -> list[float]:
-    """Of each term, as a share of what it changes: of an effect that textbooks give one form no more than its amount's
-    own error, for a larger one would have been seen in the twin's own run."""
-    std = np.sqrt(np.diag(np.array(twin.covariance)))[1:].tolist()
+    """Of each term, as a share of what it changes: no more than its own run could tell of its amount, all else known,
+    for a larger one would have been seen there. What no run told has the error of a form, if it has several."""
+    told = _told_alone(twin)
     out, at = [], 0
     for term in twin.terms:
         known = term.term.parameters(term.scale)
         amounts = [
             s / abs(v - p.neutral)
-            for p, v, s in zip(known, term.values, std[at : at + len(known)], strict=True)
-            if p.neutral is not None and v != p.neutral
+            for p, v, s in zip(known, term.values, told[at : at + len(known)], strict=True)
+            if p.neutral is not None and v != p.neutral and (s > 0.0 or _has_one_form(term))
         ]
         at += len(known)
-        alone = term.flexible is None and sum(each.id == term.effect for each in CATALOGUE) == 1
-        out.append(min([policy.compare.FORM_ERROR, *amounts]) if alone else policy.compare.FORM_ERROR)
+        out.append(min([policy.compare.FORM_ERROR, *([] if term.flexible else amounts)]))
     return out
+
+
+def _has_one_form(term: TwinTerm) -> bool:
+    return sum(each.id == term.effect for each in CATALOGUE) == 1
+
+
+def _told_alone(twin: Twin) -> list[float]:
+    """(q,) standard deviation of each parameter of the terms were all others known; 0 where it was not fitted."""
+    covariance = np.array(twin.covariance)[1:, 1:]
+    out = np.sqrt(np.diag(covariance))
+    moving = out > 0
+    scaled = covariance[np.ix_(moving, moving)] / np.outer(out[moving], out[moving])
+    out[moving] /= np.sqrt(np.maximum(np.diag(np.linalg.pinv(scaled, hermitian=True)), 1.0))
+    return cast(list[float], out.tolist())
 
 
 def _change(model: Model, theta: Theta, data: Data, base: Predicted, times: float) -> Predicted:

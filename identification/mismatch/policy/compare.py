@@ -37,13 +37,15 @@ FORM_ERROR = Threshold(
     unit="share of what a term changes",
     reason=(
         "A twin's textbook forms are taken to be off by so much in another run, in size and towards each other form "
-        "of the same effect: what its own run could not tell shows where the plan is another. An effect of one form is "
-        "off by no more than its amount's own error."
+        "of the same effect: what its own run could not tell shows where the plan is another. In size a form is off by "
+        "no more than its own run could tell of its amount if all else were known."
     ),
     evidence=(
         "A lag fitted as mixed where it was quadratic left a dead band of 9.6 sigma in a staircase after random levels "
         "(field case 3 of the lane `difference` before this). With a share for effects of one form too, asymmetry of "
-        "30 % hid a torque cross-talk of 15 sigma (difference/one_more/2 of draw 2027-01-03)."
+        "30 % hid a torque cross-talk of 15 sigma (difference/one_more/2 of draw 2027-01-03). With all of a hundredth "
+        "for effects of several forms, dead band, winding and lag hid an exponent of 15 sigma, 13 of which an oracle "
+        "still sees that has to learn all amounts from both runs (one_more/1 of draw 2036-04-01)."
     ),
 )
 FORM_ERROR_SIGMA = Threshold(
