@@ -27,8 +27,9 @@ MOST_FLUX = 0.3
 """Magnets that have lost more do not come back (Pyrhonen et al. 2008: 0.001 to 0.0012 1/K of NdFeB)."""
 MOST_FLUX_PER_KELVIN = 0.1
 """1/K, a hundred times that of the magnet itself: a thermometer outside sees only a part of its rise."""
-SLOWER_THAN_SEEN = 2.0
-"""Magnets that follow a thermometer may be so much slower than what only time itself tells: how it moved is known."""
+SLOWER_THAN_SEEN = 8.0
+"""Magnets that follow a thermometer may be so much slower than what only time itself tells: how it moved is known, and
+what is slower still follows the sum of it, however slow."""
 
 
 def _slowest(scale: Scale) -> float:
