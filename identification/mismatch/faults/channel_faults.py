@@ -26,14 +26,16 @@ from identification.mismatch.faults.driver_laws import (
     reversed_channels,
     unsigned,
 )
+from identification.mismatch.faults.leaps import leaps
 from identification.mismatch.faults.swaps import swapped_voltages, swaps
 from identification.mismatch.value import Value
 from identification.recording import Channel, Recording
 
 EFFECT = "channel_fault"
 """Its id: it has no term, for a channel that lies is put right before any physics."""
-Kind = Literal["swapped", "rescaled", "reversed", "frozen", "unsigned", "nan", "driver", "strange"]
-"""driver: the motor controller makes something else of the command; strange: it goes with no other channel."""
+Kind = Literal["swapped", "rescaled", "reversed", "frozen", "unsigned", "nan", "leap", "driver", "strange"]
+"""leap: a rate that nothing follows for a moment; driver: the motor controller makes something else of the command;
+strange: it goes with no other channel."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +84,7 @@ def _of_one(recording: Recording) -> list[Fault]:
     cells = cells_of(recording, {q: (s.start, s.end) for q, s in held.items()})
     if cells is None:
         return out
+    out += [Fault(name, q, "leap", says, p, values) for q, says, p, values in leaps(cells) if p < alarm]
     exchanged = [*swapped_voltages(recording), *swaps(cells)]
     exchanged = [s for s in exchanged if s[3] < alarm][:1]
     out += [Fault(name, a, "swapped", says, p, other=b) for a, b, says, p in exchanged]
@@ -105,7 +108,8 @@ def repaired(recording: Recording, fault: Fault) -> Recording:
     """The recording as it must have been meant, were the fault true. Other recordings are returned as they are.
 
     swapped: exchanged back. rescaled: divided by the factor from `start` on. reversed: sign changed. unsigned: sign of
-    the driver at each sample. frozen: NaN while it stood still. nan: nothing can be done, returned as it is.
+    the driver at each sample. frozen, leap: NaN while it stood still, or leapt. nan: nothing can be done, returned as
+    it is.
     """
     if recording.recording_id != fault.recording_id or not fault.repairable:
         return recording
@@ -142,7 +146,7 @@ def _unsigned(recording: Recording, channel: Channel, _fault: Fault) -> Channel:
     return replace(channel, value=np.where(sign[last] < 0, -channel.value, channel.value))
 
 
-def _frozen(_recording: Recording, channel: Channel, fault: Fault) -> Channel:
+def _unread(_recording: Recording, channel: Channel, fault: Fault) -> Channel:
     start, end = fault.parameters["start"].value, fault.parameters["end"].value
     return replace(channel, value=np.where((channel.time >= start) & (channel.time <= end), np.nan, channel.value))
 
@@ -151,5 +155,6 @@ _REPAIRS: Mapping[str, Callable[[Recording, Channel, Fault], Channel]] = {
     "rescaled": _rescaled,
     "reversed": _reversed,
     "unsigned": _unsigned,
-    "frozen": _frozen,
+    "frozen": _unread,
+    "leap": _unread,
 }

@@ -43,6 +43,35 @@ STUCK_ELSEWHERE = Threshold(
     unit="share of the stretch",
     reason="For so much of the stretch the driver must have told it to be elsewhere: a moment's lag is no fault.",
 )
+LEAP_REST = Threshold(
+    0.05,
+    unit="share of the largest rate",
+    reason="Below it a rotor stands: what a tachometer shows at rest is noise.",
+)
+LEAP_SHARE = Threshold(
+    0.05,
+    unit="share of the run",
+    reason="A longer motion is a level, or several, of which the thrust tells what it is.",
+)
+LEAP_BEYOND = Threshold(
+    1.2,
+    unit="times the largest rate elsewhere",
+    reason="Within what the run has elsewhere a motion without thrust may be one that the water followed otherwise.",
+)
+LEAP_FOLLOWED = Threshold(
+    0.25,
+    unit="share of the thrust that the rate promises",
+    reason="More of it is a rotor that turned and lost thrust, which is physics.",
+    evidence=(
+        "The tank's run at -2 V (docs/howto/real-recordings.md) has 19.6 rev/s for 0.4 s before it starts, where "
+        "thrust and torque show nothing: cavitation that takes 320 % of the thrust was named for it."
+    ),
+)
+LEAP_COLOURED = Threshold(
+    3.0,
+    unit="times the error of a mean over samples whose noise is independent",
+    reason="Noise of a stand comes again from sample to sample.",
+)
 CHANNEL_CELLS = Count(
     8,
     unit="cells",
