@@ -116,6 +116,8 @@ class History:
     coarse: Mapping[str, float] = field(default_factory=dict)
     """Of these what was read in so few steps that the steps hide how it moved: by what share of that, one standard
     deviation."""
+    quanta: Mapping[str, float] = field(default_factory=dict)
+    """Of these, step of its readings in its own unit."""
     begun_error: float = 0.0
     """K, standard error of the motor temperature that the run began with."""
     rate_per_driver: float = 1.0

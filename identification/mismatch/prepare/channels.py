@@ -111,10 +111,15 @@ def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats)
     return by_load + np.interp(at, time, smooth)
 
 
+def step_of(channel: Channel | None) -> float:
+    """Of its readings, in its own unit; 0 where none is known."""
+    return 0.0 if channel is None else channel.acquisition.quantum or 0.0
+
+
 def coarseness(channel: Channel | None, moved: Floats) -> float:
     """What a step of its readings hides of how it `moved` (M,): standard deviation, as a share of all of that; 0 of one
     that moved over many steps."""
-    step = 0.0 if channel is None else channel.acquisition.quantum or 0.0
+    step = step_of(channel)
     far = float(np.ptp(moved))
     if far >= policy.prepare.COARSE_STEPS * step:
         return 0.0

@@ -12,7 +12,7 @@ from identification.calibration.bend import CellBend, bend_left
 from identification.mismatch import policy
 from identification.mismatch.prepare.binned import binned, untorn
 from identification.mismatch.prepare.chain.quantum import quantum_of
-from identification.mismatch.prepare.channels import coarseness, followed, jumps, neighbour_at, supply, torque
+from identification.mismatch.prepare.channels import coarseness, followed, jumps, neighbour_at, step_of, supply, torque
 from identification.mismatch.prepare.grid import Held, distinct, edges_of
 from identification.mismatch.prepare.thermometer import warmed
 from identification.recording import Channel, Floats, Recording
@@ -240,6 +240,7 @@ def _filled(recording: Recording, driver: Channel, held: Held, edges: Floats, ti
         rate_count=turning.count,
         rate_sampled=turning.sampled,
         others=others,
+        quanta={q: step for q in others if (step := step_of(recording.first_of(q)))},
         coarse={q: hidden for q in others if (hidden := coarseness(recording.first_of(q), others[q]))},
         rate_per_driver=turning.per_driver,
         spacing=float(np.median(np.diff(time))),

@@ -63,7 +63,8 @@ def beyond(fitted: Fit, term: Term, data: Data) -> tuple[GoesOn, ...]:
             of_kept = power if term.traits.limits == "command" else 0.5 * power  # force goes with the rate squared
             f, was = rate[rows] ** power, kept[rows] ** of_kept
             parts.append((f, np.abs(h.others[quantity][rows]), over[rows], was))
-        told = _goes_on(quantity, *(np.concatenate(column) for column in zip(*parts, strict=True)))
+        step = max(h.quanta.get(quantity, 0.0) for h in data.histories)
+        told = _goes_on(quantity, step, *(np.concatenate(column) for column in zip(*parts, strict=True)))
         out += [told] if told is not None else []
     return tuple(out)
 
@@ -87,8 +88,11 @@ def _sides(fitted: Fit, term: Term, data: Data, run: int) -> tuple[NDArray[np.in
     return rows, kept < (1 - policy.select.GOES_ON_DEPTH) * whole, kept, np.abs(rate)
 
 
-def _goes_on(quantity: str, f: Floats, value: Floats, over: NDArray[np.bool_], kept: Floats) -> GoesOn | None:
-    """By a straight line over f (n,), the rate to the quantity's power, through rows below the limit."""
+def _goes_on(
+    quantity: str, step: float, f: Floats, value: Floats, over: NDArray[np.bool_], kept: Floats
+) -> GoesOn | None:
+    """By a straight line over f (n,), the rate to the quantity's power, through rows below the limit. Readings in steps
+    of `step` stand off by a part of one for as long as a level lasts."""
     good = np.isfinite(value)
     f, value, over, kept = f[good], value[good], over[good], kept[good]
     least = policy.select.GOES_ON_ROWS
@@ -101,6 +105,7 @@ def _goes_on(quantity: str, f: Floats, value: Floats, over: NDArray[np.bool_], k
     X = np.column_stack([np.ones(f.size), f])
     line, *_ = np.linalg.lstsq(X[below], value[below], rcond=None)
     scatter = float(np.std(value[below] - X[below] @ line)) * np.sqrt(1 + 2 / np.count_nonzero(below))
+    rounded = step / np.sqrt(12) if scatter < step else 0.0
     edge = float(np.max(f[below]))
     rise = float(line[1] * (np.mean(f[over]) - edge))
     if rise <= 0:
@@ -111,4 +116,5 @@ def _goes_on(quantity: str, f: Floats, value: Floats, over: NDArray[np.bool_], k
     std = scatter * float(np.sqrt(1 / np.count_nonzero(over) + share**2 * (ahead @ spread @ ahead) + 1 / below.sum()))
     through = float(np.mean(kept[over]) - np.max(kept[below]))
     asked = float(np.mean(f[over]) - edge) * float(np.max(kept[below])) / edge
+    std = float(np.hypot(std, np.sqrt(2) * rounded))  # on either side of the limit
     return GoesOn(quantity, share, std / rise, float(np.clip(through / max(asked, 1e-300), 0.0, 1.0)))

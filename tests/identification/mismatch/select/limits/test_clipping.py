@@ -13,7 +13,7 @@ from identification.physics.cavitation import Cavitation
 from identification.physics.command_saturation import CommandSaturation
 from identification.physics.load_cell_saturation import LoadCellSaturation
 from identification.physics.winding_resistance import WindingResistance
-from identification.recording import Channel
+from identification.recording import Acquisition, Channel
 from tests.identification.diagnosed_runs import NOISE, C, run
 from tests.identification.mismatch.pipeline.whole_diagnoses import diagnosed
 from tests.identification.mismatch.small import known_noise, rng
@@ -91,6 +91,28 @@ def test_a_rate_that_bends_by_itself_does_not_stop_with_the_thrust():
     (told,) = beyond(estimate.fit, CELL, data)
     assert told.share == pytest.approx(1.0, abs=max(4 * told.std, 0.05))
     assert contradiction(estimate.fit, CELL, estimate.noise, data) == ""
+
+
+def in_steps(recording, step):
+    """Its current as a controller tells it, whose noise is far less than a step."""
+    command, thrust, current = recording.channels
+    read = np.round(current.value / step) * step
+    return replace(
+        recording, channels=(command, thrust, replace(current, value=read, acquisition=Acquisition(quantum=step)))
+    )
+
+
+@pytest.mark.parametrize(("step", "least"), [(2.0, 0.1), (0.1, 0.005)])
+def test_a_current_that_is_read_in_steps_is_as_sure_as_they_are(step, least):
+    """3.2 A stood for 3.28 in steps of 0.1: "the current stops rising, the drive clips", and a cell that did had no
+    name."""
+    estimate, data = fitted(CELL, (46.0,), in_steps(clipping("cell", beside=("current",), limit=46.0), step))
+    (told,) = beyond(estimate.fit, CELL, data)
+    assert told.std > least
+    assert told.share == pytest.approx(1.0, abs=3 * told.std)
+    assert contradiction(estimate.fit, CELL, estimate.noise, data) == ""
+    estimate, data = fitted(CELL, (46.0,), in_steps(clipping("drive", beside=("current",), limit=46.0), 0.1))
+    assert "current stops rising" in contradiction(estimate.fit, CELL, estimate.noise, data)
 
 
 def test_nothing_is_said_where_nothing_was_recorded_or_nothing_clips():
