@@ -55,7 +55,9 @@ def best_forms(fitted: Fit, terms: Sequence[Term], data: Data, weights: Weights,
     for term in fitted.model.terms:
         for other in terms:
             if other.id == term.id and other not in fitted.model.terms and may_replace(term, other, fitted.model):
-                fitted = _better_form(fitted, term, other, data, weights, noise)
+                better = _better_form(fitted, term, other, data, weights, noise)
+                if better is not fitted:
+                    fitted, term = better, other  # noqa: PLW2901  # the next form is asked in the place of this one
     return fitted
 
 
@@ -79,8 +81,6 @@ def beginnings(term: Term, values: tuple[float, ...], other: Term, scale: Scale)
 def _better_form(now: Fit, term: Term, other: Term, data: Data, weights: Weights, noise: Noise) -> Fit:
     """The other of two forms where its BIC is less, of a rare one by far, and nothing contradicts it. What stands for a
     channel of a few steps need not be better than what those say, nor the usual one of two that do as well."""
-    if term not in now.model.terms:
-        return now
     logn = float(np.log(max(now.residual.size, 2)))
     wanted = now.chi2 - policy.select.RIVAL_BETTER_BIC - (price(other, data) - price(term, data)) * logn
     wanted += 2 * policy.select.RIVAL_BETTER_BIC * int(usual_form(other, term, data.scale))
