@@ -11,11 +11,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.estimate.fitting import Fit
+from identification.mismatch.estimate.fitting import Fit, raw
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.model.step_response import told
 from identification.mismatch.model.whitening import Weights
+from identification.mismatch.select.family_wise import lengths
 from identification.physics.term import Scale, Term
 from identification.recording import Floats
 
@@ -29,6 +30,8 @@ SHARP, DULL = 0.05, 0.3
 """Damping."""
 LOWEST = 5.0
 """Hz: what rings more slowly is among the term's own trials."""
+LONG = 0.03
+"""Damping of what rings on for five periods, and by how much trials of it are apart."""
 
 
 def alternatives(terms: Sequence[Term], scale: Scale) -> int:
@@ -119,6 +122,26 @@ def likeliest_rings(fitted: Fit, data: Data, term: Term, most: int) -> tuple[tup
         score = np.abs(change.T @ residual) / np.where(size > 0, size, np.inf)
         out += [trials[j] for j in np.argsort(-score)[: most // 2]]
     return tuple(out)
+
+
+def sharp_rings(
+    fitted: Fit, data: Data, weights: Weights, basis: Floats, term: Term, most: int
+) -> tuple[tuple[float, ...], ...]:
+    """Up to `most` trials of a stand_resonance that rings on for periods, the best first: where steps are few and large
+    it is seen for so long that a trial a tenth of its frequency off sees nothing."""
+    highest = term.parameters(data.scale)[1].high
+    if highest <= LOWEST:
+        return ()
+    tried = np.geomspace(LOWEST, highest, max(int(np.ceil(np.log(highest / LOWEST) / LONG)), 2))
+    base, _ = raw(fitted.model, fitted.theta, data, with_rate=False)
+    made = [raw(*fitted.more(term, (1.0, f, LONG)), data, with_rate=False)[0] for f in tried.tolist()]
+    thrust = [np.column_stack([each[i] for each in made]) - own[:, None] for i, own in enumerate(base)]
+    change = Weights(weights.thrust).whiten(thrust, [])
+    basis = basis[: data.size]
+    change -= basis @ (basis.T @ change)
+    size = lengths(change)
+    score = _peaks(np.abs(change.T @ fitted.residual[: data.size]) / np.where(size > 0, size, np.inf))
+    return tuple((1.0, float(tried[j]), LONG) for j in np.argsort(-score)[:most])
 
 
 def _told(fitted: Fit, data: Data, more: tuple[Term, tuple[float, ...]] | None) -> Floats:

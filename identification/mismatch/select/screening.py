@@ -27,7 +27,7 @@ from identification.mismatch.select.family_wise import (
     quiet,
     surrogate_scores,
 )
-from identification.mismatch.select.likeliest_trials import likeliest_jumps, likeliest_rings
+from identification.mismatch.select.likeliest_trials import likeliest_jumps, likeliest_rings, sharp_rings
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 
@@ -222,6 +222,8 @@ def _trials(term: Term, fit: Fit, data: Data, weights: Weights, basis: Floats) -
         found += [(found[0][0], at) for at in likeliest_jumps(fit, data, weights, basis, MOST_JUMPS)]
     if term.traits.frequency and weights.ticks:
         found += likeliest_rings(fit, data, term, MOST_RINGS)
+    elif term.traits.frequency:
+        found += sharp_rings(fit, data, weights, basis, term, MOST_RINGS)
     return found
 
 
