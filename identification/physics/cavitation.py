@@ -7,11 +7,19 @@ from typing import ClassVar, Literal
 
 import numpy as np
 
+from identification.physics.digits import percent
 from identification.physics.term import EquationContext, Parameter, Scale, Stage, TermContext
 from identification.physics.traits import Proxy, Traits
 from identification.recording import Floats
 
 RATE = Proxy("rotation_rate", "no rotation rate was recorded", "the voltage, as the steady rate that goes with it,")
+
+MOST_LOST = 0.9
+"""Of the thrust at the largest driver: a propeller in its own vapour still moves some water, and none pulls back."""
+
+
+def _too_much(term: Cavitation, theta: tuple[float, ...], driver: float) -> bool:
+    return term.lost(theta, driver) > MOST_LOST
 
 
 @dataclass(frozen=True, slots=True)
@@ -25,6 +33,7 @@ class Cavitation:
     covariates: ClassVar[tuple[str, ...]] = ("command_voltage",)
     traits: ClassVar[Traits] = Traits(
         proxy=RATE,
+        too_much=_too_much,
         told_by=(("rotation_rate", "the measured rotation rate"), ("", "another depth")),
         revealed_by="high levels at another depth; the measured rotation rate",
     )
@@ -53,12 +62,15 @@ class Cavitation:
         return (f"F = F * maximum(1 - {lost if self.form == 'linear' else f'({lost}) ** 2'}, 0)",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
-        lost = theta[0] * max(scale.driver - theta[1], 0.0)
-        share = lost if self.form == "linear" else lost**2
         return (
             f"Cavitation: above {theta[1]:.3g} {scale.driver_unit} thrust breaks down; "
-            f"{100 * share:.2g} % is lost at {scale.driver:.3g} {scale.driver_unit}."
+            f"{percent(self.lost(theta, scale.driver))} % is lost at {scale.driver:.3g} {scale.driver_unit}."
         )
+
+    def lost(self, theta: tuple[float, ...], driver: float) -> float:
+        """Share of the thrust at a driver."""
+        beyond = theta[0] * max(driver - theta[1], 0.0)
+        return min(beyond if self.form == "linear" else beyond**2, 1.0)
 
 
 FORMS = (Cavitation("linear"), Cavitation("square"))

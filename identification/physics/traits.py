@@ -127,6 +127,8 @@ class Traits:
     """It clips: LimitsCommand or LimitsReading."""
     dynamics: Callable[[Any, tuple[float, ...], float], Dynamics] | None = None
     """Of the term, its values and the largest driver: what it does between ticks."""
+    too_much: Callable[[Any, tuple[float, ...], float], bool] | None = None
+    """Of the term, its values and the largest driver: whether they are not possible together, each within bounds."""
     shown_over: str = "driver"
     """The covariate that shows it best in a picture."""
     shown_as: SignatureKind = "force"

@@ -11,7 +11,7 @@ from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import Fit, columns_of
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
-from identification.physics.term import Parameter, Term
+from identification.physics.term import Parameter, Scale, Term
 
 
 def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:
@@ -21,12 +21,18 @@ def at_bound(term: Term, fitted: Fit, data: Data, weights: Weights) -> bool:
     """
     begin, values = fitted.layout.of(term).start, fitted.values[term]
     known = term.parameters(data.scale)
-    if impossible(known, values):
+    if out_of_the_question(term, values, data.scale):
         return True
     return any(
         _ends(p, value) and abs(_push(begin + j, fitted, data, weights)) > policy.estimate.PRESSED_AT_BOUND_SIGMA
         for j, (p, value) in enumerate(zip(known, values, strict=True))
     )
+
+
+def out_of_the_question(term: Term, values: tuple[float, ...], scale: Scale) -> bool:
+    """Whether a term ends at what is physically possible, or beyond what its values can be together."""
+    too_much = term.traits.too_much
+    return impossible(term.parameters(scale), values) or (too_much is not None and too_much(term, values, scale.driver))
 
 
 def impossible(known: Sequence[Parameter], values: Sequence[float]) -> bool:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from identification.mismatch import policy
-from identification.mismatch.estimate.at_bounds import impossible
+from identification.mismatch.estimate.at_bounds import out_of_the_question
 from identification.mismatch.name.named_term import Check
 from identification.mismatch.name.naming import Named
 from identification.mismatch.validate.held_out import Score
@@ -36,7 +36,7 @@ def not_standing(
     out = {}
     for name in told:
         was, without = earned_at[name.term], less[name.term]
-        if impossible(name.term.parameters(scale), name.theta):
+        if out_of_the_question(name.term, name.theta, scale):
             out[name.term] = Check("possible", ASKED, BOUND)
         elif _moved(was, name, scale):
             out[name.term] = Check("constant", ASKED, OTHER, apart=1.0)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.mismatch.estimate.at_bounds import out_of_the_question
 from identification.run_history.remembered import RememberedRun
 from identification.run_history.slip import slip
 from tests.identification.physics.one_term import H, S, base, integrated, steps, term
@@ -70,6 +71,15 @@ def test_static_forms_of_the_propeller():
     assert term("load_cell_nonlinearity", "quadratic").apply(T, m, (1e-3,))[[0, 3]] == pytest.approx([-77.184, 77.184])
     assert term("load_cell_nonlinearity", "cubic").apply(T, m, (1e-5,))[[0, 3]] == pytest.approx([-75.73248, 75.73248])
     assert term("load_cell_even_bend").apply(T, m, (1e-3,)) == pytest.approx([-66.816, -17.676, 18.324, 77.184])
+
+
+@pytest.mark.parametrize(("form", "slope"), [("linear", 0.9 / 4), ("square", 0.9**0.5 / 4)])
+def test_no_cavitation_takes_all_of_the_thrust(form, slope):
+    """A tachometer that leapt was told as cavitation with 320 % of the thrust lost at the largest rate."""
+    onset, known = S.driver - 4.0, term("cavitation", form)
+    assert out_of_the_question(known, (1.2 * slope, onset), S)
+    assert not out_of_the_question(known, (0.9 * slope, onset), S)
+    assert "100 % is lost" in known.statement((4.0 * slope, onset), S)
 
 
 def test_forms_that_read_another_channel():
