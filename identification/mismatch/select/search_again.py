@@ -10,6 +10,7 @@ from functools import partial
 
 import numpy as np
 
+from identification.mismatch import policy
 from identification.mismatch.estimate.estimate import Estimate
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data
@@ -56,5 +57,5 @@ def _kept(system: Thruster, before: Estimate, model: Fit, rng: np.random.Generat
 
 
 def missed(data: Data, whole: Estimate, less: Estimate, judged: Screening) -> bool:
-    """Whether a screening without a term finds something, or the noise had to take what the term did."""
-    return judged.largest > judged.threshold or taken_by_noise(whole, less, judged, data)
+    """Whether a screening without a term nearly finds something, or the noise had to take what the term did."""
+    return judged.largest > policy.select.STILL_FOUND * judged.threshold or taken_by_noise(whole, less, judged, data)
