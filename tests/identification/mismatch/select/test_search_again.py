@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.select.search_again import missed, search_again
 from identification.mismatch.select.screening import Directions, Screening
+from identification.mismatch.select.search_again import missed, search_again
 from identification.physics.dead_band import DeadBand
 from identification.physics.zero_drift import ZeroDrift
 from tests.identification.diagnosed_runs import dead_band
