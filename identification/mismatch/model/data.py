@@ -40,6 +40,8 @@ class Data:
     with_rate: bool = False
     bands: tuple[tuple[float, float], ...] = ()
     """(Hz, quality) of broad peaks of the noise."""
+    rings: bool = False
+    """Stands that ring on for periods may be sought: no line is left that one could be taken for."""
     most_shift: float = 0.0
     """s, bound of the nuisance shift; 0 where nothing moves."""
     prior_factor: PriorPredictionFactor | None = None

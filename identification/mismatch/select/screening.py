@@ -222,7 +222,7 @@ def _trials(term: Term, fit: Fit, data: Data, weights: Weights, basis: Floats) -
         found += [(found[0][0], at) for at in likeliest_jumps(fit, data, weights, basis, MOST_JUMPS)]
     if term.traits.frequency and weights.ticks:
         found += likeliest_rings(fit, data, term, MOST_RINGS)
-    elif term.traits.frequency:
+    elif term.traits.frequency and data.rings:
         found += sharp_rings(fit, data, weights, basis, term, MOST_RINGS)
     return found
 

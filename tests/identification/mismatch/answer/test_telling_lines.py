@@ -127,13 +127,15 @@ def test_at_one_speed_a_line_may_stay_or_go_with_the_rotor_and_both_are_told():
 
 @pytest.fixture(scope="module")
 def blades():
-    """Three periods a turn at levels of many speeds."""
+    """Three periods a turn at levels of many speeds; the rate is read so often that the angle is known across steps."""
     start, level = levels(0, SECONDS)
     t = np.arange(0.0, SECONDS, 1 / 60)
     V = level[np.maximum(np.searchsorted(start, t, side="right") - 1, 0)]
     turns = turned(np.append(start, SECONDS), 0.7 * level, t)
     wave = np.where(V == 0, 0.0, 0.5 * np.sin(2 * np.pi * 3 * turns))
-    rate = Channel("rotation_rate", "motor", "rotation_rate", "rev/s", t, 0.7 * V)
+    often = np.arange(0.0, SECONDS, 1 / 600)
+    turning = 0.7 * level[np.maximum(np.searchsorted(start, often, side="right") - 1, 0)]
+    rate = Channel("rotation_rate", "motor", "rotation_rate", "rev/s", often, turning)
     return diagnose([run(lambda *each: each[2] + wave, seconds=SECONDS, rate=60.0, extra=(rate,))])
 
 
