@@ -26,12 +26,15 @@ CheckKind = Literal[
     "own_covariate",
     "any_curve",
     "predicts",
+    "chance",
 ]
 """What a check is about: `possible` values, what the samples can show (`sampled`), what else clips, where the measured
-rate stands, another term that undoes it, BIC, a parameter that is the same everywhere, the shape (three kinds), and
-what was not fitted."""
+rate stands, another term that undoes it, BIC, a parameter that is the same everywhere, the shape (three kinds), what
+was not fitted, and what noise makes where something is left."""
 PAYS: CheckKind = "pays"
-GRAVE: frozenset[CheckKind] = frozenset({"possible", "sampled", "clipping", "rate_levels", "undone", PAYS, "predicts"})
+GRAVE: frozenset[CheckKind] = frozenset(
+    {"possible", "sampled", "clipping", "rate_levels", "undone", PAYS, "predicts", "chance"}
+)
 """Kinds that no share of what could be explained makes up for: a term that fails one is not that physics."""
 
 LEAST_P = 1e-300

@@ -116,6 +116,7 @@ def run(
     data, now, split = selected.data, located.estimate, validated.split
     told = _Told(validated.earned, validated.unearned, _Without(now, located.left))
     open_ended = (located.structured or bool(told.unearned)) and bool(located.left.groups)
+    told = _beyond_chance(told) if open_ended else told
     if open_ended and told.unearned:
         without = _without(now, data, told.unearned, rng)
         if without.nothing and not located.structured:
@@ -126,6 +127,13 @@ def run(
             located = replace(located, estimate=now)
             told = _asked_again(told, gone, now, split, same_run=not unseen)
     return _completed(selected, located, told, split, unseen, rng, open_ended=open_ended)
+
+
+def _beyond_chance(told: _Told) -> _Told:
+    """Where something is left a name for no more than noise makes is none: it follows that."""
+    chance = [n for n in told.earned if n.p_value >= policy.unnamed.CHANCE_BESIDE_REST]
+    asked = [n.asked(Check("chance", "it is more than noise makes", f"by chance (p {n.p_value:.2g})")) for n in chance]
+    return replace(told, earned=tuple(n for n in told.earned if n not in chance), unearned=(*told.unearned, *asked))
 
 
 def _asked_again(

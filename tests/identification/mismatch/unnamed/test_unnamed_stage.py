@@ -22,12 +22,14 @@ from tests.identification.mismatch.small import history, rng, selected, short
 BAND, UNEVEN, JUMP = DeadBand(), Asymmetry(), ZeroOffset()
 
 
-def completed(values, recording, unseen=(), unearn=()):
-    """The stages behind a search that ended with this model; names of `unearn` fail a check."""
+def completed(values, recording, unseen=(), unearn=(), chance=()):
+    """The stages behind a search that ended with this model; names of `unearn` fail a check, those of `chance` are
+    worth what noise makes in one search of twenty."""
     chosen = selected(values, [recording], list(values))
     located = located_by(chosen, rng(0))
     named = named_by(chosen, located)
     named = tuple(n.asked(Check("own_covariate", "it is one", "it is none")) if n.term in unearn else n for n in named)
+    named = tuple(replace(n, p_value=0.05) if n.term in chance else n for n in named)
     validated = validated_by(located.estimate, named, chosen.data, unseen)
     return stage.run(chosen, located, validated, unseen, rng(1)), chosen
 
@@ -51,13 +53,23 @@ def test_what_has_no_name_is_modelled_by_a_shape_where_that_predicts():
     assert found.earned == ()
 
 
+def bumped(_t, V, F):
+    """In reverse 0.8 of the forward thrust, and a bump of the static curve."""
+    return np.where(F < 0, 0.8, 1.0) * F * np.where(np.abs(V) == 8.0, 1.06, 1.0)
+
+
+def test_beside_a_rest_a_name_for_no_more_than_noise_makes_is_none():
+    uneven = short(change=lambda _t, _V, F: np.where(F < 0, 0.8, 1.0) * F, seconds=160.0)
+    alone, _ = completed({UNEVEN: (1.0,)}, uneven, chance=(UNEVEN,))
+    assert [n.term for n in alone.earned] == [UNEVEN], "by itself it is believed by its BIC"
+    beside, _ = completed({UNEVEN: (1.0,)}, short(change=bumped, seconds=160.0), chance=(UNEVEN,))
+    assert beside.open_ended
+    assert [n.term for n in beside.earned] == []
+    assert "by chance (p 0.05)" in {check.failed for n in beside.unearned for check in n.checks}
+
+
 def test_a_name_keeps_its_value_beside_a_shape_over_its_own_covariate():
-    """In reverse 0.8 of the forward thrust, and a bump of the static curve: with a spline over the command in the
-    model an asymmetry could be any."""
-
-    def bumped(_t, V, F):
-        return np.where(F < 0, 0.8, 1.0) * F * np.where(np.abs(V) == 8.0, 1.06, 1.0)
-
+    """With a spline over the command in the model an asymmetry could be any."""
     found, _ = completed({UNEVEN: (1.0,)}, short(change=bumped, seconds=160.0))
     assert "command_voltage" in [t.quantity for t in found.flexible.terms]
     (name,) = found.earned
