@@ -15,7 +15,8 @@ from identification.recording import Floats
 RATE = Proxy("rotation_rate", "no rotation rate was recorded", "the voltage, as the steady rate that goes with it,")
 
 MOST_LOST = 0.9
-"""Of the thrust at the largest driver: a propeller in its own vapour still moves some water, and none pulls back."""
+"""Of the thrust at the largest driver: as much as ventilation takes at most, which takes more (0.7 to 0.9: Kozlowska,
+Steen and Koushan 2009, Classification of different type of propeller ventilation)."""
 
 
 def _too_much(term: Cavitation, theta: tuple[float, ...], driver: float) -> bool:
