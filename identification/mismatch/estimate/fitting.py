@@ -21,6 +21,9 @@ from identification.mismatch.model.whitening import Weights
 from identification.physics.term import Parameter, Term
 from identification.recording import Floats
 
+EDGE = 9.0
+"""Fall of chi-square that the slope of a clock promises and that no step of it gives: a tick stands between, and what
+the slope does may be an effect's. Less than three sigma of it would not be found anyway."""
 BEYOND_CLOCKS = 2.0
 """Times the chi-square of which a fit is hopeless: no other shift of the clocks brings one down that ends above it."""
 
@@ -36,7 +39,7 @@ class Fit:
     jacobian: Floats
     """(n, p) whitened, all parameters that were free."""
     free: NDArray[np.bool_]
-    """(q,) of the whole vector of theta: what was free, and not at a bound."""
+    """(q,) of the whole vector of theta: what was free, and stopped by no bound, nor by a tick."""
     log_det: float = 0.0
 
     @property
@@ -286,6 +289,10 @@ def _descended(
         found = Minimum(best.vector[may], left, slopes)
     ended = (best.vector <= low) | (best.vector >= high)
     free = may & ~ended
+    if free[at.shift] and not found.given_up:
+        lo, hi = low[may], high[may]
+        along = promised(found, lo, hi, free[may]) - promised(found, lo, hi, (free & still)[may])
+        free[at.shift] = along < EDGE
     return Fit(model, best, found.residual, found.slopes[:, free[may]], free, weights.log_det)
 
 

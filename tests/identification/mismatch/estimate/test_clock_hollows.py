@@ -11,6 +11,8 @@ from identification.mismatch.model.model import Model
 from identification.mismatch.model.whitening import weights
 from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.select.baseline import baseline
+from identification.mismatch.select.screening import directions
+from identification.physics.inflow_dynamics import InflowDynamics
 from identification.physics.motor_lag import MotorLag
 from identification.recording import Acquisition, Channel, Recording
 from tests.identification.diagnosed_runs import TOP, C
@@ -141,3 +143,35 @@ def test_a_part_keeps_the_clocks_that_all_rows_had():
     assert kept.chi2 < found.chi2 + 1.0
     told = replace(whole.theta, shift=moved.shift)
     assert with_clocks_of(told, whole, data, stood(data)) is whole, "all rows mind"
+
+
+def leading():
+    """A ramp of two minutes in ticks of 51 ms; thrust comes 4 ms before it, as water makes it that must follow."""
+    rng = np.random.default_rng(5)
+    when = 2.0 + 0.0506 * np.arange(2400)
+    volts = TOP * np.interp(when, [2.0, 32.0, 92.0, 122.0], [0.0, 1.0, -1.0, 0.0])
+    thrust = 0.0195 + 0.02727 * np.arange(4500)
+    now = volts[np.maximum(np.searchsorted(when, thrust, side="right") - 1, 0)]
+    smooth = TOP * np.interp(thrust, [2.0, 32.0, 92.0, 122.0], [0.0, 1.0, -1.0, 0.0])
+    early = TOP * np.interp(thrust - 0.12, [2.0, 32.0, 92.0, 122.0], [0.0, 1.0, -1.0, 0.0])
+    F = C * now * np.abs(now) + 0.034 * C * np.abs(now) * (smooth - early)
+    return Recording(
+        "leading",
+        "T1",
+        (
+            Channel("command_voltage", "command", "command_voltage", "V", when, volts),
+            Channel("thrust", "cell", "thrust", "N", thrust, F + 0.02 * rng.standard_normal(F.size)),
+        ),
+        source="leading.h5",
+    )
+
+
+def test_a_lead_that_no_shift_of_samples_makes_is_not_hidden_by_its_slope():
+    """The clock's slope was all of it, and a tick kept the clock from following: nothing was found, nothing left."""
+    data, theta = data_of([leading()], clocks=True)
+    sizes = [np.zeros(rows.size) for rows in data.rows]
+    w = weights(data, Noise(0.02**2, 0.0), sizes, None, unit=True)
+    found = fit(Model(), theta, data, w)
+    sought = directions(found, data, w, [InflowDynamics()])
+    assert not found.free[found.layout.shift]
+    assert np.max(sought.columns.T @ found.residual) > 10.0
