@@ -2,13 +2,14 @@
 
 An amplifier or a converter that clips takes the noise with it. A cell on its stop does not: what the amplifier behind
 it adds goes on, so that silence speaks for a clip but noise does not speak against it. Where a sample is the mean of
-many conversions, each clips with a noise of its own, which the samples do not show.
+many conversions, each clips with a noise of its own, which the samples do not show. Where the zero was set behind
+what clips, by a tare in software say, readings end at two values whose middle is not 0: the forms off centre.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import ClassVar, Literal
+from dataclasses import dataclass, replace
+from typing import ClassVar, Final, Literal
 
 import numpy as np
 from scipy.special import ndtr
@@ -34,6 +35,14 @@ CLIPS_SELDOM = 2.0
 NOISE_TOLD = "the noise of a conversion"
 LOWEST_KNEE = 0.25
 """Of the largest reading: what bends from less on is no limit, but another curve."""
+FARTHEST, TRIED_MIDDLE = 0.5, 0.03
+"""Of the largest reading: the middle between two ends; and where it is looked for first."""
+TRAITS: Final = Traits(
+    limits="reading",
+    told_by=(("rotation_rate", "the measured rotation rate"), ("current", "the measured current")),
+    revealed_by="current or rotation rate at the highest levels: they go on rising",
+)
+CLOSER: Final = replace(TRAITS, closer=True)
 
 
 def _beyond(z: Floats, half: Floats, noise: float) -> Floats:
@@ -64,34 +73,42 @@ class LoadCellSaturation:
     physics: ClassVar[str] = "the load cell or its amplifier clips"
     needs: ClassVar[tuple[str, ...]] = ()
     covariates: ClassVar[tuple[str, ...]] = ("thrust",)
-    traits: ClassVar[Traits] = Traits(
-        limits="reading",
-        told_by=(("rotation_rate", "the measured rotation rate"), ("current", "the measured current")),
-        revealed_by="current or rotation rate at the highest levels: they go on rising",
-    )
-    form: Literal["hard", "before_noise", "averaged", "knee"] = "hard"
+    form: Literal["hard", "before_noise", "averaged", "knee", "off_centre", "off_centre_before_noise"] = "hard"
+
+    @property
+    def traits(self) -> Traits:
+        return CLOSER if self._off_centre else TRAITS
 
     @property
     def sharp(self) -> bool:
         """Whether readings end at one value, and not over a knee, or the more the noise of a conversion."""
-        return self.form in ("hard", "before_noise")
+        return self.form not in ("averaged", "knee")
 
     @property
     def silent(self) -> bool:
         """Whether the amplifier's own noise is clipped too."""
-        return self.form != "before_noise"
+        return not self.form.endswith("before_noise")
+
+    @property
+    def _off_centre(self) -> bool:
+        return self.form.startswith("off_centre")
 
     def parameters(self, scale: Scale) -> tuple[Parameter, ...]:
         most = 1.3 * scale.reading
+        limit = Parameter("limit", "N", 0.1 * scale.reading, most, most)
+        if self._off_centre:
+            return limit, Parameter("middle", "N", -FARTHEST * scale.reading, FARTHEST * scale.reading)
         if self.sharp:
-            return (Parameter("limit", "N", 0.1 * scale.reading, most, most),)
+            return (limit,)
         if self.form == "averaged":
             noise = Parameter("noise", "N", LEAST_NOISE * scale.reading, MOST_NOISE * scale.reading, told=NOISE_TOLD)
-            return Parameter("limit", "N", 0.1 * scale.reading, most, most), noise
+            return limit, noise
         bend = Parameter("bend", "1/N", 0.0, 50.0 / scale.reading, 0.0)
         return bend, Parameter("onset", "N", LOWEST_KNEE * scale.reading, 0.98 * scale.reading)
 
     def trials(self, scale: Scale) -> tuple[tuple[float, ...], ...]:
+        if self._off_centre:
+            return tuple((0.88 * scale.reading, middle * scale.reading) for middle in (TRIED_MIDDLE, -TRIED_MIDDLE))
         if self.sharp:
             shares = (0.99, 0.95, 0.88, 0.75, 0.6) if self.silent else (0.95, 0.88, 0.75, 0.6)
             return tuple((share * scale.reading,) for share in shares)
@@ -117,8 +134,8 @@ class LoadCellSaturation:
         each = ((1.0, theta[1]),) if self.form == "averaged" else ((1 - tails, noise), (tails, TAIL * noise))
         for share, std in each:
             if share > 0:
-                over = value + now.tare - theta[0]
-                under = -theta[0] - value - now.tare
+                off = value + now.tare - self._middle(theta)
+                over, under = off - theta[0], -theta[0] - off
                 out -= share * (_beyond(over, half, std) - _beyond(under, half, std))
         return out
 
@@ -130,13 +147,13 @@ class LoadCellSaturation:
         if self.form == "averaged":
             half = np.hypot(half, np.sqrt(3) * theta[1])  # an even motion of that variance
         # limit - half share^2 is the clipped mean of an even motion
-        short = np.maximum(theta[0] - np.abs(reading), 0.0)
+        short = np.maximum(theta[0] - np.abs(reading - self._middle(theta)), 0.0)
         out: Floats = np.sqrt(np.minimum(short / np.maximum(half, LEAST_MOVE * theta[0]), 1.0))
         return out
 
     def slope(self, reading: Floats, theta: tuple[float, ...]) -> Floats:
         """What the cell would show of a small change where it reads `reading` N if it were endless."""
-        beyond = np.abs(reading) - self.start(theta)
+        beyond = np.abs(reading) - self.start(theta, np.sign(reading))
         if self.sharp:
             return np.where(beyond > 0, 0.0, 1.0)
         if self.form == "averaged":
@@ -144,11 +161,18 @@ class LoadCellSaturation:
         out: Floats = np.clip(1 - theta[0] * np.maximum(beyond, 0.0), 0.0, 1.0)
         return out
 
-    def start(self, theta: tuple[float, ...]) -> float:
-        """N: where the cell begins to show less."""
+    def start(self, theta: tuple[float, ...], side: Floats | float) -> Floats | float:
+        """N, by size: where the cell begins to show less, on a side, 1 or -1."""
         if self.form == "averaged":
             return theta[0] - CLIPS_SELDOM * theta[1]
-        return theta[0] if self.sharp else theta[1]
+        return theta[0] + side * self._middle(theta) if self.sharp else theta[1]
+
+    def _middle(self, theta: tuple[float, ...]) -> float:
+        """N: of the two ends of the readings."""
+        return theta[1] if self._off_centre else 0.0
+
+    def _ends(self, theta: tuple[float, ...]) -> tuple[float, float]:
+        return self._middle(theta) - theta[0], self._middle(theta) + theta[0]
 
     def equation(self, theta: tuple[float, ...], model: EquationContext) -> tuple[str, ...]:
         if self.form == "knee":
@@ -157,10 +181,14 @@ class LoadCellSaturation:
             what = "the mean of clip(F + e, -limit, limit), e normal of standard deviation noise"
             return (f"F = clipped_mean(F + tare, {theta[0]:.6g}, {theta[1]:.6g}) - tare  # (F, limit, noise): {what}",)
         noise = "each sample with its noise" if self.silent else "before the noise of the amplifier"
-        return (f"F = clip(F + tare, -{theta[0]:.6g}, {theta[0]:.6g}) - tare  # {noise}",)
+        low, high = self._ends(theta)
+        return (f"F = clip(F + tare, {low:.6g}, {high:.6g}) - tare  # {noise}",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
         advice = "change the range of the amplifier or the cell"
+        if self._off_centre:
+            low, high = self._ends(theta)
+            return f"Load-cell saturation: readings end at {low:.4g} and {high:.4g} N; {advice}."
         if self.sharp:
             return f"Load-cell saturation: readings end at +-{theta[0]:.4g} N; {advice}."
         if self.form == "averaged":
@@ -182,4 +210,6 @@ FORMS = (
     LoadCellSaturation("before_noise"),
     LoadCellSaturation("averaged"),
     LoadCellSaturation("knee"),
+    LoadCellSaturation("off_centre"),
+    LoadCellSaturation("off_centre_before_noise"),
 )

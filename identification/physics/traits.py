@@ -64,8 +64,8 @@ class LimitsReading(Protocol):
     def slope(self, reading: Floats, theta: tuple[float, ...]) -> Floats:
         """What the cell would show of a small change where it reads `reading` N."""
 
-    def start(self, theta: tuple[float, ...]) -> float:
-        """N, where the cell begins to show less."""
+    def start(self, theta: tuple[float, ...], side: Floats | float) -> Floats | float:
+        """N, by size: where the cell begins to show less, on a side, 1 or -1."""
 
 
 class SpreadJump(Protocol):

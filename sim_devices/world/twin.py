@@ -139,7 +139,8 @@ def _cell_limit(values: Values, form: str, _k: float, _driver: float) -> Table:
         raise WorldError(
             "load_cell_saturation of the form 'averaged' is a device's: give it `average`, and its limit here"
         )
-    return {**values, "place": "cell"} if form == "before_noise" else {**values, "form": form or "hard"}
+    place = {"place": "cell"} if form.endswith("before_noise") else {}
+    return {**values, **place, "form": form if form == "knee" else "hard"}
 
 
 def _winding(values: Values, _form: str, k: float, _driver: float) -> Table:

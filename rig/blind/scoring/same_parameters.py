@@ -62,7 +62,7 @@ def _in_form(**names: str) -> Same:
 
 def _limit(p: Table, told: Told) -> Table:
     """Of a limit that is met at once, wherever the noise comes in; a soft one has no such value."""
-    return {"limit": p["limit"]} if "form" not in p and told.form in ("hard", "before_noise", "averaged") else {}
+    return {"limit": p["limit"]} if "form" not in p and told.form != "knee" else {}
 
 
 def _winding(p: Table, told: Told) -> Table:

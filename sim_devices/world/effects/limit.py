@@ -68,6 +68,8 @@ class LoadCellSaturation(Limit):
     """
 
     place: str = "output"
+    middle: float = 0.0
+    """N: of the two values at which readings end; not 0 where a zero is set behind what clips."""
 
     def __post_init__(self) -> None:
         Limit.__post_init__(self)
@@ -75,11 +77,11 @@ class LoadCellSaturation(Limit):
 
     def apply(self, value: float, s: State, dt: float) -> float:
         """What the zero adds later is left out of it."""
-        zero = s.zero if self.place == "cell" else 0.0
+        zero = (s.zero if self.place == "cell" else 0.0) - self.middle
         return Limit.apply(self, value + zero, s, dt) - zero
 
     def over(self, value: Floats, h: History) -> Floats:
-        zero = h.zero if self.place == "cell" else 0.0
+        zero = (h.zero if self.place == "cell" else 0.0) - self.middle
         return Limit.over(self, value + zero, h) - zero
 
     @property

@@ -72,6 +72,8 @@ PLAIN = {
     ("load_cell_saturation", "before_noise"): (51.3,),
     ("load_cell_saturation", "averaged"): (51.3, 2.3),
     ("load_cell_saturation", "knee"): (0.031, 33.1),
+    ("load_cell_saturation", "off_centre"): (51.3, -2.7),
+    ("load_cell_saturation", "off_centre_before_noise"): (51.3, 2.7),
 }
 """Values that are plain to see."""
 DIGITS = 22 / 21

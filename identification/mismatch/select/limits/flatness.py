@@ -37,11 +37,11 @@ def noise_goes_on(fitted: Fit, term: Term, noise: Noise, data: Data) -> bool:
         still = moved[rows] < np.sqrt(variance)  # on its way a force is not foretold to a part of a tick
         for side in (1.0, -1.0):
             reached = np.minimum(side * first, side * last) + side * fitted.theta.tares[i]  # not on the way there
-            slope = cell.slope(reached, values)
-            deep = still & (reached > cell.start(values)) & (slope < policy.select.KNEE_SLOPE)
+            slope, start = cell.slope(side * reached, values), cell.start(values, side)
+            deep = still & (reached > start) & (slope < policy.select.KNEE_SLOPE)
             behind = 0.0 if cell.silent else variance - noise.proportional * force**2
             if cell.sharp:
-                deep &= reached > values[0] + policy.select.CLIPPED_DEPTH * np.sqrt(variance)
+                deep &= reached > start + policy.select.CLIPPED_DEPTH * np.sqrt(variance)
             count, beside = h.count[rows][deep].astype(np.float64), h.thrust[rows][deep] - told_thrust[i][deep]
             if count.sum() > 1:
                 left += float(count @ (beside - np.average(beside, weights=count)) ** 2 + h.within[rows][deep].sum())

@@ -170,3 +170,16 @@ def test_a_tare_tells_too_for_a_cell_clips_at_one_reading_either_way():
         (one,) = diagnosed(clipping(what, tare=3.0)).findings
         assert one.effect == effect
         assert not {"command_saturation", "load_cell_saturation"} & {r.effect for r in one.rivals}
+
+
+def test_readings_whose_zero_was_set_behind_what_clips_end_at_two_values():
+    """Seen as one limit either way there were a drift, a jump of the zero and an even bend beside it."""
+    made = clipping("cell", beside=("rotation_rate",), limit=46.0)
+    command, thrust, rate = made.channels
+    found = diagnosed(replace(made, channels=(command, replace(thrust, value=thrust.value + 2.0), rate)))
+    (one,) = found.findings
+    assert found.unexplained is None
+    assert (one.effect, one.form) == ("load_cell_saturation", "off_centre_before_noise")
+    assert one.parameters["limit"].value == pytest.approx(46.0, abs=0.1)
+    assert one.parameters["middle"].value == pytest.approx(2.0, abs=0.1)
+    assert "readings end at -44 and 48 N" in one.statement
