@@ -33,6 +33,8 @@ MOST_LATELY = 24
 """What the rates of the last few models make at the samples: most terms change none."""
 MOST_GAINS = 24
 """How much of a small change the last few models pass on, term by term."""
+MOST_KNOTS = 4
+"""Ticks with where a rotor passes through rest: many stands are tried on one rotor."""
 MOST_FOLLOWERS = 48
 """What follows the rates of the last few models late: most parameters change neither the rates nor its time."""
 MOST_REFERENCES = 64
@@ -54,6 +56,7 @@ class RememberedRun:
         self.leads = LeastRecentlyUsed[Floats](MOST_LEADS)
         self.lately = LeastRecentlyUsed[Floats](MOST_LATELY)
         self.gains = LeastRecentlyUsed[Any](MOST_GAINS)
+        self.knots = LeastRecentlyUsed[tuple[Floats, Floats]](MOST_KNOTS)
         self._followers = LeastRecentlyUsed[Floats](MOST_FOLLOWERS)
         self._references = LeastRecentlyUsed[Floats](MOST_REFERENCES)
         self._delays = LeastRecentlyUsed[Delay](MOST_DELAYS)

@@ -18,7 +18,7 @@ from identification.recording import Floats
 from identification.run_history.converter import Converter, Mode
 from identification.run_history.filters import within_intervals
 from identification.run_history.remembered import RememberedRun
-from identification.run_history.ticks.sub_interval_dynamics import Passed
+from identification.run_history.ticks.sub_interval_dynamics import Passed, with_knots
 
 
 def beside_means(
@@ -58,20 +58,10 @@ def _each(run: RememberedRun, passed: Passed) -> Floats:
     if passed.rotor is None and passed.ring is None:
         when, value = history.ticks
         return _shown(history.converter, at, when, value * np.abs(value))
-    when, value = _cut(history.ticks, history.edges - passed.delay)
-    if passed.rotor is None:
-        return _shown(history.converter, at, when, value * np.abs(value), passed.ring_modes(when, value))
-    when, value = _cut((when, value), passed.turning_points(when, value))
+    when, value = passed.knots(*with_knots(history.ticks, history.edges - passed.delay))
     steady, modes = passed.rotor_modes(when, value)
     ring = passed.ring_modes(when, value) if passed.ring is not None else ()
     return _shown(history.converter, at, when, steady, (*modes, *ring))
-
-
-def _cut(held: tuple[Floats, Floats], at: Floats) -> tuple[Floats, Floats]:
-    """The same staircase with knots `at` beside its own: rates of following change between two that are far apart."""
-    when, value = held
-    knots = np.union1d(when, at[(at > when[0]) & (at < when[-1])])
-    return knots, value[np.searchsorted(when, knots, side="right") - 1]
 
 
 def _shown(converter: Converter, at: Floats, when: Floats, value: Floats, modes: tuple[Mode, ...] = ()) -> Floats:

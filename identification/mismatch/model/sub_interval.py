@@ -105,13 +105,10 @@ def sample_lead(model: Model, theta: Theta, run: RememberedRun, rate: Floats, la
     if not _changes(passed, history):
         return 2 * np.abs(rate) * history.sample_lead
     assert history.ticks is not None
-    when, value = history.ticks
     last, since = run.after_ticks("thrust", passed.delay)
-    rates = run.rates_at_ticks(passed.rotor)
-    if passed.ring is None:
-        seen = passed.followed(last, since, value, rates)
-    else:
-        seen = passed.rung_at(last, since, when, value, rates)
+    seen = passed.followed(last, since, history.ticks[1], run.rates_at_ticks(passed.rotor))
+    if passed.ring is not None:
+        seen = seen * np.abs(seen) + _ringing(run, "thrust", passed)
     beside = each_lead(history, seen, _means(run, passed), _size(history, passed))
     return beside if passed.ring is not None else 2 * np.abs(rate) * beside
 
@@ -156,11 +153,17 @@ def _leads(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:
     if passed.ring is None:
         beside = lead(history, seen, means, samples, size)
         return np.array([beside, curvature(history, force, means, passed.force_means(run), beside, samples)])
-    assert history.ticks is not None
-    when, value = history.ticks
-    rung = force + samples.means(passed.ringing(*run.after_ticks(channel, passed.delay), when, value))
+    rung = force + samples.means(_ringing(run, channel, passed))
     beside = lead(history, rung, means, samples, size)
     return np.array([beside, np.zeros(beside.size)])
+
+
+def _ringing(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:
+    """(N,) what the stand adds to rate |rate| at the samples of a channel."""
+    ticks = run.history.ticks
+    assert ticks is not None
+    when, value = run.knots(passed.rotor, lambda: passed.knots(*ticks))
+    return passed.ringing(*run.samples(channel).after(when, passed.delay), when, value)
 
 
 def _followed(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:

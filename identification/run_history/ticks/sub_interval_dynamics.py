@@ -16,7 +16,7 @@ from identification.recording import Floats
 from identification.run_history.converter import Mode
 from identification.run_history.filters import complex_recursion, recursion, resonant
 from identification.run_history.remembered import RememberedRun
-from identification.run_history.rotor_lag import Rotor, follow_rate, lag_ends, lagged, to_rest
+from identification.run_history.rotor_lag import AT_REST, Rotor, follow_rate, lag_ends, lagged, to_rest
 
 SETTLED = 25.0
 """Time constants after which a rotor has followed and ringing has died away."""
@@ -59,11 +59,6 @@ class Passed:
         out = force + self.ring[0] * (resonant(moved, history.dt, *self.ring[1:]) - moved)
         return run.delayed(out, self.delay) if self.delay else out
 
-    def rung_at(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats, rates: Floats) -> Floats:
-        """(N,) rate |rate| as the stand shows it then; the ticks at `when` (T,) s."""
-        rate = self.followed(last, since, value, rates)
-        return rate * np.abs(rate) + self.ringing(last, since, when, value)
-
     def followed(self, last: NDArray[np.intp], since: Floats, value: Floats, rates: Floats) -> Floats:
         """(N,) the rate `since` s + delay after the tick `last`, of a driver that takes `value` (T,) at the ticks;
         `rates` (T,) of the rotor there."""
@@ -75,7 +70,7 @@ class Passed:
         return out
 
     def ringing(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
-        """What the stand adds to rate |rate|, (N,)."""
+        """What the stand adds to rate |rate|, (N,) `since` s + delay after the knots `last`."""
         assert self.ring is not None
         _, f, z = self.ring
         *follows, rings = self.ring_modes(when, value)
@@ -85,43 +80,55 @@ class Passed:
         return out
 
     def ring_modes(self, when: Floats, value: Floats) -> tuple[Mode, ...]:
-        """The same after each tick: modes of the linear response, the rotor taken as linear about each tick; what rings
-        is the last."""
+        """The same after each of the knots `when` (T,): what rings is the last of them.
+
+        Between two knots the force is steady but for the modes of the rotor, e^(-r s) each, and so is what a stand
+        shows of them: times w^2/(r^2 - 2 z w r + w^2). It rings by what its place and its speed lack of that then.
+        """
         assert self.ring is not None
         c, f, z = self.ring
         w = 2 * np.pi * f
         pole = complex(-z * w, w * np.sqrt(max(1 - z**2, 1e-9)))
-        force = value * np.abs(value)
-        change, gap = np.diff(force, prepend=force[0]), np.diff(when, prepend=when[0])
-        share: NDArray[np.complex128] = np.full(value.size, c * w**2 / (2j * pole.imag * pole))
-        modes = []
-        if self.rotor is not None:
-            follow = 2 * self.rotor.quadratic * np.abs(value) + self.rotor.linear_at(value)
-            follow = np.maximum(follow, SLOWEST * float(np.max(follow)))
-            share *= follow / (pole + follow)
-            lagging = recursion(np.exp(-follow * gap), change, 0.0)
-            lagging *= c * (1 - w**2 / (follow**2 - 2 * z * w * follow + w**2))
-            modes.append(Mode(lagging, follow))
-        left = share * complex_recursion(np.exp(pole * gap), change.astype(np.complex128))
-        return (*modes, Mode(2 * left, np.full(left.size, -pole)))
+        steady, modes = self.rotor_modes(when, value)
+        shown = [Mode(m.size * w**2 / (m.rate**2 - 2 * z * w * m.rate + w**2), m.rate) for m in modes]
+        gap = np.diff(when, prepend=when[0])
+        before = slice(0, -1)
+        place, speed = np.zeros(when.size), np.zeros(when.size)
+        place[1:] = -np.diff(steady)
+        for each in shown:
+            ended = each.at(gap[1:], before)
+            place[1:] += ended - np.real(each.size[1:])
+            speed[1:] -= np.real(each.rate[before] * ended - (each.rate * each.size)[1:])
+        lacking = place + 1j * (pole.real * place - speed) / pole.imag
+        rings = c * complex_recursion(np.exp(pole * gap), lacking)
+        follow = (Mode(c * (s.size - m.size), m.rate) for s, m in zip(shown, modes, strict=True))
+        return (*follow, Mode(rings, np.full(rings.size, -pole)))
 
-    def rotor_modes(self, when: Floats, value: Floats) -> tuple[Floats, tuple[Mode, Mode]]:
-        """Rate |rate| after the ticks `when` (T,), from which on `value` (T,) is held: where it goes, and two modes.
+    def rotor_modes(self, when: Floats, value: Floats) -> tuple[Floats, tuple[Mode, ...]]:
+        """Rate |rate| after the ticks `when` (T,), from which on `value` (T,) is held: where it goes, and two modes,
+        none of a rotor that follows at once.
 
         n = w + (n0 - w) e^(-l s) has the square w^2 + 2 w (n0 - w) e^(-l s) + (n0 - w)^2 e^(-2 l s). Where it turns
-        round between two ticks (`turning_points` are among them otherwise) its sign is that of its beginning.
+        round between two ticks (`knots` has none such) its sign is that of its beginning.
         """
-        assert self.rotor is not None
+        if self.rotor is None:
+            return value * np.abs(value), ()
         ends = lag_ends(value[:-1], np.diff(when), self.rotor, float(value[0]))
         begin = np.concatenate([value[:1], ends])
         rate = follow_rate(value, 0.5 * (begin + np.append(ends, value[-1])), self.rotor)
         rate = np.maximum(rate, SLOWEST * float(np.max(rate)))
-        sign = np.where(begin != 0, np.sign(begin), np.sign(value))
+        sign = np.sign(np.where(np.abs(begin) > AT_REST, begin, value))
         gap = begin - value
         return sign * value**2, (Mode(sign * 2 * value * gap, rate), Mode(sign * gap**2, 2 * rate))
 
-    def turning_points(self, when: Floats, value: Floats) -> Floats:
-        """s: where the rotor passes through rest between two of the ticks."""
+    def knots(self, when: Floats, value: Floats) -> tuple[Floats, Floats]:
+        """The ticks, and where the rotor passes through rest between two of them."""
+        if self.rotor is None:
+            return when, value
+        return with_knots((when, value), self._turning_points(when, value))
+
+    def _turning_points(self, when: Floats, value: Floats) -> Floats:
+        """s."""
         assert self.rotor is not None
         ends = lag_ends(value[:-1], np.diff(when), self.rotor, float(value[0]))
         begin = np.concatenate([value[:1], ends[:-1]])
@@ -130,3 +137,10 @@ class Passed:
         found = when[at] + to_rest(w, n, self.rotor)
         out: Floats = found[found < when[at + 1]]
         return out
+
+
+def with_knots(held: tuple[Floats, Floats], at: Floats) -> tuple[Floats, Floats]:
+    """The same staircase with knots `at` beside its own: rates of following change between two that are far apart."""
+    when, value = held
+    knots = np.union1d(when, at[(at > when[0]) & (at < when[-1])])
+    return knots, value[np.searchsorted(when, knots, side="right") - 1]
