@@ -14,12 +14,14 @@ from numpy.typing import NDArray
 
 from identification.recording import Floats
 from identification.run_history.converter import Mode
-from identification.run_history.filters import complex_recursion, recursion, resonant
+from identification.run_history.filters import complex_recursion, resonant
 from identification.run_history.remembered import RememberedRun
 from identification.run_history.rotor_lag import AT_REST, Rotor, follow_rate, lag_ends, lagged, to_rest
 
 SETTLED = 25.0
 """Time constants after which a rotor has followed and ringing has died away."""
+BENT, MOST_BENDS = 0.005, 16
+"""Change of a rate of following times the gap between two knots, above which there are some between; how many."""
 SLOWEST = 1e-3
 """Rate of following, beside that at the largest driver, of a rotor that hardly turns."""
 
@@ -122,13 +124,27 @@ class Passed:
         return sign * value**2, (Mode(sign * 2 * value * gap, rate), Mode(sign * gap**2, 2 * rate))
 
     def knots(self, when: Floats, value: Floats) -> tuple[Floats, Floats]:
-        """The ticks, and where the rotor passes through rest between two of them."""
+        """The ticks, where the rotor passes through rest between two, and some where it soon follows at another rate."""
         if self.rotor is None:
             return when, value
-        return with_knots((when, value), self._turning_points(when, value))
+        turning = with_knots((when, value), self._turning_points(when, value))
+        return turning if self.rotor.quadratic == 0 else with_knots(turning, self._bends(*turning))
+
+    def _bends(self, when: Floats, value: Floats) -> Floats:
+        """s: places between knots, as many in each gap as its rate of following changes there."""
+        assert self.rotor is not None
+        held, gap = value[:-1], np.diff(when)
+        end = lag_ends(held, gap, self.rotor, float(value[0]))
+        begin = np.concatenate([value[:1], end[:-1]])
+        change = gap * np.abs(follow_rate(held, end, self.rotor) - follow_rate(held, begin, self.rotor))
+        many = np.minimum(np.ceil(np.sqrt(change / BENT)), MOST_BENDS).astype(int)
+        gaps = np.repeat(np.arange(gap.size), many)
+        first = np.repeat(np.cumsum(many) - many, many)
+        out: Floats = when[gaps] + gap[gaps] * (np.arange(gaps.size) - first) / many[gaps]
+        return out
 
     def _turning_points(self, when: Floats, value: Floats) -> Floats:
-        """s."""
+        """S."""
         assert self.rotor is not None
         ends = lag_ends(value[:-1], np.diff(when), self.rotor, float(value[0]))
         begin = np.concatenate([value[:1], ends[:-1]])
