@@ -264,11 +264,9 @@ class Thruster:
         moved = abs(other.fit.theta.shift - estimate.fit.theta.shift) > STEP
         return moved and estimate.fit.deviance - other.fit.deviance > accept_threshold(1)
 
-    def merged(
-        self, estimate: Estimate, standing: Mapping[Term, SwapTest], best: tuple[float, Fit] | None
-    ) -> tuple[float, Fit] | None:
+    def merged(self, estimate: Estimate, standing: Mapping[Term, SwapTest]) -> tuple[float, Fit] | None:
         self.watch.trying("one term in the place of two")
-        best = one_less(estimate, self.data, self.terms, best)
+        best = one_less(estimate, self.data, self.terms)
         best = one_for_two(estimate, self.data, self.terms, standing, best)
         if best is not None:
             return best

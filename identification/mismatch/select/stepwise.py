@@ -15,7 +15,7 @@ from identification.mismatch.observer import Interrupted
 from identification.mismatch.select.rounds import Candidate, Judged, Round, T, Unhidden
 from identification.recording import Floats
 
-ROUNDS = 3
+ROUNDS = 4
 """Exchanges of a term for a rival, at most: more would go in circles."""
 
 
@@ -112,10 +112,8 @@ class System(Protocol[T, F, S, Judged]):
     def begun_better(self, state: S, other: S, /) -> bool:
         """Whether the same terms are fitted better in `other`, where a search for one more had led and it fell away."""
 
-    def merged(
-        self, state: S, standing: Mapping[T, Standing[F, T]], best: tuple[float, F] | None, /
-    ) -> tuple[float, F] | None:
-        """The better of `best`, a BIC loss and a fit, and a smaller model: one term for two, or one term less.
+    def merged(self, state: S, standing: Mapping[T, Standing[F, T]], /) -> tuple[float, F] | None:
+        """A better model that no exchange of one term leads to, a BIC loss and a fit: one term for two, or one less.
 
         `standing`: how each term of the model stands."""
 
@@ -269,15 +267,26 @@ def exchanged(system: System[T, F, S, Judged], state: S) -> tuple[S, dict[T, Sta
                 lasts = less.chi2 - rival.fit.chi2 > accept_threshold(len(rival.fit.values[rival.term]))
                 if lasts and loss < -policy.select.RIVAL_BETTER_BIC and (best is None or loss < best[0]):
                     best = (loss, rival.fit)
-        best = system.merged(state, standing, best)
+        best = best or system.merged(state, standing)
         if best is None:
             return state, standing
         if any(system.impossible(state, term) for term in state.fit.values):
             left.add(frozenset(state.fit.values))
         else:
             stood |= state.fit.values
-        state = system.replaced(state, best[1])
+        state = _exchanged(system, state, best[1])
     return state, None
+
+
+def _exchanged(system: System[T, F, S, Judged], state: S, other: F) -> S:
+    """With `other` in the place of the model, less what gives nothing beside the effect that came: it would have rivals
+    by the dozen, each as good. Not pruned where that effect, or the form that came, would itself go."""
+    whole = system.replaced(state, other)
+    smaller = pruned(system, whole)
+    before = {term.id for term in state.fit.values}
+    new = set(whole.fit.values) - set(state.fit.values)
+    came = {term for term in new if term.id not in before} or new
+    return smaller if came <= set(smaller.fit.values) else whole
 
 
 def stands(

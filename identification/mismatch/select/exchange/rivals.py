@@ -108,12 +108,11 @@ def _for_both(
     return True
 
 
-def one_less(
-    estimate: Estimate, data: Data, terms: Sequence[Term], best: tuple[float, Fit] | None
-) -> tuple[float, Fit] | None:
-    """The better of `best` and the model without one of its small terms, the others in their best forms: a term that
-    came early may do no more than repair a form that is the wrong one because of it."""
+def one_less(estimate: Estimate, data: Data, terms: Sequence[Term]) -> tuple[float, Fit] | None:
+    """The model without one of its small terms, the others in their best forms: a term that came early may do no more
+    than repair a form that is the wrong one because of it. None where none is better."""
     now = estimate.fit
+    best: tuple[float, Fit] | None = None
     less = {term: fit_without(estimate, term, data) for term in now.model.terms}
     most = max(each.chi2 for each in less.values()) - now.chi2
     logn = float(np.log(max(now.residual.size, 2)))

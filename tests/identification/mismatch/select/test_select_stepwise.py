@@ -133,8 +133,8 @@ class Columns:
     def impossible(self, state, term):
         return term in self.pressed
 
-    def merged(self, state, standing, best):
-        return best
+    def merged(self, state, standing):
+        return None
 
 
 A, B, C, D = map(Column, "abcd")
@@ -224,6 +224,17 @@ def test_a_better_rival_takes_the_place_and_how_each_stands_is_told():
     assert list(less.values) == [C]
     assert rival.term == A
     assert np.isclose(rival.bic_loss, 81 * (1 - 0.9**2))
+
+
+def test_an_exchange_leaves_no_term_behind_that_gives_nothing_any_more():
+    """A knee and two small terms stood for a loss in the winding: once that had come, they stayed, worth nothing, each
+    with a dozen rivals as good."""
+    both = wave(0) + wave(1) + wave(2)
+    system = Columns(9 * both, {A: wave(0), B: both, C: wave(1)})
+    last, standing = exchanged(system, system.state(A, C))
+    assert set(last.fit.values) == {B}
+    assert standing is not None
+    assert set(standing) == {B}
 
 
 def test_what_was_exchanged_is_a_rival_of_what_took_its_place():
