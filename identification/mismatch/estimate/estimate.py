@@ -87,6 +87,13 @@ def refresh(
     return refreshed_once(model, theta, data, extra, estimate, like)
 
 
+def by_itself(estimate: Estimate, data: Data) -> Estimate:
+    """The same model with its noise estimated from nothing, beside nothing else; once for all who ask."""
+    model, theta = estimate.fit.model, estimate.fit.theta
+    found: Estimate = data.predictor.once("by itself", lambda: refresh(model, theta, data, None, None), estimate)
+    return found
+
+
 def refreshed_once(
     model: Model, theta: Theta, data: Data, extra: Floats | None, estimate: Estimate | None, like: Noise | None
 ) -> Estimate:

@@ -13,7 +13,7 @@ import numpy as np
 
 from identification.estimation.tails import chi2_sf
 from identification.mismatch import policy
-from identification.mismatch.estimate.estimate import Estimate, by_run, forces, refresh
+from identification.mismatch.estimate.estimate import Estimate, by_itself, by_run, forces, refreshed_once
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import Weights
 from identification.mismatch.select.family_wise import beside, orthogonal_basis
@@ -34,10 +34,10 @@ def beside_slow_change(estimate: Estimate, data: Data) -> Estimate | None:
 
 def slow_changes(estimate: Estimate, data: Data) -> list[tuple[float, Estimate]]:
     """The p-value of each kind of change, and the model with its noise estimated beside it."""
-    now = refresh(estimate.fit.model, estimate.fit.theta, data, None, None)
+    now = by_itself(estimate, data)
     found = []
     for columns in slow_columns(now, data):
-        beside = refresh(now.fit.model, now.fit.theta, data, columns, now, now.noise)
+        beside = refreshed_once(now.fit.model, now.fit.theta, data, columns, now, now.noise)
         taken, noisier = _taken(beside, data, columns)
         gain = now.fit.deviance - beside.fit.deviance + taken
         found.append((float(chi2_sf(gain / noisier, columns.shape[1])), beside))

@@ -8,7 +8,7 @@ import numpy as np
 
 from identification.estimation.tails import chi2_isf
 from identification.mismatch import policy
-from identification.mismatch.estimate.estimate import Estimate, refresh, refreshed_once
+from identification.mismatch.estimate.estimate import Estimate, by_itself, refresh, refreshed_once
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data, price
 from identification.mismatch.model.parameters import Theta
@@ -41,13 +41,10 @@ def hidden(estimate: Estimate, judged: Screening, data: Data) -> tuple[Unhidden,
     likely = [each for t, v in likely for each in ((t, at) for at in _instants(judged, t, data) or (v,))]
     if not likely:
         return None
-    now = refresh(estimate.fit.model, estimate.fit.theta, data, None, None)
+    now = by_itself(estimate, data)
     found = []
     for term, values in likely:
-        begin = refined(estimate.fit, data, estimate.weights, term, values)
-        bigger, theta = estimate.fit.more(term, begin)
-        first = fit(bigger, theta, data, estimate.weights)
-        new = refreshed_once(bigger, _by_the_clocks_of(now, first), data, None, now, now.noise)
+        new = _together(estimate, term, values, data)
         gain = (now.fit.deviance - new.fit.deviance) / dispersion_of(term, new.fit, data.size)
         if gain > (asked := asked_of(term, judged, data)):
             found.append((Unhidden(gain, asked), new))
@@ -55,6 +52,19 @@ def hidden(estimate: Estimate, judged: Screening, data: Data) -> tuple[Unhidden,
         return None
     told, best = max(found, key=lambda each: each[0].gain)
     return told, refresh(best.fit.model, best.fit.theta, data, None, None)
+
+
+def _together(estimate: Estimate, term: Term, values: tuple[float, ...], data: Data) -> Estimate:
+    """The model with the term, estimated together with the noise; once for all who ask."""
+
+    def made() -> Estimate:
+        now, begin = by_itself(estimate, data), refined(estimate.fit, data, estimate.weights, term, values)
+        bigger, theta = estimate.fit.more(term, begin)
+        first = fit(bigger, theta, data, estimate.weights, near=estimate.fit)
+        return refreshed_once(bigger, _by_the_clocks_of(now, first), data, None, now, now.noise)
+
+    found: Estimate = data.predictor.once(("together", term, values), made, estimate)
+    return found
 
 
 def _by_the_clocks_of(now: Estimate, first: Fit) -> Theta:
@@ -68,7 +78,7 @@ def _by_the_clocks_of(now: Estimate, first: Fit) -> Theta:
 def taken_by_noise(whole: Estimate, less: Estimate, judged: Screening, data: Data) -> bool:
     """Whether the terms that `less` lacks of the `whole` gain, estimated together with the noise, what is asked of one
     that is hidden; `judged`: of `less`."""
-    noise = refresh(less.fit.model, less.fit.theta, data, None, None)
+    noise = by_itself(less, data)
     told = refresh(whole.fit.model, _by_the_clocks_of(noise, whole.fit), data, None, noise, noise.noise)
     lacking = set(whole.fit.model.terms) - set(less.fit.model.terms)
     return noise.fit.deviance - told.fit.deviance > sum(asked_of(term, judged, data) for term in lacking)

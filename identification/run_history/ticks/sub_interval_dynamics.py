@@ -124,7 +124,7 @@ class Passed:
         return sign * value**2, (Mode(sign * 2 * value * gap, rate), Mode(sign * gap**2, 2 * rate))
 
     def knots(self, when: Floats, value: Floats) -> tuple[Floats, Floats]:
-        """The ticks, where the rotor passes through rest between two, and some where it soon follows at another rate."""
+        """The ticks, where the rotor passes through rest between two, and more where its rate of following changes."""
         if self.rotor is None:
             return when, value
         turning = with_knots((when, value), self._turning_points(when, value))
