@@ -49,7 +49,6 @@ class Flexible:
     """A cubic or broken line through values at knots over a covariate."""
 
     physics: ClassVar[str] = "a free shape; no physics is claimed for it"
-    traits: ClassVar[Traits] = Traits()
     quantity: str
     unit: str
     knots: tuple[float, ...]
@@ -62,6 +61,10 @@ class Flexible:
     """s, of load_history."""
     period: float = 0.0
     """s after which a spline over time begins anew; 0: never."""
+
+    @property
+    def traits(self) -> Traits:
+        return Traits(own_clock=self.quantity == "time")
 
     @property
     def id(self) -> str:

@@ -136,7 +136,8 @@ def traced(
     novel, unasked = put_to_earlier(whole, before, later, asked)
     undone = (*selected.undone, *((NO_LINES,) if first.undone else ()))
     notes = (*interrupted(undone), *sound.notes, *chosen.unpredicted, *unasked)
-    case = answer.Case(prepared.recordings, sound, chosen.unseen, cleaned.lines, baseline, notes)
+    left_then = whole is not None and any(term.flexible is not None for term in whole.terms)
+    case = answer.Case(prepared.recordings, sound, chosen.unseen, cleaned.lines, baseline, notes, left_then)
     diagnosis = answer.run(case, answer.Found(selected, located, completed, experiment, novel), draws.answer)
     return Trace(prepared, sound, first, cleaned, chosen, completed, diagnosis)
 

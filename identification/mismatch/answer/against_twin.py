@@ -36,6 +36,8 @@ SAYS = {
     "not shown before": "Whether that{amount} is new cannot be told: the recordings behind {origin} could not have "
     "shown it.",
 }
+LEFT_THEN = "Whether that is new cannot be told: the recordings behind {} left something without a name as well."
+"""A shape that was drawn through one rest need not suit another, be both of one physics."""
 NEAR_REST = 0.05
 """Of the largest thrust: below, a factor of the thrust says little."""
 PART_OF_IT = "Part of what was found, or is left, may be in it."
@@ -307,8 +309,11 @@ def told_new(
     twin: Twin | None,
     left: Remainder | None = None,
     nameless: Collection[Term] = (),
+    *,
+    left_then: bool = False,
 ) -> ToldNew:
-    """Each with whether it is new, where that was asked; `nameless`: the terms that model what is `left`."""
+    """Each with whether it is new, where that was asked; `nameless`: the terms that model what is `left`; `left_then`:
+    whether the twin's own recordings left something that had no name."""
     new, not_new, notes = [], [], []
     origin = "the twin" if twin is None else twin.origin
     for term, finding in findings.items():
@@ -323,13 +328,14 @@ def told_new(
             statement = f"{finding.statement} {SAYS[novelty.since].format(amount=amount, origin=origin)}"
             new.append(replace(finding, statement=statement, since=novelty.since))
     whole = _together([novelties[term] for term in nameless if term in novelties], len(nameless))
-    if left is not None and whole is not None:
-        if whole.since == "there before":
-            not_new.append(left.statement)
-            notes.append(NOT_NEW.format(origin, whole.loss, left.statement))
-            left = None
-        else:
-            left = replace(left, statement=f"{left.statement} {SAYS[whole.since].format(amount='', origin=origin)}")
+    if left is not None and whole is not None and whole.since == "there before":
+        not_new.append(left.statement)
+        notes.append(NOT_NEW.format(origin, whole.loss, left.statement))
+        left = None
+    elif left is not None and left_then:
+        left = replace(left, statement=f"{left.statement} {LEFT_THEN.format(origin)}")
+    elif left is not None and whole is not None:
+        left = replace(left, statement=f"{left.statement} {SAYS[whole.since].format(amount='', origin=origin)}")
     return ToldNew(tuple(new), tuple(not_new), tuple(notes), left)
 
 

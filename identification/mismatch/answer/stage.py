@@ -60,6 +60,8 @@ class Case:
     baseline: Twin | None
     notes: tuple[str, ...]
     """What was left aside, and what cannot be predicted."""
+    left_then: bool = False
+    """Whether the recordings behind the twin left something that had no name."""
 
     @property
     def ids(self) -> tuple[str, ...]:
@@ -123,7 +125,14 @@ def _drafted(case: Case, found: Found, rng: np.random.Generator) -> Drafted:
         rmse(before.fit.model, before.fit.theta, measured, every), rmse(after.fit.model, after.fit.theta, data, every)
     )
     remainder, flexible = remainder_of(completed, data, case.unseen), completed.flexible
-    new = told_new(_findings(completed, data), found.novelties, case.baseline, remainder, completed.nameless)
+    new = told_new(
+        _findings(completed, data),
+        found.novelties,
+        case.baseline,
+        remainder,
+        completed.nameless,
+        left_then=case.left_then,
+    )
     quiet = located.estimate.noise
     held = with_held(score(before, after, data, measured, case.unseen, quiet, flexible=flexible is not None), flexible)
     model = values_of(completed.stated.fit, data, completed.intervals)

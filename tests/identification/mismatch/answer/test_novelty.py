@@ -66,6 +66,15 @@ def test_what_has_no_name_says_whether_it_is_new(novelty, says):
     assert (told.not_new, told.notes) == ((), ())
 
 
+@pytest.mark.parametrize("novelties", [{SHAPE: Novelty("changed", 40.0)}, {}])
+def test_what_has_no_name_is_not_called_new_where_the_twin_had_left_something_too(novelties):
+    """The same left-out physics drew one shape over the run's time and another over the loads of the next."""
+    told = told_new({}, novelties, None, LEFT, [SHAPE], left_then=True)
+    assert told.left.statement.endswith("the recordings behind the twin left something without a name as well.")
+    before = told_new({}, {SHAPE: Novelty("there before", -9.0)}, None, LEFT, [SHAPE], left_then=True)
+    assert before.left is None
+
+
 def test_of_terms_without_a_name_all_must_have_been_asked():
     """One over the run's own time is not, nor is anything where no term models what is left."""
     assert told_new({}, {SHAPE: Novelty("there before", -20.0)}, None, LEFT, [SHAPE, UNEVEN]).left is LEFT

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from identification.flexible_terms.flexible import Flexible
 from identification.mismatch import policy
 from identification.mismatch.answer.against_twin import twin_of
 from identification.mismatch.compare.saved_model_baseline import given, lasting, prior_factor, starting
@@ -250,6 +251,16 @@ def test_a_jump_of_the_zero_stays_with_the_run_that_had_it():
     own = replace(other, recording_id=twin.sources[0].recording_id)
     assert lasting(twin, [own]) is twin
     assert lasting(left, [other]) is left
+
+
+def test_a_free_shape_over_time_stays_with_the_run_that_had_it():
+    """It says so itself, and was subtracted from the next run all the same."""
+    over_time = Flexible("time", "s", (0.0, 20.0, 40.0, 60.0), (0,), ())
+    over_loads = replace(over_time, quantity="load_history", unit="1", knots=(0.0, 0.3, 0.6, 1.0), memory=5.0)
+    values = {over_time: (0.1, -0.1, 0.1), over_loads: (0.1, 0.2, 0.1)}
+    data, estimate = known_noise(values, [short(volts=dead_band(1.0))])
+    twin = twin_of(estimate, data, [short(volts=dead_band(1.0))], None)
+    assert [t.effect for t in lasting(twin, [short(seed=3)]).terms] == ["flexible:load_history"]
 
 
 def test_what_another_form_would_have_said_is_a_direction_no_longer_than_it_was_off(twin):
