@@ -255,7 +255,7 @@ def test_a_jump_of_the_zero_stays_with_the_run_that_had_it():
 
 def test_a_free_shape_over_time_stays_with_the_run_that_had_it():
     """It says so itself, and was subtracted from the next run all the same."""
-    over_time = Flexible("time", "s", (0.0, 20.0, 40.0, 60.0), (0,), ())
+    over_time = Flexible("time", "s", (0.0, 20.0, 40.0, 60.0), (0,), ("force",))
     over_loads = replace(over_time, quantity="load_history", unit="1", knots=(0.0, 0.3, 0.6, 1.0), memory=5.0)
     values = {over_time: (0.1, -0.1, 0.1), over_loads: (0.1, 0.2, 0.1)}
     data, estimate = known_noise(values, [short(volts=dead_band(1.0))])
