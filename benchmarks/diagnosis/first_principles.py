@@ -83,7 +83,7 @@ def commanded(plan: str, rng: np.random.Generator) -> Floats:
     if plan == "steps":
         hold = rng.uniform(1.5, 4.0)
         levels = rng.uniform(-1.0, 1.0, int(DURATION / hold) + 2)
-        levels[0] = 0.0
+        levels[:5] = 0.0, 0.03, -0.07, 0.1, -0.03  # on either side of a dead band, in every run
         return np.asarray(TOP * levels[(t / hold).astype(int)])
     if plan == "stairs":
         up = np.linspace(-1.0, 1.0, 9)

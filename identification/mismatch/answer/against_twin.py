@@ -38,6 +38,9 @@ SAYS = {
 }
 LEFT_THEN = "Whether that is new cannot be told: the recordings behind {} left something without a name as well."
 """A shape that was drawn through one rest need not suit another, be both of one physics."""
+NOW_KNOWN = (
+    "That is no change: its levels left open where in between it lies, and those of these recordings are others."
+)
 NEAR_REST = 0.05
 """Of the largest thrust: below, a factor of the thrust says little."""
 PART_OF_IT = "Part of what was found, or is left, may be in it."
@@ -67,7 +70,12 @@ def with_twin(
     model, was = estimate.fit.model, given_values(before)
     anew = {(t.id, t.form) for t in model.terms if model.given_for(t) is not None}
     effects = {effect for effect, _ in anew}
-    findings = tuple(_relative(f, before, (f.effect, f.form) in anew, was) for f in draft.findings)
+    closer = [f for f in draft.findings if (f.effect, f.form) in anew and _is_closer(f, before, was)]
+    draft = replace(
+        draft, notes=(*draft.notes, *(f"{_relative(f, before, True, was).statement} {NOW_KNOWN}" for f in closer))
+    )
+    left = [f for f in draft.findings if f not in closer]
+    findings = tuple(_relative(f, before, (f.effect, f.form) in anew, was) for f in left)
     changed = changed_constant(before, estimate, data, known, draft.model["C"])
     if changed is not None and (findings or beside) and _referred(changed, before, estimate, data):
         draft = replace(draft, notes=(*draft.notes, f"{changed.statement} {PART_OF_IT}"))
@@ -94,6 +102,16 @@ def _relative(finding: Finding, before: Twin, anew: bool, was: Mapping[str, Valu
     values = ", ".join(_then(name, value) for name, value in then.items())
     return replace(
         finding, statement=f"{finding.statement} {_sentence(before.origin)} has it with {values}.", before=then
+    )
+
+
+def _is_closer(finding: Finding, before: Twin, was: Mapping[str, Value]) -> bool:
+    """Whether it is a threshold that lies where the twin's levels had left it open: those of this run are others."""
+    known = next(t for t in before.terms if (t.effect, t.form) == (finding.effect, finding.form))
+    then = _had(before, finding, was)
+    return all(
+        p.jumps and abs(finding.parameters[p.name].value - then[p.name].value) <= QUANTILE * then[p.name].std
+        for p in known.term.parameters(known.scale)
     )
 
 

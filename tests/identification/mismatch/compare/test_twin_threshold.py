@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.mismatch.answer.against_twin import twin_of
+from identification.mismatch.answer.against_twin import twin_of, with_twin
 from identification.mismatch.compare.earlier_recordings import Later, put_to_earlier
 from identification.mismatch.compare.saved_model_baseline import given, prior_factor, starting
 from identification.mismatch.estimate.confidence_intervals import intervals
@@ -17,10 +17,11 @@ from identification.mismatch.estimate.stairs import covariance
 from identification.mismatch.model.model import Model, extended
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.pipeline import diagnose
-from identification.mismatch.value import QUANTILE
+from identification.mismatch.value import QUANTILE, Value
 from identification.physics.dead_band import DeadBand
 from identification.physics.motor_lag import MotorLag
 from identification.recording import Channel, Recording
+from tests.identification.mismatch.answer.answered import draft, finding
 from tests.identification.mismatch.small import data_of, known_noise
 
 C, HALF_WIDTH, HOLD = 0.5, 0.6, 1.0
@@ -96,6 +97,20 @@ def test_a_level_just_beyond_a_given_threshold_turns_the_rotor_whole(fitted):
     assert told[0][np.isclose(driver, -0.5997, rtol=1e-6)] == pytest.approx(0.0, abs=1e-12)
     spread, _ = raw(Model((JUMP,)), Theta(C, ((0.6,),), (0.0,)), later, with_rate=False)
     assert np.all(spread[0][np.isclose(driver, 0.6003, rtol=1e-6)] < 0.8 * C * 0.6003**2)
+
+
+@pytest.mark.parametrize(("half_width", "changed"), [(0.7, False), (0.2, True)])
+def test_a_threshold_that_lies_where_earlier_levels_left_it_open_has_not_changed(fitted, half_width, changed):
+    """ "Changed: within 0.43 V; the twin has 0.70 V", of which the twin knew that it is between 0.35 and 0.84."""
+    recording, data, estimate = fitted
+    twin = twin_of(estimate, data, [recording], None)
+    second = run(np.tile([*LEVELS, 0.65, -0.65], 4), 6, half_width)
+    data, theta, model = starting(twin)(*data_of([second]))
+    found = refresh(*extended(model, theta, JUMP, (half_width,)), data, None, None)
+    band = replace(finding(), form="jump", parameters={"half_width": Value(half_width, 0.02, "V")})
+    told = with_twin(draft(findings=(band,)), found, data, [second], twin)
+    assert [f.effect for f in told.findings] == ["dead_band"] * changed
+    assert [note.startswith("Dead band. ") for note in told.notes] == [True] * (not changed)
 
 
 def test_a_threshold_that_moved_across_levels_is_found_where_it_is_now():
