@@ -139,8 +139,9 @@ def _cell_limit(values: Values, form: str, _k: float, _driver: float) -> Table:
         raise WorldError(
             "load_cell_saturation of the form 'averaged' is a device's: give it `average`, and its limit here"
         )
-    place = {"place": "cell"} if form.endswith("before_noise") else {}
-    return {**values, **place, "form": form if form == "knee" else "hard"}
+    if form.endswith("before_noise"):
+        return {**values, "place": "cell"}
+    return {**values, "form": "knee" if form == "knee" else "hard"}
 
 
 def _winding(values: Values, _form: str, k: float, _driver: float) -> Table:

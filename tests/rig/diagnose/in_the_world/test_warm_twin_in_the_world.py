@@ -69,3 +69,11 @@ def test_steps_of_the_water_and_a_clip_before_the_noise_are_the_twin_s():
     assert clipped == {"load_cell_saturation": {"limit": 40.0, "place": "cell"}}
     clip = world_of(file_of(entry("load_cell_saturation", "hard", 40.0)))[1]
     assert clip == {"load_cell_saturation": {"limit": 40.0, "form": "hard"}}
+
+
+@pytest.mark.parametrize("form", ["off_centre", "off_centre_before_noise"])
+def test_readings_end_at_the_two_values_of_the_twin(form):
+    two = [entry("load_cell_saturation", form, 40.0, 3.0)]
+    for volts, end in ((12.0, 43.0), (-12.0, -37.0)):
+        assert acted(two, volts, 2.0)[-1] == pytest.approx(end)
+        assert told(two, volts, 2.0)[-1] == pytest.approx(end)
