@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from sim_devices.tables import WorldError
+from sim_devices.world.effects.limit import LoadCellSaturation
 from sim_devices.world.settings import read_world
+from sim_devices.world.state import State
 from sim_devices.world.sweep import sweep
 from sim_devices.world.twin import world_of
 from tests.rig.diagnose.in_the_world.acted_twins import acted, entry, file_of, told
@@ -71,9 +73,11 @@ def test_steps_of_the_water_and_a_clip_before_the_noise_are_the_twin_s():
     assert clip == {"load_cell_saturation": {"limit": 40.0, "form": "hard"}}
 
 
-@pytest.mark.parametrize("form", ["off_centre", "off_centre_before_noise"])
-def test_readings_end_at_the_two_values_of_the_twin(form):
-    two = [entry("load_cell_saturation", form, 40.0, 3.0)]
+def test_readings_end_at_the_two_values_of_the_twin():
+    stop = [entry("load_cell_saturation", "off_centre_before_noise", 40.0, 3.0)]
     for volts, end in ((12.0, 43.0), (-12.0, -37.0)):
-        assert acted(two, volts, 2.0)[-1] == pytest.approx(end)
-        assert told(two, volts, 2.0)[-1] == pytest.approx(end)
+        assert acted(stop, volts, 2.0)[-1] == pytest.approx(end)
+        assert told(stop, volts, 2.0)[-1] == pytest.approx(end)
+    converter = world_of(file_of(entry("load_cell_saturation", "off_centre", 40.0, 3.0)))[1]["load_cell_saturation"]
+    assert converter == {"limit": 40.0, "middle": 3.0, "form": "hard"}
+    assert LoadCellSaturation(**converter).apply(-50.0, State(), 0.1) == -37.0
