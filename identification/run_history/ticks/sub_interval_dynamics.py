@@ -144,7 +144,7 @@ class Passed:
         return out
 
     def _turning_points(self, when: Floats, value: Floats) -> Floats:
-        """S."""
+        """Times in s."""
         assert self.rotor is not None
         ends = lag_ends(value[:-1], np.diff(when), self.rotor, float(value[0]))
         begin = np.concatenate([value[:1], ends[:-1]])
