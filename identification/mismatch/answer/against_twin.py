@@ -70,12 +70,10 @@ def with_twin(
     model, was = estimate.fit.model, given_values(before)
     anew = {(t.id, t.form) for t in model.terms if model.given_for(t) is not None}
     effects = {effect for effect, _ in anew}
-    closer = [f for f in draft.findings if (f.effect, f.form) in anew and _is_closer(f, before, was)]
-    draft = replace(
-        draft, notes=(*draft.notes, *(f"{_relative(f, before, True, was).statement} {NOW_KNOWN}" for f in closer))
-    )
-    left = [f for f in draft.findings if f not in closer]
-    findings = tuple(_relative(f, before, (f.effect, f.form) in anew, was) for f in left)
+    told = [_relative(f, before, (f.effect, f.form) in anew, was) for f in draft.findings]
+    closer = [f for f in told if (f.effect, f.form) in anew and _is_closer(f, before, was)]
+    findings = tuple(f for f in told if f not in closer)
+    draft = replace(draft, notes=(*draft.notes, *(f"{f.statement} {NOW_KNOWN}" for f in closer)))
     changed = changed_constant(before, estimate, data, known, draft.model["C"])
     if changed is not None and (findings or beside) and _referred(changed, before, estimate, data):
         draft = replace(draft, notes=(*draft.notes, f"{changed.statement} {PART_OF_IT}"))
