@@ -35,24 +35,23 @@ def is_url(name: str) -> bool:
 
 def named_by(url: str, ending: str) -> list[str]:
     """URLs that a URL stands for: itself, what it matches, or what is in the folder. Raises RecordingError."""
-    system, path = _opened(url)
-    with _told(url, "listed"):
+    with _opened(url) as (system, path), _told(url, "listed"):
         if any(sign in path for sign in "*?["):
             found = [each for each in system.glob(path) if each.endswith(ending)]
         elif system.isdir(path):
             found = [each for each in system.ls(path, detail=False) if each.endswith(ending)]
         else:
             return [url]
+        whole = [system.unstrip_protocol(each) for each in sorted(found)]
     if not found:
         raise RecordingError(f"{url} names no file; expected *{ending} there")
-    chained = url.partition("::")[1:]
-    return [system.unstrip_protocol(each) + "".join(chained) for each in sorted(found)]
+    chained = "".join(url.partition("::")[1:])
+    return [each + chained for each in whole]
 
 
 def stamp_of_url(url: str) -> str:
     """Changes when the file does, by what its file system tells, or empty. Raises RecordingError."""
-    system, path = _opened(url)
-    with _told(url, "read"):
+    with _opened(url) as (system, path), _told(url, "read"):
         known: dict[str, Any] = system.info(path)
     told = {name: str(known[name]) for name in TOLD_BY if known.get(name)}
     return json.dumps({"size": known.get("size"), **told}, sort_keys=True) if told else ""
@@ -60,9 +59,8 @@ def stamp_of_url(url: str) -> str:
 
 def sha256_of_url(url: str) -> str:
     """Of its bytes, in hexadecimal. Raises OSError."""
-    system, path = _opened(url)
     found = sha256()
-    with _as_os_error(url), system.open(path, "rb") as file:
+    with _opened(url) as (system, path), _as_os_error(url), system.open(path, "rb") as file:
         while piece := file.read(PIECE):
             found.update(piece)
     return found.hexdigest()
@@ -71,8 +69,7 @@ def sha256_of_url(url: str) -> str:
 @contextmanager
 def fetched(url: str) -> Iterator[Path]:
     """The whole file beside us, as long as it is needed. Raises OSError."""
-    system, path = _opened(url)
-    with TemporaryDirectory(prefix="rig-fleet-") as folder:
+    with _opened(url) as (system, path), TemporaryDirectory(prefix="rig-fleet-") as folder:
         here = Path(folder) / Path(path).name
         with _as_os_error(url):
             system.get_file(path, str(here))
@@ -97,7 +94,18 @@ def _as_os_error(url: str) -> Iterator[None]:
         raise OSError(EIO, f"{_why(error)} ({url})") from error
 
 
-def _opened(url: str) -> tuple[Any, str]:
+@contextmanager
+def _opened(url: str) -> Iterator[tuple[Any, str]]:
+    """Its file system, and where it is in that. An archive is closed afterwards: nobody else has this one."""
+    system, path = _system_of(url)
+    try:
+        yield system, path
+    finally:
+        if (archive := getattr(system, "of", None)) is not None:
+            archive.close()
+
+
+def _system_of(url: str) -> tuple[Any, str]:
     if find_spec("fsspec") is None:
         raise ConfigError(
             f"{url}: files by URL are read by fsspec, which is not installed: pip install 'thruster-rig[fleet]'"

@@ -1,6 +1,8 @@
 """Files by URL: listed, fetched whole, known by what is in them."""
 
+import gc
 import zipfile
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
@@ -54,3 +56,17 @@ def test_a_stamp_changes_with_the_file(tmp_path):
 def test_what_is_not_there_is_one_sentence(url, archive):
     with pytest.raises(RecordingError, match=r"^[^\n]+$"):
         [stamp_of_url(each) for each in meant([url.format(archive)])]
+
+
+def test_an_archive_is_closed_while_the_error_is_still_held(archive):
+    """Held by somebody who tells it, its frames hold the file system: only closing it lets go of the file."""
+    gc.disable()
+    try:
+        with pytest.raises(RecordingError) as told:
+            meant([f"zip://*.csv::file://{archive}"])
+        with pytest.raises(OSError) as read:
+            sha256_of_url(f"zip://none.h5::file://{archive}")
+        held = [link for link in Path("/proc/self/fd").iterdir() if link.exists() and link.samefile(archive)]
+    finally:
+        gc.enable()
+    assert not held, (told, read)
