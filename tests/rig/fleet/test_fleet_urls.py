@@ -64,7 +64,7 @@ def test_an_archive_is_closed_while_the_error_is_still_held(archive):
     try:
         with pytest.raises(RecordingError) as told:
             meant([f"zip://*.csv::file://{archive}"])
-        with pytest.raises(OSError, match="none.h5") as read:
+        with pytest.raises(OSError, match=r"none\.h5") as read:
             sha256_of_url(f"zip://none.h5::file://{archive}")
         held = [link for link in Path("/proc/self/fd").iterdir() if link.exists() and link.samefile(archive)]
     finally:
