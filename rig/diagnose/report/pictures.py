@@ -32,6 +32,7 @@ MOST_SHARE = 1.5
 """A larger share of a thrust or of a step is none: it is drawn in newtons."""
 MOST_MAPS = 2
 MOST_PANELS = 3
+Ends = tuple[float, float]
 
 
 def largest(curves: Sequence[Curves], most: int) -> tuple[Curves, ...]:
@@ -66,15 +67,23 @@ def where_pictures(d: Diagnosis, runs: Sequence[Run]) -> Iterator[Picture]:
 
 
 def _region(d: Diagnosis) -> Region | None:
-    """The first mismatch that can be outlined on a map."""
-    for mismatch in d.mismatch:
-        where = mismatch.where
-        span = (where.low, where.high)
-        if where.quantity == "time":
-            return Region(stretch(where), time=span)
-        if where.quantity == driver_quantity(d):
-            return Region(stretch(where), voltage=span)
-    return None
+    """The mismatch that can be outlined on a map and holds most of the residual in the least of it."""
+    places = [(each.share, Region(stretch(each.where), *_spans(each.where, driver_quantity(d)))) for each in d.mismatch]
+    drawn = [(share / _part(region, d.curves), region) for share, region in places if region.time or region.voltage]
+    return max(drawn, key=lambda each: each[0])[1] if drawn else None
+
+
+def _spans(where: Where, driver: str) -> tuple[Ends | None, Ends | None]:
+    """Over time and over the driver."""
+    span = (where.low, where.high)
+    return span if where.quantity == "time" else None, span if where.quantity == driver else None
+
+
+def _part(region: Region, runs: Sequence[Curves]) -> float:
+    """Of the rows of all runs, those within; at least one."""
+    over = [(region.time, run.time) if region.time else (region.voltage, run.driver) for run in runs]
+    inside = sum(int(np.sum((x >= span[0]) & (x <= span[1]))) for span, x in over if span is not None)
+    return max(inside, 1) / max(sum(run.time.size for run in runs), 1)
 
 
 def _clipped(region: Region | None, run: Curves) -> Region | None:

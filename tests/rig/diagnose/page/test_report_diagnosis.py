@@ -12,7 +12,7 @@ from identification.mismatch.diagnosis import (
 )
 from identification.mismatch.prepare.preparing import history_of
 from identification.mismatch.unexplained import FlexibleShape, Spline
-from identification.mismatch.value import Value
+from identification.mismatch.value import Value, Where
 from identification.mismatch.verdict_clauses import NOT_WHITE
 from identification.recording import Channel, Recording
 from rig.diagnose.report.page import diagnosis_page, write
@@ -91,6 +91,12 @@ def test_each_section_has_its_figures():
     assert cells(page, "Before and after")[2][:3] == ("not fitted, noise taken out", "5", "0.0458")
     sweep = page.sections[6].parts[1].plot
     assert "flow" in svg(sweep)
+
+
+def test_what_is_outlined_tells_more_than_nearly_all_of_the_run():
+    always = replace(HIGH, where=Where("time", 0.0, 19.0, "s"), share=0.95)
+    where = diagnosis_page(answer(mismatch=(always, HIGH))).sections[1].parts[1].plot
+    assert "The region command voltage 8 to 30 V is outlined." in where.alt
 
 
 def test_unexplained_shows_shapes_and_what_it_resembles():
