@@ -1,6 +1,6 @@
 """Figures of several draws of the proof together: one draw of a lane has 24 cases, and a goal of 2 % needs more.
 
-    python benchmarks/diagnosis/pooled.py benchmarks/proof/bench-2037-05-01.jsonl.gz benchmarks/proof/bench-2038-02-01.jsonl.gz
+    python benchmarks/diagnosis/pooled.py benchmarks/proof/lanes.jsonl.gz benchmarks/proof/bench-2038-02-01.jsonl.gz
 
 As rows of a Markdown table. What two files hold of one case counts once for each: give no draw twice.
 """
