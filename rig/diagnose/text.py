@@ -78,6 +78,11 @@ def _para(text: str, indent: str = "") -> list[str]:
     return wrap(text, WIDTH, initial_indent=indent, subsequent_indent=hang)
 
 
+def baseline_name(d: Diagnosis) -> str:
+    """Without what a twin holds, which the statement has told."""
+    return d.baseline_model.split(" (")[0]
+
+
 def _values(values: Mapping[str, Value]) -> str:
     return ", ".join(f"{name} {with_error(value)}" for name, value in values.items())
 
@@ -85,7 +90,7 @@ def _values(values: Mapping[str, Value]) -> str:
 def _where(d: Diagnosis) -> Iterator[str]:
     if not d.mismatch:
         return
-    yield f"Where {d.baseline_model} fails:"
+    yield f"Where {baseline_name(d)} fails:"
     for m in d.mismatch:
         yield from _para(f"- {m.statement[:-1]} ({rarity(m.p_value)}).", "  ")
     yield ""
@@ -184,7 +189,7 @@ def _bar(value: float, size: float) -> str:
 def _model(d: Diagnosis) -> Iterator[str]:
     terms = "".join(f" + {term}" for term in d.model_terms)
     named = {name: value for name, value in d.model.items() if not name.startswith("flexible:")}  # these have a table
-    yield from _para(f"Model: {d.baseline_model.split(' (')[0]}{terms}; {_values(named)}{by_calibration(d)}")
+    yield from _para(f"Model: {baseline_name(d)}{terms}; {_values(named)}{by_calibration(d)}")
 
 
 def _equations(d: Diagnosis) -> Iterator[str]:

@@ -25,6 +25,7 @@ from rig.diagnose.report.pictures import (
 )
 from rig.diagnose.report.rivals import told_apart
 from rig.diagnose.report.words import driver_quantity, effect_name, evidence, rarity, value_cells, words
+from rig.diagnose.text import baseline_name
 from rig.diagnose.typed import TITLE, typed
 from rig.report import page as pages
 from rig.report import provenance
@@ -122,8 +123,8 @@ def where_section(d: Diagnosis, runs: Sequence[Run]) -> Section:
     """Where the baseline fails."""
     told = [words(f"{m.statement.removesuffix('.')} ({rarity(m.p_value)}).") for m in d.mismatch]
     if not told:
-        told = [f"Nowhere: nothing that was recorded orders the residual of {d.baseline_model}."]
-    return Section(f"Where {d.baseline_model} fails", (*sentences(told), *where_pictures(d, runs)))
+        told = [f"Nowhere: nothing that was recorded orders the residual of {baseline_name(d)}."]
+    return Section(f"Where {baseline_name(d)} fails", (*sentences(told), *where_pictures(d, runs)))
 
 
 def what_section(d: Diagnosis, runs: Sequence[Run]) -> tuple[Section, ...]:
@@ -192,7 +193,7 @@ def parameter_section(d: Diagnosis) -> Section:
     physics = {name: value for name, value in d.model.items() if not name.startswith("flexible:")}  # these are drawn
     rows = tuple(_parameter_row(name, value, d.baseline.get(name), findings) for name, value in physics.items())
     table = Table("Model with its standard errors", head, rows, columns(head, "parameter", "of", "unit"))
-    terms = " + ".join([d.baseline_model, *map(effect_name, d.model_terms)])
+    terms = " + ".join([baseline_name(d), *map(effect_name, d.model_terms)])
     listed = (Listing(TITLE, tuple(typed(d.equations, LISTED))),) if d.equations else ()
     return Section("Parameters", (table, *listed), words(f"Model: {terms}{by_calibration(d)}."))
 

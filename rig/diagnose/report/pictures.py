@@ -19,6 +19,7 @@ from identification.mismatch.unexplained import Remainder
 from identification.mismatch.value import Where, told_rows
 from rig.diagnose.report.figures import residual_size, shape, signature_over, steps_plot
 from rig.diagnose.report.words import KINDS, axis, driver_quantity, effect_name, evidence, not_drawn, stretch, words
+from rig.diagnose.text import baseline_name
 from rig.report.mismatch_figures import Panel, Region, before_after, grid_of, residual_map
 from rig.report.page import Picture
 from rig.report.regression_figures import Curve, Group
@@ -103,7 +104,7 @@ def _map(run: Curves, d: Diagnosis, region: Region | None) -> Picture:
     plot = residual_map(grid, _clipped(region, run), "residual / N", "time / s", y)
     more = len(d.curves) - MOST_MAPS
     caption = (
-        f"Measured thrust less {d.baseline_model} with its best C and tare. A band across is a matter of the level, an "
+        f"Measured thrust less {baseline_name(d)} with its best C and tare. A band across is a matter of the level, an "
         "upright one of time; both signs side by side at one level are a matter of what went before."
     )
     if more > 0:
@@ -119,7 +120,7 @@ def _level_picture(run: Curves, d: Diagnosis, region: Region | None) -> Picture:
     located = _clipped(region, run)
     span = located.voltage if located is not None else None
     plot = shape(groups, axis("driver", driver_quantity(d)), "residual / N", span, wide=True)
-    caption = f"{run.time.size} levels, each met once. Before: {d.baseline_model}; after: the model."
+    caption = f"{run.time.size} levels, each met once. Before: {baseline_name(d)}; after: the model."
     return Picture(f"Residual level by level{_of(run, d)}", plot, caption)
 
 

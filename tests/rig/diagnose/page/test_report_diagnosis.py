@@ -93,6 +93,12 @@ def test_each_section_has_its_figures():
     assert "flow" in svg(sweep)
 
 
+def test_headings_name_a_twin_and_leave_what_it_holds_to_the_statement():
+    told = answer(baseline_model="the twin t.json (C V|V| with dead_band)")
+    assert "Where the twin t.json fails" in titles(diagnosis_page(told))
+    assert "\nWhere the twin t.json fails:\n" in diagnosis_text(told)
+
+
 def test_what_is_outlined_tells_more_than_nearly_all_of_the_run():
     always = replace(HIGH, where=Where("time", 0.0, 19.0, "s"), share=0.95)
     where = diagnosis_page(answer(mismatch=(always, HIGH))).sections[1].parts[1].plot
