@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from identification.mismatch.model.converted import beside_means
 from identification.mismatch.model.model import Model
+from identification.mismatch.model.on_its_way import on_its_way
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.predictor import predict
 from identification.mismatch.model.sub_interval import ahead, shown
@@ -20,7 +21,9 @@ def at_samples(
     interval, the rate its mean. `late`: s by which the force comes after the driver."""
     history = run.history
     F, x = predict(model, theta, run, scale, tare)
-    share = theta.C * shown(model, theta, history, F, x, tare)
+    part = shown(model, theta, history, F, x, tare)
+    share = theta.C * part
+    F = F + part * on_its_way(model, theta, run, x, scale, tare)
     if not history.converter.instant and history.ticks is None:
         F = F + share * history.excess
     if theta.shift:

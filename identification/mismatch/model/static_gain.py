@@ -35,7 +35,7 @@ def rotor_gain(
 ) -> Floats | float:
     """(M,) or 1: change of the rate per change of the driver, both in units of the driver, which is behind the terms
     `by_tick` already."""
-    terms = [each for each in _static(model, theta, scale) if each[0].stage in ROTOR and each[0] not in by_tick]
+    terms = [each for each in static_terms(model, theta, scale) if each[0].stage in ROTOR and each[0] not in by_tick]
     if not terms:
         return 1.0
     key = ("rotor gain", tuple(each[:2] for each in terms))
@@ -45,7 +45,7 @@ def rotor_gain(
 
 def thrust_gain(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Scale, tare: float) -> Floats | float:
     """(M,) or 1: change of the reading per change of C x|x|, where the rates are `x` (M,)."""
-    terms = [each for each in _static(model, theta, scale) if each[0].stage not in ROTOR]
+    terms = [each for each in static_terms(model, theta, scale) if each[0].stage not in ROTOR]
     if not terms:
         return 1.0
     key = ("thrust gain", theta.C, tare, tuple(each[:2] for each in terms))
@@ -58,7 +58,7 @@ def jumping(
 ) -> Floats | None:
     """(M,) rate at its `samples`, `commanded` (N,), less the line through its means, in units of the driver: of a rotor
     that follows at once. None where no term makes it jump: a slope says it all then, and it says nothing of a jump."""
-    terms = [each for each in _static(model, theta, scale) if each[0].stage in ROTOR]
+    terms = [each for each in static_terms(model, theta, scale) if each[0].stage in ROTOR]
     if not any(p.jumps for term, _, sizes in terms for p in term.parameters(sizes)):
         return None
     key = ("jumping", tuple((term, values) for term, values, _ in terms))
@@ -76,7 +76,7 @@ def _jumping(terms: list[Acting], theta: Theta, run: RememberedRun, samples: Sam
     return np.where(samples.count > 0, beside, 0.0)
 
 
-def _static(model: Model, theta: Theta, scale: Scale) -> list[Acting]:
+def static_terms(model: Model, theta: Theta, scale: Scale) -> list[Acting]:
     """Terms that answer a fast change at once, whatever they do later."""
     out = []
     for term, values, sizes in acting(model, theta, scale):

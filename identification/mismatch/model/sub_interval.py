@@ -30,7 +30,7 @@ from identification.run_history.ticks.sub_interval_leads import curvature, each_
 def dynamics_between(model: Model, theta: Theta, history: History, largest: float, late: float) -> Passed:
     """What a model has between the driver and a force that comes `late` s after, as far as its ticks show it."""
     delay = late if _is_late(late, history) else 0.0
-    passed = Passed(_rotor(model, theta, largest), _ring(model, theta), delay)
+    passed = Passed(rotor_of(model, theta, largest), _ring(model, theta), delay)
     return passed if _changes(passed, history) else Passed(delay=delay)
 
 
@@ -54,7 +54,7 @@ def _ahead(
     model: Model, theta: Theta, run: RememberedRun, x: Floats, largest: float, late: float, by_tick: Collection[Term]
 ) -> Floats:
     history = run.history
-    passed = Passed(_rotor(model, theta, largest), _ring(model, theta), late if _is_late(late, history) else 0.0)
+    passed = Passed(rotor_of(model, theta, largest), _ring(model, theta), late if _is_late(late, history) else 0.0)
     share = passed_on(model, theta, history, by_tick)
     if not _changes(passed, history):
         return run.lately("ahead", lambda: share * (2 * np.abs(x) * history.lead + history.curved), x, share)
@@ -71,7 +71,7 @@ def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Sc
     are apart, is bent within an interval."""
     run, by_tick = behind_drive(model, theta, run, scale)
     history = run.history
-    passed = Passed(_rotor(model, theta, scale.driver), delay=late if _is_late(late, history) else 0.0)
+    passed = Passed(rotor_of(model, theta, scale.driver), delay=late if _is_late(late, history) else 0.0)
     bent = passed.rotor is not None and history.ticks is not None
     known = _remembered(run, "rate", passed) if bent or _changes(passed, history) else history.rate_lead
     share, shift = passed_on(model, theta, history, by_tick), theta.rate_shift
@@ -101,7 +101,7 @@ def _jumped(model: Model, theta: Theta, run: RememberedRun, scale: Scale, delay:
 def sample_lead(model: Model, theta: Theta, run: RememberedRun, rate: Floats, largest: float) -> Floats:
     """(N,) driver |driver|: as `ahead`, at each sample, where the rates are `rate` (N,)."""
     history = run.history
-    passed = Passed(_rotor(model, theta, largest), _ring(model, theta), delay_of(model, theta) + theta.shift)
+    passed = Passed(rotor_of(model, theta, largest), _ring(model, theta), delay_of(model, theta) + theta.shift)
     if not _changes(passed, history):
         return 2 * np.abs(rate) * history.sample_lead
     assert history.ticks is not None
@@ -194,7 +194,7 @@ def _size(history: History, passed: Passed) -> float:
     return history.size if passed.ring is None else 2 * history.size**2
 
 
-def _rotor(model: Model, theta: Theta, largest: float) -> Rotor | None:
+def rotor_of(model: Model, theta: Theta, largest: float) -> Rotor | None:
     """Coefficients of a rotor that does not follow at once; two lags one behind the other as one of both times."""
     rotors = [each.rotor for each in _dynamics(model, theta, largest) if each.rotor is not None]
     if len(rotors) < 2:
