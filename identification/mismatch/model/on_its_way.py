@@ -31,6 +31,8 @@ MOST_SAMPLES = 32
 """In an interval in which the rotor turns round, as many stand for more."""
 STRAIGHT = 1e-4
 """Times the rate of following: an interval that is shorter is straight."""
+AT_ONCE = 100.0
+"""Of one that is longer the rotor has reached its end at once."""
 
 
 class Spread(NamedTuple):
@@ -73,7 +75,7 @@ def _spread(w: Floats, x: Floats, rotor: Rotor, history: History) -> Spread | No
         span = np.minimum(span, few * history.spacing)
     else:
         few = np.full(x.size, np.inf)
-    gap, bend = x - w, np.maximum(follow_rate(w, x, rotor) * span, STRAIGHT)
+    gap, bend = x - w, np.clip(follow_rate(w, x, rotor) * span, STRAIGHT, AT_ONCE)
     half = 0.5 * bend
     scatter = np.abs(gap) * np.sqrt(np.maximum(half / np.tanh(half) - 1, 0.0) * (1 - 1 / few**2))
     if float(np.max(scatter, initial=0.0)) < SLIGHT * history.size:
