@@ -13,6 +13,7 @@ from identification.mismatch.answer.explained.trace import Trace
 from identification.mismatch.answer.periodic_findings import told_lines
 from identification.mismatch.compare.earlier_recordings import Later, put_to_earlier
 from identification.mismatch.compare.saved_model_baseline import lasting, starting
+from identification.mismatch.compare.undecided_rows import decided
 from identification.mismatch.faults import stage as faults
 from identification.mismatch.faults import wiring
 from identification.mismatch.locate import stage as locate
@@ -110,7 +111,8 @@ def traced(
     sound = faults.run(prepared, wired.faults, None if baseline is None else baseline.slip_rate)
     if isinstance(sound, Refusal):
         return sound
-    sound = replace(sound, histories=on_their_side(sound.histories, given))
+    clear = sound.histories if baseline is None else decided(sound.histories, baseline)
+    sound = replace(sound, histories=on_their_side(clear, given))
     watch.stage("looking for effects")
     first = found = search(sound.histories, draws.select, given=given, without=without, watch=watch)
     original = sound.histories
