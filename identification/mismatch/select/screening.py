@@ -116,8 +116,40 @@ def _likeliest_threshold(
     def chi2(threshold: float) -> float:
         return others.chi2(residual_of(*fit.more(term, (threshold,)), data, weights))
 
-    near = min((threshold for (threshold,) in trials), key=chi2)
-    return (sought(near, term.parameters(data.scale)[0].high, chi2),)
+    most = term.parameters(data.scale)[0].high
+    near = min((*(threshold for (threshold,) in trials), *_parted(fit, data, weights, term, most)), key=chi2)
+    return (sought(near, most, chi2),)
+
+
+def _parted(fit: Fit, data: Data, weights: Weights, term: Term, most: float) -> list[float]:
+    """Where the rows part best, each by its own error: those below as though nothing turned, the others as they are.
+
+    Noise that is slow carries an error that lasts, and shows a threshold only where the command passes it: a valley
+    that the trials may lie on either side of.
+    """
+    with_rate = bool(weights.rate)
+    turning, still = (
+        raw(*each, data, with_rate=with_rate) for each in ((fit.model, fit.theta), fit.more(term, (most,)))
+    )
+    size = [np.abs(h.driver[rows]) for h, rows in zip(data.histories, data.rows, strict=True)]
+    gain = [_gain(*each) for each in zip(data.thrust, turning[0], still[0], strict=True)]
+    if with_rate:
+        size += [np.abs(h.driver[h.rate_rows]) for h in data.histories]
+        gain += [_gain(h.rates, *each) for h, *each in zip(data.histories, turning[1], still[1], strict=True)]
+    level, better = np.concatenate(size), np.concatenate(gain)
+    order = np.argsort(level)
+    order = order[level[order] < most]
+    total = np.cumsum(better[order])
+    if not total.size or total.max() <= 0:
+        return []
+    last = int(np.argmax(total))
+    return [float(0.5 * (level[order[last]] + level[order[min(last + 1, order.size - 1)]]))]
+
+
+def _gain(seen: Floats, turning: Floats, still: Floats) -> Floats:
+    """(m,) by which a row is nearer to the second prediction, in mean squares of what the first leaves."""
+    left = (seen - turning) ** 2
+    return np.asarray((left - (seen - still) ** 2) / max(float(np.mean(left)), 1e-300), dtype=np.float64)
 
 
 def _likeliest_delay(
