@@ -18,14 +18,16 @@ from identification.twin import Twin
 
 SURELY = 4.0
 """Standard deviations of the threshold: farther off the twin knows."""
-NOT_ALL = 0.03
-"""Of the rows, at most, go: levels that are held near a threshold stay, and the covariance has a stair for each."""
+HELD = 0.5
+"""s: a level that is held longer stays, and the covariance has stairs for such."""
+NOT_ALL = 0.1
+"""Of the rows, at most, go."""
 
 
 def decided(histories: Sequence[History], twin: Twin) -> tuple[History, ...]:
     """The runs without such rows of thrust and rate."""
     bands = _bands(twin)
-    return tuple(_without(h, _between(np.abs(h.driver), bands)) for h in histories) if bands else tuple(histories)
+    return tuple(_without(h, _moving(h) & _between(np.abs(h.driver), bands)) for h in histories)
 
 
 def _bands(twin: Twin) -> list[tuple[float, float]]:
@@ -39,9 +41,20 @@ def _bands(twin: Twin) -> list[tuple[float, float]]:
     return [(low, high) for low, high in found if high > low]
 
 
+def _moving(history: History) -> NDArray[np.bool_]:
+    """(M,) whether the command goes on soon."""
+    if history.ticks is None:
+        return np.zeros(history.driver.size, dtype=np.bool_)
+    when = history.ticks[0]
+    last = np.clip(np.searchsorted(when, history.middle, side="right") - 1, 0, when.size - 1)
+    return np.diff(when, append=np.inf)[last] < HELD
+
+
 def _between(size: Floats, bands: Sequence[tuple[float, float]]) -> NDArray[np.bool_]:
     """(M,)"""
-    out: NDArray[np.bool_] = np.any([(size > low) & (size < high) for low, high in bands], axis=0)
+    out = np.zeros(size.size, dtype=np.bool_)
+    for low, high in bands:
+        out |= (size > low) & (size < high)
     return out
 
 
