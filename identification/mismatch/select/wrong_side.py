@@ -1,4 +1,4 @@
-"""Single samples on the other side of a tick than the clocks say, as the command was quick or slow to the wire then.
+"""Samples on the other side of a tick than the clocks say, as the command was quick or slow to the wire then.
 
 A ramp is written in ticks, and each is a jump of thrust and rate. A sample within a millisecond of one is foretold by
 what was held before it or after it, and which it was is a matter of what a bus and a drive did that once: of 24 sigma
@@ -8,15 +8,19 @@ tick that the clocks, which are fitted, put it on this side as well as on that.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from identification.mismatch.estimate.clock_hollows import FINE, STEP, in_best_hollow
 from identification.mismatch.estimate.estimate import unweighted
 from identification.mismatch.estimate.fitting import fit, raw
+from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Model
+from identification.mismatch.model.parameters import Theta
 from identification.mismatch.select.baseline import start
 from identification.mismatch.select.forward_selection import Given
 from identification.recording import Floats
@@ -42,7 +46,8 @@ def on_their_side(histories: Sequence[History], given: Given | None = None) -> t
         return tuple(histories)
     data, theta = start(histories)
     data, theta, model = given(data, theta) if given is not None else (data, theta, Model())
-    found = fit(model, theta, data, unweighted(data)).theta
+    even = unweighted(data)
+    found = _by_rate(model, in_best_hollow(fit(model, theta, data, even), data, even).theta, data)
     thrust, rate = raw(model, found, data, with_rate=data.with_rate)
     out = []
     for i, h in enumerate(histories):
@@ -61,26 +66,48 @@ def on_their_side(histories: Sequence[History], given: Given | None = None) -> t
     return tuple(out)
 
 
+def _by_rate(model: Model, found: Theta, data: Data) -> Theta:
+    """With the clock of the rate by which it lies nearest: that fit is of the thrust alone."""
+    if not data.with_rate or data.most_shift <= 0:
+        return found
+
+    def left(moved: Theta) -> float:
+        rate = raw(model, moved, data, with_rate=True)[1]
+        return sum(float(np.sum(np.abs(h.rates - told))) for h, told in zip(data.histories, rate, strict=True))
+
+    for step in (STEP, STEP / FINE):
+        many = math.ceil(data.most_shift / STEP) if step == STEP else FINE
+        places = [found.rate_shift + step * i for i in range(-many, many + 1)]
+        moved = [replace(found, rate_shift=place) for place in places if abs(place) <= data.most_shift]
+        found = min([found, *moved], key=left)
+    return found
+
+
 def _doubtful(
     h: History, samples: Samples, rows: NDArray[np.intp], error: Floats, shift: float, made: Callable[[Floats], Floats]
 ) -> NDArray[np.bool_]:
-    """(M,) intervals of one sample whose error, (m,) at `rows`, the other side of a tick tells, or that may be on
-    either; `made`: what a driver makes."""
+    """(M,) intervals with a sample whose error the other side of a tick tells, and of one sample that may be on either;
+    of the error, (m,) at `rows`. `made`: what a driver makes."""
     assert h.ticks is not None
     when, value = h.ticks
-    at, many = samples.middle[rows] - shift, samples.count[rows]
+    many = samples.count[rows]
+    row = np.full(samples.count.size, -1)
+    row[rows] = np.arange(rows.size)
+    which = row[samples.interval]  # of each sample the row that it is in
+    at, which = samples.time[which >= 0] - shift, which[which >= 0]
     last = np.clip(np.searchsorted(when, at, side="right") - 1, 0, when.size - 1)
     after = np.minimum(last + 1, when.size - 1)
     seen = made(value)
     std = float(np.median(np.abs(error) * np.sqrt(many))) / 0.6745
-    far = np.abs(error) > FAR_OFF * std
+    far = (np.abs(error) * np.sqrt(many) > FAR_OFF * std)[which]
+    whole = (error * many)[which]  # as though all others are where they should be
     told, either = np.zeros((2, rows.size), dtype=np.bool_)
     for other, apart in ((np.maximum(last - 1, 0), at - when[last]), (after, when[after] - at)):
         jump = seen[other] - seen[last]
-        told |= far & (np.abs(apart) < NEAR) & (np.abs(error - jump) < TOLD * np.abs(error))
-        either |= (np.abs(jump) > std) & (np.abs(apart) < TOO_CLOSE)
+        told[which[far & (np.abs(apart) < NEAR) & (np.abs(whole - jump) < TOLD * np.abs(whole))]] = True
+        either[which[(np.abs(jump) > std) & (np.abs(apart) < TOO_CLOSE)]] = True
     gone = rows[:0]
-    for each, most in ((told, FEW), (either, NOT_ALL)):
-        off = rows[each & (many == 1)]
+    for each, most in ((told, FEW), (either & (many == 1), NOT_ALL)):
+        off = rows[each]
         gone = np.concatenate([gone, off]) if off.size <= most * rows.size else gone
     return np.isin(np.arange(samples.count.size), gone)
