@@ -81,3 +81,10 @@ def test_open_world(scores):
 def test_versions(scores):
     versions = {known.version for known in read(ROOT / "benchmarks" / "proof" / "scores.jsonl.gz")}
     assert versions == set(re.findall(r"one version of the diagnosis \(`(\w+)`\)", PAGE))
+
+
+def test_lanes_of_recordings():
+    lanes = [known.score for known in read(ROOT / "benchmarks" / "proof" / "lanes.jsonl.gz")]
+    wanted = [f"| {g.what.replace('_', ' ')} | {measured(g)} |" for g in (*goals(lanes), *besides(lanes)) if g.n]
+    assert len(wanted) > 40
+    assert not [row for row in wanted if row not in PAGE and not row.startswith("| crashed")]
