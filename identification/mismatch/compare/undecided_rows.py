@@ -32,13 +32,15 @@ def decided(histories: Sequence[History], twin: Twin) -> tuple[History, ...]:
 
 def _bands(twin: Twin) -> list[tuple[float, float]]:
     """Of the driver's size, for each threshold at which the prediction jumps."""
-    std = dict(zip(twin.names, np.sqrt(np.diag(np.array(twin.covariance))), strict=True))
-    found = []
-    for term in (t for t in twin.terms if t.known and t.term.traits.tick_by_tick):
-        for p in (p for p in term.term.parameters(term.scale) if p.jumps):
-            value, far = term.parameters[p.name], SURELY * float(std[f"{term.effect}.{p.name}"])
-            found.append((value - far, value + far))
-    return [(low, high) for low, high in found if high > low]
+    std = np.sqrt(np.diag(np.array(twin.covariance)))
+    found, at = [], 1  # C comes first
+    for term in twin.terms:
+        if term.known and term.term.traits.tick_by_tick:
+            far = SURELY * std[at : at + len(term.values)]
+            known = zip(term.term.parameters(term.scale), term.values, far.tolist(), strict=True)
+            found += [(value - most, value + most) for p, value, most in known if p.jumps and most > 0]
+        at += len(term.parameters)
+    return found
 
 
 def _moving(history: History) -> NDArray[np.bool_]:

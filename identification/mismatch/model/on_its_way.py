@@ -29,10 +29,9 @@ SLIGHT = 1e-6
 """Of the largest driver: a rotor whose rates are closer together stands still."""
 MOST_SAMPLES = 32
 """In an interval in which the rotor turns round, as many stand for more."""
-STRAIGHT = 1e-4
-"""Times the rate of following: an interval that is shorter is straight."""
-AT_ONCE = 100.0
-"""Of one that is longer the rotor has reached its end at once."""
+LEAST_BEND, MOST_BEND = 1e-4, 100.0
+"""Length of an interval times the rate of following, from one that is as good as straight to one that is as good as
+settled: beyond these nothing changes but what rounding and overflow make."""
 
 
 class Spread(NamedTuple):
@@ -75,7 +74,7 @@ def _spread(w: Floats, x: Floats, rotor: Rotor, history: History) -> Spread | No
         span = np.minimum(span, few * history.spacing)
     else:
         few = np.full(x.size, np.inf)
-    gap, bend = x - w, np.clip(follow_rate(w, x, rotor) * span, STRAIGHT, AT_ONCE)
+    gap, bend = x - w, np.clip(follow_rate(w, x, rotor) * span, LEAST_BEND, MOST_BEND)
     half = 0.5 * bend
     scatter = np.abs(gap) * np.sqrt(np.maximum(half / np.tanh(half) - 1, 0.0) * (1 - 1 / few**2))
     if float(np.max(scatter, initial=0.0)) < SLIGHT * history.size:

@@ -74,3 +74,16 @@ def test_a_twin_that_knows_its_threshold_keeps_all(yesterday, today):
     sure = [[c * (i != 1) * (j != 1) for j, c in enumerate(row)] for i, row in enumerate(yesterday.covariance)]
     assert decided([whole], replace(yesterday, covariance=tuple(map(tuple, sure)))) == (whole,)
     assert decided([whole], replace(yesterday, terms=(), names=("C",), covariance=((1.0,),))) == (whole,)
+
+
+def test_of_two_thresholds_each_has_its_own_error(yesterday, today):
+    """The second stands in the covariance as `dead_band#2`."""
+    (band,) = yesterday.terms
+    far = replace(band, parameters={"half_width": 5.0})
+    names = ("C", "dead_band.half_width", "dead_band#2.half_width")
+    two = replace(yesterday, terms=(band, far), names=names, covariance=((1e-8, 0, 0), (0, 0, 0), (0, 0, 1e-4)))
+    whole = history(today)
+    (left,) = decided([whole], two)
+    gone = np.isfinite(whole.thrust) & ~np.isfinite(left.thrust)
+    assert gone.any()
+    assert np.all(np.abs(np.abs(whole.driver[gone]) - 5.0) < 0.04)
