@@ -1,4 +1,5 @@
-"""Terms without a name that predict what was not fitted worse: they leave the model before any shape is looked for."""
+"""Terms without a name that are none of the rotor's by its measured rate, or that predict what was not fitted worse:
+they leave the model before any shape is looked for."""
 
 from __future__ import annotations
 
@@ -14,12 +15,15 @@ from identification.run_history.history import History
 
 
 def refuted(split: TrainTestSplit, unearned: Sequence[Named], *, same_run: bool) -> tuple[Named, ...]:
-    """Of terms without a name those without which what was not fitted is predicted better, one after the other: the
-    one whose absence takes most off chi-square there first, the rest fitted again each time.
+    """Of terms without a name those that the measured rate contradicts, which bend C whatever they predict; then those
+    without which what was not fitted is predicted better, one after the other: the one whose absence takes most off
+    chi-square there first, the rest fitted again each time.
 
     `split`: the model fitted to a part of the data; `same_run` as in `without_each`.
     """
-    gone: list[Named] = []
+    gone = [n for n in unearned if any(check.failed and check.kind == "rate_levels" for check in n.checks)]
+    for each in gone:
+        split = replace(split, estimate=replace(split.estimate, fit=refitted_without(split, each.term)))
     while left := [n for n in unearned if n not in gone]:
         scores = without_each(split, [n.term for n in left], same_run=same_run)
         worse = worse_predicted(scores, same_run=same_run)

@@ -111,9 +111,8 @@ def _goes_on(
     if rise <= 0:
         return None
     share = float(np.mean(value[over]) - line[0] - line[1] * edge) / rise
-    spread = np.linalg.inv(X[below].T @ X[below])
-    ahead = np.array([0.0, np.mean(f[over]) - edge])
-    std = scatter * float(np.sqrt(1 / np.count_nonzero(over) + share**2 * (ahead @ spread @ ahead) + 1 / below.sum()))
+    ahead = (np.mean(f[over]) - edge) / np.linalg.norm(f[below] - np.mean(f[below]))
+    std = scatter * float(np.sqrt(1 / np.count_nonzero(over) + (share * ahead) ** 2 + 1 / below.sum()))
     through = float(np.mean(kept[over]) - np.max(kept[below]))
     asked = float(np.mean(f[over]) - edge) * float(np.max(kept[below])) / edge
     std = float(np.hypot(std, np.sqrt(2) * rounded))  # on either side of the limit
