@@ -45,6 +45,8 @@ def _behind(first: Sequence[Acting], run: RememberedRun) -> History:
     history = run.history
     assert history.ticks is not None
     (when, command), driver = history.ticks, history.driver
+    if not all(term.traits.tick_by_tick for term, _, _ in first):
+        when, command = _at_edges_too(when, command, history.edges)
     instant = RememberedRun(history.with_driver(excess=np.zeros(1)))
     for term, values, sizes in first:
         if term.traits.tick_by_tick:
@@ -58,9 +60,17 @@ def _behind(first: Sequence[Acting], run: RememberedRun) -> History:
     return with_leads(behind.with_driver(excess=excess))
 
 
+def _at_edges_too(when: Floats, command: Floats, edges: Floats) -> tuple[Floats, Floats]:
+    """The same ticks, told again where intervals begin: what a term leaves of a command moves while that is held."""
+    knots = np.union1d(when, edges[edges > when[0]])
+    return knots, command[np.searchsorted(when, knots, side="right") - 1]
+
+
 def _share(after: Floats, before: Floats, history: History, when: Floats) -> Floats:
-    """(T,) of what drives, that a term leaves which says it of means over intervals, at the ticks."""
+    """(T,) of what drives, that a term leaves which says it of means over intervals, at the ticks: that of the interval
+    which follows, or where none drives what lies between."""
     drives = np.abs(before) > TURNING * history.size
     if not drives.any():
         return np.ones(when.size)
-    return np.asarray(np.interp(when, history.middle[drives], after[drives] / before[drives]))
+    share = np.interp(history.middle, history.middle[drives], after[drives] / before[drives])
+    return np.asarray(share[np.clip(np.searchsorted(history.edges, when, side="right") - 1, 0, share.size - 1)])
