@@ -113,11 +113,20 @@ class HeldOutRmse:
     what: str
     growth_p: float = 1.0
     """How often chance makes an error that did not grow seem to have grown so much."""
+    whitened_fall: float = 0.0
+    """By how much chi-square falls there with the slow noise taken out, beyond what its parameters are worth; 0 or less
+    where it does not, or where nobody asked."""
+
+    @property
+    def hidden(self) -> bool:
+        """Whether slow noise alone makes it seem no better: with that taken out it is."""
+        by_chance = self.growth_p >= policy.validate.GROWN_P
+        return self.after >= self.before and by_chance and self.whitened_fall > 0
 
     @property
     def grown(self) -> bool:
         """Whether the model predicts what was not fitted worse than the baseline, beyond chance."""
-        plainly = self.after > policy.validate.GROWN_RATIO * self.before
+        plainly = self.after > policy.validate.GROWN_RATIO * self.before and not self.hidden
         return plainly or (self.after > self.before and self.growth_p < policy.validate.GROWN_P)
 
     @property

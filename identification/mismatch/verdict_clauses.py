@@ -113,6 +113,11 @@ def errors(findings: Sequence[Finding], held: HeldOutRmse, unit: str, more: str 
     """The errors on what was not fitted in one chain that ends with that of the model which is told: of the baseline,
     with the names, and with `more` where the model has anything but names; empty where it does no better.
     """
+    if held.hidden:
+        return (
+            f"Error on data that were not fitted: {held.before:.3g} {unit} before and {held.after:.3g} {unit} after, "
+            "for slow noise is most of it; with that taken out the model predicts them better."
+        )
     if held.after >= held.before:
         return ""
     names = with_names(findings, held, more)

@@ -48,6 +48,7 @@ def diagnosis_json(d: Diagnosis) -> dict[str, object]:
                 "noise": _number(d.heldout.noise),
                 "what": d.heldout.what,
                 "growth_p": _number(d.heldout.growth_p),
+                "whitened_fall": _number(d.heldout.whitened_fall),
             },
             "chi2_per_dof": _number(d.chi2_per_dof),
             "whiteness_p": _number(d.whiteness_p),

@@ -167,7 +167,12 @@ def by_blocks(before: Estimate, after: Estimate, data: Data, measured: Data, qui
     held = "levels" if data.histories[0].static else "blocks of time"
     what = f"every fourth of the {held}, {sum(int(b.sum()) for b in back)} rows; terms were chosen on all of them"
     errors = squares(old.model, old.theta, measured, back), squares(new.model, new.theta, data, back)
-    return compared(*errors, noise, what)
+    found = compared(*errors, noise, what)
+    if found.after < found.before:
+        return found
+    chi2 = judge_blocks(replace(after, fit=new), data, keep)
+    price = policy.validate.HELD_OUT_WORTH + 2 * max(int(new.free.sum() - old.free.sum()), 0)
+    return replace(found, whitened_fall=chi2(old).chi2 - chi2(new).chi2 - price)
 
 
 def compared(before: Squares, after: Squares, noise: float, what: str) -> HeldOutRmse:

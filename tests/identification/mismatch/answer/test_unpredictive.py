@@ -17,12 +17,15 @@ from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.faults.stage import Sound
 from identification.mismatch.locate.stage import run as located_by
 from identification.mismatch.name.stage import run as named_by
+from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.unnamed.stage import Completed
-from identification.mismatch.validate.held_out import Squares, growth_p, squares
+from identification.mismatch.validate.held_out import Squares, by_blocks, growth_p, squares
 from identification.mismatch.validate.stage import score
 from identification.mismatch.value import Where
+from identification.mismatch.verdict_clauses import errors
+from identification.physics.dead_band import DeadBand
 from identification.physics.zero_offset import ZeroOffset
-from tests.identification.diagnosed_runs import NOISE
+from tests.identification.diagnosed_runs import NOISE, dead_band
 from tests.identification.mismatch.answer.answered import SWEEP, UNEVEN, finding
 from tests.identification.mismatch.small import history, known_noise, placed, rng, selected, short
 
@@ -73,6 +76,34 @@ def test_a_little_more_needs_evidence_and_a_twentieth_none():
     assert A_LITTLE.grown
     assert not replace(A_LITTLE, growth_p=0.5).grown
     assert replace(GROWN, growth_p=0.5).grown
+
+
+def test_slow_noise_that_hides_what_a_term_predicts_does_not_refute_it():
+    """A stand of 15 sigma: the error grew by 7 % with C half a percent off in slow noise, as one in seven does."""
+    hidden = replace(GROWN, growth_p=0.14, whitened_fall=49.0)
+    assert hidden.hidden
+    assert not hidden.grown
+    assert not replace(hidden, growth_p=1e-4).hidden
+    assert replace(hidden, growth_p=1e-4).grown, "not by chance"
+    assert replace(hidden, whitened_fall=-1.0).grown
+    told = errors((finding(),), hidden, "N")
+    assert "1 N before and 1.2 N after" in told
+    assert "better" in told
+    assert errors((finding(),), replace(hidden, whitened_fall=0.0), "N") == ""
+
+
+@pytest.mark.parametrize(("half_width", "tells"), [(0.2, True), (0.06, False)])
+def test_the_slow_noise_is_taken_out_where_an_error_did_not_fall(half_width, tells):
+    """Beside 1 N that wanders whether the error falls is chance, for a dead band that the rest shows plainly too."""
+    wandering = np.interp(np.arange(0.0, 81.0), np.linspace(0.0, 80.0, 8), 2.0 * rng(0).standard_normal(8))
+    made = short(lambda t, _V, F: F + np.interp(t, np.arange(0.0, 81.0), wandering), volts=dead_band(half_width))
+    noise = Noise(NOISE**2, 0.0, scales=(20.0,), slow=(4.0,))
+    data, found = known_noise({DeadBand(): (half_width,)}, [made])
+    bare = known_noise({}, [made])[1]
+    held = by_blocks(replace(bare, noise=noise), replace(found, noise=noise), data, data, noise)
+    assert held.after > held.before
+    assert (held.whitened_fall > 0) == held.hidden == tells
+    assert by_blocks(replace(found, noise=noise), replace(bare, noise=noise), data, data, noise).whitened_fall == 0.0
 
 
 def test_chance_calls_an_error_grown_at_its_rate():
