@@ -135,6 +135,9 @@ class Twin:
     """The same before any effect was known: what a coupling to the rate refers the measured rate to, and C with it."""
     lines: tuple[TwinLine, ...] = ()
     """Periodic disturbances, the clearest first."""
+    constant_interval: tuple[float, float] | None = None
+    """95 % of C as it was told, with what rivals and what nothing claims would make of it; None where it is no wider
+    than what the covariance says."""
     alternatives: tuple[Alternative, ...] = ()
     """What other textbook forms would have said: how far the forms may be off in another run."""
     created: str = ""

@@ -107,6 +107,7 @@ def _twin(top: Table) -> Twin:
         thruster=top.text("thruster"),
         driver_quantity=driver,
         C=top.number("C"),
+        constant_interval=_interval(top) if "C_interval" in top.content else None,
         terms=terms,
         names=names,
         covariance=_covariance(top.table("covariance"), names),
@@ -122,6 +123,13 @@ def _twin(top: Table) -> Twin:
         software=top.text("software"),
         origin=f"the twin {top.path.name}",
     )
+
+
+def _interval(top: Table) -> tuple[float, float]:
+    ends = top.numbers("C_interval")
+    if len(ends) != 2 or not ends[0] <= top.number("C") <= ends[1]:
+        raise top.wrong("C_interval", "two numbers with C between them")
+    return ends[0], ends[1]
 
 
 def _term(table: Table) -> TwinTerm:

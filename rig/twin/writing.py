@@ -25,6 +25,7 @@ def twin_json(twin: Twin) -> dict[str, object]:
         "thruster": twin.thruster,
         "driver": twin.driver_quantity,
         "C": twin.C,
+        **({} if twin.constant_interval is None else {"C_interval": list(twin.constant_interval)}),
         "terms": [_term_json(t) for t in twin.terms],
         "covariance": {"names": list(twin.names), "matrix": [list(row) for row in twin.covariance]},
         "noise": asdict(twin.noise),

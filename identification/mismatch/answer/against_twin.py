@@ -63,7 +63,8 @@ def with_twin(
     is left without a name.
     """
     twin = twin_of(estimate, data, recordings, before)
-    draft = replace(draft, twin=replace(twin, alternatives=_alternatives(estimate, data, named)))
+    ends, others = draft.model["C"].ends, _alternatives(estimate, data, named)
+    draft = replace(draft, twin=replace(twin, constant_interval=ends, alternatives=others))
     if before is None:
         return draft
     known = before.origin
@@ -205,13 +206,18 @@ def _error_towards(told: Value, was: float) -> float:
     return (told.value - low if was < told.value else high - told.value) / QUANTILE
 
 
+def _told_then(twin: Twin) -> Value:
+    """C of the twin as its own recordings had it told."""
+    return Value(twin.C, float(np.sqrt(twin.covariance[0][0])), "", ends=twin.constant_interval)
+
+
 def changed_constant(twin: Twin, estimate: Estimate, data: Data, known: str, told: Value) -> Finding | None:
     """The thrust constant is no longer the twin's, at CHANGED_CONSTANT_FALSE_ALARM, and the change pays for itself.
 
     `told`: C as it is told of the model.
     """
     value, std = _constant_now(twin, estimate, data)
-    was, was_std, unit = twin.C, float(np.sqrt(twin.covariance[0][0])), told.unit
+    was, was_std, unit = twin.C, _error_towards(_told_then(twin), value), told.unit
     std = float(np.maximum(std, _error_towards(told, was)))
     both = float(np.hypot(std, was_std))
     if not isfinite(both) or both <= 0:

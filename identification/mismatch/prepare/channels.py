@@ -213,7 +213,7 @@ def _fewest(H: Floats, value: Floats) -> tuple[list[int], float]:
     """Columns (the first always) by BIC, and that: every one more brings its share of the channel's noise into the
     voltage."""
     n = value.size
-    R = np.linalg.qr(np.column_stack([H, value]), mode="r")  # the same sums of squares in a few rows
+    R: Floats = np.asarray(np.linalg.qr(np.column_stack([H, value]), mode="r"))  # same sums of squares, few rows
     best, least = [0], np.inf
     for many in range(H.shape[1]):
         for others in combinations(range(1, H.shape[1]), many):

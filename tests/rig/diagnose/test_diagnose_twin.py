@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -43,6 +44,9 @@ def test_a_twin_file_reads_back_as_it_was_written(dead, tmp_path):
     write_twin(twin, tmp_path / "again.json")
     assert json.loads(json.dumps(twin_json(read_twin(tmp_path / "again.json")))) == json.loads(path.read_text())
     assert len(twin.sources[0].sha256) == 64
+    wider = replace(twin, constant_interval=(0.9 * twin.C, 1.3 * twin.C))
+    write_twin(wider, tmp_path / "wider.json")
+    assert read_twin(tmp_path / "wider.json").constant_interval == wider.constant_interval
     assert np.array(twin.covariance).shape == (len(twin.names),) * 2
 
 
@@ -53,6 +57,7 @@ def test_a_twin_file_reads_back_as_it_was_written(dead, tmp_path):
         (lambda t: t.update(version=3), "is later than 2"),
         (lambda t: t.pop("C"), "C is missing"),
         (lambda t: t.update(C="much"), "C must be a finite number, got 'much'"),
+        (lambda t: t.update(C_interval=[0.0, 1e-9]), "C_interval must be two numbers with C between them"),
         (lambda t: t.update(driver="wind"), "driver must be one of command_voltage"),
         (lambda t: t["terms"][0].update(effect="gremlin"), "must be an effect of the catalogue"),
         (lambda t: t["terms"][0].update(form="odd"), "must be a form of"),

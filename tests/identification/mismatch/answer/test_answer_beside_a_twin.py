@@ -180,6 +180,17 @@ def test_a_constant_that_may_be_the_same_for_what_nothing_claims_has_not_changed
     assert (changed_constant(was, estimate, data, "the twin T", told) is not None) == told_so
 
 
+@pytest.mark.parametrize(("ends", "told_so"), [((0.999, 1.1), False), ((0.9, 1.001), True)])
+def test_a_constant_that_the_twins_own_recordings_left_open_has_not_changed(fitted, ends, told_so):
+    """The first run had told its C with what a recirculation of 3 sigma makes of it; of its twin that was lost, and
+    nothing changed was told as 0.67 %, 5 sigma."""
+    runs, data, estimate = fitted
+    before = replace(twin_of(estimate, data, runs, None), origin="the twin T")
+    was = replace(before, C=0.95 * before.C)
+    was = replace(was, constant_interval=tuple(end * was.C for end in ends))
+    assert (changed_constant(was, estimate, data, "the twin T", TOLD) is not None) == told_so
+
+
 CURVE = Flexible("command_voltage", "V", (-9.0, -6.0, -3.0, 0.0, 3.0, 6.0, 9.0), (3,), ("force",), 1)
 
 
