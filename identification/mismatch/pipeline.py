@@ -27,6 +27,7 @@ from identification.mismatch.select.begun_otherwise import begun_otherwise
 from identification.mismatch.select.forward_selection import search
 from identification.mismatch.select.ringing import ringing
 from identification.mismatch.select.search_again import search_again
+from identification.mismatch.select.sharpened import sharpened
 from identification.mismatch.select.stage import exchange_rivals
 from identification.mismatch.select.wrong_side import on_their_side
 from identification.mismatch.unnamed import stage as unnamed
@@ -58,6 +59,7 @@ class Draws(NamedTuple):
     beside: np.random.Generator
     apart: np.random.Generator
     rings: np.random.Generator
+    sharp: np.random.Generator
 
     @classmethod
     def of(cls, seed: int) -> Draws:
@@ -120,7 +122,7 @@ def traced(
     if cleaned.changed:  # back: a line hides small terms, and is taken for some; a peak of the noise makes it louder
         watch.stage("looking again, without lines")
         found = search_again(first, cleaned.histories, draws.select_again, given, cleaned.bands, without, watch)
-    found = ringing(found, draws.rings, watch)
+    found = sharpened(ringing(found, draws.rings, watch), draws.sharp, watch)
     watch.stage("asking for rivals")
     selected = exchange_rivals(found, draws.exchange, watch)  # goes back where the exchange made another model
     selected = begun_otherwise(selected, draws.apart, watch)

@@ -10,11 +10,9 @@ from identification.mismatch.model.parameters import Layout, Theta
 from identification.physics.catalogue import CATALOGUE
 from identification.physics.term import STAGES, Parameter, Scale, Term
 
-ORDER = {term: i for i, term in enumerate(sorted(CATALOGUE, key=lambda t: STAGES.index(t.stage)))}
-"""Stage by stage, and in the order of the catalogue within one."""
-PLACES = {(term.id, term.form): place for term, place in ORDER.items()}
-"""The same of effects and forms: a threshold that is known is sharper than that of the catalogue, and acts where it
-does."""
+PLACES = {(term.id, term.form): i for i, term in enumerate(sorted(CATALOGUE, key=lambda t: STAGES.index(t.stage)))}
+"""Stage by stage, and in the order of the catalogue within one; of effects and forms: a threshold that is known is
+sharper than that of the catalogue, and acts where it does."""
 Acting = tuple[Term, tuple[float, ...], Scale]
 """A term with its values, and the sizes that they refer to."""
 
@@ -22,7 +20,7 @@ Acting = tuple[Term, tuple[float, ...], Scale]
 def usual_form(term: Term, other: Term, scale: Scale) -> bool:
     """Whether the two are forms of one effect with as many parameters, and `term` is the first that textbooks have."""
     alike = term.id == other.id and len(term.parameters(scale)) == len(other.parameters(scale))
-    return alike and ORDER[term] < ORDER[other]
+    return alike and PLACES[term.id, term.form] < PLACES[other.id, other.form]
 
 
 @dataclass(frozen=True, eq=False, slots=True)
@@ -55,7 +53,7 @@ class Model:
 
     def given_for(self, term: Term) -> Given | None:
         """What the baseline has of the same effect in the same textbook form, once: `term` is then a change of it."""
-        if not self.given or term not in ORDER:
+        if not self.given or (term.id, term.form) not in PLACES:
             return None
         known = [g for g in self.given if (g.term.id, g.term.form) == (term.id, term.form)]
         return known[0] if len(known) == 1 else None
