@@ -56,11 +56,13 @@ def terms_of(fitted: Fit, data: Data) -> tuple[TwinTerm, ...]:
 
 
 def starting(twin: Twin) -> Callable[[Data, Theta], tuple[Data, Theta, Model]]:
-    """For search(): the twin's terms at their values, C of the twin to begin with, and how uncertain they are."""
+    """For search(): the twin's terms at their values, C and the rate per driver of the twin to begin with, and how
+    uncertain they are: what a term changes of thrust and rate goes together, and a winding's rate is not its driver's.
+    """
 
     def begin(data: Data, theta: Theta) -> tuple[Data, Theta, Model]:
         model = Model((), given(twin))
-        theta = replace(theta, C=twin.C)
+        theta = replace(theta, C=twin.C, k=theta.k if twin.rate_per_driver is None else twin.rate_per_driver)
         own = prior_factor(twin, data, theta)
         unsure = _both(data.prior_factor, own)
         before = (twin.C, sqrt(twin.covariance[0][0]))
