@@ -13,6 +13,7 @@ from typing import cast
 import numpy as np
 
 from identification.mismatch.estimate.fitting import Fit, fit
+from identification.mismatch.model.model import extended
 from identification.mismatch.observer import UNWATCHED, Observer
 from identification.mismatch.select.forward_selection import Selected, Thruster, resumed
 from identification.mismatch.select.stepwise import accept_threshold
@@ -30,10 +31,7 @@ def sharpened(found: Selected, rng: np.random.Generator, watch: Observer = UNWAT
     out = found
     for term in [t for t in found.after.fit.model.terms if _is_spread(t, found.data.scale)]:
         out = _with_sharp(out, term)
-    if out is found:
-        return found
-    again = resumed(out, out.after, rng, watch)
-    return replace(out, undone=again.undone) if again.after is out.after and again.undone else again
+    return found if out is found else resumed(out, out.after, rng, watch)
 
 
 def _is_spread(term: Term, scale: Scale) -> bool:
@@ -47,23 +45,19 @@ def _sharp(term: Term) -> Term:
 def _with_sharp(found: Selected, term: Term) -> Selected:
     """With one threshold sharp, in the catalogue too, where chi-square falls by more than a parameter's worth."""
     after, data, sharp = found.after, found.data, _sharp(term)
-    best = min(_fits(after.fit, term, sharp, found), key=lambda each: each.chi2)
+    best = min(_nearby(found, term, sharp), key=lambda each: each.chi2)
     if best.chi2 > after.fit.chi2 - accept_threshold(1):
         return found
     new = Thruster(data, found.terms).replaced(after, fit(best.model, best.theta, data, after.weights, near=after.fit))
     return replace(found, after=new, terms=tuple(sharp if t == term else t for t in found.terms), standing=None)
 
 
-def _fits(now: Fit, term: Term, sharp: Term, found: Selected) -> list[Fit]:
+def _nearby(found: Selected, term: Term, sharp: Term) -> list[Fit]:
     """With it there or nearby, all other values as they are."""
-    data, values = found.data, now.values[term]
-    (spread,) = [(j, p.blur) for j, p in enumerate(term.parameters(data.scale)) if p.blur > 0]
+    now, data, known = found.after.fit, found.data, term.parameters(found.data.scale)
     out = []
     for share in REACH:
-        moved = tuple(v + share * spread[1] if j == spread[0] else v for j, v in enumerate(values))
+        moved = tuple(v + share * p.blur for p, v in zip(known, now.values[term], strict=True))
         model, theta = now.less(term)
-        known = {**model.values(theta), sharp: moved}
-        bigger = model.plus(sharp)
-        theta = replace(theta, terms=tuple(known[t] for t in bigger.terms))
-        out.append(fit(bigger, theta, data, found.after.weights, most_steps=0))
+        out.append(fit(*extended(model, theta, sharp, moved), data, found.after.weights, most_steps=0))
     return out
