@@ -169,10 +169,14 @@ def test_a_run_that_was_not_fitted_judges_the_flexible_term():
     assert "whole runs" in found.heldout.what
 
 
-def test_a_step_in_gain_is_no_formula():
-    found = diagnosed(run(lambda t, _V, F: F * np.where(t < 70, 1.0, 0.93), rate=20.0))
+@pytest.mark.parametrize("step", [0.93, 1.07])
+def test_a_step_in_gain_is_no_formula(step):
+    """A supply that falls as it is drawn on does most of a gain that falls, and nothing of one that rises."""
+    found = diagnosed(run(lambda t, _V, F: F * np.where(t < 70, 1.0, step), rate=20.0))
     left = found.unexplained
-    assert found.findings == ()
+    assert found.verdict == "unexplained"
+    assert {f.effect for f in found.findings} <= ({"supply_sag"} if step < 1 else set())
+    assert all(f.grade == "mostly" and "time" in " ".join(f.doubts) for f in found.findings)
     assert left.where.quantity == "time"
     assert left.formula is None
     assert found.heldout.after < 0.6 * found.heldout.before
