@@ -19,9 +19,9 @@ from identification.mismatch.compare.earlier_recordings import Novelty
 from identification.mismatch.compare.saved_model_baseline import terms_of
 from identification.mismatch.diagnosis import Finding
 from identification.mismatch.estimate.estimate import Estimate, fit_without, forces
+from identification.mismatch.estimate.fit_covariance import covariance
 from identification.mismatch.estimate.fitting import Fit
 from identification.mismatch.estimate.rate_levels import rate_by_levels
-from identification.mismatch.estimate.stairs import covariance
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import acting
 from identification.mismatch.name.naming import Named

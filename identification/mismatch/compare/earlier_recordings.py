@@ -17,8 +17,8 @@ import numpy as np
 from identification.mismatch import policy
 from identification.mismatch.compare.saved_model_baseline import lasting, starting, terms_of
 from identification.mismatch.estimate.estimate import Estimate, forces, refresh
+from identification.mismatch.estimate.fit_covariance import covariance
 from identification.mismatch.estimate.fitting import Fit, fit
-from identification.mismatch.estimate.stairs import covariance
 from identification.mismatch.faults import stage as faults
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.model import Given, Model, acting, extended, reduced

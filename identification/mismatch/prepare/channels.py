@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
 from math import sqrt
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,15 +11,12 @@ from numpy.typing import NDArray
 from identification.mismatch import policy
 from identification.mismatch.prepare.grid import Held
 from identification.recording import Channel, Floats, Recording
-from identification.run_history.filters import lowpass
 
 CALMED = ("flow_speed", "motor_temperature", "water_temperature")
 REACHES = (4, 16, 64, 256)
 """Samples on either side that are averaged: as many as let the neighbours foretell each sample best."""
 LOADS = 6
-"""Columns of the supply's load."""
-SUPPLY_LAGS = (0.0, 0.01, 0.02, 0.04, 0.08, 0.16)
-"""s by which a supply may follow its load: an output capacitor of tens of ms, or a rotor."""
+"""Columns of a load."""
 
 
 def followed(channel: Channel, at: Floats) -> Floats | None:
@@ -84,74 +79,6 @@ def _calm_where_it_rests(value: Floats, apart: NDArray[np.bool_]) -> Floats:
     return out
 
 
-def supply(channel: Channel, held: Held, at: Floats, driven: Floats, dt: Floats) -> Floats | None:
-    """Supply voltage: what the load makes of it, and the slow rest, so that it is known between its samples; a rest
-    that is no larger than what the steps of the readings make is none of the supply's."""
-    good = np.isfinite(channel.value)
-    if np.count_nonzero(good) < 2 * LOADS:
-        return followed(channel, at)
-    time, value = channel.time[good], channel.value[good]
-    size = float(np.max(np.abs(driven))) or 1.0
-    then = _driven_at(held, time)
-    load = min((_load(held, time, value, at, driven, dt, lag) for lag in SUPPLY_LAGS), key=lambda each: each.missed)
-    apart = np.abs(np.diff(then)) > policy.prepare.COMMAND_STEP * size
-    step = channel.acquisition.quantum or 0.0
-    smooth, missed = calmest(load.rest, REACHES, step, apart)
-    if float(np.mean(smooth**2)) <= step**2 / 12:  # a staircase that a meter makes of what the load does
-        return load.made
-    if missed > (1 - policy.prepare.SUPPLY_REST_TOLD) * float(np.mean(load.rest**2)):
-        return load.made
-    return load.made + _between(time, smooth, apart, held, at)
-
-
-class _Load(NamedTuple):
-    """What the load makes of a supply, (M,) V, what it leaves of the samples, (n,) V, and the price of that (BIC)."""
-
-    made: Floats
-    rest: Floats
-    missed: float
-
-
-def _load(held: Held, time: Floats, value: Floats, at: Floats, driven: Floats, dt: Floats, lag: float) -> _Load:
-    """By powers of the driver that a capacitor or a rotor follows `lag` s late, and what was drawn so far."""
-    size = float(np.max(np.abs(driven))) or 1.0
-    charge = np.cumsum(np.abs(driven / size) ** 3 * dt)
-    drawn = np.interp(time, at, charge)
-    then, now = (np.abs(v) / size for v in (_driven_at(held, time), driven))
-    which = np.clip(np.searchsorted(at - 0.5 * dt, time, side="right") - 1, 0, at.size - 1)
-    since = np.clip(time - (at - 0.5 * dt)[which], 0.0, None)
-
-    def power(k: int) -> tuple[Floats, Floats]:
-        if not lag:
-            return then**k, now**k
-        end, mean = lowpass(now**k, dt, lag, float(now[0] ** k))
-        before = np.concatenate([now[:1] ** k, end[:-1]])[which]
-        return then**k + (before - then**k) * np.exp(-since / lag), mean
-
-    powers = [power(k) for k in range(1, 5)]
-    most = max(float(charge[-1]), 1e-12)
-    H, G = (
-        np.column_stack([np.ones(q.size), *(p[i] for p in powers), q / most]) for i, q in enumerate((drawn, charge))
-    )
-    kept, missed = _fewest(H, value)
-    if lag:
-        missed += float(np.log(value.size))
-    theta = np.linalg.lstsq(H[:, kept], value, rcond=None)[0]
-    return _Load(G[:, kept] @ theta, value - H[:, kept] @ theta, missed)
-
-
-def _between(time: Floats, value: Floats, apart: NDArray[np.bool_], held: Held, at: Floats) -> Floats:
-    """(M,) `value` between its samples, each side of a step of the driver (`apart`, (n-1,)) by its own samples: what
-    the load has not yet made of a step is none of what was before it."""
-    gap = np.flatnonzero(apart)
-    stepped = np.clip(held.time[np.searchsorted(held.time, time[gap + 1], side="right") - 1], time[gap], time[gap + 1])
-    before = np.nextafter(stepped, -np.inf)
-    knots = np.concatenate([time, before, stepped])
-    order = np.argsort(knots, kind="stable")
-    out: Floats = np.interp(at, knots[order], np.concatenate([value, value[gap], value[gap + 1]])[order])
-    return out
-
-
 def step_of(channel: Channel | None) -> float:
     """Of its readings, in its own unit; 0 where none is known."""
     return 0.0 if channel is None else channel.acquisition.quantum or 0.0
@@ -175,7 +102,7 @@ def torque(channel: Channel, held: Held, edges: Floats, driven: Floats) -> Float
         return followed(channel, 0.5 * (edges[1:] + edges[:-1]))
     time, value = channel.time[good], channel.value[good]
     size = float(np.max(np.abs(driven))) or 1.0
-    then = _driven_at(held, time)
+    then = driven_at(held, time)
 
     def columns(v: Floats) -> Floats:
         u = v / size
@@ -199,7 +126,7 @@ def _means(time: Floats, value: Floats, edges: Floats) -> Floats:
     return np.where(count > 0, total / np.maximum(count, 1), between)
 
 
-def _driven_at(held: Held, time: Floats) -> Floats:
+def driven_at(held: Held, time: Floats) -> Floats:
     """(n,) the driver at each time."""
     if not held.stepwise:
         line: Floats = np.interp(time, held.time, held.value)
@@ -207,22 +134,6 @@ def _driven_at(held: Held, time: Floats) -> Floats:
     index = np.clip(np.searchsorted(held.time, time, side="right") - 1, 0, held.time.size - 1)
     out: Floats = held.value[index]
     return out
-
-
-def _fewest(H: Floats, value: Floats) -> tuple[list[int], float]:
-    """Columns (the first always) by BIC, and that: every one more brings its share of the channel's noise into the
-    voltage."""
-    n = value.size
-    R: Floats = np.asarray(np.linalg.qr(np.column_stack([H, value]), mode="r"))  # same sums of squares, few rows
-    best, least = [0], np.inf
-    for many in range(H.shape[1]):
-        for others in combinations(range(1, H.shape[1]), many):
-            tried = [0, *others]
-            left = R[:, -1] - R[:, tried] @ np.linalg.lstsq(R[:, tried], R[:, -1], rcond=None)[0]
-            price = n * np.log(max(float(left @ left), 1e-300)) + len(tried) * np.log(n)
-            if price < least:
-                best, least = tried, price
-    return best, least
 
 
 def neighbour_of(recording: Recording) -> Channel | None:

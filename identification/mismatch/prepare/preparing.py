@@ -12,8 +12,9 @@ from identification.calibration.bend import CellBend, bend_left
 from identification.mismatch import policy
 from identification.mismatch.prepare.binned import binned, untorn
 from identification.mismatch.prepare.chain.quantum import quantum_of
-from identification.mismatch.prepare.channels import coarseness, followed, jumps, neighbour_at, step_of, supply, torque
+from identification.mismatch.prepare.channels import coarseness, followed, jumps, neighbour_at, step_of, torque
 from identification.mismatch.prepare.grid import Held, distinct, edges_of
+from identification.mismatch.prepare.supply import supply
 from identification.mismatch.prepare.thermometer import warmed
 from identification.recording import Channel, Floats, Recording
 from identification.run_history.converter import Converter

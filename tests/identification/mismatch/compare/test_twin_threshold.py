@@ -12,8 +12,8 @@ from identification.mismatch.compare.earlier_recordings import Later, put_to_ear
 from identification.mismatch.compare.saved_model_baseline import given, prior_factor, starting
 from identification.mismatch.estimate.confidence_intervals import intervals
 from identification.mismatch.estimate.estimate import refresh
+from identification.mismatch.estimate.fit_covariance import covariance
 from identification.mismatch.estimate.fitting import raw
-from identification.mismatch.estimate.stairs import covariance
 from identification.mismatch.model.model import Model, extended
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.pipeline import diagnose

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from identification.mismatch.prepare.channel_availability import held_by_all, predictable
-from identification.mismatch.prepare.channels import followed, jumps, neighbour_at, supply, torque
+from identification.mismatch.prepare.channels import followed, jumps, neighbour_at, torque
 from identification.mismatch.prepare.grid import Held
 from identification.mismatch.prepare.scales import scale_of
+from identification.mismatch.prepare.supply import supply
 from identification.physics.speed_of_advance import SpeedOfAdvance
 from identification.recording import Channel
 from identification.run_history.remembered import RememberedRun

@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from identification.mismatch.estimate.fit_covariance import covariance
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.estimate.stairs import covariance
 from identification.mismatch.model.model import Model
 from identification.mismatch.model.parameters import Theta
 from identification.mismatch.model.whitening import weights
