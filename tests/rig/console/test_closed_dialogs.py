@@ -27,4 +27,5 @@ def test_nothing_is_kept_of_dialogs_that_have_closed():
             return counts
 
     counts = asyncio.run(scene())
-    assert counts[-1] <= counts[1]
+    since = OPENINGS - 2
+    assert counts[-1] - counts[1] < since, "one or two come and go with what is drawn meanwhile; a dialog has ten"
