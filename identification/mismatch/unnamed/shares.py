@@ -78,7 +78,7 @@ def with_shares(
     split: TrainTestSplit, named: Sequence[Named], others: Sequence[Term], best: float, *, same_run: bool
 ) -> tuple[Named, ...]:
     """The names with their shares: beside each other, without the terms `others`, which have no name. Those that
-    another run need not repeat have none there.
+    another run need not repeat have none there, nor have those that slow noise hides.
 
     `best`: RMSE in N of the model that predicts best, free shapes and all; `same_run`: what was not fitted is blocks of
     time of the runs that were.
@@ -92,7 +92,16 @@ def with_shares(
         less = without[n.term]
         return replace(n, attained=Attained(less.rmse, score.rmse, share(less, score, least)))
 
-    return tuple(shared(n) if same_run or not n.term.traits.own_clock else n for n in named)
+    def judged(n: Named) -> bool:
+        return (same_run or not n.term.traits.own_clock) and not _behind_slow_noise(without[n.term], score, n)
+
+    return tuple(shared(n) if judged(n) else n for n in named)
+
+
+def _behind_slow_noise(without: Score, with_it: Score, named: Named) -> bool:
+    """Whether it takes nothing off the error, and yet off what is left of it with slow noise taken out."""
+    price = policy.validate.HELD_OUT_WORTH + 2 * len(named.theta)
+    return with_it.rmse >= without.rmse and without.chi2 - with_it.chi2 > price
 
 
 def scores_alone(

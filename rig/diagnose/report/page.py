@@ -35,6 +35,7 @@ LISTED = 80
 """Columns of the equations."""
 MOST_ROWS = 12
 """Rows of a table of steps that stays open."""
+PREDICTS_BETTER = "With slow noise taken out the model predicts them better"
 VERDICTS: Mapping[str, Remark] = {
     "adequate": Remark("Adequate: no mismatch at the stated false-alarm rate.", "good"),
     "explained": Remark("Explained: the findings account for the mismatch.", "good"),
@@ -85,7 +86,10 @@ def short(d: Diagnosis) -> Iterator[Remark]:
         tone = "good" if held.after <= held.before else "bad"
         change = f"from {held.before:.3g} to {held.after:.3g} {d.unit}"
         text = f"On data that were not fitted the error goes {change}{better}{noise}."
-        yield Remark(text) if not d.model_terms else Remark(text, "good" if tone == "good" else "bad")
+        if held.hidden:
+            yield Remark(f"{text.removesuffix('.')}, for slow noise is most of it. {PREDICTS_BETTER}.")
+        else:
+            yield Remark(text) if not d.model_terms else Remark(text, "good" if tone == "good" else "bad")
     if d.next_experiment is not None:
         total = sum(step.duration for step in d.next_experiment.steps)
         sweep = f"a sweep of {total:.0f} s, expected power {d.next_experiment.expected_power:.2f}"
@@ -168,7 +172,7 @@ def after_table(d: Diagnosis) -> tuple[Table, Sentences]:
         ("not fitted", held.before, held.after, f"{held.noise:.4g}" if known else "–"),
     ]
     rows: list[tuple[str, ...]] = [(name, f"{a:.4g}", f"{b:.4g}", floor, _change(a, b)) for name, a, b, floor in listed]
-    if known and max(held.before, held.after) > held.noise:
+    if known and max(held.before, held.after) > held.noise and not held.hidden:
         own = [beyond_noise(x, held.noise) for x in (held.before, held.after)]
         told = ["within noise" if x == 0 else f"{x:.3g}" for x in own]
         rows.append(("not fitted, noise taken out", *told, "", _change(*own) if own[1] > 0 else ""))
@@ -176,6 +180,7 @@ def after_table(d: Diagnosis) -> tuple[Table, Sentences]:
     meaning = "" if d.white else f": {NOT_WHITE}"
     judged = (
         Remark(words(f"Not fitted: {d.heldout.what}.")),
+        *((Remark(f"{PREDICTS_BETTER}: χ² is less by {held.whitened_fall:.3g} there."),) if held.hidden else ()),
         Remark(f"χ² per degree of freedom of the weighted residual: {d.chi2_per_dof:.3f}."),
         Remark(
             f"What remains is {white} ({rarity(d.whiteness_p)}){meaning}.",

@@ -1,10 +1,13 @@
 """Names that are mostly right, and what each effect is of what any shape could explain."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from identification.mismatch.estimate.fitting import fit
 from identification.mismatch.name.naming import Check, name
+from identification.mismatch.noise.covariance import Noise
 from identification.mismatch.unnamed.shares import (
     mended,
     mostly_right,
@@ -13,14 +16,15 @@ from identification.mismatch.unnamed.shares import (
     only_repairs,
     scores_alone,
     share,
+    with_shares,
 )
 from identification.mismatch.validate.held_out import Score
 from identification.mismatch.validate.train_test_split import train_test_split
 from identification.physics.asymmetry import Asymmetry
 from identification.physics.dead_band import DeadBand
-from tests.identification.diagnosed_runs import dead_band, run
+from tests.identification.diagnosed_runs import NOISE, dead_band, run
 from tests.identification.mismatch.pipeline.whole_diagnoses import diagnosed
-from tests.identification.mismatch.small import known_noise, short
+from tests.identification.mismatch.small import known_noise, rng, short
 
 
 def lumpy(_t, V, F):
@@ -66,6 +70,16 @@ def doubted(checks, widths=(1.2, 0.7)):
     return train_test_split(estimate, data, ()), named
 
 
+def behind_slow_noise(half_width):
+    """A dead band beside 1 N that wanders in tens of seconds, its noise known; and the judge."""
+    places = np.arange(0.0, 81.0)
+    wandering = np.interp(places, np.linspace(0.0, 80.0, 8), 2.0 * rng(0).standard_normal(8))
+    made = short(lambda t, _V, F: F + np.interp(t, places, wandering), volts=dead_band(half_width))
+    data, estimate = known_noise({DeadBand(): (half_width,)}, [made])
+    heard = replace(estimate, noise=Noise(NOISE**2, 0.0, scales=(20.0,), slow=(4.0,)))
+    return train_test_split(heard, data, ()), name(heard, data, [])
+
+
 SHAPE = "own_covariate"
 
 
@@ -89,6 +103,16 @@ def test_a_name_that_takes_nothing_off_beside_the_others_is_not_needed():
     score, without = scores_alone(split, named, [])
     assert without[Asymmetry()].rmse < score.rmse  # so it is by chance
     assert [n.term for n in needed(split, named, named)] == [DeadBand()]
+
+
+@pytest.mark.parametrize(("half_width", "tells"), [(0.2, True), (0.06, False)])
+def test_a_name_that_slow_noise_hides_has_no_share(half_width, tells):
+    """Beside 1 N that wanders it takes nothing off the error, which is no share of 0 % where it is plain without."""
+    split, named = behind_slow_noise(half_width)
+    score, without = scores_alone(split, named, [])
+    (one,) = with_shares(split, named, [], score.rmse, same_run=True)
+    assert without[DeadBand()].rmse < score.rmse
+    assert (one.attained is None) == tells
 
 
 def test_what_makes_too_little_even_together_is_not_said():
