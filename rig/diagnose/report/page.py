@@ -87,7 +87,7 @@ def short(d: Diagnosis) -> Iterator[Remark]:
         change = f"from {held.before:.3g} to {held.after:.3g} {d.unit}"
         text = f"On data that were not fitted the error goes {change}{better}{noise}."
         if held.hidden:
-            yield Remark(f"{text.removesuffix('.')}, for slow noise is most of it. {PREDICTS_BETTER}.")
+            yield Remark(f"{text} Slow noise makes most of that error. {PREDICTS_BETTER}.")
         else:
             yield Remark(text) if not d.model_terms else Remark(text, "good" if tone == "good" else "bad")
     if d.next_experiment is not None:
