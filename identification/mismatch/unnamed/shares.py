@@ -15,7 +15,7 @@ from identification.mismatch.estimate.at_bounds import at_bound
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.name.named_term import GRAVE, Attained
 from identification.mismatch.name.naming import Named
-from identification.mismatch.validate.held_out import Score
+from identification.mismatch.validate.held_out import Score, held_out_price
 from identification.mismatch.validate.train_test_split import TrainTestSplit, better, refitted_without
 from identification.physics.term import Term
 
@@ -100,8 +100,8 @@ def with_shares(
 
 def _behind_slow_noise(without: Score, with_it: Score, named: Named) -> bool:
     """Whether it takes nothing off the error, and yet off what is left of it with slow noise taken out."""
-    price = policy.validate.HELD_OUT_WORTH + 2 * len(named.theta)
-    return with_it.rmse >= without.rmse and without.chi2 - with_it.chi2 > price
+    fall = without.chi2 - with_it.chi2
+    return with_it.rmse >= without.rmse and fall > held_out_price(len(named.theta))
 
 
 def scores_alone(

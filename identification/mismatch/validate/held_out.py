@@ -171,8 +171,13 @@ def by_blocks(before: Estimate, after: Estimate, data: Data, measured: Data, qui
     if found.after < found.before:
         return found
     chi2 = judge_blocks(replace(after, fit=new), data, keep)
-    price = policy.validate.HELD_OUT_WORTH + 2 * max(int(new.free.sum() - old.free.sum()), 0)
+    price = held_out_price(max(int(new.free.sum() - old.free.sum()), 0))
     return replace(found, whitened_fall=chi2(old).chi2 - chi2(new).chi2 - price)
+
+
+def held_out_price(parameters: int) -> float:
+    """Of chi-square on what was not fitted, for so many more parameters."""
+    return float(policy.validate.HELD_OUT_WORTH) + 2 * parameters
 
 
 def compared(before: Squares, after: Squares, noise: float, what: str) -> HeldOutRmse:

@@ -11,7 +11,14 @@ from identification.mismatch.estimate.estimate import Estimate, forces
 from identification.mismatch.estimate.fitting import Fit, fit
 from identification.mismatch.model.data import Data
 from identification.mismatch.model.whitening import weights
-from identification.mismatch.validate.held_out import Score, blocks, judge_blocks, judge_runs, refitted
+from identification.mismatch.validate.held_out import (
+    Score,
+    blocks,
+    held_out_price,
+    judge_blocks,
+    judge_runs,
+    refitted,
+)
 from identification.physics.term import Term
 from identification.run_history.history import History
 
@@ -56,6 +63,6 @@ def refitted_without(split: TrainTestSplit, term: Term) -> Fit:
 def better(new: Score, old: Score, parameters: int) -> bool:
     """Whether what was not fitted is predicted better by more than chance."""
     return (
-        new.chi2 < old.chi2 - (policy.validate.HELD_OUT_WORTH + 2 * parameters if parameters else 0)
+        new.chi2 < old.chi2 - (held_out_price(parameters) if parameters else 0)
         and new.rmse < policy.validate.HELD_OUT_RMSE_SLACK * old.rmse
     )

@@ -83,13 +83,13 @@ def short(d: Diagnosis) -> Iterator[Remark]:
     if isfinite(held.before) and isfinite(held.after):
         better = "" if held.after >= held.before else f", {_change(held.before, held.after)} less"
         noise = f"; the noise alone is {held.noise:.3g} {d.unit}" if isfinite(held.noise) else ""
-        tone = "good" if held.after <= held.before else "bad"
+        tone: pages.Tone = "good" if held.after <= held.before else "bad"
         change = f"from {held.before:.3g} to {held.after:.3g} {d.unit}"
         text = f"On data that were not fitted the error goes {change}{better}{noise}."
         if held.hidden:
             yield Remark(f"{text} Slow noise makes most of that error. {PREDICTS_BETTER}.")
         else:
-            yield Remark(text) if not d.model_terms else Remark(text, "good" if tone == "good" else "bad")
+            yield Remark(text, tone if d.model_terms else "")
     if d.next_experiment is not None:
         total = sum(step.duration for step in d.next_experiment.steps)
         sweep = f"a sweep of {total:.0f} s, expected power {d.next_experiment.expected_power:.2f}"
@@ -180,7 +180,11 @@ def after_table(d: Diagnosis) -> tuple[Table, Sentences]:
     meaning = "" if d.white else f": {NOT_WHITE}"
     judged = (
         Remark(words(f"Not fitted: {d.heldout.what}.")),
-        *((Remark(f"{PREDICTS_BETTER}: χ² is less by {held.whitened_fall:.3g} there."),) if held.hidden else ()),
+        *(
+            (Remark(f"{PREDICTS_BETTER}: χ² falls there by {held.whitened_fall:.3g} more than its price."),)
+            if held.hidden
+            else ()
+        ),
         Remark(f"χ² per degree of freedom of the weighted residual: {d.chi2_per_dof:.3f}."),
         Remark(
             f"What remains is {white} ({rarity(d.whiteness_p)}){meaning}.",

@@ -136,7 +136,7 @@ def test_an_error_that_slow_noise_makes_grow_is_no_cross_on_the_page():
     hidden = HeldOutRmse(0.0687, 0.0736, 0.06, "every fourth block of time", 0.14, whitened_fall=49.0)
     page = shown(answer(heldout=hidden))
     assert "from 0.0687 to 0.0736 N; the noise alone is 0.06 N. Slow noise makes most of that error. With slow" in page
-    assert "With slow noise taken out the model predicts them better: χ² is less by 49 there." in page
+    assert "With slow noise taken out the model predicts them better: χ² falls there by 49 more than its price." in page
     assert "not fitted, noise taken out" not in page, "of the white noise it is that, not of the slow"
     plain = shown(answer(heldout=replace(hidden, whitened_fall=0.0)))
     assert "not fitted, noise taken out" in plain
