@@ -33,8 +33,14 @@ class Mode:
 
     def at(self, since: Floats, index: NDArray[np.intp] | slice = ALL) -> Floats:
         """`since` s after the intervals `index` began, as all that follows."""
-        out: Floats = np.real(self.size[index] * np.exp(-self.rate[index] * np.maximum(since, 0.0)))
-        return out
+        since = np.maximum(since, 0.0)
+        left: Floats = np.exp(-np.real(self.rate)[index] * since)
+        if np.iscomplexobj(self.size) or np.iscomplexobj(self.rate):
+            left *= np.abs(self.size)[index]
+            left *= np.cos(np.angle(self.size)[index] - np.imag(self.rate)[index] * since)
+        else:
+            left *= np.real(self.size)[index]
+        return left
 
     def integral(self, since: Floats, index: NDArray[np.intp] | slice = ALL) -> Floats:
         """Since then."""

@@ -6,7 +6,7 @@ some thousand of them and a motor lag is still seen. Values are means over the i
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -37,8 +37,10 @@ STILL = 1e-3
 """Share of the largest driver by which it may move within an interval that tells so."""
 TAIL = 3.0
 """Times the standard deviation of the others: that of the samples in the tails."""
-MOST_AFTER = 4
-"""Delays and ticks of which is remembered which tick is before each sample."""
+MOST_AFTER = 8
+"""Delays and ticks of which is remembered which samples are after each tick."""
+BLOCK = 8192
+"""Samples of which something is made at a time."""
 SAMPLES = ("thrust_samples", "rate_samples")
 """What is worked out of samples and intervals alone."""
 GLITCH = 30.0
@@ -50,7 +52,7 @@ class Samples:
     """When the samples of a channel were taken."""
 
     time: Floats
-    """(N,) s."""
+    """(N,) s, none before the one before it."""
     interval: NDArray[np.intp]
     """(N,) index of the interval that each is in."""
     count: NDArray[np.intp]
@@ -58,18 +60,79 @@ class Samples:
     middle: Floats
     """(M,) s, their mean time; the middle of the interval where there are none."""
 
-    _after: LeastRecentlyUsed[tuple[NDArray[np.intp], Floats]] = field(
+    _begins: LeastRecentlyUsed[NDArray[np.intp]] = field(
+        default_factory=lambda: LeastRecentlyUsed(MOST_AFTER), init=False, repr=False
+    )
+    _pieces: LeastRecentlyUsed[tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]] = field(
         default_factory=lambda: LeastRecentlyUsed(MOST_AFTER), init=False, repr=False
     )
 
     def after(self, when: Floats, delay: float) -> tuple[NDArray[np.intp], Floats]:
-        """(N,) the last of the ticks `when` that is `delay` s ago or longer, else the first, and s since then."""
+        """(N,) the last of the ticks `when` (T,) that is `delay` s ago or longer, else the first, and s since then."""
+        begin = self._begun(when, delay)
+        last = np.repeat(np.arange(when.size), np.diff(begin, append=self.time.size))
+        return last, np.maximum(self.time - delay - when[last], 0.0)
 
-        def made() -> tuple[NDArray[np.intp], Floats]:
-            last = np.maximum(np.searchsorted(when, self.time - delay, side="right") - 1, 0)
-            return last, np.maximum(self.time - delay - when[last], 0.0)
+    def soon_after(
+        self, when: Floats, delay: float, within: Floats
+    ) -> Iterator[tuple[NDArray[np.intp], NDArray[np.intp], Floats]]:
+        """(k,) samples less than `within` (T,) s after the tick that `after` gives them; it, and s since then; in
+        blocks, all of which is in a processor's own memory while something is made of them."""
+        begin, late = self._begun(when, delay), self.time - delay
+        end = np.minimum(np.append(begin[1:], late.size), np.searchsorted(late, when + within))
+        many = np.maximum(end - begin, 0)
+        total = np.cumsum(many)
+        ends = np.unique(np.searchsorted(total, np.arange(BLOCK, int(total[-1]) + BLOCK, BLOCK)) + 1)
+        for lo, hi in zip([0, *ends], [*np.minimum(ends, when.size), when.size], strict=True):
+            few = many[lo:hi]
+            last = np.repeat(np.arange(lo, hi), few)
+            which = np.arange(last.size) + np.repeat(begin[lo:hi] - (np.cumsum(few) - few), few)
+            if which.size:
+                yield which, last, np.maximum(late[which] - when[last], 0.0)
 
-        return self._after(delay, made, when)
+    def means_after(
+        self,
+        when: Floats,
+        delay: float,
+        within: Floats,
+        told: Callable[[NDArray[np.intp], Floats], Floats],
+        rows: int = 1,
+    ) -> Floats:
+        """(r, M) means over each interval of what is `told` (r, k) of the samples `soon_after` ticks, by the tick and s
+        since then; of all others 0 counts. `rows`: r."""
+        total = np.zeros((rows, self.count.size))
+        for which, last, since in self.soon_after(when, delay, within):
+            interval = self.interval[which]
+            part = slice(interval[0], interval[-1] + 1)
+            for row, value in zip(total, told(last, since), strict=True):
+                row[part] += np.bincount(interval - interval[0], weights=value)
+        total /= np.maximum(self.count, 1)
+        return total
+
+    def held_means(self, when: Floats, delay: float, value: Floats) -> Floats:
+        """(M,) `means` of what is `value` (T,) from the ticks `when` on, `delay` s after."""
+        interval, tick, many = self._pieces(delay, lambda: self._in_pieces(self._begun(when, delay)), when)
+        total = np.bincount(interval, weights=value[tick] * many, minlength=self.count.size)
+        out: Floats = total / np.maximum(self.count, 1)
+        return out
+
+    def _begun(self, when: Floats, delay: float) -> NDArray[np.intp]:
+        """(T,) first sample of each tick; of the first tick are those before it, too."""
+
+        def made() -> NDArray[np.intp]:
+            first = np.searchsorted(self.time - delay, when)
+            first[0] = 0
+            return first
+
+        return self._begins(delay, made, when)
+
+    def _in_pieces(self, begin: NDArray[np.intp]) -> tuple[NDArray[np.intp], NDArray[np.intp], NDArray[np.intp]]:
+        """Samples of one interval and one tick, which begin at the samples `begin`: interval, tick, how many, or 0."""
+        both = np.concatenate([2 * begin, 2 * (np.cumsum(self.count) - self.count) + 1])
+        both.sort(kind="stable")  # of two that ascend: they are merged
+        new = both & 1
+        interval, tick = np.maximum(np.cumsum(new) - 1, 0), np.cumsum(1 - new) - 1
+        return interval, tick, np.diff(both >> 1, append=self.time.size)
 
     def means(self, value: Floats) -> Floats:
         """(M,) means of values (N,) over each interval; 0 where there are none."""
@@ -153,7 +216,7 @@ class History:
     sample_time: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     """(N,) s, every thrust sample that is in an interval."""
     sample_lead: Floats = field(default_factory=lambda: np.zeros(1), repr=False)
-    """(N,) or (1,): as `lead`, at each sample."""
+    """(N,) or (1,): as `lead`, at each sample, of a driver that was measured."""
     sample_thrust: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     rate_time: Floats = field(default_factory=lambda: np.empty(0), repr=False)
     """(n,) s, every sample of the rotation rate."""

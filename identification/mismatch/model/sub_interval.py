@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import replace
+from functools import partial
 from typing import cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.mismatch import policy
 from identification.mismatch.model.behind_drive import behind_drive
@@ -19,12 +21,13 @@ from identification.mismatch.model.static_gain import jumping, rotor_gain, thrus
 from identification.physics.term import Scale, Term
 from identification.physics.traits import Dynamics, LimitsCommand, LimitsReading
 from identification.recording import Floats
+from identification.run_history.converter import Mode
 from identification.run_history.filters import reconstructed
 from identification.run_history.history import History
 from identification.run_history.remembered import Channel, RememberedRun
 from identification.run_history.rotor_lag import Rotor
-from identification.run_history.ticks.sub_interval_dynamics import Passed
-from identification.run_history.ticks.sub_interval_leads import curvature, each_lead, lead
+from identification.run_history.ticks.sub_interval_dynamics import Passed, lasts
+from identification.run_history.ticks.sub_interval_leads import each_lead, lead, lead_and_curvature
 
 
 def dynamics_between(model: Model, theta: Theta, history: History, largest: float, late: float) -> Passed:
@@ -58,7 +61,7 @@ def _ahead(
     share = passed_on(model, theta, history, by_tick)
     if not _changes(passed, history):
         return run.lately("ahead", lambda: share * (2 * np.abs(x) * history.lead + history.curved), x, share)
-    known = _remembered(run, "thrust", passed)
+    known = _remembered(run, passed)
     if passed.ring is not None:
         return np.asarray(share * known[0], dtype=np.float64)
     then = run.delayed(x, passed.delay) if passed.delay else x
@@ -73,7 +76,7 @@ def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Sc
     history = run.history
     passed = Passed(rotor_of(model, theta, scale.driver), delay=late if _is_late(late, history) else 0.0)
     bent = passed.rotor is not None and history.ticks is not None
-    known = _remembered(run, "rate", passed) if bent or _changes(passed, history) else history.rate_lead
+    known = _rate_lead(run, passed) if bent or _changes(passed, history) else history.rate_lead
     share, shift = passed_on(model, theta, history, by_tick), theta.rate_shift
     gain = 1.0 if history.ticks is None else rotor_gain(model, theta, run, scale, by_tick)
     jumped = None if passed.rotor is not None or by_tick else _jumped(model, theta, run, scale, passed.delay)
@@ -82,8 +85,7 @@ def turning(model: Model, theta: Theta, run: RememberedRun, x: Floats, scale: Sc
         assert history.rate_sampled is not None
         moved = run.delayed(x, shift) if shift else x
         line = reconstructed(moved, history.middle, history.rate_sampled)
-        ticks = np.atleast_2d(known)[0]
-        beside = gain * ticks if jumped is None else np.where(ticks != 0, jumped, 0.0)
+        beside = gain * known if jumped is None else np.where(known != 0, jumped, 0.0)
         return np.asarray(line + share * beside, dtype=np.float64)
 
     return run.lately(("turning", shift), made, x, known, share, gain, jumped)
@@ -101,14 +103,17 @@ def _jumped(model: Model, theta: Theta, run: RememberedRun, scale: Scale, delay:
 def sample_lead(model: Model, theta: Theta, run: RememberedRun, rate: Floats, largest: float) -> Floats:
     """(N,) driver |driver|: as `ahead`, at each sample, where the rates are `rate` (N,)."""
     history = run.history
-    passed = Passed(rotor_of(model, theta, largest), _ring(model, theta), delay_of(model, theta) + theta.shift)
-    if not _changes(passed, history):
+    if history.ticks is None:
         return 2 * np.abs(rate) * history.sample_lead
-    assert history.ticks is not None
+    passed = Passed(rotor_of(model, theta, largest), _ring(model, theta), delay_of(model, theta) + theta.shift)
+    passed = passed if _changes(passed, history) else Passed()
     last, since = run.after_ticks("thrust", passed.delay)
     seen = passed.followed(last, since, history.ticks[1], run.rates_at_ticks(passed.rotor))
     if passed.ring is not None:
-        seen = seen * np.abs(seen) + _ringing(run, "thrust", passed)
+        seen = seen * np.abs(seen)
+        when, modes = _ring_modes(run, passed)
+        last, since = history.thrust_samples.after(when, passed.delay)
+        seen += sum(mode.at(since, last) for mode in modes)
     beside = each_lead(history, seen, _means(run, passed), _size(history, passed))
     return beside if passed.ring is not None else 2 * np.abs(rate) * beside
 
@@ -141,42 +146,69 @@ def _changes(passed: Passed, history: History) -> bool:
     return passed != Passed() and history.ticks is not None and history.tick <= policy.estimate.TICK_INTERVAL
 
 
-def _remembered(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:
-    """(2, M) `lead` and `curvature` of a channel; of a stand that rings the lead of the force."""
-    return run.leads((channel, passed), lambda: _leads(run, channel, passed))
+def _remembered(run: RememberedRun, passed: Passed) -> Floats:
+    """(2, M) `lead` and `curvature` of the thrust; of a stand that rings the lead of the force."""
+    return run.leads(("thrust", passed), lambda: _leads(run, passed))
 
 
-def _leads(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:
+def _leads(run: RememberedRun, passed: Passed) -> Floats:
     history = run.history
-    samples, means, size = run.samples(channel), _means(run, passed), _size(history, passed)
-    seen, force = _followed(run, channel, replace(passed, ring=None))
+    samples, means, size = history.thrust_samples, _means(run, passed), _size(history, passed)
+    seen, force = _followed(run, "thrust", replace(passed, ring=None))
     if passed.ring is None:
-        beside = lead(history, seen, means, samples, size)
-        return np.array([beside, curvature(history, force, means, passed.force_means(run), beside, samples)])
-    rung = force + samples.means(_ringing(run, channel, passed))
-    beside = lead(history, rung, means, samples, size)
+        return lead_and_curvature(history, (seen, force), (means, passed.force_means(run)), samples, size)
+    when, modes = _ring_modes(run, passed)
+    rung = [samples.means_after(when, passed.delay, lasts(mode), partial(_of_mode, mode)) for mode in modes]
+    beside = lead(history, force + np.sum(rung, axis=(0, 1)), means, samples, size)
     return np.array([beside, np.zeros(beside.size)])
 
 
-def _ringing(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:
-    """(N,) what the stand adds to rate |rate| at the samples of a channel."""
+def _rate_lead(run: RememberedRun, passed: Passed) -> Floats:
+    """(M,) `lead` of the rate."""
+
+    def made() -> Floats:
+        (seen,) = _followed(run, "rate", passed)
+        history = run.history
+        return lead(history, seen, _means(run, passed), history.rate_samples, _size(history, passed))
+
+    return run.leads(("rate", passed), made)
+
+
+def _ring_modes(run: RememberedRun, passed: Passed) -> tuple[Floats, tuple[Mode, ...]]:
+    """(T,) s and what the stand adds to rate |rate| from then on."""
     ticks = run.history.ticks
     assert ticks is not None
     when, value = run.knots(passed.rotor, lambda: passed.knots(*ticks))
-    return passed.ringing(*run.samples(channel).after(when, passed.delay), when, value)
+    return when, passed.ring_modes(when, value)
+
+
+def _of_mode(mode: Mode, last: NDArray[np.intp], since: Floats) -> Floats:
+    return mode.at(since, last)[np.newaxis]
 
 
 def _followed(run: RememberedRun, channel: Channel, passed: Passed) -> Floats:
-    """(2, M) means at the samples of rate and rate |rate|: a stand that rings in any way has the same rotor."""
-    samples = run.samples(channel)
+    """(2, M) means at the samples of rate and rate |rate|, of the rate's channel (1, M) the first alone: a stand that
+    rings in any way has the same rotor."""
+    samples, squared = run.samples(channel), channel == "thrust"
 
     def made() -> Floats:
         assert run.history.ticks is not None
-        value = run.history.ticks[1]
-        rate = passed.followed(*run.after_ticks(channel, passed.delay), value, _rates(run, passed))
-        return np.array([samples.means(rate), samples.means(rate * np.abs(rate))])
+        when, value = run.history.ticks
+        rates = _rates(run, passed)
+
+        def beside(last: NDArray[np.intp], since: Floats) -> Floats:
+            held, rate = value[last], passed.followed(last, since, value, rates)
+            return _told(rate, squared) - _told(held, squared)
+
+        held = np.array([samples.held_means(when, passed.delay, each) for each in _told(value, squared)])
+        return held + samples.means_after(when, passed.delay, passed.unsettled(value), beside, held.shape[0])
 
     return run.lately((channel, passed), made)
+
+
+def _told(rate: Floats, squared: bool) -> Floats:
+    """(2, k) rate and rate |rate|, or (1, k) the first alone."""
+    return np.array([rate, rate * np.abs(rate)] if squared else [rate])
 
 
 def _rates(run: RememberedRun, passed: Passed) -> Floats:

@@ -22,6 +22,8 @@ SETTLED = 25.0
 """Time constants after which a rotor has followed and ringing has died away."""
 BENT, MOST_BENDS = 0.005, 16
 """Change of a rate of following times the gap between two knots, above which there are some between; how many."""
+FOREVER = 1e9
+"""s: a rotor that nothing brakes has not followed by then."""
 SLOWEST = 1e-3
 """Rate of following, beside that at the largest driver, of a rotor that hardly turns."""
 
@@ -61,28 +63,21 @@ class Passed:
         out = force + self.ring[0] * (resonant(moved, history.dt, *self.ring[1:]) - moved)
         return run.delayed(out, self.delay) if self.delay else out
 
+    def unsettled(self, value: Floats) -> Floats:
+        """(T,) s after each tick from which on `value` (T,) is held, until the rotor has followed."""
+        if self.rotor is None:
+            return np.zeros(value.size)
+        rate = self.rotor.quadratic * np.abs(value) + self.rotor.linear_at(value)
+        return SETTLED / np.maximum(rate, SETTLED / FOREVER)
+
     def followed(self, last: NDArray[np.intp], since: Floats, value: Floats, rates: Floats) -> Floats:
         """(N,) the rate `since` s + delay after the tick `last`, of a driver that takes `value` (T,) at the ticks;
         `rates` (T,) of the rotor there."""
-        out: Floats = value[last]
-        if self.rotor is not None:
-            rate = self.rotor.quadratic * np.abs(value) + self.rotor.linear_at(value)
-            follows = np.flatnonzero(since * rate[last] < SETTLED)
-            out[follows] = lagged(out[follows], rates[last[follows]], since[follows], self.rotor)
-        return out
-
-    def ringing(self, last: NDArray[np.intp], since: Floats, when: Floats, value: Floats) -> Floats:
-        """What the stand adds to rate |rate|, (N,) `since` s + delay after the knots `last`."""
-        assert self.ring is not None
-        _, f, z = self.ring
-        *follows, rings = self.ring_modes(when, value)
-        out = sum((mode.at(since, last) for mode in follows), np.zeros(since.size))
-        near = np.flatnonzero(2 * np.pi * f * z * since < SETTLED)
-        out[near] += rings.at(since[near], last[near])
-        return out
+        held: Floats = value[last]
+        return held if self.rotor is None else lagged(held, rates[last], since, self.rotor)
 
     def ring_modes(self, when: Floats, value: Floats) -> tuple[Mode, ...]:
-        """The same after each of the knots `when` (T,): what rings is the last of them.
+        """What the stand adds to rate |rate| after each of the knots `when` (T,); what rings is the last of them.
 
         Between two knots the force is steady but for the modes of the rotor, e^(-r s) each, and so is what a stand
         shows of them: times w^2/(r^2 - 2 z w r + w^2). It rings by what its place and its speed lack of that then.
@@ -153,6 +148,11 @@ class Passed:
         found = when[at] + to_rest(w, n, self.rotor)
         out: Floats = found[found < when[at + 1]]
         return out
+
+
+def lasts(mode: Mode) -> Floats:
+    """(T,) s after each knot until it has died away."""
+    return np.asarray(SETTLED / np.real(mode.rate), dtype=np.float64)
 
 
 def with_knots(held: tuple[Floats, Floats], at: Floats) -> tuple[Floats, Floats]:

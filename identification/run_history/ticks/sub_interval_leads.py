@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.recording import Floats
 from identification.run_history.filters import reconstructed, within_intervals
@@ -15,19 +16,27 @@ def lead(history: History, seen: Floats, means: Floats, samples: Samples, size: 
     Nothing where that is too much for a tick, `size` what the largest driver makes of it.
     """
     beside = seen - reconstructed(means, history.middle, samples.middle)
-    return _ticks(np.where(samples.count > 0, beside, 0.0), size)
+    return np.where(_of_ticks(beside, samples, size), beside, 0.0)
 
 
-def curvature(history: History, seen: Floats, means: Floats, force: Floats, beside: Floats, samples: Samples) -> Floats:
-    """(M,) rate |rate| `seen` at the samples less the line through its means `force` (M,), and what the lead `beside`
-    the `means` of the rate makes of it."""
-    line = reconstructed(force, history.middle, samples.middle)
-    return np.where(beside != 0, seen - line - 2 * np.abs(means) * beside, 0.0)
+def lead_and_curvature(
+    history: History, seen: tuple[Floats, Floats], means: tuple[Floats, Floats], samples: Samples, size: float
+) -> Floats:
+    """(2, M) of the rate `lead`, and rate |rate| at the samples less the line through its means and what the lead makes
+    of it. `seen` and `means`: of rate and rate |rate|."""
+    beside, force = (s - reconstructed(m, history.middle, samples.middle) for s, m in zip(seen, means, strict=True))
+    curved = force - 2 * np.abs(means[0]) * beside
+    return np.where(_of_ticks(beside, samples, size), np.array([beside, curved]), 0.0)
+
+
+def _of_ticks(beside: Floats, samples: Samples, size: float) -> NDArray[np.bool_]:
+    return (samples.count > 0) & (np.abs(beside) < LARGEST_LEAD * size)
 
 
 def each_lead(history: History, value: Floats, means: Floats, size: float) -> Floats:
     """(N,) as `lead`, of each thrust sample."""
-    return _ticks(value - within_intervals(means, history.edges, history.sample_time), size)
+    beside = value - within_intervals(means, history.edges, history.sample_time)
+    return np.where(np.abs(beside) < LARGEST_LEAD * size, beside, 0.0)
 
 
 def with_leads(history: History, measured: Floats | None = None) -> History:
@@ -37,39 +46,22 @@ def with_leads(history: History, measured: Floats | None = None) -> History:
     """
     if history.ticks is None:
         return history if measured is None else _paired(history, measured)
-    driver, size, samples = history.driver, history.size, history.thrust_samples
-    value = _held(history, samples)
-    beside = lead(history, samples.means(value), driver, samples, size)
-    force = driver * np.abs(driver)
-    curved = curvature(history, samples.means(value * np.abs(value)), driver, force, beside, samples)
-    out = history.with_driver(lead=beside, curved=curved, sample_lead=each_lead(history, value, driver, size))
+    (when, value), driver, size, samples = history.ticks, history.driver, history.size, history.thrust_samples
+    seen = samples.held_means(when, 0.0, value), samples.held_means(when, 0.0, value * np.abs(value))
+    beside, curved = lead_and_curvature(history, seen, (driver, driver * np.abs(driver)), samples, size)
     if history.rate is None:
-        return out
+        return history.with_driver(lead=beside, curved=curved)
     turning = history.rate_samples
-    return out.with_driver(rate_lead=lead(history, turning.means(_held(history, turning)), driver, turning, size))
+    rate_lead = lead(history, turning.held_means(when, 0.0, value), driver, turning, size)
+    return history.with_driver(lead=beside, curved=curved, rate_lead=rate_lead)
 
 
 def _paired(history: History, value: Floats) -> History:
     driver, samples = history.driver, history.thrust_samples
-    beside = lead(history, samples.means(value), driver, samples, np.inf)
-    line = reconstructed(driver * np.abs(driver), history.middle, samples.middle)
-    curved = samples.means(value * np.abs(value)) - line - 2 * np.abs(driver) * beside
+    seen = samples.means(value), samples.means(value * np.abs(value))
+    beside, curved = lead_and_curvature(history, seen, (driver, driver * np.abs(driver)), samples, np.inf)
     return history.with_driver(
         lead=beside,
-        curved=np.where(samples.count > 0, curved, 0.0),
+        curved=curved,
         sample_lead=each_lead(history, value, driver, np.inf),
     )
-
-
-def _held(history: History, samples: Samples) -> Floats:
-    """(N,) the command at each sample."""
-    assert history.ticks is not None
-    when, value = history.ticks
-    last, _ = samples.after(when, 0.0)
-    out: Floats = value[last]
-    return out
-
-
-def _ticks(value: Floats, size: float) -> Floats:
-    out: Floats = np.where(np.abs(value) < LARGEST_LEAD * size, value, 0.0)
-    return out
