@@ -6,7 +6,9 @@ a drive that saturates, a coupling for the rest, and C far off. A stand that rin
 loss, a lag and the water together, made the others take a wrong size and form, and stayed for the little that was left.
 A drive that saturates from a fifth of the command on, where it can begin at the earliest, stood for a winding loss. And
 a term that came first stays for less than it would be found by: a ramp whose commands came a millisecond late left a
-coupling of 3.8 sigma beside the lag that had taken all of its thousand.
+coupling of 3.8 sigma beside the lag that had taken all of its thousand. And a term of many values can be like much: a
+heating of winding and magnet stood for a winding loss and half of a recirculation, and when both were in nothing more
+fitted, though something was left at 38 sigma.
 """
 
 from __future__ import annotations
@@ -30,15 +32,27 @@ NO_OTHER_BEGINNING = "whether effects tell it all without what was taken first a
 
 
 def begun_otherwise(found: Selected, rng: np.random.Generator, watch: Observer = UNWATCHED) -> Selected:
-    """The model of a search without what was overtaken or has values that are not possible, then of one without a term
-    that follows the rate, where there are such and that model is better, or the same less what none would find; else as
-    found."""
+    """The model of a search without what was overtaken or has values that are not possible, then of one without terms
+    of many values if something is left beside them, then of one without a term that follows the rate, where there are
+    such and that model is better, or the same less what none would find; else as found."""
     told = _searched_without({*overtaken(found), *_impossible(found)}, NO_OTHER_BEGINNING, found, rng, watch)
+    told = _searched_without(_many_sided(told, rng), NO_OTHER_BEGINNING, told, rng, watch)
     return _searched_without(_followers(told), NO_EFFECTS, told, rng, watch)
 
 
 def _followers(found: Selected) -> list[Term]:
     return [term for term in found.after.fit.model.terms if term.traits.follows_rate]
+
+
+def _many_sided(found: Selected, rng: np.random.Generator) -> list[Term]:
+    """Terms of many values beside which something is left that no other term may take; none where nothing is."""
+    now, system = found.after, Thruster(found.data, found.terms)
+    sizes = {term: len(values) for term, values in now.fit.values.items()}
+    many = [term for term, size in sizes.items() if size >= policy.select.MANY_SIDED]
+    if not many or found.undone:
+        return []
+    last = system.judged(now, rng) if found.last is None else found.last
+    return many if last.largest > last.threshold else []
 
 
 def _impossible(found: Selected) -> list[Term]:

@@ -18,6 +18,7 @@ from identification.mismatch.select.rounds import Candidate, Round
 from identification.mismatch.select.stepwise import accept_threshold
 from identification.physics.dead_band import DeadBand
 from identification.physics.linear_term import LinearTerm
+from identification.physics.load_cell_creep import LoadCellCreep
 from identification.physics.rotation_coupling import RotationCoupling
 from identification.recording import Channel
 from tests.identification.diagnosed_runs import dead_band, levels
@@ -142,3 +143,20 @@ def test_who_ends_that_search_is_told_so():
     told = begun_otherwise(found, rng(0), Ended())
     assert told.after is found.after
     assert told.undone == (NO_OTHER_BEGINNING,)
+
+
+WANDERS = LoadCellCreep("two_constants")
+SIZES = (0.02, 3.0, 0.02, 30.0)
+
+
+def test_a_term_of_many_values_beside_which_something_is_left_is_done_without():
+    found = selected({WANDERS: SIZES}, [short(volts=dead_band(1.2))], (WANDERS, BAND))
+    told = begun_otherwise(found, rng(0))
+    assert ids(told) == ["dead_band"]
+    assert told.terms == (WANDERS, BAND)
+
+
+def test_a_term_of_many_values_beside_which_nothing_is_left_is_not_asked_again(monkeypatch):
+    found = selected({WANDERS: SIZES, BAND: (1.0,)}, [short(volts=dead_band(1.2))], (WANDERS, BAND))
+    monkeypatch.setattr(module, "onwards", None)
+    assert begun_otherwise(found, rng(0)) is found
