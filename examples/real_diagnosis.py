@@ -83,7 +83,7 @@ def diagnosed(root: Path, case: Case, folder: Path) -> Diagnosis:
 
 def short(case: Case, found: Diagnosis, took: float) -> str:
     held = found.heldout
-    error = f"{held.before:.4g} -> {held.after:.4g} N rms (noise {held.noise:.3g})"
+    error = f"{held.before:.4g} -> {held.after:.4g} N rms with all that the model has (noise {held.noise:.3g})"
     return f"{case.name}: {found.headline}\n  {found.statement}\n  not fitted: {error}; {held.what}; {took:.0f} s"
 
 

@@ -16,6 +16,8 @@ NOT_WHITE = (
 MISSING = "Missing from the model:"
 CHANGED = "Changed:"
 IN_MEASUREMENT = "In the measurement, not in the thruster:"
+NO_BETTER = 0.995
+"""Of the error before: names that leave more take nothing off."""
 MOST_REFUSED = 3
 """Names in a sentence: all of them are in the answer."""
 
@@ -58,7 +60,8 @@ def graded(f: Finding) -> str:
     if f.share is None:
         return says
     return (
-        f"{says} It does {100 * f.share:.0f} % of what any shape in its place could do for data that were not fitted."
+        f"{says} Of the error that a curve of any shape in its place would take off data that were not fitted, it "
+        f"takes off {100 * f.share:.0f} %."
     )
 
 
@@ -104,9 +107,9 @@ def in_part(share: float) -> str:
     """A headline where a part has names.
 
     >>> in_part(0.973)
-    'unexplained in part: what has a name takes off 97 % of the error'
+    'unexplained in part: what has a name takes off 97 % of the error beyond the noise'
     """
-    return f"unexplained in part: what has a name takes off {_percent(share)} of the error"
+    return f"unexplained in part: what has a name takes off {_percent(share)} of the error beyond the noise"
 
 
 def errors(findings: Sequence[Finding], held: HeldOutRmse, unit: str, more: str = "") -> str:
@@ -123,20 +126,32 @@ def errors(findings: Sequence[Finding], held: HeldOutRmse, unit: str, more: str 
     names = with_names(findings, held, more)
     chain = [f"{held.before:.3g} {unit} before"]
     if findings and names is not None:
-        chain.append(f"{names:.3g} {unit} with {'it' if len(findings) == 1 else 'these'}")
+        chain.append(f"{names:.3g} {unit} with {_alone(len(findings), names, held.before, more)}")
     if more:
         chain.append(f"{held.after:.3g} {unit} with {more}")
     return f"Error on data that were not fitted: {', '.join(chain)}; {of_noise(held.after, held.noise, unit)}."
+
+
+def _alone(many: int, names: float, before: float, more: str) -> str:
+    """So many names, and that they are no better by themselves, if they are not.
+
+    >>> _alone(2, 0.399, 0.362, "a free curve"), _alone(1, 0.399, 0.41, "")
+    ('these alone, which predict no better than without', 'it')
+    """
+    one = many == 1
+    if not more or names < NO_BETTER * before:
+        return "it" if one else "these"
+    return f"{'it' if one else 'these'} alone, which predict{'s' if one else ''} no better than without"
 
 
 def of_noise(error: float, noise: float, unit: str) -> str:
     """An error on what was not fitted beside the noise of what was, as a clause.
 
     >>> of_noise(1.47, 0.31, "N"), of_noise(0.51, 0.72, "N")
-    ('noise alone gives 0.31 N', 'it is no larger than the noise where it was fitted (0.72 N)')
+    ('noise alone gives 0.31 N', '0.51 N is no more than the noise of the data that were fitted (0.72 N)')
     """
     if error <= noise:
-        return f"it is no larger than the noise where it was fitted ({noise:.3g} {unit})"
+        return f"{error:.3g} {unit} is no more than the noise of the data that were fitted ({noise:.3g} {unit})"
     return f"noise alone gives {noise:.3g} {unit}"
 
 
@@ -177,4 +192,4 @@ def refused(candidates: Sequence[tuple[str, str]]) -> str:
     """What was tried for it, each (name, first check that it failed); the first few."""
     told = [f"{name.replace('_', ' ')} ({why})" for name, why in candidates[:MOST_REFUSED]]
     more = len(candidates) - len(told)
-    return f"Tried for it and refused: {'; '.join(told)}{f'; and {more} more, in the list below' if more else ''}."
+    return f"Tried for it and refused: {'; '.join(told)}{f'; and {more} more' if more else ''}."

@@ -58,10 +58,15 @@ class TimeSkew:
         return (f"F = delayed(F, {theta[0]:.6g})  # F so many s before",)
 
     def statement(self, theta: tuple[float, ...], scale: Scale) -> str:
+        ms = f"{1000 * abs(theta[0]):.3g} ms"
+        if theta[0] > 0:
+            return (
+                f"Time skew: the force arrives {ms} after the command that causes it; a pulse on both channels tells "
+                "whether that is clocks, transport or an amplifier that smooths."
+            )
         return (
-            f"Time skew: the force arrives {1000 * abs(theta[0]):.3g} ms "
-            f"{'after' if theta[0] > 0 else 'before'} the command that causes it; a pulse on both channels "
-            "tells whether clocks, transport or an amplifier that smooths."
+            f"Time skew: by its stamps the force comes {ms} before the command that causes it, so the clocks differ or "
+            "the command is stamped late; a pulse on both channels tells by how much."
         )
 
 

@@ -116,7 +116,7 @@ def finding_of(named: NamedTerm[T, F], scale: Any, known: Mapping[T, tuple[Inter
     return Finding(
         named.term.id,
         named.term.form,
-        named.term.statement(named.theta, scale) + (f" The data do not determine its {lost}." if lost else ""),
+        named.term.statement(named.theta, scale) + (_undetermined(lost) if lost else ""),
         values,
         named.p_value,
         named.bic_gain,
@@ -128,6 +128,10 @@ def finding_of(named: NamedTerm[T, F], scale: Any, known: Mapping[T, tuple[Inter
         named.searched,
         named.asked_effects,
     )
+
+
+def _undetermined(lost: str) -> str:
+    return f" The data do not determine its {lost}: what is told here is one value of many that do as well."
 
 
 def _rival(rival: RivalTerm[T, F], scale: Any) -> RivalFinding:

@@ -75,7 +75,7 @@ def _told(cells: Cells, low: int, high: int, share: float, p: float) -> tuple[st
     start, end = float(cells.time[before]), float(cells.time[behind])
     peak = cells.size * float(cells.driver[low:high][np.argmax(np.abs(cells.driver[low:high]))])
     says = (
-        f"{RATE} reads up to {peak:.4g} rev/s from {start:.4g} s to {end:.4g} s, more than anywhere else, and of the "
-        f"thrust that goes with it {100 * max(share, 0.0):.2g} % comes: it did not turn."
+        f"{RATE} reads up to {peak:.4g} rev/s from {start:.4g} s to {end:.4g} s, more than anywhere else, and the cell "
+        f"shows {100 * max(share, 0.0):.2g} % of the thrust of such a rate: the reading is false, it did not turn so."
     )
     return says, p, {"start": Value(start, 0.0, "s"), "end": Value(end, 0.0, "s"), "peak": Value(peak, 0.0, "rev/s")}

@@ -184,7 +184,8 @@ def _repaired(estimate: Estimate, data: Data, less: Mapping[Term, Fit]) -> dict[
                 if own > policy.name.CLEARLY_BETTER_ALONE * others:
                     continue  # the other alone leaves so many times what this one alone leaves
                 told = (
-                    f"{beside.id.replace('_', ' ')} by itself does {share:.0f} % of what both do, and neither does all"
+                    f"it and {beside.id.replace('_', ' ')} mend each other: that by itself does {share:.0f} % of what "
+                    "the two do together"
                 )
                 out[term] = (*out.get(term, ()), told)
     return out

@@ -165,7 +165,7 @@ def test_two_shapes_that_repair_each_other_doubt_each_other():
     flat = table(lambda v: 0.6 * np.sign(v) * np.abs(v) ** 1.9, number=161, noise=0.05)
     data, estimate = known_noise({WindingResistance(): (0.1,), LinearTerm(): (0.1,)}, [flat], 0.05)
     named = name(estimate, data, [])
-    assert all(any("by itself does" in text for text in n.failed_checks) for n in named)
+    assert all(any("mend each other" in text for text in n.failed_checks) for n in named)
     each = table(lambda v: C * dead_band(1.5)(v) * np.abs(dead_band(1.5)(v)) * np.where(v < 0, 0.8, 1.0), number=161)
     data, estimate = known_noise({BAND: (0.5,), UNEVEN: (1.0,)}, [each], 0.05)
     assert all(n.failed_checks == () for n in name(estimate, data, []))

@@ -81,7 +81,7 @@ def test_two_shapes_that_repair_each_other_are_no_names():
     assert (found.verdict, effects(found)) == ("unexplained", set())
     assert found.unexplained.where.quantity == "command_voltage"
     assert len(found.unexplained.resembles) == 2
-    assert all("by itself does" in text for text in found.unexplained.resembles)
+    assert all("mend each other" in text for text in found.unexplained.resembles)
 
 
 def test_two_shapes_that_each_explain_a_part_are_named():
