@@ -19,6 +19,15 @@ def test_stand_forms_use_their_filters():
     assert term("time_skew").apply(T, m, (0.3,)) == pytest.approx(filters.delayed(T, H.edges, 0.3))
 
 
+def test_a_force_before_its_command_is_no_amplifier():
+    skew = term("time_skew")
+    assert "24.1 ms after the command that causes it" in skew.statement((0.0241,), S)
+    assert "an amplifier that smooths" in skew.statement((0.0241,), S)
+    early = skew.statement((-0.0241,), S)
+    assert "comes 24.1 ms before the command that causes it, so the clocks differ" in early
+    assert "amplifier" not in early
+
+
 def test_a_clipping_cell_shows_the_mean_of_samples_that_clip_one_by_one():
     """Monte Carlo of noisy samples round the limit, tare and all."""
     value = np.linspace(-110.0, 110.0, 41)
