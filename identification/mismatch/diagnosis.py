@@ -298,14 +298,14 @@ class Diagnosis:
                 told += [(f, unsettled(f)) for f in findings if f.rivals]
                 return f"{self._left_out(told)} {to_settle(self.next_experiment)}"
             case Unexplained(findings, remainder):
-                return beside(findings, remainder.statement, self.heldout, self.unit, self._nameless)
+                return beside(findings, remainder.statement, self.heldout, self.unit, self.nameless)
 
     @property
     def named_share(self) -> float | None:
         """Of the rms error beyond the noise that the baseline has on what was not fitted, how much is gone with the
         names, 0 to 1; None where nothing is named, or there is no error beyond the noise.
         """
-        return named_share(self.findings, self.heldout, self._nameless)
+        return named_share(self.findings, self.heldout, self.nameless)
 
     @property
     def headline(self) -> str:
@@ -316,7 +316,7 @@ class Diagnosis:
         return in_part(share) if share >= policy.answer.LEAST_SHARE_TOLD else self.verdict
 
     @property
-    def _nameless(self) -> str:
+    def nameless(self) -> str:
         """What is in the model beside names; empty where nothing is."""
         if self.unexplained is not None and self.unexplained.flexible:
             return "a free curve, which is no physics"

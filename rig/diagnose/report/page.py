@@ -85,6 +85,8 @@ def short(d: Diagnosis) -> Iterator[Remark]:
         noise = f"; the noise alone is {held.noise:.3g} {d.unit}" if isfinite(held.noise) else ""
         tone: pages.Tone = "good" if held.after <= held.before else "bad"
         change = f"from {held.before:.3g} to {held.after:.3g} {d.unit}"
+        if better and d.nameless:
+            better += f" with {d.nameless}"
         text = f"On data that were not fitted the error goes {change}{better}{noise}."
         if held.hidden:
             yield Remark(f"{text} Slow noise makes most of that error. {PREDICTS_BETTER}.")

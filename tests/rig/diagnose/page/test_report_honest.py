@@ -50,6 +50,14 @@ def test_a_value_that_is_not_determined_is_said_to_be_so():
         assert "20 N" not in told
 
 
+def test_what_a_free_curve_takes_off_is_not_the_names():
+    """11.5 -> 0.638 N looked solved; the one name left 11.5."""
+    curve = answer((LAGS,), replace(ODD, flexible=(SHAPE,)))
+    page = shown(replace(curve, heldout=HeldOutRmse(11.5, 0.638, 0.498, "levels")))
+    assert "from 11.5 to 0.638 N, 94 % less with a free curve, which is no physics; the noise" in page
+    assert "94 % less; the noise" in shown(replace(answer(), heldout=HeldOutRmse(11.5, 0.638, 0.498, "levels")))
+
+
 AT = np.linspace(0.0, 3.0, 5)
 TABLE = ((0.5, 0.05, 0.04, 0.01), (1.5, 0.15, 0.16, 0.01), (2.5, 0.25, -44.7, 55.0))
 WILD = Spline("gain", WORDS["gain"], "1", AT, 0.1 * AT, np.array([0.01, 0.01, 0.01, 0.02, 40.0]), TABLE)
