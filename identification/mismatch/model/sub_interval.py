@@ -147,7 +147,7 @@ def _changes(passed: Passed, history: History) -> bool:
 
 
 def _remembered(run: RememberedRun, passed: Passed) -> Floats:
-    """(2, M) `lead` and `curvature` of the thrust; of a stand that rings the lead of the force."""
+    """(2, M) `lead_and_curvature` of the thrust; of a stand that rings the lead of the force, and nothing."""
     return run.leads(("thrust", passed), lambda: _leads(run, passed))
 
 
