@@ -138,10 +138,10 @@ def _alone(many: int, names: float, before: float, more: str) -> str:
     >>> _alone(2, 0.399, 0.362, "a free curve"), _alone(1, 0.399, 0.41, "")
     ('these alone, which predict no better than without', 'it')
     """
-    one = many == 1
+    who, predict = ("it", "predicts") if many == 1 else ("these", "predict")
     if not more or names < NO_BETTER * before:
-        return "it" if one else "these"
-    return f"{'it' if one else 'these'} alone, which predict{'s' if one else ''} no better than without"
+        return who
+    return f"{who} alone, which {predict} no better than without"
 
 
 def of_noise(error: float, noise: float, unit: str) -> str:

@@ -39,7 +39,7 @@ TAIL = 3.0
 """Times the standard deviation of the others: that of the samples in the tails."""
 MOST_AFTER = 8
 """Delays and ticks of which is remembered which samples are after each tick."""
-BLOCK = 8192
+SAMPLE_BLOCK = 8192
 """Samples of which something is made at a time."""
 SAMPLES = ("thrust_samples", "rate_samples")
 """What is worked out of samples and intervals alone."""
@@ -82,7 +82,9 @@ class Samples:
         end = np.minimum(np.append(begin[1:], late.size), np.searchsorted(late, when + within))
         many = np.maximum(end - begin, 0)
         total = np.cumsum(many)
-        ends = np.unique(np.searchsorted(total, np.arange(BLOCK, int(total[-1]) + BLOCK, BLOCK)) + 1)
+        ends = np.unique(
+            np.searchsorted(total, np.arange(SAMPLE_BLOCK, int(total[-1]) + SAMPLE_BLOCK, SAMPLE_BLOCK)) + 1
+        )
         for lo, hi in zip([0, *ends], [*np.minimum(ends, when.size), when.size], strict=True):
             few = many[lo:hi]
             last = np.repeat(np.arange(lo, hi), few)

@@ -7,8 +7,8 @@ loss, a lag and the water together, made the others take a wrong size and form, 
 A drive that saturates from a fifth of the command on, where it can begin at the earliest, stood for a winding loss. And
 a term that came first stays for less than it would be found by: a ramp whose commands came a millisecond late left a
 coupling of 3.8 sigma beside the lag that had taken all of its thousand. And a term of many values can be like much: a
-heating of winding and magnet stood for a winding loss and half of a recirculation, and when both were in nothing more
-fitted, though something was left at 38 sigma.
+heating of winding and magnet stood for a winding loss, with a stand of 0.6 Hz the model was full, and something was
+left at 38 sigma.
 """
 
 from __future__ import annotations
@@ -47,8 +47,7 @@ def _followers(found: Selected) -> list[Term]:
 def _many_sided(found: Selected, rng: np.random.Generator) -> list[Term]:
     """Terms of many values beside which something is left that no other term may take; none where nothing is."""
     now, system = found.after, Thruster(found.data, found.terms)
-    sizes = {term: len(values) for term, values in now.fit.values.items()}
-    many = [term for term, size in sizes.items() if size >= policy.select.MANY_SIDED]
+    many = [term for term, values in now.fit.values.items() if len(values) >= policy.select.MANY_SIDED]
     if not many or found.undone:
         return []
     last = system.judged(now, rng) if found.last is None else found.last

@@ -42,7 +42,7 @@ def test_means_of_what_is_held(delay):
 
 @pytest.mark.parametrize("block", [1, 7, 50, 10_000])
 def test_means_of_what_comes_soon_after_a_tick(block, monkeypatch):
-    monkeypatch.setattr(module, "BLOCK", block)
+    monkeypatch.setattr(module, "SAMPLE_BLOCK", block)
     samples, when, value = jittered()
     within = np.where(np.arange(when.size) % 3 == 0, 1e9, 0.05)
     last, since = one_by_one(samples, when, 0.01)
