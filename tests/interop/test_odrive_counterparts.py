@@ -110,7 +110,7 @@ class Mock:
         mock = self._module.ODriveCANMock(3, bus)
         mock.notifier.remove_listener(mock.can_reader)  # it would hand over from a thread what is the loop's own
         mock.notifier.stop()
-        mock.notifier = can.Notifier(bus, [mock.can_reader], loop=asyncio.get_running_loop())
+        mock.notifier = can.Notifier(bus, [mock.can_reader], timeout=0.1, loop=asyncio.get_running_loop())
         tasks = [asyncio.create_task(each) for each in (mock.heartbeat_loop(0.02), mock.encoder_loop(0.01))]
         tasks.append(asyncio.create_task(mock.message_handler()))
         self.mock = mock
@@ -119,6 +119,8 @@ class Mock:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
+        mock.notifier.stop()  # its thread hands frames to this loop, which ends here
+        bus.shutdown()
 
 
 def test_our_driver_against_the_mock_of_odrive_can(request, third_party):
