@@ -128,6 +128,12 @@ def rows(device, count):
     return samples
 
 
+def silent(device, seconds):
+    device.drain()
+    threading.Event().wait(seconds)
+    return device.drain() == []
+
+
 # -- maps ------------------------------------------------------------------------------------------------------------
 
 
@@ -206,10 +212,8 @@ def test_a_standard_and_an_extended_identifier_are_two(written, bus, sender):
     device.open()
     sender.frames = {(TORQUE, False): bytes(8)}
     rows(device, 1)
-    wait_until(lambda: device.drain() == [])
-    for _ in range(5):
-        threading.Event().wait(0.005)
-        assert device.drain() == []
+    wait_until(lambda: silent(device, 0.05))
+    assert silent(device, 0.025)
     device.close()
 
 

@@ -275,8 +275,7 @@ def test_an_error_that_is_not_of_a_silence_is_a_fault(bit):
         drive(device, 12.0)
         assert device.health().alive
         found.script.errors = 1 << bit
-        drive(device, 12.0)
-        assert not device.health().alive
+        wait_until(lambda: drive(device, 12.0) is not None and not device.health().alive)
         assert "has stopped the motor for it" in device.health().error
         device.close()
 
