@@ -9,7 +9,7 @@ from textual.pilot import Pilot
 
 from rig.console.app import ConsoleApp
 from rig.console.view_model.answers import Answer, answer_of, fault_of
-from rig.link.front_end_messages import LogLine, Progress, Snapshot, Watching
+from rig.link.front_end_messages import LogLine, Point, Progress, Snapshot, Watching
 from tests.rig.console.feeds import CHECKS, DEVICES, LOG, ManualClock, PlayedFeed, campaign, running, snapshot
 from tests.rig.console.past import TELLS_PAST
 from tests.rig.console.told import EXPLAINED, ambiguous, message, unexplained
@@ -63,8 +63,14 @@ DEVIATES = Watching(
     brief="look at the propeller",
     advice="look at the propeller and at what drives it; the zero at rest has not moved with it",
 )  # fmt: skip
-BENT = tuple(replace(p, thrust=0.92 * p.thrust if p.voltage < 0 else p.thrust) for p in running().points)
-"""Weaker in reverse than `C V|V|` has it."""
+
+
+def bent(points: tuple[Point, ...]) -> tuple[Point, ...]:
+    """Weaker in reverse than `C V|V|` has it."""
+    return tuple(replace(p, thrust=0.92 * p.thrust if p.voltage < 0 else p.thrust) for p in points)
+
+
+BENT = bent(running().points)
 
 SCENES = {
     "preflight": Scene((snapshot("preflight"),)),
@@ -106,7 +112,7 @@ SCENES = {
     "history": Scene((PAST_END,), keys=("8", "down", "down", "space", "down", "down")),
     "compare": Scene((PAST_END,), keys=("8", "down", "down", "space", "end", "enter")),
     "end": Scene(campaign()),
-    "end_misfit": Scene((*campaign()[:2], *(replace(s, points=BENT) for s in campaign()[3:]))),
+    "end_misfit": Scene((*campaign()[:2], *(replace(s, points=bent(s.points)) for s in campaign()[3:]))),
     "tripped": Scene((running("done", outcome="tripped", stop_confirmed=True, command=0.0,
                               cause="motor.current 41.2 A is above its limit of 40 A."),)),
 }  # fmt: skip
