@@ -196,7 +196,7 @@ class Flexible:
         what = " and ".join(WORDS[m] for m in self.times)
         of_run = " It is of this run's own clock: another run need not repeat it." if self.quantity == "time" else ""
         anew = f" and begins anew every {self.period:.4g} s" if self.period else ""
-        over = f"A flexible term over {self.quantity} ({len(self.knots)} knots)"
+        over = f"A free curve over {self.quantity} ({len(self.knots)} knots)"
         return f"{over} {what}{anew}; no physics is claimed for it.{of_run}"
 
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from identification.mismatch import policy
 from identification.mismatch.answer.advice import what_to_do
-from identification.mismatch.locate.places import says, where_of
+from identification.mismatch.locate.places import locate, says
 from identification.mismatch.model.data import Data
 from identification.mismatch.name.naming import Named
 from identification.mismatch.unexplained import Remainder
@@ -29,14 +29,14 @@ def remainder_of(completed: Completed, data: Data, unseen: Sequence[History]) ->
         clear = [g.covariate.quantity for g in left.groups if g.p_value < policy.locate.RESIDUAL_FALSE_ALARM]
         quantity = foremost(bare, data, clear or [quantity], left.pulses)
     judged = next((g for g in left.groups if g.covariate.quantity == quantity), left.groups[0])
-    where, share, table = where_of(judged, bare.fit, data, bare.weights)
+    place = locate(judged.covariate, bare.fit, data, bare.weights)
     resembles = tuple(f"{n.term.id}: {'; '.join(n.failed_checks)}" for n in unearned)
-    text = f"{_what(unearned)}: {says(where, share, judged.covariate.what)}"
+    text = f"{_what(unearned)}: {says(place)}"
     repairs = bool(unearned) and len(only_repairs(unearned)) == len(unearned)
     if repairs:
         names = " or ".join(n.term.id.replace("_", " ") for n in unearned)
         text += f" It is mostly {names}: each explains nearly the same alone, and neither all of it."
-    found = Remainder(where, judged.share, left.p_value, table, text, resembles)
+    found = Remainder(place.where, judged.share, left.p_value, place.table, text, resembles)
     found = with_flexible(found, flexible, data, unseen)
     tried = refused([(n.term.id, n.failed_checks[0]) for n in unearned]) if unearned and not repairs else ""
     return replace(found, statement=" ".join(filter(None, [found.statement, what_to_do(quantity), tried])))

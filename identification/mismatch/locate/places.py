@@ -31,25 +31,42 @@ ROUNDING = 1e-9
 """Of a covariate's reach: such an edge is 0."""
 
 
-def where_of(
-    judged: CovariateTest, fitted: Fit, data: Data, weights: Weights
-) -> tuple[Where, float, tuple[tuple[float, float, float], ...]]:
-    """Where a covariate tells most of what is left: the stretch, the share of the residual in it, and rows of
-    (covariate, N, standard error in N).
-    """
-    place = locate(judged, fitted, data, weights)
-    return Where(place.quantity, place.low, place.high, place.unit), place.share, place.table
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where over a covariate the residual is, and its shape."""
+
+    where: Where
+    share: float
+    """Of the residual, that lies in the stretch."""
+    samples: float
+    """Of all samples, that lie in it."""
+    table: tuple[tuple[float, float, float], ...]
+    """(covariate, mean residual in N, its standard error) bin by bin."""
+    what: str
+    """How a model without the covariate fails there."""
 
 
-def says(where: Where, share: float, what: str) -> str:
-    """The sentence for such a place; `what` is how the baseline fails there."""
+def says(place: Place) -> str:
+    """The sentence for a place: a share of the residual means something beside the share of the samples."""
+    where = place.where
     if where.quantity in SIDES:  # it has two values or three, and a stretch of it says nothing to a person
         falling, rising = SIDES[where.quantity]
-        side = rising if where.low >= 0 else falling if where.high <= 0 else "both ways"
-        return f"{100 * share:.0f} % of the residual lies {side}: {what}."
-    unit = "" if where.unit == "1" else f" {where.unit}"
-    place = f"{where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
-    return f"{100 * share:.0f} % of the residual lies at {place}: {what}."
+        there = rising if where.low >= 0 else falling if where.high <= 0 else "both ways"
+    else:
+        unit = "" if where.unit == "1" else f" {where.unit}"
+        there = f"at {where.quantity} {where.low:.3g} to {where.high:.3g}{unit}"
+    return f"{100 * place.share:.0f} % of the residual lies {there}{_of_all(place.samples)}: {place.what}."
+
+
+def _of_all(samples: float) -> str:
+    """Nothing where it is all of them.
+
+    >>> _of_all(0.084), _of_all(0.002), _of_all(0.997)
+    (', with 8 % of the samples', ', with less than 1 % of the samples', '')
+    """
+    if samples >= 0.995:
+        return ""
+    return f", with {'less than 1' if samples < 0.01 else f'{100 * samples:.0f}'} % of the samples"
 
 
 def places_of(found: Selected, after: Estimate, rng: np.random.Generator, *, pulsing: bool) -> tuple[Mismatch, ...]:
@@ -75,29 +92,14 @@ def places_of(found: Selected, after: Estimate, rng: np.random.Generator, *, pul
 
 def _mismatch(judged: CovariateTest, bare: Fit, data: Data, weights: Weights) -> tuple[Mismatch, bool]:
     """Of one covariate, and whether it is all of that covariate, which says nothing."""
-    where, share, table = where_of(judged, bare, data, weights)
-    told = Mismatch("thrust", where, share, judged.p_value, says(where, share, judged.covariate.what))
+    place = locate(judged.covariate, bare, data, weights)
+    where, table = place.where, place.table
+    told = Mismatch("thrust", where, place.share, judged.p_value, says(place))
     return told, where.low <= table[0][0] and where.high >= table[-1][0]
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
-    """Where over a covariate the residual is, and its shape."""
-
-    quantity: str
-    unit: str
-    low: float
-    high: float
-    share: float
-    p_value: float
-    table: tuple[tuple[float, float, float], ...]
-    """(covariate, mean residual in N, its standard error) bin by bin."""
-    what: str
-
-
-def locate(judged: CovariateTest, fit: Fit, data: Data, weights: Weights) -> Place:
+def locate(c: Covariate, fit: Fit, data: Data, weights: Weights) -> Place:
     """The stretch of the covariate that holds most of what its columns make of the residual: noise is everywhere."""
-    c = judged.covariate
     covariate = np.concatenate(c.values)
     residual = np.concatenate(
         [
@@ -109,18 +111,21 @@ def locate(judged: CovariateTest, fit: Fit, data: Data, weights: Weights) -> Pla
     edges = _bins(covariate)
     index = np.clip(np.searchsorted(edges, covariate, side="right") - 1, 0, edges.size - 2)
     k = edges.size - 1
-    weight = np.bincount(index, weights=count, minlength=k)
+    weight = np.bincount(index, weights=count, minlength=k).astype(np.float64)
     mean = np.bincount(index, weights=count * residual, minlength=k) / np.maximum(weight, 1e-300)
     rows = np.bincount(index, minlength=k)
     spread = np.bincount(index, weights=count * (residual - mean[index]) ** 2, minlength=k) / np.maximum(weight, 1e-300)
     error = np.sqrt(spread / np.maximum(rows, 1))
-    power = np.bincount(index, weights=count * _structure(c, residual, data, weights) ** 2, minlength=k)
+    structure = _structure(c, residual, data, weights)
+    power = np.bincount(index, weights=count * structure**2, minlength=k).astype(np.float64)
     full = rows > 0
-    low, high, share = _stretch(edges, np.asarray(power, dtype=np.float64))
-    low, high = (0.0 if abs(edge) < ROUNDING * (edges[-1] - edges[0]) else edge for edge in (low, high))
+    first, last = _stretch(edges, power)
+    reach = edges[-1] - edges[0]
+    low, high = (0.0 if abs(edge) < ROUNDING * reach else float(edge) for edge in edges[[first, last]])
     center = 0.5 * (edges[1:] + edges[:-1])
     table = tuple((float(center[i]), float(mean[i]), float(error[i])) for i in np.flatnonzero(full))
-    return Place(c.quantity, c.unit, low, high, share, judged.p_value, table, c.what)
+    share, samples = (_part(of, first, last) for of in (power, weight))
+    return Place(Where(c.quantity, low, high, c.unit), share, samples, table, c.what)
 
 
 def _structure(c: Covariate, residual: Floats, data: Data, weights: Weights) -> Floats:
@@ -149,16 +154,20 @@ def _bins(covariate: Floats) -> Floats:
     return found
 
 
-def _stretch(edges: Floats, power: Floats) -> tuple[float, float, float]:
-    """The shortest run of bins that holds PLACE_SHARE of the power, or the whole."""
+def _stretch(edges: Floats, power: Floats) -> tuple[int, int]:
+    """Edges of the shortest run of bins that holds PLACE_SHARE of the power, or of the whole."""
+    best = (0, power.size)
     total = float(power.sum())
     if total <= 0:
-        return float(edges[0]), float(edges[-1]), 0.0
-    best = (0, power.size)
+        return best
     cumulative = np.concatenate([[0.0], np.cumsum(power)])
     for i in range(power.size):
         j = int(np.searchsorted(cumulative, cumulative[i] + policy.locate.PLACE_SHARE * total))
         if j <= power.size and edges[j] - edges[i] < edges[best[1]] - edges[best[0]]:
             best = (i, j)
-    share = float((cumulative[best[1]] - cumulative[best[0]]) / total)
-    return float(edges[best[0]]), float(edges[best[1]]), share
+    return best
+
+
+def _part(of: Floats, first: int, last: int) -> float:
+    total = float(of.sum())
+    return float(of[first:last].sum()) / total if total > 0 else 0.0

@@ -79,7 +79,7 @@ FORMULA_GAIN_BIC = Threshold(
 )
 FORMULA_PREDICTS = Threshold(
     0.85,
-    unit="share of the flexible terms' fall of the held-out chi-square",
+    unit="share of the free curves' fall of the held-out chi-square",
     reason=(
         "A formula is told only where it predicts nearly as well as the free shape: else it is a part of the "
         "truth at best."

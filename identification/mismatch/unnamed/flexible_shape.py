@@ -144,7 +144,7 @@ def with_flexible(found: Remainder, extended: Extended | None, data: Data, other
     names = " and ".join(t.id.replace("_", " ") for t in extended.dropped)
     better = extended.held < extended.without
     how = "carries it" if better or not names else f"predicts about as well as {names}, and claims less"
-    says = f"A flexible term over {over} (a curve of any shape, no physics) {how}."
+    says = f"A free curve over {over} (of any shape, no physics) {how}."
     if extended.equals:
         says += f" Over {' or '.join(extended.equals)} it does about as well: this plan cannot tell them apart."
     return replace(
@@ -162,7 +162,7 @@ def with_held(held: HeldOutRmse, extended: Extended | None) -> HeldOutRmse:
     """The error on what was not fitted; flexible terms were chosen without the data that judge them."""
     if extended is None:
         return held
-    what = f"{held.what}; the flexible terms were chosen and fitted without the data that judge them"
+    what = f"{held.what}; the free curves were chosen and fitted without the data that judge them"
     return replace(held, after=extended.held, what=what)
 
 

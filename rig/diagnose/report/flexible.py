@@ -34,7 +34,7 @@ def modelled_remarks(u: Remainder) -> Iterator[Remark]:
         names = ", ".join(map(effect_name, u.replaces))
         yield Remark(f"It stands in the place of {names}, whose name was not earned.")
     if not u.flexible:
-        yield Remark("No flexible term predicts better what was not fitted; the model is left as it is.", "doubt")
+        yield Remark("No free curve predicts better what was not fitted; the model is left as it is.", "doubt")
     if u.formula is None:
         return
     f = u.formula
@@ -65,7 +65,7 @@ def _picture(f: FlexibleShape, s: Spline, driver: str) -> Picture:
     at, _, measured, std = np.array(s.table)[s.told].T
     points = Group("measured", at, factor * measured, 1.96 * factor * std)
     over, value, half = s.at[s.drawn], s.value[s.drawn], 1.96 * s.std[s.drawn]
-    curve = Curve("flexible term", over, factor * value, factor * (value - half), factor * (value + half))
+    curve = Curve("free curve", over, factor * value, factor * (value - half), factor * (value + half))
     x = axis(f.covariate, driver)
     x = f"{x} (low-pass of {f.memory:g} s)" if f.memory else x
     x = f"{x} (within each {f.period:.4g} s)" if f.period else x
@@ -77,4 +77,4 @@ def _picture(f: FlexibleShape, s: Spline, driver: str) -> Picture:
         "lacks, in bins, with 95 % intervals. No physics is claimed; beyond the range it is constant."
         + not_drawn(len(s.table) - at.size)
     )
-    return Picture(f"Flexible term over {name}: {s.times}", plot, caption)
+    return Picture(f"Free curve over {name}: {s.times}", plot, caption)

@@ -98,10 +98,10 @@ def effect_name(effect: str, form: str = "") -> str:
     >>> effect_name("motor_lag", "first_order")
     'motor lag (first order)'
     >>> effect_name("flexible:flow_speed")
-    'flexible term over flow speed'
+    'free curve over flow speed'
     """
     if effect.startswith("flexible:"):
-        return f"flexible term over {effect.removeprefix('flexible:').replace('_', ' ')}"
+        return f"free curve over {effect.removeprefix('flexible:').replace('_', ' ')}"
     return effect.replace("_", " ") + (f" ({form.replace('_', ' ')})" if form else "")
 
 

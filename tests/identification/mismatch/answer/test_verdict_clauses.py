@@ -14,7 +14,7 @@ from identification.mismatch.diagnosis import (
     Rmse,
     Unexplained,
 )
-from identification.mismatch.locate.places import says
+from identification.mismatch.locate.places import Place, says
 from identification.mismatch.unexplained import FlexibleShape
 from identification.mismatch.value import Where
 from identification.mismatch.verdict_clauses import errors, missing, named_share, refused, to_settle
@@ -83,12 +83,16 @@ def test_a_model_that_does_no_better_has_no_chain():
 
 def test_a_covariate_that_is_a_sign_is_told_as_a_side():
     rising = Where("direction_of_change", 0.5, 1.5, "1")
-    assert says(rising, 0.94, "up and down differ") == (
-        "94 % of the residual lies where the driver rises: up and down differ."
+    assert says(Place(rising, 0.94, 0.3, (), "up and down differ")) == (
+        "94 % of the residual lies where the driver rises, with 30 % of the samples: up and down differ."
     )
-    assert "lies in reverse:" in says(Where("direction", -1.5, -0.5, "1"), 0.5, "the two directions differ")
-    assert "lies both ways:" in says(Where("direction", -1.5, 1.5, "1"), 0.5, "the two directions differ")
-    assert "at command_voltage -0.5 to 1 V:" in says(Where("command_voltage", -0.5, 1.0, "V"), 0.7, "it is bent")
+
+    def told(quantity, low, high):
+        return says(Place(Where(quantity, low, high, "1"), 0.5, 1.0, (), "it differs"))
+
+    assert "lies in reverse:" in told("direction", -1.5, -0.5)
+    assert "lies both ways:" in told("direction", -1.5, 1.5)
+    assert "at command_voltage -0.5 to 1:" in told("command_voltage", -0.5, 1.0)
 
 
 BAND = finding()

@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from identification.mismatch import policy
 from identification.mismatch.estimate.fitting import fit
-from identification.mismatch.locate.places import locate, places_of, says, where_of
+from identification.mismatch.locate.places import Place, locate, places_of, says
 from identification.mismatch.locate.pulses import likeliest_pulses
 from identification.mismatch.locate.residual_structure_test import residual_structure
 from identification.mismatch.locate.slow_change import beside_slow_change, slow_changes, slow_columns
@@ -125,25 +125,25 @@ def test_a_shape_is_trusted_to_a_few_per_cent_of_its_own_correction():
 
 def test_the_place_is_the_shortest_stretch_that_holds_most_of_it():
     data, estimate, found = judged(short(change=PLANTED["command_voltage"]))
-    place = locate(found.groups[0], estimate.fit, data, estimate.weights)
-    assert (place.quantity, place.unit) == ("command_voltage", "V")
-    assert (place.low, place.high) == pytest.approx((7.0, 9.0))
+    place = locate(found.groups[0].covariate, estimate.fit, data, estimate.weights)
+    where = place.where
+    assert (where.quantity, where.unit) == ("command_voltage", "V")
+    assert (where.low, where.high) == pytest.approx((7.0, 9.0))
     assert place.share > 0.5
     table_ = {round(at): (mean, error) for at, mean, error in place.table}
     mean, error = table_[8]
     assert mean == pytest.approx(0.6, abs=5 * error + 0.1)
     h, r = data.histories[0], data.rows[0]
     at_8 = r[h.driver[r] == 8.0]
-    assert at_8.size
-    where, share, shape = where_of(found.groups[0], estimate.fit, data, estimate.weights)
-    assert (where, share, shape) == (Where("command_voltage", place.low, place.high, "V"), place.share, place.table)
+    assert place.samples == pytest.approx(h.count[at_8].sum() / h.count[r].sum())
 
 
 def test_a_place_is_told_in_words():
-    assert says(Where("time", 3.0, 12.3456, "s"), 0.456, "it drifts") == (
-        "46 % of the residual lies at time 3 to 12.3 s: it drifts."
+    assert says(Place(Where("time", 3.0, 12.3456, "s"), 0.456, 0.0803, (), "it drifts")) == (
+        "46 % of the residual lies at time 3 to 12.3 s, with 8 % of the samples: it drifts."
     )
-    assert says(Where("direction", -1.0, 0.0, "1"), 1.0, "x") == "100 % of the residual lies in reverse: x."
+    reverse = Place(Where("direction", -1.0, 0.0, "1"), 1.0, 0.5, (), "x")
+    assert says(reverse) == "100 % of the residual lies in reverse, with 50 % of the samples: x."
 
 
 def test_places_of_the_baseline_are_those_of_what_was_found():

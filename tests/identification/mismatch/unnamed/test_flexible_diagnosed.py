@@ -67,10 +67,10 @@ def test_the_answer_says_so_in_json_text_and_page(wave):
     assert told["model"]["terms"] == ["flexible:time"]
     assert all(f"flexible:time.{name}" in told["model"]["parameters"] for name in free["coefficients"])
     text = diagnosis_text(found)
-    assert "A flexible term over time" in text
+    assert "A free curve over time" in text
     assert "flexible:time" in text
     page = diagnosis_page(found)
-    assert any("Flexible term over time" in getattr(part, "title", "") for s in page.sections for part in s.parts)
+    assert any("Free curve over time" in getattr(part, "title", "") for s in page.sections for part in s.parts)
 
 
 def test_a_twin_keeps_it_and_simulates_it(wave, tmp_path):

@@ -115,7 +115,7 @@ def test_unexplained_shows_shapes_and_what_it_resembles():
         "bad",
         "doubt",
         "doubt",
-    ]  # what it resembles; no flexible term
+    ]  # what it resembles; no free curve
     assert "located here" in svg(section.parts[1].plot)
     assert page.lead.startswith("Something is left at time 5 to 20 s. Error on data that were not fitted: 5 N before, ")
 
@@ -125,9 +125,9 @@ def test_a_flexible_term_of_each_kind_is_drawn(times):
     """A run that was diagnosed had neither page nor text where the kind had no label."""
     at = np.linspace(0.0, 3.0, 5)
     spline = Spline(times, WORDS[times], "1", at, 0.1 * at, 0.01 + 0.0 * at, ((0.5, 0.05, 0.04, 0.01),))
-    found = FlexibleShape("time_since_step", "s", (0.0, 1.0, 3.0), 1, 0.0, 0.0, {}, (spline,), "A flexible term.")
+    found = FlexibleShape("time_since_step", "s", (0.0, 1.0, 3.0), 1, 0.0, 0.0, {}, (spline,), "A free curve.")
     page = diagnosis_page(answer(unexplained=replace(ODD, flexible=(found,)), findings=()))
-    assert f"Flexible term over time since step: {times}" in titles(page)["What is not explained"]
+    assert f"Free curve over time since step: {times}" in titles(page)["What is not explained"]
 
 
 def test_adequate_page_has_little_to_say():

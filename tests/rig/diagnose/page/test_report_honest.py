@@ -61,7 +61,7 @@ def test_what_a_free_curve_takes_off_is_not_the_names():
 AT = np.linspace(0.0, 3.0, 5)
 TABLE = ((0.5, 0.05, 0.04, 0.01), (1.5, 0.15, 0.16, 0.01), (2.5, 0.25, -44.7, 55.0))
 WILD = Spline("gain", WORDS["gain"], "1", AT, 0.1 * AT, np.array([0.01, 0.01, 0.01, 0.02, 40.0]), TABLE)
-SHAPE = FlexibleShape("time", "s", (0.0, 3.0), 3, 0.0, 0.0, {}, (WILD,), "A flexible term.")
+SHAPE = FlexibleShape("time", "s", (0.0, 3.0), 3, 0.0, 0.0, {}, (WILD,), "A free curve.")
 
 
 def test_rows_of_a_shape_that_are_not_determined_are_neither_told_nor_drawn():
@@ -74,17 +74,17 @@ def test_rows_of_a_shape_that_are_not_determined_are_neither_told_nor_drawn():
     page = diagnosis_page(d)
     pictures = [p for s in page.sections for p in s.parts if p.kind == "picture"]
     drawn = {p.title: p for p in pictures}
-    assert "from 0 to 22.5 with its 95 % band" in drawn["Flexible term over time: gain"].plot.alt
-    assert "1 place is not drawn" in drawn["Flexible term over time: gain"].caption
+    assert "from 0 to 22.5 with its 95 % band" in drawn["Free curve over time: gain"].plot.alt
+    assert "1 place is not drawn" in drawn["Free curve over time: gain"].caption
     assert "largest -0.3" in drawn["What is left over time"].plot.alt
     assert "44.7" not in read(html(page)).text, "no spline is among the physics"
 
 
 def test_an_axis_is_as_high_as_what_is_known():
-    """Of the flexible term above: 4,000 % where nothing is known, 23 % where something is."""
+    """Of the free curve above: 4,000 % where nothing is known, 23 % where something is."""
     d = answer(unexplained=replace(ODD, flexible=(SHAPE,)), findings=())
     (section,) = (s for s in diagnosis_page(d).sections if s.title == "What is not explained")
-    plot = next(p.plot for p in section.parts if getattr(p, "title", "") == "Flexible term over time: gain")
+    plot = next(p.plot for p in section.parts if getattr(p, "title", "") == "Free curve over time: gain")
     ticks = [t for t in read(svg(plot)).text.replace("−", "-").split() if t.lstrip("-").isdigit()]
     assert max(abs(int(t)) for t in ticks) < 100
 
