@@ -181,7 +181,7 @@ def to_settle(found: NextExperiment | None) -> str:
     """What would tell the rivals, in a sentence."""
     if found is None:
         return "Run the next experiment."
-    why = found.why.split(";", maxsplit=1)[0]
+    why = found.why.split(";", maxsplit=1)[0].replace("_", " ")
     if not found.steps:
         return f"No sweep settles it: {why}."
     seconds = sum(step.duration for step in found.steps)

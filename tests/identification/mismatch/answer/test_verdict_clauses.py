@@ -24,7 +24,7 @@ from tests.identification.mismatch.answer.answered import LEFT, finding
 def test_the_next_experiment_is_told_with_what_it_separates():
     steps = (PlanStep(5.4, 3.0), PlanStep(-5.4, 4.0))
     found = to_settle(NextExperiment("separates exponent from dead_band: levels of 5.4 V; exponent stays", steps, 0.9))
-    assert found.endswith("2 steps, 7 s in all: it separates exponent from dead_band: levels of 5.4 V.")
+    assert found.endswith("2 steps, 7 s in all: it separates exponent from dead band: levels of 5.4 V.")
 
 
 def test_where_no_sweep_settles_it_that_is_said():
