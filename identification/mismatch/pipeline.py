@@ -24,6 +24,7 @@ from identification.mismatch.periodic.stage import untouched
 from identification.mismatch.prepare import stage as prepare
 from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.select.begun_otherwise import begun_otherwise
+from identification.mismatch.select.early_force import early_of
 from identification.mismatch.select.forward_selection import search
 from identification.mismatch.select.ringing import ringing
 from identification.mismatch.select.search_again import search_again
@@ -36,7 +37,9 @@ from identification.mismatch.validate.second_search import without_what_is_refus
 
 if TYPE_CHECKING:
     from identification.mismatch.diagnosis import Diagnosis
+    from identification.mismatch.faults.stage import Sound
     from identification.mismatch.next_experiment.sweeps import Limits
+    from identification.mismatch.prepare.stage import Prepared
     from identification.recording import Recording
     from identification.twin import Twin
 
@@ -60,6 +63,7 @@ class Draws(NamedTuple):
     apart: np.random.Generator
     rings: np.random.Generator
     sharp: np.random.Generator
+    early: np.random.Generator
 
     @classmethod
     def of(cls, seed: int) -> Draws:
@@ -107,16 +111,18 @@ def traced(
     draws, given = Draws.of(seed), None if baseline is None else starting(baseline)
     watch.stage("reading the runs")
     wired = wiring.run(recordings, holdout)
-    prepared = prepare.run(wired.recordings, wired.holdout, baseline)
-    if isinstance(prepared, Refusal):
-        return prepared
-    sound = faults.run(prepared, wired.faults, None if baseline is None else baseline.slip_rate)
-    if isinstance(sound, Refusal):
-        return sound
-    clear = sound.histories if baseline is None else decided(sound.histories, baseline)
-    sound = replace(sound, histories=on_their_side(clear, given))
+    read = _read(wired, baseline)
+    if isinstance(read, Refusal):
+        return read
     watch.stage("looking for effects")
-    first = found = search(sound.histories, draws.select, given=given, without=without, watch=watch)
+    first = search(read.sound.histories, draws.select, given=given, without=without, watch=watch)
+    if early := 0.0 if first.undone else early_of(first):  # back: on other intervals
+        watch.stage("looking again, for a force that comes before its command")
+        read = _read(wired, baseline, early)
+        if isinstance(read, Refusal):
+            return read
+        first = search_again(first, read.sound.histories, draws.early, given, without=without, watch=watch)
+    found, (prepared, sound) = first, read
     original = sound.histories
     cleaned = untouched(original) if found.undone else periodic.run(first.after.fit, first.data, original)
     if cleaned.changed:  # back: a line hides small terms, and is taken for some; a peak of the noise makes it louder
@@ -144,6 +150,26 @@ def traced(
     case = answer.Case(prepared.recordings, sound, chosen.unseen, cleaned.lines, baseline, notes, left_then)
     diagnosis = answer.run(case, answer.Found(selected, located, completed, experiment, novel), draws.answer)
     return Trace(prepared, sound, first, cleaned, chosen, completed, diagnosis)
+
+
+class Read(NamedTuple):
+    """Runs as they were given, and with what of them may be believed."""
+
+    prepared: Prepared
+    sound: Sound
+
+
+def _read(wired: wiring.Wired, baseline: Twin | None, early: float = 0.0) -> Read | Refusal:
+    """On intervals that are short before steps too, where the force comes `early` s before its command."""
+    prepared = prepare.run(wired.recordings, wired.holdout, baseline, early)
+    if isinstance(prepared, Refusal):
+        return prepared
+    sound = faults.run(prepared, wired.faults, None if baseline is None else baseline.slip_rate)
+    if isinstance(sound, Refusal):
+        return sound
+    clear = sound.histories if baseline is None else decided(sound.histories, baseline)
+    given = None if baseline is None else starting(baseline)
+    return Read(prepared, replace(sound, histories=on_their_side(clear, given)))
 
 
 def interrupted(undone: Sequence[str]) -> tuple[str, ...]:

@@ -249,15 +249,17 @@ def fit_dynamics(recordings: Sequence[Recording]) -> DynamicsFit | Unusable:
     if not (np.all(np.isfinite(start)) and start[1] != 0):
         return Unusable(f"recording {recordings[0].recording_id}: the rotation rate does not follow the voltage at all")
     full, plain = _fitted(drives, start, with_gamma=True), _fitted(drives, start, with_gamma=False)
-    fits = [_told(recordings, drives, found) for found in (full, plain)]
-    rich, poor = fits
-    gamma = rich.significance["gamma"]
-    keep = full.seen and full.converged and gamma.significant and gamma.value > 0
-    if not (full if keep else plain).converged:
-        return Unusable(
-            f"recording {recordings[0].recording_id}: no rotor model n' = beta T - alpha n|n| comes to fit it"
-        )
-    return replace(rich if keep else poor, rmse_without_gamma=poor.rmse)
+    rich = _told(recordings, drives, full) if full.seen and full.converged else None
+    keep = rich is not None and rich.significance["gamma"].significant and rich.significance["gamma"].value > 0
+    chosen = full if keep else plain
+    if not (chosen.seen and chosen.converged):
+        why = "comes to fit it" if chosen.seen else "shows in it, for its rate hardly follows the voltage"
+        return Unusable(f"recording {recordings[0].recording_id}: no rotor model n' = beta T - alpha n|n| {why}")
+    return replace(_told(recordings, drives, chosen), rmse_without_gamma=_rms(plain.misfit))
+
+
+def _rms(misfit: Floats) -> float:
+    return float(np.sqrt(misfit @ misfit / misfit.size))
 
 
 def _told(recordings: Sequence[Recording], drives: Sequence[Drive], found: Descent) -> DynamicsFit:
@@ -276,7 +278,7 @@ def _told(recordings: Sequence[Recording], drives: Sequence[Drive], found: Desce
         sigma * np.linalg.norm(np.linalg.pinv(found.J), axis=1),
         by_name,
         {name: significance(known[name], known.std_of(name), by_name[name]) for name in names},
-        float(np.sqrt(found.misfit @ found.misfit / n)),
+        _rms(found.misfit),
         float("nan"),
         whiteness(found.misfit),
         levels,

@@ -111,7 +111,18 @@ def drive(recording: Recording) -> Drive | Unusable:
     V = np.nan_to_num(source.value)
     if n.min() > -0.01 * n.max() and V.min() < -SIDED * V.max():
         return Unusable(f"{who}: the rotation rate never turns negative while the voltage does; give it its sign")
+    if _turns_one_way(n, V[np.maximum(np.searchsorted(source.time, t, side="right") - 1, 0)]):
+        return Unusable(f"{who}: the rotation rate goes the same way for both signs of the voltage; give it its sign")
     return _cut(who, source, t, n)
+
+
+def _turns_one_way(n: Floats, V: Floats) -> bool:
+    """Whether a rate (n,) has lost its sign, all but where the rotor was still on its way."""
+    forward, back = SIDED * np.abs(V).max() < V, -SIDED * np.abs(V).max() > V
+    if not (forward.any() and back.any()):
+        return False
+    ahead, behind = np.median(n[forward]), np.median(n[back])
+    return bool(ahead * behind > 0 and min(abs(ahead), abs(behind)) > SIDED * np.quantile(np.abs(n), 0.95))
 
 
 def _cut(who: str, source: Channel, t: Floats, n: Floats) -> Drive | Unusable:

@@ -33,8 +33,8 @@ class Sound:
 def run(prepared: Prepared, told: Sequence[Fault] = (), rate_per_driver: float | None = None) -> Sound | Refusal:
     """Refused where a recording that was put right cannot be diagnosed; `told`: faults that were put right before;
     `rate_per_driver`: of a twin, for all runs."""
-    faults, histories = _put_right(prepared.recordings, prepared.histories)
-    faults_of_unseen, unseen = _put_right(prepared.held_out, prepared.unseen)
+    faults, histories = _put_right(prepared.recordings, prepared.histories, prepared.early)
+    faults_of_unseen, unseen = _put_right(prepared.held_out, prepared.unseen, prepared.early)
     if isinstance(histories, Refusal):
         return histories
     if isinstance(unseen, Refusal):
@@ -47,7 +47,7 @@ def run(prepared: Prepared, told: Sequence[Fault] = (), rate_per_driver: float |
 
 
 def _put_right(
-    recordings: Sequence[Recording], histories: tuple[History, ...]
+    recordings: Sequence[Recording], histories: tuple[History, ...], early: float
 ) -> tuple[tuple[Fault, ...], tuple[History, ...] | Refusal]:
     faults = find_faults(recordings)
     if not any(f.grave and f.repairable for f in faults):
@@ -59,4 +59,4 @@ def _put_right(
             if fault.recording_id == recording.recording_id and fault.grave and fault.repairable:
                 right = repaired(right, fault)
         mended.append(right)
-    return faults, histories_of(mended)
+    return faults, histories_of(mended, early)

@@ -16,6 +16,15 @@ SCREENING_FALSE_ALARM = Threshold(
         "proof 3 of 1,002 passed it and were given a name."
     ),
 )
+EARLY_FORCE = Threshold(
+    0.25,
+    unit="share of the time between two samples",
+    reason=(
+        "A force that comes so much before its command moves at a sample where the intervals have nothing move: they "
+        "are made again, short before steps too."
+    ),
+    evidence="benchmarks/diagnosis/euler_logs.py: without, a lag of the water or a loss at reversals stood for it.",
+)
 STILL_FOUND = Threshold(
     0.95,
     unit="times the threshold",

@@ -21,6 +21,8 @@ WINDOW = 0.0015
 """s before and after a sample that stands for its time."""
 WINDOW_ZONE = 0.1
 """s after a change of the command in which samples have windows."""
+BEFORE_STEP = 2.0
+"""Spacings of the samples: so long, and by how much the force comes before it, they have windows before a step too."""
 LEAST_WINDOWED = 0.008
 """s between samples: where they are denser, only those after a step have windows..."""
 DENSE_ZONE = 10.0
@@ -156,8 +158,9 @@ class Held:
         return out
 
 
-def edges_of(time: Floats, held: Held, most: int) -> Floats:
-    """Edges between samples, dense after changes; big steps of the command are edges too."""
+def edges_of(time: Floats, held: Held, most: int, early: float = 0.0) -> Floats:
+    """Edges between samples, dense after changes; big steps of the command are edges too. `early`: s by which the force
+    comes before its command; more than 0: dense before steps as well."""
     spacing = float(np.median(np.diff(time)))
     between = 0.5 * (time[1:] + time[:-1])
     candidates = np.concatenate([[time[0] - 0.5 * spacing], between, [time[-1] + 0.5 * spacing]])
@@ -175,7 +178,11 @@ def edges_of(time: Floats, held: Held, most: int) -> Floats:
     if 0 < gap.size < most // 4:  # samples at the end of a long interval would stand for its middle
         edges = np.union1d(edges, np.concatenate([time[gap] + 0.5 * spacing, time[gap + 1] - 0.5 * spacing]))
     edges = _with_starts(_with_jumps(edges, held, most), candidates, held, spacing, most)
-    return _with_windows(_with_steps(edges, held, spacing, most), time, held, spacing, most)
+    edges = _with_windows(_with_steps(edges, held, spacing, most), time, held, spacing, most)
+    if not (early and held.stepwise):
+        return edges
+    steps = _changes(held, edges, policy.prepare.COMMAND_STEP)
+    return _cut_by_windows(edges, _shortly_before(steps, time, early + BEFORE_STEP * spacing), steps, spacing, most)
 
 
 def _with_jumps(edges: Floats, held: Held, most: int) -> Floats:
@@ -241,6 +248,16 @@ def _shortly_after(changes: Floats, time: Floats, zone: float) -> Floats:
     return out
 
 
+def _shortly_before(changes: Floats, time: Floats, zone: float) -> Floats:
+    """Those of the samples after which one of the changes comes within `zone` s."""
+    if not changes.size:
+        return changes
+    following = np.searchsorted(changes, time, side="right")
+    until = changes[np.minimum(following, changes.size - 1)] - time
+    out: Floats = time[(following < changes.size) & (until < zone)]
+    return out
+
+
 def _from_tick_to_tick(edges: Floats, ticks: Floats, apart: float) -> Floats:
     """Ticks as edges; of the edges before, those that lie between ticks less than `apart` s from each other go."""
     before = np.searchsorted(ticks, edges, side="right") - 1
@@ -265,6 +282,11 @@ def _with_windows(edges: Floats, time: Floats, held: Held, spacing: float, most:
         edges = _from_tick_to_tick(edges, changes, ON_RAMP * spacing)
         changes = _changes(held, edges, LARGEST_TICK)
         own = _shortly_after(changes, time, zone)
+    return _cut_by_windows(edges, own, changes, spacing, most)
+
+
+def _cut_by_windows(edges: Floats, own: Floats, changes: Floats, spacing: float, most: int) -> Floats:
+    """The changes as edges, and a short interval about each of the samples `own`, cut where a change is."""
     half = min(WINDOW, WINDOW_SHARE * spacing)
     if own.size > most:
         return edges

@@ -43,8 +43,8 @@ class Refusal:
     reason: str
 
 
-def history_of(recording: Recording, most_intervals: int = MOST_INTERVALS) -> History | Refusal:
-    """The run on at most about `most_intervals` intervals."""
+def history_of(recording: Recording, most_intervals: int = MOST_INTERVALS, early: float = 0.0) -> History | Refusal:
+    """The run on at most about `most_intervals` intervals; `early`: s by which the force comes before its command."""
     name = recording.source or recording.recording_id
     recording = _own_first(recording)
     thrust = recording.first_of("thrust")
@@ -66,7 +66,7 @@ def history_of(recording: Recording, most_intervals: int = MOST_INTERVALS) -> Hi
     time, force = _clear_of_steps(time, force, held)
     if time.size < policy.prepare.THRUST_SAMPLES:
         return Refusal(f"{name}: almost every thrust sample coincides with a change of the driver")
-    edges = edges_of(time, held, MOST_MOVING if held.changes().size > MANY_CHANGES else most_intervals)
+    edges = edges_of(time, held, MOST_MOVING if held.changes().size > MANY_CHANGES else most_intervals, early)
     return replace(_filled(recording, driver, held, edges, time, force), quantum=quantum_of(thrust))
 
 

@@ -24,27 +24,32 @@ class Prepared:
     """Of what is held out."""
     moved: tuple[tuple[str, ...], ...] = ()
     """Of each recording to be diagnosed, a sentence for each stream whose stamps were brought back to its samples."""
+    early: float = 0.0
+    """s by which the force comes before its command, where that was found."""
 
 
-def run(recordings: Sequence[Recording], holdout: Sequence[Recording], baseline: Twin | None) -> Prepared | Refusal:
+def run(
+    recordings: Sequence[Recording], holdout: Sequence[Recording], baseline: Twin | None, early: float = 0.0
+) -> Prepared | Refusal:
     """Recordings of one thruster, driven by one quantity, that fit together and to the twin, if there is one.
 
+    `early`: s by which the force comes before its command, where that is known.
     A Refusal says which of them do not, and why.
     """
     sampled = [as_sampled(recording) for recording in recordings]
     recordings, moved = [each for each, _ in sampled], tuple(told for _, told in sampled)
     holdout = [as_sampled(recording)[0] for recording in holdout]
-    histories = histories_of(recordings)
+    histories = histories_of(recordings, early)
     if isinstance(histories, Refusal):
         return histories
-    unseen = histories_of(holdout) if holdout else ()
+    unseen = histories_of(holdout, early) if holdout else ()
     if isinstance(unseen, Refusal):
         return unseen
     wrong = unfit(recordings, holdout, histories, unseen, baseline)
-    return wrong or Prepared(tuple(recordings), histories, tuple(holdout), unseen, moved)
+    return wrong or Prepared(tuple(recordings), histories, tuple(holdout), unseen, moved, early)
 
 
-def histories_of(recordings: Sequence[Recording]) -> tuple[History, ...] | Refusal:
+def histories_of(recordings: Sequence[Recording], early: float = 0.0) -> tuple[History, ...] | Refusal:
     """Of recordings that may be diagnosed together."""
     if not recordings:
         return Refusal("no recording was given")
@@ -56,7 +61,7 @@ def histories_of(recordings: Sequence[Recording]) -> tuple[History, ...] | Refus
         return Refusal("the same recording was given twice")
     out = []
     for recording in recordings:
-        history = history_of(recording)
+        history = history_of(recording, early=early)
         if isinstance(history, Refusal):
             return history
         out.append(history)

@@ -123,6 +123,22 @@ def test_too_few_holds_leave_the_steady_relation_open():
     assert "cannot be told" in " ".join(verdicts(fit))
 
 
+def test_a_rate_that_lost_its_sign_is_told_as_such():
+    """As where it was given the command's, though it had its own: negative while the rotor is on its way alone."""
+    rows, V, t, n = motion()
+    commanded = V[np.searchsorted(rows, t, side="right") - 1]
+    found = fit_dynamics([recorded((rows, V, t, n * np.sign(commanded)), np.random.default_rng(10))])
+    assert isinstance(found, Unusable)
+    assert "goes the same way for both signs of the voltage; give it its sign" in found.reason
+
+
+def test_a_rate_that_is_noise_alone_has_no_rotor_model():
+    rows, V, t, n = motion(levels=(8.0, -8.0, 16.0, -16.0))
+    found = fit_dynamics([recorded((rows, V, t, 0 * n), np.random.default_rng(1), sigma=1.0)])
+    assert isinstance(found, Unusable)
+    assert "no rotor model n' = beta T - alpha n|n|" in found.reason
+
+
 def test_what_cannot_be_used_says_why():
     rows, V, t, n = motion(levels=(8.0, -8.0))
     rate = Channel("n", "motor", "rotation_rate", "rev/s", t, n)
