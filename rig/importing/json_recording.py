@@ -11,6 +11,7 @@ Times are s, ascending; null is a value that was not given.
 
 from __future__ import annotations
 
+import codecs
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +23,7 @@ from identification.recording import QUANTITY_UNITS, Floats
 from rig.errors import RecordingError
 from rig.importing.convert import Imported
 from rig.importing.streams import StreamData
+from rig.importing.without_map import HEAD, what_to_do
 from rig.link.recorder_messages import Attribute, ChannelSpec, StepRow, StreamSpec
 
 FORMAT = "thruster-rig-recording"
@@ -43,6 +45,8 @@ class Plain:
 
 def read_plain(data: bytes) -> Plain:
     """Raises RecordingError with one sentence that says where the file is not as the format asks."""
+    if not data[:HEAD].lstrip(codecs.BOM_UTF8 + b" \t\r\n").startswith((b"{", b"[")):
+        raise RecordingError(f"no JSON, and a table needs --map: {what_to_do(data)}")
     if len(data) > MOST_BYTES:
         raise RecordingError(f"{len(data)} bytes of JSON; at most {MOST_BYTES} are read: write a table, and a map")
     try:
