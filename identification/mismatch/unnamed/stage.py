@@ -19,7 +19,7 @@ from identification.mismatch.model.data import Data
 from identification.mismatch.name.named_term import Check, restated
 from identification.mismatch.name.naming import Named
 from identification.mismatch.select.exchange.static_pairs import STATIC
-from identification.mismatch.select.forward_selection import Selected
+from identification.mismatch.select.forward_selection import Selected, prune
 from identification.mismatch.unnamed.confirmed import ASKED, not_standing
 from identification.mismatch.unnamed.flexible import Extended, extend
 from identification.mismatch.unnamed.flexible_shape import shared
@@ -170,8 +170,10 @@ def _completed(
 
 
 def _noise_followed(earned: Sequence[Named], without: _Without, now: Estimate, data: Data) -> Completed:
-    """It was noise that the terms without a name followed: they go."""
-    after = refresh(without.bare.fit.model, without.bare.fit.theta, data, None, now)
+    """It was noise that the terms without a name followed: they go, and with them names that were worth something beside
+    them alone (a lag of the water, its share 0 beside the lag and the delay that were left)."""
+    after = prune(refresh(without.bare.fit.model, without.bare.fit.theta, data, None, now), data)
+    earned = [n for n in earned if n.term in after.fit.values]
     told = told_by_unrest(after, data)
     return Completed(after, *_with_values(earned, now, told, data, None), (), None, False, after, without.left, told)
 

@@ -22,14 +22,15 @@ from tests.identification.mismatch.small import history, rng, selected, short
 BAND, UNEVEN, JUMP = DeadBand(), Asymmetry(), ZeroOffset()
 
 
-def completed(values, recording, unseen=(), unearn=(), chance=()):
+def completed(values, recording, unseen=(), unearn=(), chance=(), earn=()):
     """The stages behind a search that ended with this model; names of `unearn` fail a check, those of `chance` are
-    worth what noise makes in one search of twenty."""
+    worth what noise makes in one search of twenty, and those of `earn` were asked nothing."""
     chosen = selected(values, [recording], list(values))
     located = located_by(chosen, rng(0))
     named = named_by(chosen, located)
     named = tuple(n.asked(Check("own_covariate", "it is one", "it is none")) if n.term in unearn else n for n in named)
     named = tuple(replace(n, p_value=0.05) if n.term in chance else n for n in named)
+    named = tuple(replace(n, checks=()) if n.term in earn else n for n in named)
     validated = validated_by(located.estimate, named, chosen.data, unseen)
     return stage.run(chosen, located, validated, unseen, rng(1)), chosen
 
@@ -66,6 +67,14 @@ def test_beside_a_rest_a_name_for_no_more_than_noise_makes_is_none():
     assert beside.open_ended
     assert [n.term for n in beside.earned] == []
     assert "by chance (p 0.05)" in {check.failed for n in beside.unearned for check in n.checks}
+
+
+def test_a_name_worth_nothing_without_the_terms_that_followed_noise_goes_with_them():
+    """ "After a step thrust overshoots by 0 %" was told, beside a lag and a delay that had taken its place."""
+    values = {BAND: (1.2,), UNEVEN: (1.0,), JUMP: (0.0, 40.0)}
+    found, _ = completed(values, short(volts=dead_band(1.2)), unearn=(JUMP,), earn=(BAND, UNEVEN))
+    assert [n.term for n in found.earned] == [BAND]
+    assert found.after.fit.model.terms == (BAND,)
 
 
 def test_a_name_keeps_its_value_beside_a_shape_over_its_own_covariate():
