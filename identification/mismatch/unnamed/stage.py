@@ -170,8 +170,8 @@ def _completed(
 
 
 def _noise_followed(earned: Sequence[Named], without: _Without, now: Estimate, data: Data) -> Completed:
-    """It was noise that the terms without a name followed: they go, and with them names that were worth something beside
-    them alone (a lag of the water, its share 0 beside the lag and the delay that were left)."""
+    """It was noise that the terms without a name followed: they go, and with them names that were worth something
+    beside them alone (a lag of the water, its share 0 beside the lag and the delay that were left)."""
     after = prune(refresh(without.bare.fit.model, without.bare.fit.theta, data, None, now), data)
     earned = [n for n in earned if n.term in after.fit.values]
     told = told_by_unrest(after, data)

@@ -24,13 +24,13 @@ BAND, UNEVEN, JUMP = DeadBand(), Asymmetry(), ZeroOffset()
 
 def completed(values, recording, unseen=(), unearn=(), chance=(), earn=()):
     """The stages behind a search that ended with this model; names of `unearn` fail a check, those of `chance` are
-    worth what noise makes in one search of twenty, and those of `earn` were asked nothing."""
+    worth what noise makes in one search of twenty, and those of `earn` have passed all that they were asked."""
     chosen = selected(values, [recording], list(values))
     located = located_by(chosen, rng(0))
     named = named_by(chosen, located)
     named = tuple(n.asked(Check("own_covariate", "it is one", "it is none")) if n.term in unearn else n for n in named)
     named = tuple(replace(n, p_value=0.05) if n.term in chance else n for n in named)
-    named = tuple(replace(n, checks=()) if n.term in earn else n for n in named)
+    named = tuple(replace(n, checks=(), p_value=1e-6) if n.term in earn else n for n in named)
     validated = validated_by(located.estimate, named, chosen.data, unseen)
     return stage.run(chosen, located, validated, unseen, rng(1)), chosen
 
