@@ -66,7 +66,8 @@ def logged(world: World, seed: int) -> Recording:
     """Two minutes of it."""
     rng = np.random.default_rng(seed)
     t = world.step * np.arange(round(120.0 / world.step))
-    levels = np.append(0.0, rng.uniform(-TOP, TOP, 24).round(1))
+    levels = rng.uniform(-TOP, TOP, 25).round(1)
+    levels[0] = 0.0
     volts = TOP * np.sin(2 * np.pi * t / 30) if world.sine else levels[(t / HOLD + 1e-9).astype(int)]
     x, water = turned(world, volts)
     force = C * x * np.abs(x) * np.where(x < 0, world.reverse, 1.0) + world.inflow * C * np.abs(x) * (x - water)
