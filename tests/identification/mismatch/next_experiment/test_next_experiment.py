@@ -219,4 +219,4 @@ def test_where_nothing_that_may_be_driven_tells_them_apart_there_is_no_sweep():
     assert found.next_experiment.steps == ()
     told = "within these limits asymmetry is like torque_crosstalk (the torque channel, or dead weights on the cell"
     assert told in found.next_experiment.why
-    assert "No sweep settles it: within these limits asymmetry is like torque_crosstalk" in found.statement
+    assert "No sweep settles it: within these limits asymmetry is like torque crosstalk" in found.statement
