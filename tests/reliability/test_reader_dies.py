@@ -26,7 +26,8 @@ PERIOD = 0.1
 
 
 def kill(thread: threading.Thread) -> int:
-    """End a thread within, and say when: ns of the monotonic clock."""
+    """End a thread within, and say when: ns of the monotonic clock. One that waits (for a reply, `timeout` at most) ends
+    when it wakes."""
     assert ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit)) == 1
     return time.monotonic_ns()
 
@@ -78,7 +79,7 @@ def test_reader_of_a_can_bus(report, prompt):
 def test_poller_of_a_transmitter(which, name, report, prompt):
     with Peer(transmitter, terminator=None) as peer:
         before = set(threading.enumerate())
-        device = keller.Keller("cell", keller.Options(peer.port, rate=1 / PERIOD, baud=115_200, timeout=0.5))
+        device = keller.Keller("cell", keller.Options(peer.port, rate=1 / PERIOD, baud=115_200, timeout=0.2))
         device.open()
         (thread,) = [each for each in readers(before) if each.name == name]
         died = kill(thread)
