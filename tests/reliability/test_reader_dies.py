@@ -26,8 +26,9 @@ PERIOD = 0.1
 
 
 def kill(thread: threading.Thread) -> int:
-    """End a thread within, and say when: ns of the monotonic clock. One that waits (for a reply, `timeout` at most) ends
-    when it wakes."""
+    """End a thread within, and say when: ns of the monotonic clock. One that waits (for a reply, `timeout` at most)
+    ends when it wakes.
+    """
     assert ctypes.pythonapi.PyThreadState_SetAsyncExc(ctypes.c_ulong(thread.ident), ctypes.py_object(SystemExit)) == 1
     return time.monotonic_ns()
 
