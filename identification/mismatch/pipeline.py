@@ -25,7 +25,7 @@ from identification.mismatch.prepare import stage as prepare
 from identification.mismatch.prepare.preparing import Refusal
 from identification.mismatch.select.begun_otherwise import begun_otherwise
 from identification.mismatch.select.early_force import early_of
-from identification.mismatch.select.forward_selection import search
+from identification.mismatch.select.forward_selection import Given, Selected, search
 from identification.mismatch.select.ringing import ringing
 from identification.mismatch.select.search_again import search_again
 from identification.mismatch.select.sharpened import sharpened
@@ -111,18 +111,11 @@ def traced(
     draws, given = Draws.of(seed), None if baseline is None else starting(baseline)
     watch.stage("reading the runs")
     wired = wiring.run(recordings, holdout)
-    read = _read(wired, baseline)
-    if isinstance(read, Refusal):
-        return read
-    watch.stage("looking for effects")
-    first = search(read.sound.histories, draws.select, given=given, without=without, watch=watch)
-    if early := 0.0 if first.undone else early_of(first):  # back: on other intervals
-        watch.stage("looking again, for a force that comes before its command")
-        read = _read(wired, baseline, early)
-        if isinstance(read, Refusal):
-            return read
-        first = search_again(first, read.sound.histories, draws.early, given, without=without, watch=watch)
-    found, (prepared, sound) = first, read
+    begun = _begun(wired, baseline, given, draws, without, watch)
+    if isinstance(begun, Refusal):
+        return begun
+    prepared, sound, first = begun
+    found = first
     original = sound.histories
     cleaned = untouched(original) if found.undone else periodic.run(first.after.fit, first.data, original)
     if cleaned.changed:  # back: a line hides small terms, and is taken for some; a peak of the noise makes it louder
@@ -152,14 +145,41 @@ def traced(
     return Trace(prepared, sound, first, cleaned, chosen, completed, diagnosis)
 
 
-class Read(NamedTuple):
-    """Runs as they were given, and with what of them may be believed."""
+class Begun(NamedTuple):
+    """Runs as they were given, with what of them may be believed, and a first model of them."""
 
     prepared: Prepared
     sound: Sound
+    first: Selected
 
 
-def _read(wired: wiring.Wired, baseline: Twin | None, early: float = 0.0) -> Read | Refusal:
+def _begun(
+    wired: wiring.Wired,
+    baseline: Twin | None,
+    given: Given | None,
+    draws: Draws,
+    without: Collection[str],
+    watch: Observer,
+) -> Begun | Refusal:
+    """The first search; where that has the force before its command, gone on with on intervals that suit it."""
+    read = _read(wired, baseline, given)
+    if isinstance(read, Refusal):
+        return read
+    watch.stage("looking for effects")
+    first = search(read[1].histories, draws.select, given=given, without=without, watch=watch)
+    early = 0.0 if first.undone else early_of(first)
+    if not early:
+        return Begun(*read, first)
+    watch.stage("looking again, for a force that comes before its command")
+    read = _read(wired, baseline, given, early)
+    if isinstance(read, Refusal):
+        return read
+    return Begun(*read, search_again(first, read[1].histories, draws.early, given, without=without, watch=watch))
+
+
+def _read(
+    wired: wiring.Wired, baseline: Twin | None, given: Given | None, early: float = 0.0
+) -> tuple[Prepared, Sound] | Refusal:
     """On intervals that are short before steps too, where the force comes `early` s before its command."""
     prepared = prepare.run(wired.recordings, wired.holdout, baseline, early)
     if isinstance(prepared, Refusal):
@@ -168,8 +188,7 @@ def _read(wired: wiring.Wired, baseline: Twin | None, early: float = 0.0) -> Rea
     if isinstance(sound, Refusal):
         return sound
     clear = sound.histories if baseline is None else decided(sound.histories, baseline)
-    given = None if baseline is None else starting(baseline)
-    return Read(prepared, replace(sound, histories=on_their_side(clear, given)))
+    return prepared, replace(sound, histories=on_their_side(clear, given))
 
 
 def interrupted(undone: Sequence[str]) -> tuple[str, ...]:

@@ -255,7 +255,8 @@ def fit_dynamics(recordings: Sequence[Recording]) -> DynamicsFit | Unusable:
     if not (chosen.seen and chosen.converged):
         why = "comes to fit it" if chosen.seen else "shows in it, for its rate hardly follows the voltage"
         return Unusable(f"recording {recordings[0].recording_id}: no rotor model n' = beta T - alpha n|n| {why}")
-    return replace(_told(recordings, drives, chosen), rmse_without_gamma=_rms(plain.misfit))
+    told = rich if keep and rich is not None else _told(recordings, drives, plain)
+    return replace(told, rmse_without_gamma=_rms(plain.misfit))
 
 
 def _rms(misfit: Floats) -> float:

@@ -118,7 +118,8 @@ def drive(recording: Recording) -> Drive | Unusable:
 
 def _turns_one_way(n: Floats, V: Floats) -> bool:
     """Whether a rate (n,) has lost its sign, all but where the rotor was still on its way."""
-    forward, back = SIDED * np.abs(V).max() < V, -SIDED * np.abs(V).max() > V
+    least = SIDED * np.abs(V).max()
+    forward, back = least < V, -least > V
     if not (forward.any() and back.any()):
         return False
     ahead, behind = np.median(n[forward]), np.median(n[back])

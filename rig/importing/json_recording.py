@@ -22,8 +22,8 @@ import numpy as np
 from identification.recording import QUANTITY_UNITS, Floats
 from rig.errors import RecordingError
 from rig.importing.convert import Imported
+from rig.importing.reading.without_map import HEAD, what_to_do
 from rig.importing.streams import StreamData
-from rig.importing.without_map import HEAD, what_to_do
 from rig.link.recorder_messages import Attribute, ChannelSpec, StepRow, StreamSpec
 
 FORMAT = "thruster-rig-recording"

@@ -3,7 +3,7 @@
 Intervals are short after a step, where a rotor and the water move, and long before the next one, where nothing does.
 Of a log whose command is stamped late (a simulation by steps as long as its rows, of which each shows what its own
 command has done) the rotor moves before the step: on long intervals a delay and a lag could not follow it, and what
-they missed was told as a lag of the water of 20 ms.
+they missed was told as a loss at reversals, or as a lag of the water.
 """
 
 from __future__ import annotations
